@@ -64,7 +64,7 @@ def bake_scene(url: str, scene_id: str) -> dict[str, Any]:
 async def edit_once(url: str, bake_id: str) -> None:
     """Open a session, wait for its first exact frame, sharpen the ball's highlight, wait for the frame of that edit."""
     address = f"{url}/api/bakes/{bake_id}/session"
-    async with websockets.connect(address, subprotocols=[websockets.Subprotocol("relume.v1")], max_size=None) as socket:
+    async with websockets.connect(address, subprotocols=[websockets.Subprotocol("relume.v2")], max_size=None) as socket:
         await socket.send(json.dumps({"type": "open"}))
         before = await exact_frame(socket, 0)
         patch = [{"op": "replace", "path": "/materials/Ball/terms/1/params/roughness", "value": 0.15}]

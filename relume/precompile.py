@@ -135,7 +135,7 @@ def _move_lights(transfer: FixedViewTransfer, picture: Picture) -> None:
         picture.prepare("/lights/Lamp")
         for height in (1.0, 1.1, 1.2):
             geometry = {} if kind == "directional" else {"position": [0.0, height, 0.5]}
-            partial = {"materials": dark, "lights": {"Lamp": {"kind": kind, "scale": height, **geometry}}}
+            partial = {"materials": dark, "lights": {"Lamp": {"kind": kind, "intensity": height, **geometry}}}
             picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
             _render(picture)
 

@@ -13,7 +13,7 @@ from relume.scene.shadow_catcher_ground import with_ground
 SIZE = (40, 30)
 CENTRE, RADIUS = np.array([0.0, 0.5, 0.0]), 0.35
 RED = Material("Ball", ({"model": "lambert", "color": [0.8, 0.1, 0.1]},))
-EMISSIVE_BALL = Light("Ball", {"kind": "mesh", "material": "Ball", "emission": [2.0, 1.0, 0.5], "on": False})
+EMISSIVE_BALL = Light("Ball", {"kind": "mesh", "material": "Ball", "emission": [2.0, 1.0, 0.5], "enabled": False})
 CAMERA = make_camera("front", (0.5, 2.2, 3.2), (0, 0.25, 0), 0.7)
 POINT_LIGHT = {"kind": "point", "position": [0.4, 2.0, 0.3], "emission": [5.0, 5.0, 5.0]}
 
@@ -38,7 +38,7 @@ def set_paths(paths):
 
 
 def plain_ground(document):
-    document["materials"]["Ground"]["catcher"] = False
+    document["materials"]["Ground"]["shadow_catcher"] = False
 
 
 def changes(*edits):
@@ -50,7 +50,7 @@ def changes(*edits):
 
 
 def set_only_area_light(document):
-    document["environment"]["scale"] = 0.0
+    document["environment"]["intensity"] = 0.0
     document["lights"]["Lamp"] = POINT_LIGHT
 
 
@@ -62,10 +62,10 @@ def inner(transfer, name):
 
 
 def set_only_spot_light(document):
-    document["environment"]["scale"] = 0.0
+    document["environment"]["intensity"] = 0.0
     document["lights"]["Lamp"] = {**POINT_LIGHT, "kind": "spot", "direction": [0.0, -1.0, 0.0], "cone": [15.0, 20.0]}
 
 
 def set_only_emissive_ball(document):
-    document["environment"]["scale"] = 0.0
+    document["environment"]["intensity"] = 0.0
     document["lights"]["Ball"]["on"] = True

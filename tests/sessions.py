@@ -95,11 +95,11 @@ def apply_random_edit(rng, document):
     name = list(document["materials"])[rng.integers(len(document["materials"]))]
     terms = document["materials"][name]["terms"]
     kind = rng.choice(
-        ["params", "curve", "color", "reset", "model", "add", "remove", "scale", "texture"],
+        ["params", "curve", "color", "reset", "model", "add", "remove", "intensity", "texture"],
         p=[0.35, 0.25, 0.1, 0.05, 0.05, 0.05, 0.05, 0.05, 0.05],
     )
-    if kind == "scale":
-        document["environment"]["scale"] = float(rng.uniform(0, 3))
+    if kind == "intensity":
+        document["environment"]["intensity"] = float(rng.uniform(0, 3))
         document["environment"]["color"] = rng.uniform(0, 1, 3).tolist()
         return kind
     if kind == "add" and len(terms) < 3:

@@ -28,7 +28,7 @@ from relume_worker.service import BakeService
 from relume_worker.status import bake_id
 
 _START_S = 60.0
-SPEAKS = Subprotocol("relume.v1")
+SPEAKS = Subprotocol("relume.v2")
 OPENING = json.dumps({"type": "open"})
 
 

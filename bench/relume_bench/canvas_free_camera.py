@@ -51,7 +51,7 @@ def measure(tiny: bool) -> list[Figure]:
     with baked_folder(scene, recipe) as data_folder, serving(data_folder) as server:
         query = urlencode({"scene": data_folder.scene, "bake": data_folder.bake, "view": views[0]})
         url = f"http://127.0.0.1:{server.port}/?{query}"
-        browser_result, server_result = (_drag(browser, url, renderer, moves) for renderer in ("browser", "server"))
+        browser_result, server_result = (_drag(browser, url, renderer, moves) for renderer in ("client", "server"))
     context = {
         "size": list(size),
         "probes": num_probes,
@@ -73,7 +73,7 @@ class _Received:
         self.clear()
 
     def clear(self) -> None:
-        self.frames: dict[str, list[int]] = {"picture": [], "tables": []}
+        self.frames: dict[str, list[int]] = {"picture": [], "scene_update": []}
         self.num_bytes, self.is_converged = 0, False
 
     def count(self, message: Any) -> None:
@@ -95,7 +95,7 @@ def _drag(browser: str, url: str, renderer: str, moves: int) -> dict[str, Any]:
         page.on("websocket", lambda socket: socket.on("framereceived", received.count))
         page.add_init_script(_CHOOSE.format(renderer))
         page.goto(url)
-        first = _first(page, received) if renderer == "browser" else {}
+        first = _first(page, received) if renderer == "client" else {}
         page.locator(".exactness.is-exact").wait_for(timeout=_READY_TIMEOUT_MS)
         page.wait_for_timeout(1000)
         box: Any = page.locator(".picture canvas").bounding_box()
@@ -107,7 +107,7 @@ def _drag(browser: str, url: str, renderer: str, moves: int) -> dict[str, Any]:
         drawn, start = page.evaluate("[window.relumeStats.drawnHere, performance.now()]")
         _orbit_camera(page, x, y, moves)
         drawn_after, end = page.evaluate("[window.relumeStats.drawnHere, performance.now()]")
-        pictures = drawn_after - drawn if renderer == "browser" else len(received.frames["picture"])
+        pictures = drawn_after - drawn if renderer == "client" else len(received.frames["picture"])
         result = {
             "pictures": pictures,
             "fps": 1e3 * pictures / (end - start),
@@ -115,7 +115,7 @@ def _drag(browser: str, url: str, renderer: str, moves: int) -> dict[str, Any]:
             "first": first,
         }
         page.mouse.up()
-        result["turn"] = _rotate_environment(page, received) if renderer == "browser" else {}
+        result["turn"] = _rotate_environment(page, received) if renderer == "client" else {}
         result["graphics"] = page.evaluate(_GRAPHICS)
         chromium.close()
     return result
@@ -141,14 +141,14 @@ def _rotate_environment(page: Any, received: _Received) -> dict[str, float]:
     for k in range(_NUM_ROTATIONS):
         page.mouse.move(x + 2 * k, y)
         page.wait_for_timeout(200)
-    meanwhile = max(received.frames["tables"], default=0)
+    meanwhile = max(received.frames["scene_update"], default=0)
     received.clear()
     page.mouse.up()
     for _ in range(_READY_TIMEOUT_MS // 100):
         if received.is_converged:
             break
         page.wait_for_timeout(100)
-    return {"turn_bytes": meanwhile, "turned_bytes": max(received.frames["tables"], default=0)}
+    return {"turn_bytes": meanwhile, "turned_bytes": max(received.frames["scene_update"], default=0)}
 
 
 def _orbit_camera(page: Any, x: float, y: float, moves: int) -> None:

@@ -26,7 +26,7 @@ from relume_bench.baked_server import SPEAKS, BakedFolder, Server, SessionClient
 from relume_bench.figure import Figure
 from relume_bench.flooding import FLOOD_TYPES, flood
 from relume_bench.scenes import LAMBERT, cook_torrance, teapot_on_table
-from relume_server.collaboration.join import derive_watch_key
+from relume_server.collaboration.join import derive_view_token
 
 _SIGMA = "/materials/Teapot/terms/1/params/sigma"
 _PAUSE_S = 0.02
@@ -47,14 +47,14 @@ def measure(tiny: bool) -> list[Figure]:
         session(server, data_folder.bake) as client,
         _flood_room(server, data_folder, room),
     ):
-        client.send_message(type="touch", curve="/materials/Teapot/terms/1/curves/theta_h")
+        client.send_message(type="prepare", curve="/materials/Teapot/terms/1/curves/theta_h")
         client.exact(0)
         slider_client = _SliderClient(client)
         slider_client.edit(seconds)  # what is made once is made
         for _ in range(rounds):
             for kind in FLOOD_TYPES:
                 for number in (0, 1, 4):
-                    with _flooding(server, data_folder, derive_watch_key(room), kind, number):
+                    with _flooding(server, data_folder, derive_view_token(room), kind, number):
                         latencies.setdefault((kind, number), []).extend(slider_client.edit(seconds))
     quiet_ms = float(np.median([ms for (_, number), each in latencies.items() if number == 0 for ms in each]))
     medians = {
@@ -79,7 +79,7 @@ class _SliderClient:
             sigma = 0.2 + 0.15 * np.sin(2 * np.pi * self._revision / 90)
             patch = [{"op": "replace", "path": _SIGMA, "value": round(float(sigma), 5)}]
             send_time_s = time.perf_counter()
-            self._client.send_message(type="edit", revision=self._revision, patch=patch, hand=_SIGMA)
+            self._client.send_message(type="edit", revision=self._revision, patch=patch, active_control=_SIGMA)
             while (frame := self._client.frame()) is None or frame[0]["revision"] < self._revision:
                 pass
             latencies.append(1e3 * (time.perf_counter() - send_time_s))

@@ -14,7 +14,7 @@ from websockets.exceptions import WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
 FLOOD_TYPES = ("acknowledgements", "exposure", "refused")
-SPEAKS = Subprotocol("relume.v1")
+SPEAKS = Subprotocol("relume.v2")
 _AT_ONCE, _REST_S = 20_000, 0.5
 _BEFORE_S = 2.0  # until the server has taken what it takes of a burst
 
@@ -33,7 +33,7 @@ def flood(address: str, watch: str, kind: str, started: Event) -> None:
             suppress(WebSocketException, OSError),
             connect(address, subprotocols=[SPEAKS], max_size=None, compression=None, ping_interval=None) as viewer,
         ):
-            viewer.send(json.dumps({"type": "open", "watch": watch}))
+            viewer.send(json.dumps({"type": "open", "view_token": watch}))
             threading.Thread(target=_read, args=(viewer,), daemon=True).start()
             while True:
                 viewer.socket.sendall(block)

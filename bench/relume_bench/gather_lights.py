@@ -47,7 +47,7 @@ def measure(tiny: bool) -> list[Figure]:
         scene = cornell_box(is_floor_glossy=True)
         transfer = open_transfer(bake(scene, recipe, Path(folder) / "gather.zarr").path, Cache(4 << 30))
         light_positions = [{"position": [float(x), 1.7, 0.2]} for x in np.linspace(-0.4, 0.4, num_frames)]
-        scales = [{**light_positions[-1], "scale": float(scale)} for scale in np.geomspace(0.1, 3, num_frames)]
+        scales = [{**light_positions[-1], "intensity": float(scale)} for scale in np.geomspace(0.1, 3, num_frames)]
         drags = [
             [_POINT_LIGHT | light_position for light_position in light_positions],
             [_PANEL | light_position for light_position in light_positions],

@@ -86,7 +86,7 @@ def _errors(folder: Path, tiny: bool) -> list[Figure]:
 
 
 def _make_look(transfer: FixedViewTransfer, lights: dict[str, Any]) -> Look:
-    return validate({"environment": {"scale": 0.0}, "lights": lights}, transfer.default_look)
+    return validate({"environment": {"intensity": 0.0}, "lights": lights}, transfer.default_look)
 
 
 def _average_blocks(picture: NDArray[np.floating]) -> F64:
@@ -132,7 +132,7 @@ def _gain_fps(folder: Path, tiny: bool) -> Figure:
     picture = Picture(transfer, "front", Cache(1 << 30))
     durations = []
     for k in range(5 if tiny else 60):
-        panel = _LIGHTS["rectangle"] | {"scale": 1 + k / 60}
+        panel = _LIGHTS["rectangle"] | {"intensity": 1 + k / 60}
         picture.set_look(validate({"lights": {"A": _LIGHTS["point"], "B": panel}}, transfer.default_look))
         start_time = time.perf_counter()
         if k > 1:  # the first shades all, the second one light alone

@@ -36,7 +36,7 @@ def measure(tiny: bool) -> list[Figure]:
         serving(data_folder) as server,
         session(server, data_folder.bake) as client,
     ):
-        client.send_message(type="touch", curve="/materials/Teapot/terms/1/curves/theta_h")
+        client.send_message(type="prepare", curve="/materials/Teapot/terms/1/curves/theta_h")
         client.exact(0)
         slider_client = _SliderClient(client)
         slider_client.drag(seconds)  # what is made once is made
@@ -48,9 +48,9 @@ def measure(tiny: bool) -> list[Figure]:
             queued = _fill(server, data_folder)
             loaded_ms.append(slider_client.drag(seconds))
             responses = [_call(server, "GET", address) for address in queued]
-            painted += sum(int(body["done"] if "done" in body else body["passes"]) for body in responses)
+            painted += sum(int(body["completed"]) for body in responses)
             for address in queued:
-                _call(server, "DELETE", f"{address}?forget=true" if "truths" in address else address)
+                _call(server, "DELETE", f"{address}?delete_files=true" if "comparisons" in address else address)
             time.sleep(0.5)
     context = {
         "alone_fps": float(np.median(unloaded_ms)),
@@ -93,8 +93,8 @@ def _fill(server: Server, data_folder: BakedFolder) -> list[str]:
         str(_call(server, "POST", "/api/renders", {**common, "looks": looks, "format": "png"})["id"])
         for _ in range(_NUM_BATCHES)
     ]
-    comparison_id = str(_call(server, "POST", "/api/truths", {**common, "passes": 1024})["id"])
-    addresses = [*(f"/api/renders/{identity}" for identity in job_addresses), f"/api/truths/{comparison_id}"]
+    comparison_id = str(_call(server, "POST", "/api/comparisons", {**common, "passes": 1024})["id"])
+    addresses = [*(f"/api/renders/{identity}" for identity in job_addresses), f"/api/comparisons/{comparison_id}"]
     deadline = time.monotonic() + _WAIT_S
     while not all(_call(server, "GET", addresses[k])["progress"] > 0 for k in (0, -1)):
         if time.monotonic() > deadline:

@@ -112,7 +112,7 @@ def _use_scene(server: Server, scene: Scene, size: tuple[int, int], num_lights: 
     light = [("/environment/rotation", 40.0), ("/environment/map", "sunset")]
     with session(server, bake["id"]) as client:
         client.exact(0)
-        client.send_message(type="touch", curve=f"/materials/{material.name}/terms/0/curves/{curve}")
+        client.send_message(type="prepare", curve=f"/materials/{material.name}/terms/0/curves/{curve}")
         for revision, (path, value) in enumerate(light, start=1):
             client.send_message(type="edit", revision=revision, patch=[{"op": "replace", "path": path, "value": value}])
             client.exact(revision)

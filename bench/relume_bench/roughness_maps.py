@@ -91,7 +91,13 @@ def _map(texels: F32) -> Texture:
 
 def _mirror(name: str, texels: F32) -> dict[str, object]:
     params = {"roughness": round(float(texels.mean()), 6), "f0": 1.0}
-    return {"model": "ggx", "color": list(_COLORS[name]), "params": params, "texture": None, "roughness_map": True}
+    return {
+        "model": "ggx",
+        "color": list(_COLORS[name]),
+        "params": params,
+        "texture": None,
+        "roughness_map": "roughness",
+    }
 
 
 def _render_relume(scene: Scene, size: tuple[int, int], lights: int, folder: Path) -> tuple[F64, F64]:
@@ -100,9 +106,7 @@ def _render_relume(scene: Scene, size: tuple[int, int], lights: int, folder: Pat
     recipe = Recipe("direct", ("front",), (_FINER * width, _FINER * height), lights)
     transfer = open_transfer(bake(scene, recipe, folder / "rough.zarr").path, Cache(4 << 30))
     materials = transfer.default_look["materials"]
-    plain = {
-        name: {"terms": [{**material["terms"][0], "roughness_map": False}]} for name, material in materials.items()
-    }
+    plain = {name: {"terms": [{**material["terms"][0], "roughness_map": None}]} for name, material in materials.items()}
 
     def picture(changes: dict[str, object]) -> F64:
         return averaged(render_image(transfer, "front", validate(changes, transfer.default_look)), _FINER)

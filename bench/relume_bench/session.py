@@ -34,7 +34,7 @@ def measure(tiny: bool) -> list[Figure]:
     with baked_folder(scene, Recipe("direct", ("front",), size, num_lights)) as data_folder:
         ids = open_transfer(bake_path(data_folder.data, data_folder.bake), Cache(4 << 30)).views["front"].material_ids()
         with serving(data_folder) as server, session(server, data_folder.bake) as client:
-            client.send_message(type="touch", curve="/materials/Teapot/terms/1/curves/theta_h")
+            client.send_message(type="prepare", curve="/materials/Teapot/terms/1/curves/theta_h")
             client.exact(0)
             client.send_message(type="edit", revision=1, patch=[{"op": "replace", "path": _SIGMA, "value": 0.19}])
             client.exact(1)

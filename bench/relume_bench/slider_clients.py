@@ -61,7 +61,7 @@ class SliderClient:
         """See the exact picture, take the slider in hand and begin to move it; until a frame has shown that."""
         await self._is_exact.wait()
         self._is_dragging = True
-        await self._send_message(type="touch", parameter=self._slider)
+        await self._send_message(type="prepare", parameter=self._slider)
         await self._edit()
         await self._has_first_frame.wait()
 
@@ -74,7 +74,7 @@ class SliderClient:
         )
         low, high = self._span
         patch = [{"op": "replace", "path": self._slider, "value": round(low + (high - low) * float(along), 5)}]
-        await self._send_message(type="edit", revision=self._revision, patch=patch, hand=self._slider)
+        await self._send_message(type="edit", revision=self._revision, patch=patch, active_control=self._slider)
 
     async def _send_message(self, **message: Any) -> None:
         await self._connection.send(json.dumps(message))

@@ -45,7 +45,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 def _largest(server: Server, data_folder: BakedFolder) -> tuple[str, int]:
     """Path and size of the largest array, each read whole once."""
-    root = f"/api/bakes/{data_folder.bake}/surface"
+    root = f"/api/bakes/{data_folder.bake}/probes"
     sizes = {}
     with urllib.request.urlopen(f"http://127.0.0.1:{server.port}{root}") as answer:
         names = json.load(answer)["arrays"]

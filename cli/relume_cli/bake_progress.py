@@ -33,7 +33,7 @@ def follow(changes: Subscription, label: str, interrupted: Callable[[], bool] = 
 def detail(status: BakeStatus) -> str:
     """What it does, rate and time left, in words."""
     if status.state == "queued":
-        return "waiting" if status.ahead == 0 else f"waiting for {status.ahead} before it"
+        return "waiting" if status.queue_position == 0 else f"waiting for {status.queue_position} before it"
     if status.phase is None:
         return "starting"
     since_s = time.time() - (status.phase_since or time.time())

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from relume.core.import_warnings import EFFECTS
+from relume.core.import_warnings import SEVERITIES
 from relume_cli.options import Data, check_readable
 from relume_cli.terminal.printing import Json, print_result
 
@@ -36,8 +36,8 @@ def import_scene(
 ) -> None:
     """Register a scene; print its id, and what was read of it.
 
-    What was not read is a warning each: "wrong" is missing or looks other than the file says, "simplified" looks much
-    the same, "unused" does not change the picture.
+    What was not read is a warning each: "unsupported" is missing or looks other than the file says, "approximated"
+    looks much the same, "ignored" does not change the picture.
     """
     from relume.scene.shadow_catcher_ground import with_ground
     from relume_cli.data_folder import open_bakes, open_settings
@@ -53,8 +53,8 @@ def import_scene(
     finally:
         service.close()
     print_result(scene_document(record, bakes), record.id, as_json=as_json, details=_summary_lines(scene))
-    for warning in sorted(record.warnings, key=lambda remark: EFFECTS.index(remark.effect)):
-        typer.echo(f"warning, {warning.effect}: {warning}", err=True)
+    for warning in sorted(record.warnings, key=lambda warning: SEVERITIES.index(warning.severity)):
+        typer.echo(f"warning, {warning.severity}: {warning}", err=True)
 
 
 def _summary_lines(scene: Scene) -> Iterator[str]:

@@ -41,7 +41,7 @@ def _describe_curve(curve: Curve) -> dict[str, Any]:
         "angle": curve.angle.name.lower(),
         "parameters": list(curve.parameters),
         "bands": curve.num_bands,
-        "outgoing": curve.depends_on_view,
+        "view_dependent": curve.depends_on_view,
     }
 
 
@@ -55,11 +55,12 @@ def describe() -> list[dict[str, Any]]:
             "source": term.source,
             "texture": term.texture,
             "needs_data": term.needs_data,
-            "width": None if term.width is None else term.width[0],
+            "width_parameter": None if term.width is None else term.width[0],
             "width_power": None if term.width is None else term.width[1],
             "data_prefix": None if term.data is None else term.data.prefix,
             "parameters": [
-                asdict(parameter) | {"fixed": parameter.name in term.fixed} for parameter in term.parameters
+                asdict(parameter) | {"requires_new_operator": parameter.name in term.fixed}
+                for parameter in term.parameters
             ],
             "curves": [_describe_curve(curve) for curve in term.curves],
         }

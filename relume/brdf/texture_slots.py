@@ -14,6 +14,8 @@ from relume.core.errors import SceneError
 from relume.core.validation import Pointer, invalid_value
 
 TEXTURES = ("diffuse", "specular")
+ROUGHNESS = "roughness"
+"""What a term's `roughness_map` is called where it is the material's own."""
 
 Images = tuple[str | None, str | None]
 """What a look names in the place of each of a material's `TEXTURES`; None where it names nothing."""
@@ -34,7 +36,7 @@ IMAGES = AssetStore("image", "image:", "image.json", SceneError, max_entries=1_0
 """Where such images are kept, by `relume.images.image_store`."""
 
 
-def is_user_image(texture: str | bool | None) -> TypeGuard[str]:
+def is_user_image(texture: str | None) -> TypeGuard[str]:
     """Whether a term's `texture` or `roughness_map` names an image rather than one of the material's own."""
     return isinstance(texture, str) and texture.startswith(IMAGES.prefix)
 
@@ -72,15 +74,19 @@ def roughness_image(documents: Sequence[Mapping[str, Any]]) -> str | None:
     return next((name for document in documents if is_user_image(name := document.get("roughness_map"))), None)
 
 
-def check_map(pointer: Pointer, roughness_map: Any) -> bool | str:
-    """A term's `roughness_map`. Raises ParameterError unless it is yes, no, or an image that is here.
+def check_map(pointer: Pointer, roughness_map: Any) -> str | None:
+    """A term's `roughness_map`. Raises ParameterError unless it is null, the material's own, or an image that is here.
 
     Args:
         pointer: where it stands in its look. roughness_map: what stands there.
     """
-    if isinstance(roughness_map, bool) or (isinstance(roughness_map, str) and IMAGES.exists(roughness_map)):
+    if roughness_map is None or (
+        isinstance(roughness_map, str) and (roughness_map == ROUGHNESS or IMAGES.exists(roughness_map))
+    ):
         return roughness_map
-    raise invalid_value(pointer, roughness_map, "true, false, or an image that was sent to /api/images and is here")
+    raise invalid_value(
+        pointer, roughness_map, f"null, {ROUGHNESS!r}, or an image that was sent to /api/images and is here"
+    )
 
 
 def check_image(pointer: Pointer, image: Any) -> str:
@@ -127,7 +133,7 @@ def _check_single_map(pointer: Pointer, documents: Sequence[Mapping[str, Any]]) 
     """Samples of a material have one level of roughness each: its terms follow one map, or none."""
     image = roughness_image(documents)
     for k, document in enumerate(documents):
-        roughness_map = document.get("roughness_map", False)
-        if image is not None and roughness_map not in (False, image):
-            allowed = f"false, or {image!r}, as other terms of this material have; change them together"
+        roughness_map = document.get("roughness_map")
+        if image is not None and roughness_map not in (None, image):
+            allowed = f"null, or {image!r}, as other terms of this material have; change them together"
             raise invalid_value((*pointer, k, "roughness_map"), roughness_map, allowed)

@@ -4,50 +4,50 @@ from __future__ import annotations
 
 from typing import Any, Literal, get_args
 
-Effect = Literal["wrong", "simplified", "unused"]
-EFFECTS: tuple[Effect, ...] = get_args(Effect)
+Severity = Literal["unsupported", "approximated", "ignored"]
+SEVERITIES: tuple[Severity, ...] = get_args(Severity)
 
 
-class ImportRemark(str):
+class ImporterWarning(str):
     """A sentence, and what the thing it tells of does to the picture; without that, a plain string.
 
     Attributes:
-        effect: "wrong": something is missing, or looks other than the file says. "simplified": it looks much the same,
-            but not quite. "unused": the picture is the same without it.
+        severity: "unsupported": something is missing, or looks other than the file says. "approximated": it looks much
+            the same, but not quite. "ignored": the picture is the same without it.
     """
 
-    effect: Effect
+    severity: Severity
 
-    def __new__(cls, sentence: str, effect: Effect) -> ImportRemark:
-        remark = super().__new__(cls, sentence)
-        remark.effect = effect
-        return remark
+    def __new__(cls, sentence: str, severity: Severity) -> ImporterWarning:
+        warning = super().__new__(cls, sentence)
+        warning.severity = severity
+        return warning
 
     def __getnewargs__(self) -> tuple[Any, ...]:
-        return str(self), self.effect
+        return str(self), self.severity
 
     def document(self) -> dict[str, str]:
         """As JSON."""
-        return {"text": str(self), "effect": self.effect}
+        return {"text": str(self), "severity": self.severity}
 
 
-def unsupported(sentence: str) -> ImportRemark:
+def unsupported(sentence: str) -> ImporterWarning:
     """Something is missing in the picture, or looks other than the file says."""
-    return ImportRemark(sentence, "wrong")
+    return ImporterWarning(sentence, "unsupported")
 
 
-def approximated(sentence: str) -> ImportRemark:
+def approximated(sentence: str) -> ImporterWarning:
     """Something looks much the same as the file says, but not quite."""
-    return ImportRemark(sentence, "simplified")
+    return ImporterWarning(sentence, "approximated")
 
 
-def ignored(sentence: str) -> ImportRemark:
+def ignored(sentence: str) -> ImporterWarning:
     """Something is not used, and the picture is the same without it."""
-    return ImportRemark(sentence, "unused")
+    return ImporterWarning(sentence, "ignored")
 
 
-def warning_of(document: object) -> ImportRemark:
+def warning_of(document: object) -> ImporterWarning:
     """Read what `ImportRemark.document` wrote; plain sentences, of older scenes, may be anything."""
-    if isinstance(document, dict) and document.get("effect") in EFFECTS:
-        return ImportRemark(str(document["text"]), document["effect"])
+    if isinstance(document, dict) and document.get("severity") in SEVERITIES:
+        return ImporterWarning(str(document["text"]), document["severity"])
     return unsupported(str(document))

@@ -29,7 +29,7 @@ from PIL import Image
 from relume.brdf.texture_slots import IMAGES, NormalMap, is_user_image
 from relume.core.cache import asset_cached
 from relume.core.color import srgb_encode
-from relume.core.import_warnings import ImportRemark, warning_of
+from relume.core.import_warnings import ImporterWarning, warning_of
 from relume.image_io.write_image import png_bytes, to_bytes
 from relume.images.read_image import MAX_SIDE, read_image
 from relume.scene.model import WRAPS, Texture, TextureEncoding
@@ -77,7 +77,7 @@ class ImageRecord:
     name: str
     created: float
     size: tuple[int, int]
-    warnings: tuple[ImportRemark, ...]
+    warnings: tuple[ImporterWarning, ...]
     roughness: float
     recipe: ImageRecipe | None = None
 
@@ -98,7 +98,7 @@ def store(folder: Path, source: Path, name: str) -> ImageRecord:
     texture, warnings = read_image(source, name)
 
     def fill(staged_folder: Path) -> dict[str, Any]:
-        return _write(staged_folder, texture) | {"warnings": [remark.document() for remark in warnings]}
+        return _write(staged_folder, texture) | {"warnings": [warning.document() for warning in warnings]}
 
     return get_record(folder, IMAGES.store(folder, source, name, fill))
 

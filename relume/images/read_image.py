@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImportRemark, approximated, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, unsupported
 from relume.image_io.decode import Decoder
 from relume.image_io.read_linear import EXR_MAGIC, read_pixels
 from relume.scene.model import Texture, TextureEncoding
@@ -19,7 +19,7 @@ MAX_FILE_BYTES = 100_000_000
 MAX_SIDE = 4_096
 
 
-def read_image(path: Path, name: str) -> tuple[Texture, tuple[ImportRemark, ...]]:
+def read_image(path: Path, name: str) -> tuple[Texture, tuple[ImporterWarning, ...]]:
     """Read a file of an image, and say what was changed.
 
     Args:
@@ -37,7 +37,7 @@ def read_image(path: Path, name: str) -> tuple[Texture, tuple[ImportRemark, ...]
     if data.startswith(EXR_MAGIC):
         return _read_exr(data, label)
     pixels = Decoder().decode(data, label)
-    limited, warnings = limit_size(pixels[..., :3]), tuple[ImportRemark, ...]()
+    limited, warnings = limit_size(pixels[..., :3]), tuple[ImporterWarning, ...]()
     if limited.shape != pixels[..., :3].shape:
         sizes = [f"{array.shape[1]}×{array.shape[0]}" for array in (pixels, limited)]
         warnings = (approximated(f"{label} is {sizes[0]}; it is kept as {sizes[1]}, each texel the mean of its own"),)
@@ -62,7 +62,7 @@ def _check_size(label: str, width: int, height: int) -> None:
         raise SceneError(f"{label} is {width}×{height}; at most {MAX_SIDE}×{MAX_SIDE} is taken, scale it down")
 
 
-def _read_exr(data: bytes, label: str) -> tuple[Texture, tuple[ImportRemark, ...]]:
+def _read_exr(data: bytes, label: str) -> tuple[Texture, tuple[ImporterWarning, ...]]:
     pixels = read_pixels(data, ".exr", label, partial(_check_size, label))
     warnings = []
     broken = ~np.isfinite(pixels).all(axis=-1, keepdims=True)

@@ -19,7 +19,7 @@ from relume.core.validation import (
     names_text,
 )
 from relume.image_io.ocio.view import MAX_NAME
-from relume.look.light_validation import MAX_SCALE, complete_lights, default_lights
+from relume.look.light_validation import MAX_INTENSITY, complete_lights, default_lights
 from relume.look.model import BackgroundKind, Look, PathFilter, ToneMap
 from relume.scene.model import Light, Material
 
@@ -27,13 +27,13 @@ MAX_TERMS = 16
 MAX_BOUNCES = 24  # between white walls, which reflect 0.73, a thousandth of the light is left after 22
 NORMAL_SCALE = (0.0, 10.0)
 RANGES: dict[str, dict[str, tuple[float, float]]] = {  # of each number of a field; degrees, stops
-    "environment": {"scale": (0.0, MAX_SCALE), "color": (0.0, MAX_COLOR), "rotation": (-360.0, 360.0)},
+    "environment": {"intensity": (0.0, MAX_INTENSITY), "color": (0.0, MAX_COLOR), "rotation": (-360.0, 360.0)},
     "background": {"color": (0.0, MAX_COLOR), "blur": (2.0, 60.0)},
     "transport": {"bounces": (0, MAX_BOUNCES)},
     "display": {"exposure": (-20.0, 20.0)},
 }
 DEFAULTS: dict[str, dict[str, Any]] = {
-    "environment": {"map": None, "scale": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0},
+    "environment": {"map": None, "intensity": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0},
     "background": {"kind": "map", "color": [0.5, 0.5, 0.5], "blur": 10.0},
     "transport": {"show": "all", "bounces": MAX_BOUNCES},
     "display": {"exposure": 0.0, "tone_map": "agx"},
@@ -51,7 +51,7 @@ def default_look(scene_materials: Sequence[Material], scene_lights: Sequence[Lig
         "materials": {
             material.name: {
                 "terms": _complete_terms(("materials", material.name, "terms"), list(material.terms), ()),
-                **({"catcher": True} if material.shadow_catcher else {}),
+                **({"shadow_catcher": True} if material.shadow_catcher else {}),
             }
             for material in scene_materials
         },
@@ -113,9 +113,11 @@ def _complete_material(name: str, partial: Any, default: Mapping[str, Any], prev
     if partial is previous[name] or partial is default[name]:
         return partial
     pointer: Pointer = ("materials", name)
-    fields = _merge(pointer, partial, {**default[name], "normal_map": None})  # only a scene's ground may be a catcher
-    if not isinstance(fields.get("catcher", True), bool):
-        raise invalid_value((*pointer, "catcher"), fields["catcher"], "true or false")
+    fields = _merge(
+        pointer, partial, {**default[name], "normal_map": None}
+    )  # only a scene's ground may be a shadow catcher
+    if not isinstance(fields.get("shadow_catcher", True), bool):
+        raise invalid_value((*pointer, "shadow_catcher"), fields["shadow_catcher"], "true or false")
     normals = _complete_normals((*pointer, "normal_map"), fields.pop("normal_map", None))
     return {
         **fields,
@@ -152,7 +154,7 @@ def _complete_environment(partial: Any, default: Mapping[str, Any], previous: Ma
     if fields["map"] != previous.get("map"):
         _check_map(("environment", "map"), fields["map"])
     ranges = RANGES["environment"]
-    check_number(("environment", "scale"), fields["scale"], *ranges["scale"])
+    check_number(("environment", "intensity"), fields["intensity"], *ranges["intensity"])
     check_triple(("environment", "color"), fields["color"], *ranges["color"])
     check_number(("environment", "rotation"), fields["rotation"], *ranges["rotation"])
     return fields

@@ -18,10 +18,10 @@ from relume.look.model import LightKind
 from relume.scene.model import Light
 from relume.scene.validate import MAX_EMISSION, MAX_LIGHT_NAME, MAX_LIGHTS, MAX_METERS
 
-MAX_SCALE = 1e4
+MAX_INTENSITY = 1e4
 MIN_DIRECTION = 1e-6  # of its longest component
 LIGHT_RANGES: dict[str, tuple[float, float]] = {  # of each number of a field; metres, degrees
-    "scale": (0.0, MAX_SCALE),
+    "intensity": (0.0, MAX_INTENSITY),
     "color": (0.0, MAX_COLOR),
     "emission": (0.0, MAX_EMISSION),
     "position": (-MAX_METERS, MAX_METERS),
@@ -32,7 +32,7 @@ LIGHT_RANGES: dict[str, tuple[float, float]] = {  # of each number of a field; m
 }
 
 _WHITE = (1.0, 1.0, 1.0)
-_COMMON_DEFAULTS: dict[str, Any] = {"scale": 1.0, "color": list(_WHITE), "on": True, "emission": list(_WHITE)}
+_COMMON_DEFAULTS: dict[str, Any] = {"intensity": 1.0, "color": list(_WHITE), "enabled": True, "emission": list(_WHITE)}
 _POSITION = {"position": [0.0, 1.0, 0.0]}
 _DIRECTION = {"direction": [0.0, -1.0, 0.0]}
 _KIND_DEFAULTS: dict[str, dict[str, Any]] = {
@@ -113,11 +113,11 @@ def _merge(pointer: Pointer, partial: Mapping[str, Any], base: Mapping[str, Any]
 
 def _check_field(pointer: Pointer, field: str, value: Any, base: Mapping[str, Any]) -> None:
     match field:
-        case "scale" | "rotation":
+        case "intensity" | "rotation":
             check_number(pointer, value, *LIGHT_RANGES[field])
         case "color" | "emission" | "position":
             check_triple(pointer, value, *LIGHT_RANGES[field])
-        case "on":
+        case "enabled":
             if not isinstance(value, bool):
                 raise invalid_value(pointer, value, "true or false")
         case "direction":

@@ -17,7 +17,7 @@ Rgb = tuple[float, float, float]
 Xyz = tuple[float, float, float]
 LightKind = Literal["point", "spot", "directional", "rectangle", "mesh"]
 ToneMap = Literal["agx", "filmic", "none"]
-PathFilter = Literal["all", "direct", "reflected", "first_bounce", "further_bounces"]
+PathFilter = Literal["all", "direct", "indirect", "first_bounce", "further_bounces"]
 BackgroundKind = Literal["map", "blurred", "color", "transparent"]
 
 
@@ -36,16 +36,16 @@ class DrawnCurve(TypedDict):
 class TermLook(TypedDict):
     """One term: colour · texture · quotient · Π curves; drawn curves stand in for those that `params` would give.
 
-    `data` names the measured material, for models that need one and for no other. `roughness_map`: the width of the
-    term is scaled by the material's map of roughness, where it has one, or by "image:<id>", one that was sent.
-    `texture` names one of the material's own images by its channel, or one that was sent.
+    `data` names the measured material, for models that need one and for no other. `roughness_map`: what scales the
+    width of the term: "roughness", the material's own map where it has one, or "image:<id>", one that was sent; null:
+    nothing. `texture` names one of the material's own images by its channel, or one that was sent.
     """
 
     model: str
     data: NotRequired[str]
     color: Rgb
     texture: str | None
-    roughness_map: NotRequired[bool | str]
+    roughness_map: NotRequired[str | None]
     params: dict[str, float | Rgb]
     curves: dict[str, DrawnCurve | list[DrawnCurve]]
 
@@ -70,13 +70,13 @@ class MaterialLook(_FrozenModel):
     """
 
     terms: tuple[TermLook, ...]
-    catcher: bool = False
+    shadow_catcher: bool = False
     normal_map: NormalMapLook | None = None
 
     @property
     def normals(self) -> NormalMap | None:
         """The same as a value; none of a catcher, whose own surface is not seen."""
-        normal_map = None if self.catcher else self.normal_map
+        normal_map = None if self.shadow_catcher else self.normal_map
         return None if normal_map is None else NormalMap(normal_map.image, normal_map.scale)
 
 
@@ -95,11 +95,11 @@ BAKED_ENVIRONMENT = EnvironmentKey(None, 0.0)
 
 
 class EnvironmentLook(_FrozenModel):
-    """The light around: multiplied by `scale` and `color`, turned about +Y by `rotation` degrees, counter-clockwise
+    """The light around: multiplied by `intensity` and `color`, turned about +Y by `rotation` degrees, counter-clockwise
     seen from above. `map` names it, see `relume.assets.environments`; None: the scene's own."""
 
     map: str | None
-    scale: float
+    intensity: float
     color: Rgb
     rotation: float
 
@@ -110,9 +110,9 @@ class EnvironmentLook(_FrozenModel):
 
     @property
     def gain(self) -> Rgb:
-        """What multiplies each channel of the environment: scale · color."""
+        """What multiplies each channel of the environment: intensity · color."""
         red, green, blue = self.color
-        return self.scale * red, self.scale * green, self.scale * blue
+        return self.intensity * red, self.intensity * green, self.intensity * blue
 
 
 class LightGeometry(NamedTuple):
@@ -131,15 +131,16 @@ class LightGeometry(NamedTuple):
 class _LightLook(_FrozenModel):
     """What lights of all kinds have; `emission` in the unit of the kind."""
 
-    scale: float
+    intensity: float
     color: Rgb
-    on: bool
+    enabled: bool
     emission: Rgb
 
     @property
     def gain(self) -> Rgb:
-        """What multiplies each channel of a light of unit emission: scale · color · emission, nothing where off."""
-        scale = self.scale if self.on else 0.0
+        """What multiplies each channel of a light of unit emission: intensity · color · emission, nothing where
+        disabled."""
+        scale = self.intensity if self.enabled else 0.0
         red, green, blue = (scale * c * e for c, e in zip(self.color, self.emission, strict=True))
         return red, green, blue
 
@@ -272,6 +273,8 @@ class Look(_FrozenModel):
 
     def without_compositing(self) -> Look:
         """The same with nothing that is only put behind or under the objects: what brute force can be asked for."""
-        plain = {name: material.model_copy(update={"catcher": False}) for name, material in self.materials.items()}
+        plain = {
+            name: material.model_copy(update={"shadow_catcher": False}) for name, material in self.materials.items()
+        }
         background = self.background.model_copy(update={"kind": "map"})
         return self.model_copy(update={"materials": plain, "background": background})

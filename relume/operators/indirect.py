@@ -147,7 +147,7 @@ def precompute_rows(
         for block in range(first, last):
             maker.write(rows, block)
 
-    parallel_for_cancellable(step, blocks, _BLOCKS_PER_STEP, progress, is_canceled, "freezing")
+    parallel_for_cancellable(step, blocks, _BLOCKS_PER_STEP, progress, is_canceled, "precomputing")
     return rows
 
 

@@ -172,7 +172,7 @@ def pack_columns(
                 values, scale[tile, :, :, block] = quantize(columns)
             transport[tile, :, :, offset : offset + stop - start] = values.transpose(0, 2, 1)
 
-    parallel_for_cancellable(step, tiles * num_blocks, 1, progress, is_canceled, "freezing")
+    parallel_for_cancellable(step, tiles * num_blocks, 1, progress, is_canceled, "precomputing")
     importance = np.sqrt(squared_norms if bounds is not None else squared_norms[0])
     return (
         QuantizedOperator(transport, scale, importance, bounds)

@@ -34,14 +34,14 @@ class Viewport:
 
     Attributes:
         colors: of the materials, linear. (materials, 3) float32
-        framing: a camera that sees all of it. lowest, highest: its corners, metres. (3,)
+        default_camera: a camera that sees all of it. bounds_min, bounds_max: its corners, metres. (3,)
     """
 
     geometry: SceneBuffers
     colors: F32
-    framing: Camera
-    lowest: F64
-    highest: F64
+    default_camera: Camera
+    bounds_min: F64
+    bounds_max: F64
 
     @classmethod
     def from_scene(cls, scene: Scene) -> Viewport:

@@ -80,17 +80,17 @@ class Comparison:
         rmse: of the difference, noise included. noise: of the estimate.
         error: of the frame, noise taken off; None where that cannot be told from the noise.
         standard_error: of `error`, one standard deviation of what other passes would make of it; None where that is.
-        limit: what the error is very likely below.
-        significant: share of pixels that differ by more than noise explains; at most `FALSE_DISCOVERY_RATE` of these by
-            chance.
+        error_upper_bound: what the error is very likely below.
+        significant_pixel_fraction: share of pixels that differ by more than noise explains; at most
+            `FALSE_DISCOVERY_RATE` of these by chance.
     """
 
     rmse: float
     noise: float
     error: float | None
     standard_error: float | None
-    limit: float
-    significant: float
+    error_upper_bound: float
+    significant_pixel_fraction: float
 
 
 def compare(frame: F32, estimate: Estimate) -> tuple[Comparison, Mask]:
@@ -114,8 +114,8 @@ def compare(frame: F32, estimate: Estimate) -> tuple[Comparison, Mask]:
         noise=float(np.sqrt(noise)),
         error=root,
         standard_error=None if root is None else deviation / (2 * root),
-        limit=float(np.sqrt(max(0.0, error) + 2 * deviation)),
-        significant=float(differs.mean()),
+        error_upper_bound=float(np.sqrt(max(0.0, error) + 2 * deviation)),
+        significant_pixel_fraction=float(differs.mean()),
     )
     return figures, differs
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.brdf.roughness_levels import uses_roughness_map
-from relume.brdf.texture_slots import TEXTURES, roughness_image, user_images
+from relume.brdf.texture_slots import ROUGHNESS, TEXTURES, roughness_image, user_images
 from relume.images.image_store import load_normal_map, load_roughness_map, load_texture, mean_roughness
 from relume.look import Look
 from relume.raytrace.surface_interaction import SurfaceInteraction, triplanar_axes
@@ -71,7 +71,8 @@ def _terms_with_roughness_map(material: Material, look: Look) -> tuple[dict[str,
     look_terms = look.materials[material.name].terms
     uses_map = [k < len(look_terms) and uses_roughness_map(look_terms[k]) for k in range(len(material.terms))]
     return tuple(
-        {**term, "roughness_map": True} if f else dict(term) for term, f in zip(material.terms, uses_map, strict=True)
+        {**term, "roughness_map": ROUGHNESS} if f else dict(term)
+        for term, f in zip(material.terms, uses_map, strict=True)
     )
 
 

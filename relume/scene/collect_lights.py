@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImportRemark, approximated, ignored
+from relume.core.import_warnings import ImporterWarning, approximated, ignored
 from relume.scene.emission import normalize_emission
 from relume.scene.model import Light, Material, Mesh
 from relume.scene.unique_names import unique_name
@@ -21,7 +21,7 @@ F64 = NDArray[np.float64]
 class LightCollector:
     """Collects the lights of one file, whatever its format."""
 
-    def __init__(self, warnings: list[ImportRemark]) -> None:
+    def __init__(self, warnings: list[ImporterWarning]) -> None:
         self._warnings = warnings
         self._names: dict[str, int] = {}
         self.lights: list[Light] = []

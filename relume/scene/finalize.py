@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from relume.assets.environments.environment import Environment
-from relume.core.import_warnings import EFFECTS, ImportRemark
+from relume.core.import_warnings import SEVERITIES, ImporterWarning
 from relume.scene.model import Camera, Light, Material, Mesh, Scene
 from relume.scene.scene_folder import make_scene
 
@@ -19,7 +19,7 @@ def finalize(
     materials: Sequence[Material],
     cameras: Sequence[Camera],
     environment: Environment,
-    warnings: Sequence[ImportRemark],
+    warnings: Sequence[ImporterWarning],
     variants: Mapping[str, dict[str, Any]] | None = None,
     lights: Sequence[Light] = (),
 ) -> Scene:
@@ -36,11 +36,11 @@ def finalize(
         SceneError: the parts do not make a scene (see `relume.scene.validate`).
     """
     all_warnings = [*environment.warnings, *warnings]
-    sorted_warnings = sorted(all_warnings, key=lambda remark: EFFECTS.index(remark.effect))[:MAX_WARNINGS]
+    sorted_warnings = sorted(all_warnings, key=lambda warning: SEVERITIES.index(warning.severity))[:MAX_WARNINGS]
     if len(all_warnings) > len(sorted_warnings):
         sorted_warnings.append(
-            ImportRemark(
-                f"and {len(all_warnings) - len(sorted_warnings):,} more of the kind", sorted_warnings[-1].effect
+            ImporterWarning(
+                f"and {len(all_warnings) - len(sorted_warnings):,} more of the kind", sorted_warnings[-1].severity
             )
         )
     return make_scene(name, meshes, materials, cameras, environment, sorted_warnings, variants, lights)

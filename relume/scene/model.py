@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.assets.environments.environment import Environment
-from relume.core.import_warnings import ImportRemark
+from relume.core.import_warnings import ImporterWarning
 
 F32 = NDArray[np.float32]
 U32 = NDArray[np.uint32]
@@ -114,8 +114,8 @@ class Material:
         terms: the material's default terms as they stand in a look document.
         textures: per-sample multipliers by channel name; a term that names `"texture": "diffuse"` is multiplied by
             `textures["diffuse"]`. Known channels: "diffuse", "specular"; and "roughness", over the roughness that
-            terms say, which scales the width of those with `"roughness_map": true`; and "emission", over the mean of
-            what the material's surfaces shine.
+            terms say, which scales the width of those with `"roughness_map": "roughness"`; and "emission", over the
+            mean of what the material's surfaces shine.
         normal_map: tangent-space normals in [-1, 1]; None where there is none.
         double_sided: whether both sides are seen; single-sided back faces are shaded as if turned round.
         shadow_catcher: it is a ground that looks may show by its shadows alone, and the default look does.
@@ -181,6 +181,6 @@ class Scene:
     materials: tuple[Material, ...]
     cameras: tuple[Camera, ...]
     environment: Environment
-    warnings: tuple[ImportRemark, ...] = ()
+    warnings: tuple[ImporterWarning, ...] = ()
     variants: dict[str, dict[str, Any]] = field(default_factory=dict)
     lights: tuple[Light, ...] = ()

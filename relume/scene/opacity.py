@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.core.import_warnings import ImportRemark, unsupported
+from relume.core.import_warnings import ImporterWarning, unsupported
 from relume.scene.model import Opacity
 
 _OPAQUE = 254  # of 255; below that lies what lossy images do to a white one
@@ -17,7 +17,7 @@ def make_opacity(
     factor: float,
     cutoff: float | None,
     label: str,
-    warnings: list[ImportRemark],
+    warnings: list[ImporterWarning],
 ) -> Opacity | None:
     """Make a material's opacity; None where it is whole.
 

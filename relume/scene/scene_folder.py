@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from relume.assets.environments.environment import Environment
 from relume.core.errors import NotFoundError, SceneError
 from relume.core.filesystem import atomic_write
-from relume.core.import_warnings import ImportRemark, warning_of
+from relume.core.import_warnings import ImporterWarning, warning_of
 from relume.scene.model import Camera, Glass, Light, Material, Mesh, Opacity, Scene, Texture, TextureEncoding
 from relume.scene.validate import check_scene
 
@@ -38,7 +38,7 @@ def make_scene(
     materials: Sequence[Material],
     cameras: Sequence[Camera],
     environment: Environment,
-    warnings: Sequence[ImportRemark] = (),
+    warnings: Sequence[ImporterWarning] = (),
     variants: Mapping[str, dict[str, Any]] | None = None,
     lights: Sequence[Light] = (),
 ) -> Scene:
@@ -181,7 +181,7 @@ def _to_document(scene: Scene) -> tuple[dict[str, Any], Arrays]:
                 "double_sided": material.double_sided,
                 # ids of scenes without these stay what they were
                 **_encoding_documents(material),
-                **({"catcher": True} if material.shadow_catcher else {}),
+                **({"shadow_catcher": True} if material.shadow_catcher else {}),
                 **({"opacity": _opacity_document(material.opacity)} if material.opacity else {}),
                 **({"glass": asdict(material.glass)} if material.glass else {}),
             }
@@ -236,7 +236,7 @@ def _assemble_material(i: int, document: dict[str, Any], arrays: Arrays) -> Mate
     }
     normal_map = textures.pop("normal_map", None)
     terms = tuple(dict(term) for term in document["terms"])
-    double_sided, shadow_catcher = bool(document["double_sided"]), bool(document.get("catcher", False))
+    double_sided, shadow_catcher = bool(document["double_sided"]), bool(document.get("shadow_catcher", False))
     opacity = _assemble_opacity(document["opacity"], arrays[f"material{i}_opacity"]) if "opacity" in document else None
     glass = _assemble_glass(document["glass"]) if "glass" in document else None
     return Material(str(document["name"]), terms, textures, normal_map, double_sided, shadow_catcher, opacity, glass)

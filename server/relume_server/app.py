@@ -62,8 +62,8 @@ ROUTE_GROUPS = (
     color,
     models,
     materials,
+    btf_jobs,  # before btfs, which would take "jobs" for an id
     btfs,
-    btf_jobs,
     library,
     balls,
     environments,

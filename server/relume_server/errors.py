@@ -147,8 +147,8 @@ TABLE: Sequence[tuple[type[Exception], ErrorMapping]] = (
     (InProgressError, ErrorMapping(409, "in-progress", "Not answered yet", CLOSE_POLICY)),
     (KeyReusedError, ErrorMapping(422, "key-reused", "Key of another call", CLOSE_POLICY)),
     (InUseError, ErrorMapping(409, "in-use", "In use", CLOSE_NOT_READY)),
-    (DrainingError, ErrorMapping(503, "leaving", "Being stopped", CLOSE_RESTART)),
-    (OtherServerError, ErrorMapping(404, "elsewhere", "On another server", CLOSE_RESTART)),
+    (DrainingError, ErrorMapping(503, "draining", "Being stopped", CLOSE_RESTART)),
+    (OtherServerError, ErrorMapping(404, "other-server", "On another server", CLOSE_RESTART)),
     (BusyError, ErrorMapping(503, "busy", "Too busy", CLOSE_BUSY)),
     (NearlyFullError, ErrorMapping(507, "disk", "Disk is nearly full", CLOSE_INTERNAL)),
     (TooLargeError, ErrorMapping(413, "too-large", "Too large", CLOSE_TOO_BIG)),
@@ -170,7 +170,7 @@ TABLE: Sequence[tuple[type[Exception], ErrorMapping]] = (
     (relume_errors.StoreNotFoundError, ErrorMapping(404, "store-not-found", "No such bake store", CLOSE_NOT_FOUND)),
     (relume_errors.StoreError, ErrorMapping(409, "store", "Bake store cannot be used", CLOSE_DAMAGED)),
     (relume_errors.EditNotSupportedError, ErrorMapping(409, "edit-not-supported", "Edit not supported", CLOSE_POLICY)),
-    (relume_errors.ResultUnavailableError, ErrorMapping(409, "not-made", "Cannot be made", CLOSE_INTERNAL)),
+    (relume_errors.ResultUnavailableError, ErrorMapping(409, "generation-failed", "Generation failed", CLOSE_INTERNAL)),
     (relume_errors.EditError, ErrorMapping(422, "edit", "Edit cannot be applied", CLOSE_POLICY)),
     (relume_errors.ProtocolError, ErrorMapping(400, "protocol", "Protocol broken", CLOSE_PROTOCOL)),
     (relume_errors.CancelledError, ErrorMapping(409, "cancelled", "Cancelled", CLOSE_GOING_AWAY)),
@@ -239,7 +239,11 @@ def validation_problem(
     more = f"; and {len(fields) - _MAX_LISTED_FIELDS} more" if len(fields) > _MAX_LISTED_FIELDS else ""
     detail = "; ".join(field["detail"] for field in fields[:_MAX_LISTED_FIELDS]) + more
     return Problem(
-        type="urn:relume:problem:form", title="Not of the declared form", status=status, detail=detail, errors=fields
+        type="urn:relume:problem:invalid-request",
+        title="Not of the declared form",
+        status=status,
+        detail=detail,
+        errors=fields,
     )
 
 
@@ -254,7 +258,7 @@ def http_problem(error: HTTPException, method: str, allowed_methods: Sequence[st
         detail = f"the body cannot be read ({detail.rstrip('.')}); send what /api/openapi.json describes"
     if status == HTTPStatus.METHOD_NOT_ALLOWED:
         detail = f"{method} is not taken at this address; use {' or '.join(allowed_methods) or 'another'}"
-    slug = {400: "form", 405: "method"}.get(status, "not-found")
+    slug = {400: "invalid-request", 405: "method"}.get(status, "not-found")
     title = HTTPStatus(status).phrase
     return Problem(type=f"urn:relume:problem:{slug}", title=title, status=status, detail=detail)
 

@@ -24,7 +24,7 @@ from relume_server.errors import ForbiddenOriginError, TooLargeError, make_probl
 
 # as large as the settings allow: an environment of 4K is 25 MB, one of 8K some 100
 UPLOADS = (
-    "/api/scenes", "/api/environments", "/api/images", "/api/materials/btf-works", "/api/materials/btf-works/geometry",
+    "/api/scenes", "/api/environments", "/api/images", "/api/materials/btf/jobs", "/api/materials/btf/jobs/geometry",
 )  # fmt: skip
 MAX_MATERIAL_BYTES = FILE_BYTES + 64 * 1024  # the file and the form around it
 # documents with many looks

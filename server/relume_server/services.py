@@ -209,10 +209,10 @@ def _queues(settings: Settings, service: BakeService, batch: Batches, access: Au
         return get_scene(service.ledger, service.ledger.bake(bake).scene).name
 
     def on_btf_ready(work: str, material: str, num_bytes: int) -> None:
-        access.quotas.convert(("btf-work", work), ("btf", material), num_bytes)
+        access.quotas.convert(("btf-job", work), ("btf", material), num_bytes)
 
     def on_btf_failed(work: str) -> None:
-        access.quotas.set_bytes("btf-work", work, 0)
+        access.quotas.set_bytes("btf-job", work, 0)
 
     return _Queues(
         RenderQueue(sessions, settings.data, batch.run, quota, scene_name, partial(access.quotas.set_bytes, "render")),

@@ -126,8 +126,8 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
 def generate_protocol() -> str:
     """Messages and bodies; the same models give the same text."""
     blocks = [HEAD]
-    limits = "MAX_MESSAGE_BYTES", "MAX_FRAMES_IN_FLIGHT", "MAX_VIEWS_SHOWN", "MAX_EYE_PIXELS"
-    for name in ("SUBPROTOCOL", *limits, "SURFACE_LAYOUT"):
+    limits = "MAX_MESSAGE_BYTES", "MAX_FRAMES_IN_FLIGHT", "MAX_VISIBLE_VIEWS", "MAX_CAMERA_PIXELS"
+    for name in ("SUBPROTOCOL", *limits, "PROBES_LAYOUT"):
         value = getattr(protocol, name)
         blocks.append(f"export const {name} = {literal(value)};")
     blocks.append(f"export const MAX_PERSON_NAME = {rooms.MAX_PERSON_NAME};")

@@ -47,7 +47,7 @@ _PATTERNS = {
     "^[a-z2-7]+$": "the id of a link",
     "^/": "a JSON pointer, which begins with /",
 }
-_LISTS = {"size": "[width, height] in pixels", "to_world": "16 numbers, by row", "about": "[x, y, z] in metres"}
+_LISTS = {"size": "[width, height] in pixels", "to_world": "16 numbers, by row", "pivot": "[x, y, z] in metres"}
 
 
 class _LocatedError(NamedTuple):

@@ -25,7 +25,7 @@ def test_viewers_write_under_their_name_and_change_nothing_else(
 ) -> None:
     vera, path = bearer("view", "Vera"), f"/api/scenes/{baked.scene}/comments"
     pin: dict[str, Any] = {"bake": baked.bake, "view": "front", "x": 1, "y": 2, "size": SIZE, "text": "Too bright"}
-    assert client.get("/api/me", headers=vera).json()["viewers_comment"]
+    assert client.get("/api/me", headers=vera).json()["allow_viewer_comments"]
     made = client.post(path, json={**pin, "author": "Ann"}, headers=vera)
     assert (made.status_code, made.json()["author"]) == (201, "Vera")
     assert client.post(path, json=pin).status_code == 401

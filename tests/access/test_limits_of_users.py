@@ -137,7 +137,7 @@ class TestBytes:
         self, client: TestClient, bearer: Bearer, access: AuthServices, settings: Settings, tmp_path: Path
     ) -> None:
         settings.max_bytes_per_user = 1_000_000
-        ann, works = bearer("edit", "Ann"), "/api/materials/btf-works"
+        ann, works = bearer("edit", "Ann"), "/api/materials/btf/jobs"
         with zipped(tmp_path / "a.zip").open("rb") as images:
             url = client.post(works, files={"images": ("a.zip", images)}, headers=ann).headers["location"]
         while (body := client.get(url, headers=ann).json())["state"] != "ready":
@@ -153,7 +153,7 @@ class TestBytes:
         settings.max_bytes_per_user = kept
         refused = client.post(f"{works}/synthetic", json={"geometry": "weave", "size": 8}, headers=ann)
         assert refused.status_code == 429
-        assert client.delete(f"{url}?forget=true", headers=ann).status_code == 204
+        assert client.delete(f"{url}?delete_files=true", headers=ann).status_code == 204
         assert access.quotas.used_bytes("Ann") == kept
         assert client.delete(f"/api/materials/btf/{body['material']}", headers=ann).status_code == 204
         assert access.quotas.used_bytes("Ann") == 0
@@ -178,7 +178,7 @@ class TestBytes:
         images = zipped(tmp_path / "a.zip")
         with images.open("rb") as file:
             sent = client.post(
-                "/api/materials/btf-works", files={"images": ("a.zip", file)}, headers=bearer("edit", "Ann")
+                "/api/materials/btf/jobs", files={"images": ("a.zip", file)}, headers=bearer("edit", "Ann")
             )
         assert sent.status_code == 503
         assert owned == [images.stat().st_size]
@@ -202,7 +202,7 @@ class TestTurns:
         names: dict[str, str] = {}
         for k, name in enumerate(["Ann"] * 4 + ["Bob"] * 2 + ["Cem"] * 4):
             names[bakes.submit(baked.scene, Recipe("direct", ("front",), SIZE, 11 + k), name)] = name
-        assert [bakes.get(bake).ahead for bake in names] == [0, 3, 6, 8, 1, 4, 2, 5, 7, 9]
+        assert [bakes.get(bake).queue_position for bake in names] == [0, 3, 6, 8, 1, 4, 2, 5, 7, 9]
         monkeypatch.setattr(bakes.ledger, "claimable", claimable)
         while len(order) < 10:
             time.sleep(0.01)
@@ -227,7 +227,7 @@ class TestBakes:
 
     def test_each_has_so_many_under_way(self, gate: threading.Event, client: TestClient, bearer: Bearer) -> None:
         ann, bob = bearer("edit", "Ann"), bearer("edit", "Bob")
-        scene = client.post("/api/built-ins/cornell_box", headers=ann).json()["id"]
+        scene = client.post("/api/example-scenes/cornell_box", headers=ann).json()["id"]
         recipes = [{"scene": scene, "size": list(SIZE), "lights": lights} for lights in (10, 20)]
         first = client.post("/api/bakes", json=recipes[0], headers=ann)
         assert first.status_code == 202, first.text

@@ -34,7 +34,7 @@ def calls(at_least: Role) -> list[tuple[str, str]]:
 def me(client: TestClient) -> dict[str, Any]:
     """Who the server thinks it is, without what it says of itself."""
     found: dict[str, Any] = client.get("/api/me").json()
-    assert found.pop("viewers_comment") is False
+    assert found.pop("allow_viewer_comments") is False
     return found
 
 
@@ -66,7 +66,7 @@ def test_editors_edit_and_only_admins_read_the_audit(client: TestClient, bearer:
 def test_what_is_open_stays_open(client: TestClient) -> None:
     for path in ("/livez", "/readyz", "/api/openapi.json"):
         assert client.get(path).status_code == 200
-    assert me(client) == {"login": True, "name": "", "role": "anyone", "by": "nobody"}
+    assert me(client) == {"login": True, "name": "", "role": "anyone", "auth_method": "nobody"}
     assert client.get("/").status_code == 503  # the editor, which is not built here
 
 
@@ -133,9 +133,9 @@ def test_browsers_log_in_and_out_by_a_cookie(client: TestClient, access: AuthSer
     assert "httponly" in cookie
     assert "samesite=strict" in cookie
     assert "secure" not in cookie  # plain HTTP
-    assert me(client) == {"login": True, "name": "Ann", "role": "edit", "by": "token"}
+    assert me(client) == {"login": True, "name": "Ann", "role": "edit", "auth_method": "token"}
     assert client.post("/api/logout").status_code == 204
-    assert client.get("/api/me").json()["by"] == "nobody"
+    assert client.get("/api/me").json()["auth_method"] == "nobody"
 
 
 @pytest.mark.parametrize("beside", ['prefs={"a":1,"b":2}', "a[b]=1", "a@b=1", "novalue", "name=Zo\xeb", "path=/x"])
@@ -176,7 +176,7 @@ class TestProxy:
         proxy = self.at(client, "10.1.2.3")
         ann = proxy.get("/api/me", headers={"X-Forwarded-User": "Ann"}).json()
         bob = proxy.get("/api/me", headers={"X-Forwarded-User": "Bob"}).json()
-        assert (ann["name"], ann["role"], ann["by"]) == ("Ann", "edit", "proxy")
+        assert (ann["name"], ann["role"], ann["auth_method"]) == ("Ann", "edit", "proxy")
         assert (bob["name"], bob["role"]) == ("Bob", "view")
         assert proxy.get("/api/scenes").status_code == 401
 

@@ -33,7 +33,8 @@ def test_every_route_has_a_role_and_every_role_a_route() -> None:
 
 def test_every_message_has_a_role() -> None:
     messages = get_args(get_args(protocol.ClientMessage)[0])
-    assert {get_args(kind.model_fields["type"].annotation)[0] for kind in messages} | {"seen", "hold"} == set(MESSAGES)
+    types = {get_args(kind.model_fields["type"].annotation)[0] for kind in messages}
+    assert types | {"edit_local", "prepare_parameter"} == set(MESSAGES)
 
 
 def test_a_call_that_is_not_listed_is_for_admins() -> None:
@@ -46,7 +47,7 @@ def test_a_call_that_is_not_listed_is_for_admins() -> None:
 def test_of_lines_that_fit_the_strictest_counts() -> None:
     assert required_role("GET", "/api/materials/measured/0123456789abcdef/thumbnail.png") is Role.VIEW
     assert required_role("DELETE", "/api/scenes/0123456789abcdef") is Role.EDIT
-    assert required_role("POST", "/api/scenes/0123456789abcdef/finder") is Role.VIEW
+    assert required_role("POST", "/api/scenes/0123456789abcdef/viewport") is Role.VIEW
 
 
 def test_an_answer_of_200_says_that_nothing_was_changed() -> None:

@@ -100,11 +100,11 @@ def test_viewers_watch_and_are_told_why_they_do_not_edit(client: TestClient, bak
         told = session.text("problem")
         assert (told["revision"], told["problem"]["status"]) == (1, 403)
         assert told["problem"]["detail"].startswith("Vera may look at this picture but not edit it; ask an admin")
-        session.send_message(type="touch", parameter=SIGMA)
+        session.send_message(type="prepare", parameter=SIGMA)
         assert session.text("problem")["problem"]["status"] == 403
-        session.send_message(type="edit", revision=1, patch=[SEEN], hand=SIGMA)  # which would prepare it
+        session.send_message(type="edit", revision=1, patch=[SEEN], active_control=SIGMA)  # which would prepare it
         assert session.text("problem")["problem"]["status"] == 403
-        session.send_message(type="touch", curve=THETA_H)
+        session.send_message(type="prepare", curve=THETA_H)
         shape = session.text("curve")
         assert (shape["curve"], len(shape["bands"])) == (THETA_H, len(shape["generated"]))
         session.send_message(type="view", name="front")
@@ -114,8 +114,8 @@ def test_viewers_watch_and_are_told_why_they_do_not_edit(client: TestClient, bak
         session.exact(2)
         session.send_message(type="edit", revision=3, patch=[SEEN])
         session.exact(3)
-        session.send_message(type="probe", x=3, y=4)
-        assert session.text("probe")["material"] == "Paper"
+        session.send_message(type="inspect", x=3, y=4)
+        assert session.text("inspect")["material"] == "Paper"
 
 
 def test_how_viewers_look_is_their_own_and_no_edit(
@@ -134,8 +134,8 @@ def test_how_viewers_look_is_their_own_and_no_edit(
 
 def test_the_place_of_somebody_is_nobody_elses(client: TestClient, baked: Baked, bearer: Bearer) -> None:
     with open_session(client, baked.bake, opening=ROOM_FIELDS, headers=bearer("edit", "Ann")) as ann:
-        seat = ann.text("hello")["room"]["seat"]
-        opening = {**ROOM_FIELDS, "seat": seat}
+        seat = ann.text("hello")["room"]["participant_token"]
+        opening = {**ROOM_FIELDS, "participant_token": seat}
         with open_session(client, baked.bake, opening=opening, headers=bearer("view", "Vera")) as vera:
             found = vera.text("hello")["room"]
             assert [(each["name"], each["role"]) for each in found["people"]] == [("Ann", "edit"), ("Vera", "view")]

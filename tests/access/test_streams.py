@@ -120,7 +120,7 @@ class TestSession:
         monkeypatch.setattr("relume_server.session.session.PROXY_REVALIDATION_S", 0.05)
         with open_session(client, baked.bake) as session:
             hello = session.text("hello")
-            assert session.text("leaving")["seconds"] == 0.2
+            assert session.text("server_draining")["seconds"] == 0.2
             with open_session(client, baked.bake, opening={"resume": hello["resume"]}) as again:
                 assert again.text("hello")["resumed"]
             with pytest.raises(ConnectionError) as ended:

@@ -337,7 +337,7 @@ def test_description_is_json_for_every_term():
     listed = json.loads(json.dumps(describe()))
     assert [entry["model"] for entry in listed] == list(TERMS)
     ggx = next(entry for entry in listed if entry["model"] == "ggx")
-    assert [(c["name"], c["angle"], c["bands"], c["outgoing"]) for c in ggx["curves"]] == [
+    assert [(c["name"], c["angle"], c["bands"], c["view_dependent"]) for c in ggx["curves"]] == [
         ("theta_h", "theta_h", 256, False),
         ("theta_d", "theta_d", 64, False),
         ("theta_i", "theta_i", 64, False),
@@ -354,10 +354,10 @@ def test_description_is_json_for_every_term():
         "scale",
         "step",
         "help",
-        "fixed",
+        "requires_new_operator",
     }
-    assert not roughness["fixed"]
-    fixed = {(entry["model"], p["name"]) for entry in listed for p in entry["parameters"] if p["fixed"]}
+    assert not roughness["requires_new_operator"]
+    fixed = {(entry["model"], p["name"]) for entry in listed for p in entry["parameters"] if p["requires_new_operator"]}
     assert ("oren_nayar", "sigma") in fixed
     assert (roughness["minimum"], roughness["maximum"]) == (0.03, 1.0)
 

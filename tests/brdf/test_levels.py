@@ -23,7 +23,7 @@ LEVELS = RoughnessLevels((0.5, 1.0, 1.5), np.array([0, 0, 1, 2, 2, 2], np.uint8)
 
 
 def document(model, **more):
-    return complete_term(("terms", 0), {"model": model, "roughness_map": True, **more}, None)
+    return complete_term(("terms", 0), {"model": model, "roughness_map": "roughness", **more}, None)
 
 
 def half_width(model, ratio):
@@ -57,7 +57,7 @@ def test_curves_of_the_width_differ_and_others_do_not() -> None:
     assert level_bands(term, curves["theta_h"], LEVELS).shape == (3, 3, 256)
     assert level_bands(term, curves["theta_d"], LEVELS).shape == (3, 64)
     assert level_bands(term, curves["theta_h"], NO_LEVELS).shape == (3, 256)
-    assert level_bands({**term, "roughness_map": False}, curves["theta_h"], LEVELS).shape == (3, 256)
+    assert level_bands({**term, "roughness_map": None}, curves["theta_h"], LEVELS).shape == (3, 256)
     for k, ratio in enumerate(LEVELS.ratios):
         expected = curve_bands(scaled_roughness(term, ratio), curves["theta_h"])
         np.testing.assert_array_equal(level_bands(term, curves["theta_h"], LEVELS)[k], expected)
@@ -85,7 +85,7 @@ def test_terms_without_a_width_refuse_a_map(model) -> None:
         document(model)
 
 
-@pytest.mark.parametrize("value", [None, 1, "map", [], {}])
+@pytest.mark.parametrize("value", [True, False, 1, "map", [], {}])
 def test_only_true_and_false_say_whether_the_map_is_followed(value) -> None:
     with pytest.raises(ParameterError, match="roughness_map"):
         complete_term(("terms", 0), {"model": "ggx", "roughness_map": value}, None)

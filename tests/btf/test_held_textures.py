@@ -71,7 +71,7 @@ def test_a_texture_that_is_turned_follows_and_is_exact_at_rest(bake, small_btf, 
     for degrees in (10.0, 40.0):
         look = covered(bake, small_btf.record, scale=2.0, rotation=degrees)
         held.set_look(look)
-        assert held.advance(None).fidelity == "followed"
+        assert held.advance(None).fidelity == "incremental"
         expected = render_image(bake, "front", look)
         assert 1e-4 < relative_rmse(held.image(), expected) < 0.2 * relative_rmse(before, expected)
         assert held.next_job().is_refinement

@@ -17,7 +17,7 @@ from relume_worker.status import bake_id
 def test_the_demo_bakes_what_the_editor_asks_for_first(tmp_path: Path) -> None:
     app = create_app(Settings(data=tmp_path, preload_importer=False, prewarm=False))
     with TestClient(app, "http://127.0.0.1") as client:
-        scene = client.post("/api/built-ins/still_life").json()
+        scene = client.post("/api/example-scenes/still_life").json()
         request = {"scene": scene["id"], "method": "gather", "views": [view["name"] for view in scene["views"]]}
         for recipe, preset in zip(demo_recipes(demo_scene()), ("preview", "good"), strict=True):
             asked = client.post("/api/bakes", json=request | {"preset": preset, "dry_run": True})

@@ -282,4 +282,4 @@ def test_an_import_prints_its_id_and_what_was_read(run: Any, tmp_path: Path) -> 
     ]
     (scene,) = parsed(run("import", str(tmp_path / "t.obj"), "--json", data=tmp_path / "data")[1])
     assert scene["id"] == text.strip()
-    assert {remark["effect"] for remark in scene["remarks"]} == {"wrong", "simplified", "unused"}
+    assert {warning["severity"] for warning in scene["warnings"]} == {"unsupported", "approximated", "ignored"}

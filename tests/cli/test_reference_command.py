@@ -73,8 +73,8 @@ def test_a_bake_is_compared_with_both_kinds_of_paths(
     assert main([*ASKED, str(look), "--spp", "256", "--output", output, "--compare", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert (document["path"], document["size"]) == (output, [32, 24])
-    assert document["found"]["error"] == pytest.approx(float(found[1]) / 100, rel=0.2)
-    assert document["found_of_method"]["rmse"] < document["found"]["rmse"]
+    assert document["error_all_paths"]["error"] == pytest.approx(float(found[1]) / 100, rel=0.2)
+    assert document["error_method_paths"]["rmse"] < document["error_all_paths"]["rmse"]
     assert main([*ASKED, str(look), "--spp", "4", "--output", output, "--compare", "--size", "8x6"]) == 1
     assert "a bake has its own" in capsys.readouterr().err
 

@@ -62,7 +62,7 @@ def apply_all_edits(document):
     for change in (
         draw_curve,
         set_floor_color,
-        edit_light("Panel", scale=0.5),
+        edit_light("Panel", intensity=0.5),
         edit_environment(rotation=80.0),
         edit_transport(bounces=1),
     ):
@@ -76,10 +76,10 @@ EDITS = {  # what a hand has touched before, and what it then does
     "a parameter held": (EXPONENT, set_exponent(60)),
     "a diffuse colour": ("/materials/Floor/terms/0/color", set_floor_color),
     "another model": (LOBE, replace_terms),
-    "brightness of a lamp": ("/lights/Lamp", edit_light("Lamp", scale=0.3)),
+    "brightness of a lamp": ("/lights/Lamp", edit_light("Lamp", intensity=0.3)),
     "a lamp moved": ("/lights/Lamp", edit_light("Lamp", position=[-0.4, 0.9, 0.7])),
-    "a lamp switched off": (None, edit_light("Panel", on=False)),
-    "tint of the environment": (None, edit_environment(scale=0.5, color=[1.0, 0.6, 0.4])),
+    "a lamp switched off": (None, edit_light("Panel", enabled=False)),
+    "tint of the environment": (None, edit_environment(intensity=0.5, color=[1.0, 0.6, 0.4])),
     "the environment turned": ("/environment/rotation", edit_environment(rotation=40.0)),
     "fewer paths": (None, edit_transport(bounces=1)),
     "all at once": (LOBE, apply_all_edits),

@@ -81,7 +81,9 @@ def test_a_watched_picture_comes_to_rest_like_any_other(transfer):
 def test_no_light_is_black(transfer):
     picture = live(transfer)
     before = picture.image()
-    dark = add_lights(edit_environment(scale=0.0), edit_light("Lamp", on=False), edit_light("Panel", scale=0.0))
+    dark = add_lights(
+        edit_environment(intensity=0.0), edit_light("Lamp", enabled=False), edit_light("Panel", intensity=0.0)
+    )
     picture.set_look(make_look(transfer, dark))
     assert not run_until_exact(picture).image().any()
     picture.set_look(make_look(transfer, add_lights()))
@@ -91,7 +93,7 @@ def test_no_light_is_black(transfer):
 def test_twice_the_light_is_twice_the_picture(transfer):
     picture = live(transfer)
     before = picture.image()
-    twice = (edit_environment(scale=2.0), edit_light("Lamp", scale=2.0), edit_light("Panel", scale=2.0))
+    twice = (edit_environment(intensity=2.0), edit_light("Lamp", intensity=2.0), edit_light("Panel", intensity=2.0))
     np.testing.assert_array_equal(edited(picture, transfer, None, *twice).image(), 2 * before)
     np.testing.assert_array_equal(exact_image(transfer, make_look(transfer, add_lights(*twice))), 2 * before)
 
@@ -100,8 +102,8 @@ def test_solos_of_all_sources_sum_to_the_whole(transfer):
     picture = live(transfer)
     whole, total = picture.image(), np.zeros_like(picture.image())
     for source in (*LIGHTS, None) if EditAxis.LIGHT in transfer.axes else (None,):
-        off = [edit_light(name, on=False) for name in LIGHTS if name != source]
-        alone = edited(picture, transfer, None, *off, edit_environment(scale=float(source is None))).image()
+        off = [edit_light(name, enabled=False) for name in LIGHTS if name != source]
+        alone = edited(picture, transfer, None, *off, edit_environment(intensity=float(source is None))).image()
         assert alone.any()
         total += alone
     np.testing.assert_allclose(total, whole, rtol=ADDED * UNIT)
@@ -192,13 +194,13 @@ def brute_force_knows(transfer):
 def test_straight_light_is_that_of_brute_force(scene, transfer, recipe):
     """Every texel at exact angles; a hundred triangles for the environment, and curves in bands, are two per cent."""
     brute_force_knows(transfer)
-    look = make_look(transfer, add_lights(edit_light("Panel", on=False), edit_transport(show="direct")))
+    look = make_look(transfer, add_lights(edit_light("Panel", enabled=False), edit_transport(show="direct")))
     truth = reference_image(scene, "front", look, recipe.size, 0)
     assert relative_rmse(exact_image(transfer, look), truth) < 0.03
 
 
 OFF = pytest.mark.parametrize(
-    "off", [edit_environment(scale=0.0), edit_light("Lamp", on=False)], ids=["of a lamp", "of the map"]
+    "off", [edit_environment(intensity=0.0), edit_light("Lamp", enabled=False)], ids=["of a lamp", "of the map"]
 )
 
 
@@ -218,7 +220,7 @@ def test_light_between_matt_surfaces_is_that_of_brute_force(scene, transfer, rec
     brute_force_knows(transfer)
     look = make_look(
         transfer,
-        add_lights(edit_light("Panel", on=False), off, remove_glossy_term, edit_transport(show="first_bounce")),
+        add_lights(edit_light("Panel", enabled=False), off, remove_glossy_term, edit_transport(show="first_bounce")),
     )
     found = exact_image(transfer, look).mean(axis=(0, 1))
     assert np.all((found > 0) == has_bounces(transfer))
@@ -233,7 +235,7 @@ def test_light_that_highlights_send_is_about_as_much_as_by_brute_force(scene, tr
     brute_force_knows(transfer)
     if not has_bounces(transfer):
         pytest.skip(f"{transfer.method} has no light between surfaces")
-    lights = edit_light("Panel", on=False), off, edit_transport(show="first_bounce")
+    lights = edit_light("Panel", enabled=False), off, edit_transport(show="first_bounce")
     look = make_look(transfer, add_lights(*lights))
     (expected, deviation), (sent_by_matt, _) = (
         followed(scene, each, recipe, True, 4)

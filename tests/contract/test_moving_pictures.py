@@ -108,9 +108,9 @@ def test_it_never_says_that_it_is_exact_and_rests(moving):
 
 
 def test_no_light_is_black_and_twice_the_light_twice_the_picture(moving):
-    dark = (edit_environment(scale=0.0), edit_light("Lamp", on=False), edit_light("Panel", scale=0.0))
+    dark = (edit_environment(intensity=0.0), edit_light("Lamp", enabled=False), edit_light("Panel", intensity=0.0))
     assert not make_picture(moving, *dark).image().any()
-    twice = (edit_environment(scale=2.0), edit_light("Lamp", scale=2.0), edit_light("Panel", scale=2.0))
+    twice = (edit_environment(intensity=2.0), edit_light("Lamp", intensity=2.0), edit_light("Panel", intensity=2.0))
     np.testing.assert_allclose(
         make_picture(moving, *twice).image(), 2 * make_picture(moving).image(), rtol=ROUNDED, atol=ROUNDED
     )
@@ -125,8 +125,8 @@ def test_solos_of_all_sources_sum_to_the_whole(moving):
 
     whole, total = make_picture(moving, plain).image(), 0
     for source in ("Lamp", "Panel", None):
-        off = [edit_light(name, on=False) for name in ("Lamp", "Panel") if name != source]
-        alone = make_picture(moving, plain, *off, edit_environment(scale=float(source is None))).image()
+        off = [edit_light(name, enabled=False) for name in ("Lamp", "Panel") if name != source]
+        alone = make_picture(moving, plain, *off, edit_environment(intensity=float(source is None))).image()
         assert alone.any()
         total = total + alone
     np.testing.assert_allclose(total, whole, rtol=ROUNDED, atol=ROUNDED)
@@ -171,7 +171,7 @@ def test_diffuse_light_from_elsewhere_is_that_of_brute_force(scene, moving, asid
         wall = {"model": "lambert", "color": [0.2, 0.3, 0.5], "params": {}, "curves": curves}
         document["materials"]["Wall"]["terms"] = [wall]
 
-    changes = (plain, edit_light("Panel", on=False), edit_light("Lamp", on=False), edit_transport(show=show))
+    changes = (plain, edit_light("Panel", enabled=False), edit_light("Lamp", enabled=False), edit_transport(show=show))
     look = make_look(moving, add_lights(*changes))
     passes = [
         reference_image(_with(scene, aside), "front", look, (48, 36), 64, pass_index=k, reflects=True) for k in range(4)

@@ -87,9 +87,9 @@ def test_the_moving_picture_stands_until_the_still_is_exact_and_comes_back_with_
         while not (step := picture.advance(None)).exact:
             run_next_job(picture)
         assert step.changed
-        assert step.was_off == pytest.approx(relative_rmse(first, picture.image()), rel=1e-3)
-        assert 0 < step.was_off < 0.5
-        assert picture.advance(None).was_off is None
+        assert step.previous_error == pytest.approx(relative_rmse(first, picture.image()), rel=1e-3)
+        assert 0 < step.previous_error < 0.5
+        assert picture.advance(None).previous_error is None
         assert not picture.advance(None).changed
         picture.set_camera(moving.views["front"].camera, (48, 36))
         step = picture.advance(None)
@@ -167,7 +167,7 @@ def test_with_too_little_memory_the_moving_picture_stays(baked, scene, aside):
         StaticViewBuilder(moving.light_transport, scene).make_static_view,
         moving.cache,
     )
-    picture.set_look(make_look(moving, add_lights(edit_light("Panel", on=False))))
+    picture.set_look(make_look(moving, add_lights(edit_light("Panel", enabled=False))))
     picture.set_camera(aside, SIZE)
     picture.advance(None)
     run_next_job(picture)
@@ -198,15 +198,15 @@ def few_at_once(picture, aside, monkeypatch):
 def test_a_few_exact_samples_correct_the_moving_picture_until_the_still_is_there(few_at_once):
     picture, before = few_at_once
     step = picture.advance(None)
-    assert (step.exact, step.fidelity, step.was_off, step.changed) == (False, "approximate", None, True)
+    assert (step.exact, step.fidelity, step.previous_error, step.changed) == (False, "approximate", None, True)
     assert picture.array_blocks() is None  # no shader elsewhere knows of it
     first = picture.image().copy()
     assert isinstance(picture.next_job(), StaticViewJob)
     step = rested(picture)
     assert step.exact
-    assert step.was_off == pytest.approx(relative_rmse(before, picture.image()), rel=1e-3)
-    assert step.was_off > 0.1
-    assert relative_rmse(first, picture.image()) < 0.4 * step.was_off
+    assert step.previous_error == pytest.approx(relative_rmse(before, picture.image()), rel=1e-3)
+    assert step.previous_error > 0.1
+    assert relative_rmse(first, picture.image()) < 0.4 * step.previous_error
 
 
 def test_where_the_moving_picture_is_right_few_samples_leave_it_alone(picture, aside, monkeypatch):

@@ -71,7 +71,7 @@ ROWS = {
         f"{rooms.MAX_PERSON_NAME}; {rooms.MIN_ROOM} to {rooms.MAX_ROOM} characters"
     ),
     "views shown at once; frames that are not acknowledged": (
-        f"{protocol.MAX_VIEWS_SHOWN}; {protocol.MAX_FRAMES_IN_FLIGHT}"
+        f"{protocol.MAX_VISIBLE_VIEWS}; {protocol.MAX_FRAMES_IN_FLIGHT}"
     ),
     "cameras placed in a scene": f"{cameras.MAX_CAMERAS}",
     "saved look; number of them": f"{look_store.MAX_LOOK_BYTES // KIB} KiB; {look_store.MAX_LOOKS:,}",
@@ -82,7 +82,7 @@ ROWS = {
     "frames whose looks are told at once; all together": f"{renders.MAX_LISTED_FRAMES}; "
     f"{renders.MAX_LISTED_BYTES // MIB} MiB",
     "passes of a comparison; of each kind of long work waiting": f"{most('passes'):,}; {Settings().max_queued}",
-    "pixels of a view whose eye moves": f"{protocol.MAX_EYE_PIXELS:,}",
+    "pixels of a view whose eye moves": f"{protocol.MAX_CAMERA_PIXELS:,}",
 }
 
 

@@ -62,8 +62,8 @@ class Server:
 
     def create_free_camera_scene(self) -> str:
         """A scene of its own with one bake, whose view moves; it is to be deleted."""
-        identity = str(self.call("/api/built-ins/cornell_box", {})["id"])
-        self.bake({"scene": identity, "method": "probes", "size": (120, 120), "lights": 100, "points": 4000})
+        identity = str(self.call("/api/example-scenes/cornell_box", {})["id"])
+        self.bake({"scene": identity, "method": "probes", "size": (120, 120), "lights": 100, "probes": 4000})
         return identity
 
     def ball_on_a_floor(self) -> str:

@@ -133,9 +133,11 @@ def render(client, bake, look, path):
 
 def test_a_frame_in_another_light_is_judged_in_that_light(client, imported, bake):
     request = {"bake": bake, "view": "front", "look": {"environment": {"map": imported["map"]}}, "passes": 2}
-    url = client.post("/api/truths", json=request).headers["location"]
+    url = client.post("/api/comparisons", json=request).headers["location"]
     wait(lambda: client.get(url).json()["state"] == "ready")
-    assert client.get(url).json()["found_of_method"]["limit"] < 0.25  # in the studio's light it would be above 1
+    assert (
+        client.get(url).json()["error_method_paths"]["error_upper_bound"] < 0.25
+    )  # in the studio's light it would be above 1
 
 
 def test_what_was_deleted_is_known_no_more(client, bake):

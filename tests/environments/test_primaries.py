@@ -41,7 +41,7 @@ def test_a_map_in_other_primaries_is_the_same_light(tmp_path):
     found = read_environment(write_map(tmp_path / "a.exr", other, REC_2020), "dusk")
     wanted[3, 4] = wanted[5, 6] = 0
     np.testing.assert_allclose(found.radiance, wanted, atol=2e-3 * wanted.max(), rtol=2e-3)
-    assert [warning.effect for warning in found.warnings] == ["wrong"]
+    assert [warning.severity for warning in found.warnings] == ["unsupported"]
     plain = read_environment(write_map(tmp_path / "b.exr", wanted, REC_709), "dusk")
     np.testing.assert_array_equal(plain.radiance, wanted)
 

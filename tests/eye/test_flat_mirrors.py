@@ -163,7 +163,7 @@ def test_a_hand_on_the_mirrors_colour_sees_what_it_throws(lit):
     run_until_exact(picture)
     for color in (0.5, 0.1):
         picture.set_look(colored(color), active_pointer="/materials/Mirror/terms/0/color")
-        while picture.advance(None).fidelity != "followed":
+        while picture.advance(None).fidelity != "incremental":
             run_next_job(picture)
         exact = render_image(lit, "front", colored(color))
         assert 1e-6 < relative_rmse(picture.image(), exact) < 0.01

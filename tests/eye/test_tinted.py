@@ -142,7 +142,7 @@ def test_a_lamp_that_a_look_adds_behind_tinted_glass_shows_its_tint(of, tmp_path
 
     def lit(document):
         document["lights"]["Lamp"] = {"kind": "point", "position": [0.0, 6.0, -3.0], "emission": [90.0, 90.0, 90.0]}
-        document["environment"]["scale"] = 0.0
+        document["environment"]["intensity"] = 0.0
 
     picture, _ = rendered(scene, tmp_path, lit)
     pixels = picture.reshape(-1, 3)

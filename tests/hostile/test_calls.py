@@ -24,7 +24,7 @@ def test_files_beside_a_scene_are_bounded_and_their_names_are_no_paths(client: T
     assert parse_problem(refused)["type"] == "urn:relume:problem:parameter"
     climbing = [("scene", ("a/b/c.obj", obj)), ("companions", ("../../../../tmp/x", b"newmtl Red\n"))]
     taken = client.post("/api/scenes", files=climbing).json()
-    assert ["relume.db' is not beside" in warning for warning in taken["warnings"]] == [True]
+    assert ["relume.db' is not beside" in warning["text"] for warning in taken["warnings"]] == [True]
     client.delete(f"/api/scenes/{taken['id']}")
     assert list(settings.data.glob("upload-*")) == []
 
@@ -109,7 +109,7 @@ def test_look_beyond_its_size_is_413(client: TestClient) -> None:
         {"looks": []},
         {"looks": [{}] * 1001},
         {"looks": [{"materials": {"Nothing": {}}}]},
-        {"looks": [{"environment": {"scale": -1}}]},
+        {"looks": [{"environment": {"intensity": -1}}]},
         {"format": "exe"},
         {"size": [0, 1]},
         {"size": [161, 96]},
@@ -192,7 +192,7 @@ def test_null_characters_come_to_no_database(client: TestClient, method: str, pa
     assert (refused["status"], refused["parameter"]) == (422, "the address")
 
 
-@pytest.mark.parametrize("path", ["/api/models/albedo", "/api/models/in-out"])
+@pytest.mark.parametrize("path", ["/api/models/albedo", "/api/models/zernike-fit"])
 def test_names_that_are_no_unicode_are_refused_in_unicode(client: TestClient, path: str) -> None:
     body = b'{"terms": [{"model": "lambert", "\\ud800": 1}]}'
     refused = parse_problem(client.post(path, content=body, headers={"Content-Type": "application/json"}))
@@ -211,7 +211,7 @@ def test_bodies_that_cannot_be_read_are_a_kind_of_problem(
     client: TestClient, content: bytes, kind: str, words: str
 ) -> None:
     refused = parse_problem(client.post("/api/environments", content=content, headers={"Content-Type": kind}))
-    assert refused["type"] == "urn:relume:problem:form"
+    assert refused["type"] == "urn:relume:problem:invalid-request"
     if refused["status"] == 400:
         assert words in refused["detail"]
 

@@ -41,8 +41,8 @@ def is_alive(session: Session, revision: int) -> bool:
         '{"type": "ack", "frame": 1, "more": 1}',
         '{"type": "edit", "revision": 1, "patch": []}',
         '{"type": "edit", "revision": 1, "patch": [{"op": "move", "from": "/a", "path": "/b"}]}',
-        '{"type": "brush", "curve": "/x", "from": NaN, "to": 3}',
-        '{"type": "stream", "format": "gif"}',
+        '{"type": "highlight_curve_range", "curve": "/x", "from": NaN, "to": 3}',
+        '{"type": "encoding", "format": "gif"}',
         "[" * 60_000,
         '{"type": "edit", "revision": 1, "patch": ' + "[" * 30_000 + "]" * 30_000 + "}",
     ],
@@ -116,7 +116,7 @@ def test_old_revision_is_refused(client: TestClient, baked: Baked, revision: int
         ("/materials/Paper/terms/1/curves", {"theta_x": {"points": [[0, 1], [90, 0]]}}),
         ("/materials/Paper/terms/1/curves", {"theta_h": {"points": [[k / 100, 1] for k in range(4097)]}}),
         ("/materials/Paper/terms/99/color", [1, 1, 1]),
-        ("/environment/scale", -1),
+        ("/environment/intensity", -1),
         ("/environment/color", [1, 1]),
         ("/__class__/__init__", 1),
         ("no pointer", 1),
@@ -149,12 +149,12 @@ def test_curve_of_a_hundred_thousand_points_is_too_big_a_message(client: TestCli
     "message",
     [
         {"type": "view", "name": "../../etc"},
-        {"type": "probe", "x": 160, "y": 0},
-        {"type": "probe", "view": "left", "x": 0, "y": 0},
-        {"type": "touch", "curve": "/materials/Paper/terms/1/curves/theta_x"},
-        {"type": "touch", "curve": "/materials/../terms/1/curves/theta_h"},
-        {"type": "touch", "curve": "/materials/Paper/terms/999/curves/theta_h"},
-        {"type": "brush", "curve": "/materials/Paper/terms/0/curves/theta_h", "from": 0, "to": 9},
+        {"type": "inspect", "x": 160, "y": 0},
+        {"type": "inspect", "view": "left", "x": 0, "y": 0},
+        {"type": "prepare", "curve": "/materials/Paper/terms/1/curves/theta_x"},
+        {"type": "prepare", "curve": "/materials/../terms/1/curves/theta_h"},
+        {"type": "prepare", "curve": "/materials/Paper/terms/999/curves/theta_h"},
+        {"type": "highlight_curve_range", "curve": "/materials/Paper/terms/0/curves/theta_h", "from": 0, "to": 9},
         {"type": "ack", "frame": 999},
     ],
 )
@@ -172,14 +172,14 @@ def test_flood_of_edits_and_brushes_keeps_one_of_each(client: TestClient, baked:
         session.frame()
         for revision in range(1, 500):
             session.edit(revision, SIGMA, 0.2 + revision / 1000)
-            session.send_message(type="brush", curve=THETA_H, **{"from": 0.0, "to": 9.0})
+            session.send_message(type="highlight_curve_range", curve=THETA_H, **{"from": 0.0, "to": 9.0})
         with pytest.raises(ConnectionError) as closed:
             session.text("never")
     assert closed.value.args[0] == 4408
     assert control.num_looks < 10
 
 
-@pytest.mark.parametrize("subprotocols", [[], ["relume.v2"], ["RELUME.V1"]])
+@pytest.mark.parametrize("subprotocols", [[], ["relume.v1"], ["RELUME.V2"]])
 def test_other_subprotocol_closes_1002(client: TestClient, baked: Baked, subprotocols: list[str]) -> None:
     with open_session(client, baked.bake, subprotocols=subprotocols) as session:
         with pytest.raises(ConnectionError) as closed:
@@ -241,13 +241,13 @@ def test_session_on_damaged_store_says_so(client: TestClient, baked: Baked) -> N
         "no json",
         '{"type": "open", "room": 1}',
         '{"type": "open", "resume": ""}',
-        '{"type": "open", "seat": "' + "a" * 65 + '"}',
+        '{"type": "open", "participant_token": "' + "a" * 65 + '"}',
         '{"type": "open", "token": "x"}',
         '{"type": "ack", "frame": 1}',
     ],
 )
 def test_a_session_that_does_not_begin_with_open_is_closed(client: TestClient, baked: Baked, text: str) -> None:
-    with client.websocket_connect(session_path(baked.bake, {}), ["relume.v1"]) as websocket:
+    with client.websocket_connect(session_path(baked.bake, {}), ["relume.v2"]) as websocket:
         websocket.send_text(text)
         with pytest.raises(ConnectionError) as closed:
             Session(websocket, acknowledges=False).receive()
@@ -258,7 +258,7 @@ def test_a_client_that_says_nothing_is_closed(
     client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("relume_server.session.reader.OPEN_SECONDS", 0.05)
-    opened = client.websocket_connect(session_path(baked.bake, {}), ["relume.v1"])
+    opened = client.websocket_connect(session_path(baked.bake, {}), ["relume.v2"])
     with opened as websocket, pytest.raises(ConnectionError) as closed:
         Session(websocket, acknowledges=False).receive()
     assert closed.value.args == (1008, "no message within 0.05 s; send open first")
@@ -279,7 +279,7 @@ def test_unknown_resume_token_is_a_new_session(client: TestClient, baked: Baked,
 
 def test_a_null_character_in_the_address_of_a_session_is_refused(client: TestClient, baked: Baked) -> None:
     path = f"/api/bakes/{baked.bake}/session?room_prefix=%00"
-    with pytest.raises(WebSocketDenialResponse) as refused, client.websocket_connect(path, ["relume.v1"]):
+    with pytest.raises(WebSocketDenialResponse) as refused, client.websocket_connect(path, ["relume.v2"]):
         pass
     assert refused.value.status_code == 422
     assert "null character" in refused.value.json()["detail"]

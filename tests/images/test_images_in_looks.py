@@ -71,7 +71,7 @@ def test_what_other_surfaces_get_from_it_follows(bakes, named):
 
     def reflected(scene, texture):
         look = painted(scene, texture)
-        return look.model_copy(update={"transport": look.transport.model_copy(update={"show": "reflected"})})
+        return look.model_copy(update={"transport": look.transport.model_copy(update={"show": "indirect"})})
 
     found = render_exact(bare, reflected(plain, named), method)
     expected = render_exact(baked, reflected(own, "diffuse"), method)

@@ -59,7 +59,7 @@ def with_tangents(scene):
 @pytest.fixture(scope="module", params=["flat", pytest.param("bumpy", marks=pytest.mark.slow)])
 def plain(request):
     """A floor and a ball on it, and a wall, that shine; whether they have bumps of their own."""
-    shiny = {"model": "ggx", "texture": None, "params": {"roughness": 0.4, "f0": 0.5}, "roughness_map": True}
+    shiny = {"model": "ggx", "texture": None, "params": {"roughness": 0.4, "f0": 0.5}, "roughness_map": "roughness"}
     floor = {"model": "lambert", "color": [0.2, 0.3, 0.2]}, shiny
     wall = {**floor[0], "color": [0.8, 0.5, 0.2]}, shiny
     own = (
@@ -109,7 +109,7 @@ def test_pictures_are_those_of_a_scene_that_has_the_map(bakes, plain, named):
 def test_what_surfaces_send_is_of_the_normals_that_are_seen(bakes, plain, named):
     """Of the normals of the bake it would be 27 % off."""
     bare, baked = bakes
-    reflected = {"transport": {"show": "reflected"}}
+    reflected = {"transport": {"show": "indirect"}}
     found = render_exact(bare, bumpy(plain, named, **reflected), bare.method)
     expected = render_exact(baked, bumpy(plain, None, **reflected), bare.method)
     assert relative_rmse(found, expected) < 0.05
@@ -205,7 +205,7 @@ def test_no_strength_is_no_bumps(bakes, plain, named):
 def test_what_is_seen_in_a_mirror_leans_as_well(named, method, tmp_path):
     """A floor and a ball before a wall that is a mirror, among the pixels of the mirror."""
     chrome = {"model": "ggx", "texture": None, "color": [0.9, 0.9, 0.9], "params": {"roughness": 0.03, "f0": 1.0}}
-    shiny = {"model": "ggx", "texture": None, "params": {"roughness": 0.4, "f0": 0.5}, "roughness_map": True}
+    shiny = {"model": "ggx", "texture": None, "params": {"roughness": 0.4, "f0": 0.5}, "roughness_map": "roughness"}
     scene = with_tangents(corner([Material("Floor", (shiny,)), Material("Wall", (chrome,))]))
     bare, baked = (open_small_bake(s, method, tmp_path / str(k)) for k, s in enumerate((scene, with_own(scene, named))))
     in_mirror = bare.views["front"].material_ids() == 1

@@ -44,7 +44,7 @@ def bumps():
 def plain():
     """A bumpy floor and a ball on it, as rough everywhere; a wall that shines as well."""
     shiny = {"model": "ggx", "color": [1.0, 1.0, 1.0], "texture": None, "params": {"roughness": 0.4, "f0": 0.5}}
-    floor = {"model": "lambert", "color": [0.2, 0.3, 0.2]}, {**shiny, "roughness_map": True}
+    floor = {"model": "lambert", "color": [0.2, 0.3, 0.2]}, {**shiny, "roughness_map": "roughness"}
     wall = {**floor[0], "color": [0.8, 0.5, 0.2]}, shiny
     materials = [Material("Floor", floor, {}, bumps()), Material("Wall", wall)]
     return corner(materials)
@@ -132,7 +132,7 @@ def test_truths_show_it(plain, named):
     mean, own = mean_roughness(named), with_own(plain, named)
     found, expected = (
         reference_image(scene, "front", rough(scene, follows, mean), (16, 16), 0)
-        for scene, follows in ((plain, named), (own, True))
+        for scene, follows in ((plain, named), (own, "roughness"))
     )
     assert relative_rmse(found, expected) < 1e-3
     assert relative_rmse(reference_image(plain, "front", rough(plain, True, mean), (16, 16), 0), expected) > 0.05
@@ -146,7 +146,7 @@ def test_terms_of_a_material_follow_one(plain, named):
         validate(document, default_look(plain.materials))
 
 
-@pytest.mark.parametrize("follows", ["image:0000000000000000", "image:../x", "map", 3, None])
+@pytest.mark.parametrize("follows", ["image:0000000000000000", "image:../x", "map", 3, True])
 def test_an_image_that_is_not_here_is_no_map(plain, follows):
     with pytest.raises(ParameterError, match=r"terms/1/roughness_map.*image that was sent"):
         rough(plain, follows, 0.4)

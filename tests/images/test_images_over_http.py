@@ -167,7 +167,7 @@ def wait(is_done):
 @pytest.mark.slow
 def test_a_ball_of_a_material_shows_its_images(client, sent):
     """The scene's own and one that was sent; what is not here is refused by its name."""
-    scene = client.post("/api/built-ins/still_life").json()["id"]
+    scene = client.post("/api/example-scenes/still_life").json()["id"]
     url = f"/api/scenes/{scene}/ball"
 
     def ball(**given):

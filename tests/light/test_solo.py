@@ -9,13 +9,13 @@ from relume.look import Look, default_look, validate
 from relume.scene.model import Material
 
 WHITE = Material("White", ({"model": "lambert", "color": [1.0, 1.0, 1.0]},))
-LAMP = {"kind": "point", "position": [0.0, 1.0, 0.0], "scale": 2.0}
-ENVIRONMENT = {"scale": 0.5, "color": [1.0, 0.5, 0.25], "rotation": 20.0}
+LAMP = {"kind": "point", "position": [0.0, 1.0, 0.0], "intensity": 2.0}
+ENVIRONMENT = {"intensity": 0.5, "color": [1.0, 0.5, 0.25], "rotation": 20.0}
 
 
 def look(lamp: bool = True, spot: bool = False, **environment: object) -> Look:
     """A lamp that is on, a spot that is off, and the light around, each as it is asked for."""
-    lights = {"Lamp": {**LAMP, "on": lamp}, "Spot": {"kind": "spot", "on": spot}}
+    lights = {"Lamp": {**LAMP, "enabled": lamp}, "Spot": {"kind": "spot", "enabled": spot}}
     return validate({"lights": lights, "environment": {**ENVIRONMENT, **environment}}, default_look([WHITE]))
 
 
@@ -28,11 +28,11 @@ def shown(of: Look, *solo: str) -> tuple[object, object]:
     ("solo", "switched"),
     [
         ((), look()),
-        (("Lamp",), look(scale=0.0)),
-        (("Spot",), look(lamp=False, spot=True, scale=0.0)),
+        (("Lamp",), look(intensity=0.0)),
+        (("Spot",), look(lamp=False, spot=True, intensity=0.0)),
         (("environment",), look(lamp=False)),
         (("environment", "Spot"), look(lamp=False, spot=True)),
-        (("Lamp", "Nobody"), look(scale=0.0)),
+        (("Lamp", "Nobody"), look(intensity=0.0)),
         (("Nobody",), look()),
     ],
 )
@@ -41,7 +41,7 @@ def test_light_is_that_of_the_look_with_the_others_off(solo: tuple[str, ...], sw
 
 
 def test_a_light_without_emission_is_as_dark_alone_as_it_is() -> None:
-    dark = validate({"lights": {"Lamp": {**LAMP, "scale": 0.0}}}, default_look([WHITE]))
+    dark = validate({"lights": {"Lamp": {**LAMP, "intensity": 0.0}}}, default_look([WHITE]))
     light, gain = shown(dark, "Lamp")
     assert gain == (0.0, 0.0, 0.0)
     assert light == illumination_from_look(dark, ["White"], has_bounces=True)

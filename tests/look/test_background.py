@@ -15,8 +15,8 @@ DEFAULT = default_look([PLAIN, GROUND])
 
 def test_default_shows_the_map_and_a_ground_catches():
     assert DEFAULT["background"]["kind"] == "map"
-    assert DEFAULT["materials"]["Ground"]["catcher"] is True
-    assert "catcher" not in DEFAULT["materials"]["Ball"]
+    assert DEFAULT["materials"]["Ground"]["shadow_catcher"] is True
+    assert "shadow_catcher" not in DEFAULT["materials"]["Ball"]
 
 
 def test_looks_and_stores_of_before_have_one_too():
@@ -45,17 +45,17 @@ def test_what_is_no_background_is_refused(field, value):
 
 
 def test_only_a_ground_may_catch():
-    patch = [{"op": "replace", "path": "/materials/Ground/catcher", "value": False}]
+    patch = [{"op": "replace", "path": "/materials/Ground/shadow_catcher", "value": False}]
     changed = apply_patch(DEFAULT, patch, DEFAULT)
-    assert validate(changed, DEFAULT).materials["Ground"].catcher is False
+    assert validate(changed, DEFAULT).materials["Ground"].shadow_catcher is False
     assert changed["materials"]["Ball"] is DEFAULT["materials"]["Ball"]
-    with pytest.raises(ParameterError, match="/materials/Ball/catcher"):
-        complete({"materials": {"Ball": {"catcher": True}}}, DEFAULT)
-    with pytest.raises(ParameterError, match="/materials/Ground/catcher"):
-        complete({"materials": {"Ground": {"catcher": 1}}}, DEFAULT)
+    with pytest.raises(ParameterError, match="/materials/Ball/shadow_catcher"):
+        complete({"materials": {"Ball": {"shadow_catcher": True}}}, DEFAULT)
+    with pytest.raises(ParameterError, match="/materials/Ground/shadow_catcher"):
+        complete({"materials": {"Ground": {"shadow_catcher": 1}}}, DEFAULT)
 
 
 def test_brute_force_is_asked_for_what_is_there():
     look = validate({"background": {"kind": "transparent"}}, DEFAULT).without_compositing()
     assert look.background.kind == "map"
-    assert not look.materials["Ground"].catcher
+    assert not look.materials["Ground"].shadow_catcher

@@ -21,8 +21,8 @@ def test_default_look_has_every_field(default):
         "curves": {},
     }
     assert default["materials"]["a/b~c"]["terms"][0]["texture"] is None
-    assert default["environment"] == {"map": None, "scale": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0}
-    plain = {"scale": 1.0, "color": [1.0, 1.0, 1.0], "on": True}
+    assert default["environment"] == {"map": None, "intensity": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0}
+    plain = {"intensity": 1.0, "color": [1.0, 1.0, 1.0], "enabled": True}
     spot = {"kind": "spot", "position": [1.0, 2.0, 3.0], "direction": [0.0, -1.0, 0.0], "cone": [20.0, 30.0]}
     panel = {"kind": "mesh", "material": "Teapot", "emission": [5.0, 5.0, 4.0]}
     assert default["lights"] == {"Key": {**plain, **spot, "emission": [1.0, 1.0, 1.0]}, "Panel": {**plain, **panel}}
@@ -35,13 +35,13 @@ def test_default_look_has_every_field(default):
 def test_partial_look_keeps_what_it_does_not_name(default):
     partial = {
         "materials": {"Teapot": {"terms": [{"model": "lambert", "color": [0, 1, 0]}]}},
-        "lights": {"Key": {"on": False}},
+        "lights": {"Key": {"enabled": False}},
         "display": {"exposure": 2},
     }
     full = complete(partial, default)
     assert [t["model"] for t in full["materials"]["Teapot"]["terms"]] == ["lambert"]
     assert full["materials"]["a/b~c"] == default["materials"]["a/b~c"]
-    assert full["lights"] == {**default["lights"], "Key": {**default["lights"]["Key"], "on": False}}
+    assert full["lights"] == {**default["lights"], "Key": {**default["lights"]["Key"], "enabled": False}}
     assert full["display"] == {"exposure": 2, "tone_map": "agx"}
     assert complete({}, default) == default
 
@@ -61,15 +61,15 @@ def test_the_contract_s_example_is_valid(default):
                 ]
             }
         },
-        "environment": {"map": None, "scale": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0},
-        "lights": {"Key": {"scale": 1.0, "color": [1, 1, 1], "on": True}},
+        "environment": {"map": None, "intensity": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0},
+        "lights": {"Key": {"intensity": 1.0, "color": [1, 1, 1], "enabled": True}},
         "display": {"exposure": 0.0, "tone_map": "agx"},
     }
     look = validate(example, default)
     assert isinstance(look, Look)
     assert look.materials["Teapot"].terms[1]["params"]["sigma"] == 0.2
     assert look.display.tone_map == "agx"
-    assert look.lights["Key"].on is True
+    assert look.lights["Key"].enabled is True
     with pytest.raises(ValidationError):
         look.display.exposure = 3.0
 
@@ -86,7 +86,7 @@ def test_lights_are_added_completed_and_taken_away(default):
     lamp = {"op": "add", "path": "/lights/Lamp", "value": {"kind": "rectangle", "size": [1, 2]}}
     added = apply_patch(default, [lamp], default)
     assert added["lights"]["Lamp"] == {
-        "kind": "rectangle", "scale": 1.0, "color": [1.0, 1.0, 1.0], "on": True, "emission": [1.0, 1.0, 1.0],
+        "kind": "rectangle", "intensity": 1.0, "color": [1.0, 1.0, 1.0], "enabled": True, "emission": [1.0, 1.0, 1.0],
         "position": [0.0, 1.0, 0.0], "direction": [0.0, -1.0, 0.0], "rotation": 0.0, "size": [1, 2],
     }  # fmt: skip
     moved = apply_patch(added, replace("/lights/Lamp/position/1", 1.5), default)
@@ -100,14 +100,14 @@ def test_light_of_the_scene_may_change_its_kind_and_comes_back_when_removed(defa
     assert edited["lights"]["Key"]["position"] == [0.0, 1.0, 0.0], "another kind starts from its own defaults"
     edited = apply_patch(edited, [{"op": "remove", "path": "/lights/Key"}], default)
     assert edited == default
-    dark = apply_patch(default, replace("/lights/Panel/on", False), default)
+    dark = apply_patch(default, replace("/lights/Panel/enabled", False), default)
     assert validate(dark, default).lights["Panel"].gain == (0.0, 0.0, 0.0)
 
 
 def test_light_s_gain_and_geometry_say_all_of_it(default):
     edited = apply_patch(
         default,
-        replace("/lights/Key", {"scale": 2, "color": [1, 0.5, 0], "emission": [3, 3, 3]}),
+        replace("/lights/Key", {"intensity": 2, "color": [1, 0.5, 0], "emission": [3, 3, 3]}),
         default,
     )
     key, before = validate(edited, default).lights["Key"], validate(default, default).lights["Key"]
@@ -125,8 +125,8 @@ def test_light_s_gain_and_geometry_say_all_of_it(default):
         ({"bounces": 1}, (True, 1, 1)),
         ({"bounces": 0}, (True, 1, 0)),
         ({"show": "direct"}, (True, 1, 0)),
-        ({"show": "reflected"}, (False, 1, 24)),
-        ({"show": "reflected", "bounces": 0}, (False, 1, 0)),
+        ({"show": "indirect"}, (False, 1, 24)),
+        ({"show": "indirect", "bounces": 0}, (False, 1, 0)),
         ({"show": "first_bounce"}, (False, 1, 1)),
         ({"show": "first_bounce", "bounces": 0}, (False, 1, 0)),
         ({"show": "further_bounces", "bounces": 3}, (False, 2, 3)),

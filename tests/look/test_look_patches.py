@@ -104,8 +104,8 @@ def test_what_a_patch_removes_is_the_default_again(default):
 def test_empty_path_replaces_the_whole_look(default):
     edited = apply_patch(default, replace("/display/exposure", 3), default)
     assert apply_patch(edited, replace("", {}), default) == default
-    whole = apply_patch(default, replace("", {"environment": {"scale": 2}}), default)
-    assert whole["environment"] == {"map": None, "scale": 2, "color": [1.0, 1.0, 1.0], "rotation": 0.0}
+    whole = apply_patch(default, replace("", {"environment": {"intensity": 2}}), default)
+    assert whole["environment"] == {"map": None, "intensity": 2, "color": [1.0, 1.0, 1.0], "rotation": 0.0}
 
 
 def test_term_may_be_added_moved_down_and_changed_in_model(default):
@@ -147,10 +147,10 @@ OPERATIONS = st.builds(
             "/materials/Teapot/terms/1/color",
             "/display/exposure",
             "/environment",
-            "/lights/Key/on",
+            "/lights/Key/enabled",
             "/lights/Lamp",
             "/lights/Lamp/cone",
-            "/lights/Lamp/scale",
+            "/lights/Lamp/intensity",
             f"{CURVES}/theta_d",
             "",
         ]

@@ -25,12 +25,12 @@ def ball(document):
 
 
 def test_keyframes_are_themselves_and_numbers_between_go_evenly():
-    first, last = look(), look(environment={"rotation": 90.0, "scale": 3.0})
+    first, last = look(), look(environment={"rotation": 90.0, "intensity": 3.0})
     assert interpolate_looks([first, last], 0.0) == first
     assert interpolate_looks([first, last], 1.0) == last
     between = interpolate_looks([first, last], 0.25)
     assert between["environment"]["rotation"] == pytest.approx(22.5)
-    assert between["environment"]["scale"] == pytest.approx(1.5)
+    assert between["environment"]["intensity"] == pytest.approx(1.5)
     assert complete(between, DEFAULT) == between
 
 

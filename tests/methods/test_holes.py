@@ -84,7 +84,7 @@ def test_a_moving_eye_sees_through_and_shaders_are_told(scene, tmp_path):
     holes = found.embree.alpha_test
     assert holes is not None
     np.testing.assert_array_equal(holes.image >= 0, found.stored_scene.face_material == 1)
-    assert constants(found)["has_holes"]
+    assert constants(found)["has_alpha_test"]
     look = make_look(found)
     wanted = reference_image(scene, "front", look, (48, 36), 0)
     assert relative_rmse(render_image(found, "front", look), wanted) < 0.2
@@ -95,5 +95,5 @@ def test_bakes_of_whole_surfaces_hold_nothing_of_holes(scene, tmp_path):
     without = make_tiny_scene(*scene.meshes, camera=scene.cameras[0], environment=studio(), materials=whole)
     found = opened(without, "probes", tmp_path)
     assert found.embree.alpha_test is None
-    assert not constants(found)["has_holes"]
+    assert not constants(found)["has_alpha_test"]
     assert not (tmp_path / "probes.zarr" / "alpha_masks").exists()

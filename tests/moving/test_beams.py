@@ -147,7 +147,7 @@ def test_a_turned_sun_casts_its_shadows_where_it_stands(sunlit, tmp_path):
 def test_small_lamps_cast_the_shadows_of_a_fixed_view(kind, sunlit, fixed):
     def lit(document):
         document["lights"] = {"Lamp": copy.deepcopy(LAMPS[kind])}
-        document["environment"]["scale"] = 0.0
+        document["environment"]["intensity"] = 0.0
 
     expected = render_image(fixed, "front", look_of(fixed, lit))
     by_pixels = error(picture_of(sunlit, look_of(sunlit, lit)).image(), expected)

@@ -54,7 +54,7 @@ def rendered(transfer, *several, **kwargs):
         ((), 0.03),
         ((WHITE,), 0.05),
         ((WHITE, environment(rotation=70.0)), 0.05),
-        ((background(kind="blurred", blur=12.0), environment(rotation=40.0, scale=2.0)), 0.03),
+        ((background(kind="blurred", blur=12.0), environment(rotation=40.0, intensity=2.0)), 0.03),
         ((COLOUR, set_only_area_light), 0.15),
         ((COLOUR, set_only_spot_light, set_paths("direct")), 0.15),
         ((COLOUR, set_only_emissive_ball), 0.01),

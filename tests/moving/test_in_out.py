@@ -13,18 +13,18 @@ from relume.math.zernike import NUM_FUNCTIONS, num_functions, project
 
 def test_one_function_is_enough_for_a_diffuse_surface():
     told = factorization_error(document("lambert"))
-    assert (told.functions, told.needed, told.is_mirror) == (NUM_FUNCTIONS, 1, False)
-    assert told.missed < 1e-3
+    assert (told.functions, told.required_functions, told.is_mirror) == (NUM_FUNCTIONS, 1, False)
+    assert told.residual < 1e-3
 
 
 def test_sharper_highlights_need_more_until_they_are_mirrors():
     told = [factorization_error(document("phong", params={"exponent": e})) for e in (4.0, 8.0, 10.0, 300.0)]
-    needed = [one.needed or 1000 for one in told]
+    needed = [one.required_functions or 1000 for one in told]
     assert needed == sorted(needed)
     assert len(set(needed)) > 2
     assert [one.is_mirror for one in told] == [False, False, False, True]
-    assert told[-1].needed is None
-    missed = [one.missed for one in told]
+    assert told[-1].required_functions is None
+    missed = [one.residual for one in told]
     assert missed == sorted(missed)
 
 
@@ -41,7 +41,7 @@ def test_what_is_missed_is_what_a_projection_onto_a_prefix_leaves(exponent):
             fitted = basis @ np.linalg.lstsq(basis * np.sqrt(weight)[:, None], value * np.sqrt(weight), rcond=None)[0]
             left.append(np.sqrt((weight * (value - fitted) ** 2).sum() / (weight * value**2).sum()))
         assert missed[degree] == pytest.approx(np.average(left, weights=cosine), abs=0.01)
-    assert factorization_error(term).needed in (
+    assert factorization_error(term).required_functions in (
         None,
         *(num_functions(n) for n, share in enumerate(missed) if share <= BOUND),
     )

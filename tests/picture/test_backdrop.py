@@ -128,7 +128,7 @@ def test_ground_is_as_dark_as_its_lamp_says(standing):
 
 
 def blue_lamp_alone(document):
-    document["environment"]["scale"] = 0.0
+    document["environment"]["intensity"] = 0.0
     document["lights"]["Lamp"] = {**POINT_LIGHT, "emission": [0.0, 0.0, 5.0]}
 
 
@@ -198,13 +198,13 @@ def test_background_is_the_map_or_a_colour_or_blurred(standing):
     if not outside.any():
         pytest.fail("the view shows no background")
     for scale in (2.0, 0.0):
-        image = rendered(standing, background(kind="color", color=[0.3, 0.2, 0.1]), environment(scale=scale))
+        image = rendered(standing, background(kind="color", color=[0.3, 0.2, 0.1]), environment(intensity=scale))
         np.testing.assert_allclose(image[outside], np.broadcast_to([0.3, 0.2, 0.1], image[outside].shape), rtol=1e-5)
     image = rendered(standing, background(kind="color"))
     ball = inner(standing, "Ball")
     np.testing.assert_array_equal(image[ball], plain[ball])
     turn = 40.0
-    image = rendered(standing, background(kind="blurred", blur=12.0), environment(rotation=turn, scale=2.0))
+    image = rendered(standing, background(kind="blurred", blur=12.0), environment(rotation=turn, intensity=2.0))
     towards = rotate_about_y(directions(standing)[outside].astype(float), -turn).astype(np.float32)
     np.testing.assert_allclose(image[outside], 2 * lookup(prefiltered(downsampled(studio()), 12.0), towards), rtol=1e-4)
 
@@ -266,7 +266,7 @@ def test_lamps_that_move_keep_the_ground_near_its_look(standing):
 @pytest.mark.parametrize("kind", ["map", "blurred", "color"])
 def test_brightness_of_the_environment_multiplies_what_is_there(standing, kind, monkeypatch):
     """Only a colour, which is not the light's own, is written anew."""
-    brighter = changes(background(kind=kind), environment(scale=2.0, color=[1.0, 0.5, 0.2]))
+    brighter = changes(background(kind=kind), environment(intensity=2.0, color=[1.0, 0.5, 0.2]))
     expected = rendered(standing, brighter)
     picture = Picture(standing, "front", Cache(BUDGET))
     picture.set_look(make_look(standing, background(kind=kind)))

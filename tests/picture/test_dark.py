@@ -17,7 +17,7 @@ from relume.store.bake_protocol import Recipe
 
 def test_no_light_is_black(transfer):
     def dark(document):
-        document["environment"]["scale"] = 0.0
+        document["environment"]["intensity"] = 0.0
 
     picture = open_exact_picture(transfer, BALL + "theta_h")
     picture.set_look(make_look(transfer, dark))

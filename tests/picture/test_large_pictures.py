@@ -73,7 +73,7 @@ def test_a_curve_in_sixteen_bits_is_followed_to_a_thousandth_and_exact_at_rest(t
     before = picture.image()
     for points in ([[0, 3.0], [20, 0.5], [90, 0]], [[0, 9.0], [5, 0.1], [90, 0.02]]):
         advance = drag(picture, transfer, bent(points), FLOOR + "curves/theta_h")
-        assert (advance.fidelity, advance.exact) == ("near", False)
+        assert (advance.fidelity, advance.exact) == ("near_exact", False)
         error = relative_rmse(picture.image(), shown_exactly(transfer, bent(points)))
         assert 1e-8 < error < A_THOUSANDTH
     assert isinstance(picture.next_job(), Shade)
@@ -112,7 +112,7 @@ def test_where_that_is_too_much_some_samples_say_what_changes(transfer, small, m
         drags = [bent([[0, value], [20, 0.5], [90, 0]]) for value in (3, 5)]
     for change in drags:
         advance = drag(picture, transfer, change, FLOOR + held)
-        assert (advance.fidelity, advance.exact) == ("followed", False)
+        assert (advance.fidelity, advance.exact) == ("incremental", False)
         expected = shown_exactly(transfer, change)
         assert relative_rmse(picture.image(), expected) < 0.5 * relative_rmse(before, expected)
     assert isinstance(picture.next_job(), Shade)
@@ -139,7 +139,7 @@ def test_a_look_that_moves_on_while_its_operator_is_made_is_caught_up_with(trans
     look = bent([[0, 3.0], [20, 0.5], [90, 0]])
     picture.set_look(make_look(transfer, look), active_pointer=FLOOR + "curves/theta_h")
     picture.install(job, job.run(lambda share: None, lambda: False))
-    assert picture.advance(None).fidelity == "followed"
+    assert picture.advance(None).fidelity == "incremental"
     assert relative_rmse(run_until_exact(picture).image(), shown_exactly(transfer, look)) < 1e-6
 
 

@@ -29,7 +29,7 @@ PANEL = {
 }
 SPOT = {"kind": "spot", "position": [0.0, 2.0, 1.5], "direction": [0, -1, -0.7], "emission": [9.0, 5.0, 5.0]}
 SUN = {"kind": "directional", "direction": [-1, -2, -1]}
-ENVIRONMENT_OFF = {"scale": 0.0}
+ENVIRONMENT_OFF = {"intensity": 0.0}
 
 
 def rendered(transfer, lights, environment=None, change=lambda document: None, view="front"):
@@ -44,22 +44,22 @@ def rendered(transfer, lights, environment=None, change=lambda document: None, v
 @pytest.mark.parametrize("light", [LAMP, PANEL, SPOT, SUN], ids=lambda light: light["kind"])
 def test_light_adds_to_that_of_the_environment(transfer, light):
     alone = rendered(transfer, {"A": light}, ENVIRONMENT_OFF)
-    beside = rendered(transfer, {"A": light}, {"scale": 0.5, "color": [1.0, 0.5, 0.2]})
-    environment = rendered(transfer, {}, {"scale": 0.5, "color": [1.0, 0.5, 0.2]})
+    beside = rendered(transfer, {"A": light}, {"intensity": 0.5, "color": [1.0, 0.5, 0.2]})
+    environment = rendered(transfer, {}, {"intensity": 0.5, "color": [1.0, 0.5, 0.2]})
     assert alone.mean() > 0.01
     np.testing.assert_allclose(beside, alone + environment, rtol=1e-3, atol=1e-5)
 
 
 def test_picture_is_linear_in_the_gains_of_lights(transfer):
     apart = [rendered(transfer, {"A": light}, ENVIRONMENT_OFF) for light in (LAMP, PANEL)]
-    dimmed = {"A": LAMP | {"scale": 3.0, "color": [1.0, 0.5, 0.0]}, "B": PANEL | {"emission": [10.0, 5.0, 5.0]}}
+    dimmed = {"A": LAMP | {"intensity": 3.0, "color": [1.0, 0.5, 0.0]}, "B": PANEL | {"emission": [10.0, 5.0, 5.0]}}
     together = rendered(transfer, dimmed, ENVIRONMENT_OFF)
     expected = apart[0] * np.array([3.0, 1.5, 0.0]) + apart[1] * np.array([2.0, 1.0, 1.0])
     np.testing.assert_allclose(together, expected, rtol=1e-3, atol=1e-5)
 
 
 def test_lights_that_are_off_leave_the_picture_as_it_is_without_them(transfer):
-    off = {"A": LAMP | {"on": False}, "B": SUN | {"scale": 0.0}, "C": SPOT | {"color": [0, 0, 0]}}
+    off = {"A": LAMP | {"enabled": False}, "B": SUN | {"intensity": 0.0}, "C": SPOT | {"color": [0, 0, 0]}}
     np.testing.assert_array_equal(rendered(transfer, off), rendered(transfer, {}))
 
 
@@ -115,7 +115,7 @@ def room(*, lamp_sides=True, lights=(), lamp=None):
 
 
 SHINING = Light("Lamp", {"kind": "mesh", "material": "Lamp", "emission": [4.0, 2.0, 1.0]})
-OFF = {"Lamp": {"on": False}}
+OFF = {"Lamp": {"enabled": False}}
 
 
 def baked(scene, folder, method="direct"):

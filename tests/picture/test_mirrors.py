@@ -252,7 +252,7 @@ def test_a_rectangle_that_shines_is_seen_in_a_mirror_where_it_hangs(hung):
 
     def lamp(towards):
         def change(document):
-            document["environment"]["scale"] = 0
+            document["environment"]["intensity"] = 0
             document["lights"] = {
                 "Panel": {"kind": "rectangle", "position": centre.tolist(), "direction": [0, 0, towards],
                           "size": [side, side], "emission": [7, 7, 7]}
@@ -287,7 +287,7 @@ def test_a_rectangle_that_is_dimmed_in_a_session_is_dimmed_in_the_mirror(hung):
         return change
 
     picture = Picture(hung, "front", Cache(1 << 30))
-    for change in (lamp(7), lamp(2), lamp(2, on=False), lamp(3), lambda document: None):
+    for change in (lamp(7), lamp(2), lamp(2, enabled=False), lamp(3), lambda document: None):
         look = make_look(hung, change)
         picture.set_look(look)
         run_until_exact(picture)

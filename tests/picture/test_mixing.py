@@ -54,14 +54,16 @@ OTHERS = {"color": [1.0, 0.2, 0.0]}, {"emission": [1, 7, 1]}
 SLOW = (pytest.param(fields, marks=pytest.mark.slow) for fields in OTHERS)
 
 
-@pytest.mark.parametrize("fields", [{"scale": 3.0}, pytest.param({"on": False}, marks=pytest.mark.slow), *SLOW])
+@pytest.mark.parametrize(
+    "fields", [{"intensity": 3.0}, pytest.param({"enabled": False}, marks=pytest.mark.slow), *SLOW]
+)
 def test_first_change_shades_one_source_and_later_ones_nothing(transfer, lit, fields):
     lit.set_look(look_with(transfer, changed("Panel", **fields)))
     assert num_made(lit) <= num_terms(lit)
     expected = exact_image(transfer, look_with(transfer, changed("Panel", **fields)))
     np.testing.assert_allclose(lit.image(), expected, rtol=1e-4, atol=1e-5)
     for scale in (0.3, 0.0, 5.0):
-        look = look_with(transfer, changed("Panel", scale=scale))
+        look = look_with(transfer, changed("Panel", intensity=scale))
         lit.set_look(look)
         assert lit.advance(None).exact, "no glimpse, no wait"
         assert lit.next_job() is None
@@ -69,12 +71,12 @@ def test_first_change_shades_one_source_and_later_ones_nothing(transfer, lit, fi
 
 
 def test_environment_s_brightness_is_mixed_beside_lights(transfer, lit):
-    for environment in ({"scale": 0.0}, {"scale": 2.0, "color": [0.5, 1.0, 1.0]}):
+    for environment in ({"intensity": 0.0}, {"intensity": 2.0, "color": [0.5, 1.0, 1.0]}):
         look = look_with(transfer, ALL, environment)
         lit.set_look(look)
         num_made(lit)
         np.testing.assert_allclose(lit.image(), exact_image(transfer, look), rtol=1e-4, atol=1e-5)
-    lit.set_look(look_with(transfer, ALL, {"scale": 0.7}))
+    lit.set_look(look_with(transfer, ALL, {"intensity": 0.7}))
     assert lit.advance(None).exact
 
 
@@ -82,20 +84,20 @@ def test_solo_shows_what_the_others_switched_off_would_show(transfer, lit):
     whole = look_with(transfer, ALL)
     lit.set_look(whole, solo=frozenset({"Sun"}))
     run_until_exact(lit)
-    alone = {name: light | {"on": name == "Sun"} for name, light in ALL.items()}
-    expected = exact_image(transfer, look_with(transfer, alone, {"scale": 0.0}))
+    alone = {name: light | {"enabled": name == "Sun"} for name, light in ALL.items()}
+    expected = exact_image(transfer, look_with(transfer, alone, {"intensity": 0.0}))
     np.testing.assert_allclose(lit.image(), expected, rtol=1e-4, atol=1e-5)
     lit.set_look(whole)
     np.testing.assert_allclose(run_until_exact(lit).image(), exact_image(transfer, whole), rtol=1e-4, atol=1e-5)
 
 
 def test_soloed_light_is_shaded_alone_and_the_others_come_back_at_once(transfer, lit):
-    solo = {name: light | {"on": name == "Sun"} for name, light in ALL.items()}
-    look = look_with(transfer, solo, {"scale": 0.0})
+    solo = {name: light | {"enabled": name == "Sun"} for name, light in ALL.items()}
+    look = look_with(transfer, solo, {"intensity": 0.0})
     lit.set_look(look)
     assert num_made(lit) == num_terms(lit)
     np.testing.assert_allclose(lit.image(), exact_image(transfer, look), rtol=1e-4, atol=1e-5)
-    louder = look_with(transfer, solo | {"Sun": SUN | {"scale": 2.0}}, {"scale": 0.0})
+    louder = look_with(transfer, solo | {"Sun": SUN | {"intensity": 2.0}}, {"intensity": 0.0})
     lit.set_look(louder)
     assert lit.advance(None).exact
     lit.set_look(look_with(transfer, ALL))
@@ -106,7 +108,7 @@ def test_soloed_light_is_shaded_alone_and_the_others_come_back_at_once(transfer,
 @pytest.mark.parametrize("environment", [{}, {"rotation": 40.0}])
 def test_after_a_solo_the_others_come_back_without_being_shaded(transfer, lit, environment):
     def look_at(sun_scale):
-        lights = changed("Panel", scale=3.0) | {"Sun": SUN | {"scale": sun_scale}}
+        lights = changed("Panel", intensity=3.0) | {"Sun": SUN | {"intensity": sun_scale}}
         return look_with(transfer, lights, environment)
 
     lit.set_look(look_at(1.0))
@@ -134,7 +136,7 @@ def test_gains_and_curves_changed_by_turns_stay_exact(transfer, lit):
     """A curve's operator belongs to one light; after another gain it is made anew, never used on."""
 
     def edited(scale, exponent):
-        lights = changed("Lamp", scale=scale)
+        lights = changed("Lamp", intensity=scale)
         return make_look(
             transfer,
             lambda d: (
@@ -155,7 +157,7 @@ def test_touching_a_light_makes_its_own_image_ahead(transfer, lit):
     while (need := lit.next_job()) is not None:
         lit.install(need, need.run(lambda share: None, lambda: False))
         assert lit.advance(None).exact
-    look = look_with(transfer, changed("Panel", scale=0.3))
+    look = look_with(transfer, changed("Panel", intensity=0.3))
     lit.set_look(look)
     assert lit.advance(None).exact
     np.testing.assert_allclose(lit.image(), exact_image(transfer, look), rtol=3e-3, atol=1e-4)
@@ -165,7 +167,7 @@ def test_a_light_in_hand_is_prepared_again_where_it_was_put(transfer, lit):
     lit.prepare("/lights/Panel")
     run_until_exact(lit).set_look(look_with(transfer, changed("Panel", position=[-0.9, 1.4, 1.0])))
     run_until_exact(lit)
-    look = look_with(transfer, changed("Panel", position=[-0.9, 1.4, 1.0], scale=0.3))
+    look = look_with(transfer, changed("Panel", position=[-0.9, 1.4, 1.0], intensity=0.3))
     lit.set_look(look)
     assert lit.advance(None).exact
     np.testing.assert_allclose(lit.image(), exact_image(transfer, look), rtol=3e-3, atol=1e-4)

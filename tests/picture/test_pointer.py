@@ -40,7 +40,7 @@ def test_a_pointer_is_read_and_written_alike(text, meant):
         "/materials/Teapot/terms/0/textures/diffuse",
         "/lights",
         "/lights/",
-        "/lights/Lamp/scale",
+        "/lights/Lamp/intensity",
         "/environment",
         "/environment/radius",
         "/environment/rotation/0",

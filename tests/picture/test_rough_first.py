@@ -87,7 +87,7 @@ def test_a_hand_goes_on_by_the_rough_one_until_the_exact_one_is_there(transfer, 
     assert not exact.is_refinement
     for change in drags:
         picture.set_look(make_look(transfer, change), active_pointer=FLOOR + held)
-        assert picture.advance(None).fidelity == "followed"
+        assert picture.advance(None).fidelity == "incremental"
         assert picture.next_job().key == exact.key, "the hand does not stop it"
         expected = twins.full_evaluation(transfer, "front", make_look(transfer, change))
         assert relative_rmse(picture.image(), expected) < 0.5 * relative_rmse(before, expected)

@@ -123,6 +123,6 @@ def test_a_map_that_is_gone_is_refused_and_the_picture_stays(plain, map_name):
 
 
 def test_looks_of_stores_that_know_no_map_are_completed(plain):
-    old = {**plain.default_look, "environment": {"scale": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0}}
+    old = {**plain.default_look, "environment": {"intensity": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0}}
     assert validate({}, old).environment.map is None
     assert validate({"environment": {"map": "sunset"}}, old).environment.map == "sunset"

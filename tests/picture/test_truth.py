@@ -40,7 +40,7 @@ EDITED = {
             ]
         },
     },
-    "environment": {"scale": 1.5, "color": [1.0, 0.8, 0.5]},
+    "environment": {"intensity": 1.5, "color": [1.0, 0.8, 0.5]},
 }
 
 

@@ -34,7 +34,7 @@ def bumps(side=256):
 @pytest.fixture(scope="module")
 def scene():
     """A polished floor of small bumps, in the light of a lamp that it mirrors."""
-    shiny = {"model": "ggx", "texture": None, "params": {"roughness": 0.3, "f0": 0.9}, "roughness_map": True}
+    shiny = {"model": "ggx", "texture": None, "params": {"roughness": 0.3, "f0": 0.9}, "roughness_map": "roughness"}
     floor = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
     sky = np.full((32, 64, 3), 0.05, np.float32)
     sky[5:9, 14:19] = 20

@@ -215,7 +215,7 @@ def test_rendered_frame_agrees(tmp_path: Path) -> None:
     scene, size = still_life(), (48, 36)
     store = bake_in_process(DirectMethod(), scene, Recipe("direct", ("front",), size, 4000), tmp_path / "store.zarr")
     default = default_look(scene.materials)
-    partial = {"environment": {"scale": 0.5}, "materials": {"Ball": {"terms": [WHITE]}}}
+    partial = {"environment": {"intensity": 0.5}, "materials": {"Ball": {"terms": [WHITE]}}}
     frame = render_image(open_transfer(store, Cache(1 << 30)), "front", validate(partial, default))
     truth = image_of(scene, size, 0, **partial)
     assert relative_rmse(frame, truth) < 0.005
@@ -286,8 +286,8 @@ def lit_bake(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, FixedView
 @pytest.mark.parametrize("kind", LIGHTS)
 def test_frame_under_each_kind_of_local_light_agrees(lit_bake: tuple[Scene, FixedViewTransfer], kind: str) -> None:
     scene, transfer = lit_bake
-    lights = {"mesh": {"on": kind == "mesh"}, **({} if kind == "mesh" else {kind: LIGHTS[kind]})}
-    look = validate({"environment": {"scale": 0.0}, "lights": lights}, transfer.default_look)
+    lights = {"mesh": {"enabled": kind == "mesh"}, **({} if kind == "mesh" else {kind: LIGHTS[kind]})}
+    look = validate({"environment": {"intensity": 0.0}, "lights": lights}, transfer.default_look)
     frame = render_image(transfer, "front", look)
     truth = reference_image(scene, "front", look, (48, 36), 1024 if kind in ("rectangle", "mesh") else 1)
     assert truth.mean() > 0.01

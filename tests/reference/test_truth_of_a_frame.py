@@ -41,23 +41,23 @@ def test_perfect_frame_differs_by_the_noise_alone(passes: int) -> None:
     found = judged(1.0, passes)
     assert found.noise == pytest.approx(0.05 / np.sqrt(passes), rel=0.05)
     assert found.rmse == pytest.approx(found.noise, rel=0.05)
-    assert (found.error, found.significant) == (None, 0.0)
-    assert found.limit < found.noise * (1.5 if passes == 2 else 0.5)
+    assert (found.error, found.significant_pixel_fraction) == (None, 0.0)
+    assert found.error_upper_bound < found.noise * (1.5 if passes == 2 else 0.5)
 
 
 def test_error_of_a_frame_is_found_below_the_noise() -> None:
     found = judged(1.01)
     assert found.noise > 0.015
     assert found.error == pytest.approx(0.01, rel=0.1)
-    assert found.error < found.limit < 1.2 * found.error
-    assert found.significant > 0.9  # of blocks; a pixel alone does not tell
+    assert found.error < found.error_upper_bound < 1.2 * found.error
+    assert found.significant_pixel_fraction > 0.9  # of blocks; a pixel alone does not tell
 
 
 def test_more_passes_less_noise_same_error() -> None:
     few, many = judged(1.05, passes=4), judged(1.05, passes=64)
     assert many.noise == pytest.approx(few.noise / 4, rel=0.1)
     assert many.error == pytest.approx(0.05, rel=0.02)
-    assert many.limit < few.limit
+    assert many.error_upper_bound < few.error_upper_bound
 
 
 def test_few_wrong_pixels_are_found_and_the_others_left_alone() -> None:
@@ -65,7 +65,7 @@ def test_few_wrong_pixels_are_found_and_the_others_left_alone() -> None:
     frame[10:13, 20:26] *= 2
     found, differs = compare(frame, estimate(16, 0.05))
     assert differs[10:13, 20:26].mean() > 0.9
-    assert 18 / 4800 <= found.significant < 40 / 4800
+    assert 18 / 4800 <= found.significant_pixel_fraction < 40 / 4800
 
 
 def test_of_what_is_called_different_few_are_so_by_chance() -> None:
@@ -79,7 +79,7 @@ def test_of_what_is_called_different_few_are_so_by_chance() -> None:
 
 def test_truth_without_noise_calls_rounding_no_difference() -> None:
     found, _ = compare(truth(), estimate(4, 0.0))
-    assert (found.noise, found.error, found.significant) == (pytest.approx(0, abs=1e-6), None, 0.0)
+    assert (found.noise, found.error, found.significant_pixel_fraction) == (pytest.approx(0, abs=1e-6), None, 0.0)
     wrong = truth()
     wrong[:4] *= 1.01
     found, differs = compare(wrong, estimate(4, 0.0))
@@ -151,7 +151,7 @@ def test_right_frame_under_a_small_sun_is_not_blamed_and_wrong_ones_are(roughnes
     frame = reference_image(scene, "front", look, size, 1024, pass_index=1_000)
     known = added([reference_image(scene, "front", look, size, 16, pass_index=k) for k in range(16)])
     found, _ = compare(frame, known)
-    assert found.significant <= 0.01
+    assert found.significant_pixel_fraction <= 0.01
     assert found.error is None or found.error < 0.01
 
     floor = {"terms": [{"model": "lambert", "color": [0.525, 0.4725, 0.42]}]}

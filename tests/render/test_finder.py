@@ -62,12 +62,12 @@ def test_a_surface_is_darker_where_it_turns_away(walls: Viewport) -> None:
 def test_the_framing_camera_sees_the_scene_and_its_corners_hold_it(name: str) -> None:
     scene = built_in(name)
     finder = Viewport.from_scene(scene)
-    image = finder.image(finder.framing, SIZE)
+    image = finder.image(finder.default_camera, SIZE)
     assert len(np.unique(image.reshape(-1, 3), axis=0)) > 20
     positions = np.concatenate([mesh.positions[mesh.faces.ravel()] for mesh in scene.meshes])
-    assert (finder.lowest <= positions.min(axis=0) + 1e-6).all()
-    assert (finder.highest >= positions.max(axis=0) - 1e-6).all()
-    place = finder.point_at(finder.framing, SIZE, 32, 24)
+    assert (finder.bounds_min <= positions.min(axis=0) + 1e-6).all()
+    assert (finder.bounds_max >= positions.max(axis=0) - 1e-6).all()
+    place = finder.point_at(finder.default_camera, SIZE, 32, 24)
     assert place is not None
-    assert (place >= finder.lowest - 1e-3).all()
-    assert (place <= finder.highest + 1e-3).all()
+    assert (place >= finder.bounds_min - 1e-3).all()
+    assert (place <= finder.bounds_max + 1e-3).all()

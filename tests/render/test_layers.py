@@ -33,7 +33,7 @@ def test_layers_of_lights_and_of_paths_each_sum_to_the_picture(gathered, tmp_pat
 def test_light_groups_sum_to_the_picture(gathered, tmp_path):
     layers, channel = exported(gathered, tmp_path, "color", "light_groups")
     names = [layer.name for layer in layers]
-    groups = {f"light_{of}_{kind}" for of in ("environment", "Key", "Fill") for kind in ("direct", "reflected")}
+    groups = {f"light_{of}_{kind}" for of in ("environment", "Key", "Fill") for kind in ("direct", "indirect")}
     assert set(names) == {"light_background", *groups}
     assert_sum(channel, names)
 
@@ -43,7 +43,7 @@ def exported(transfer, folder, background, layering):
 
     def change(document):
         document["lights"].update(LIGHTS)
-        document["environment"].update(scale=0.7, rotation=30.0)
+        document["environment"].update(intensity=0.7, rotation=30.0)
         document["background"].update(kind=background, color=[0.2, 0.3, 0.1])
 
     look = make_look(transfer, change)

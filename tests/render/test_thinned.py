@@ -24,7 +24,7 @@ def test_a_panel_shines_on_every_pixel_that_is_left_as_on_the_whole_picture(gath
     panel = {"kind": "rectangle", "position": [0.5, 1.2, 0.5], "direction": [-1, -1, -1], "size": [0.6, 0.4]}
 
     def change(document):
-        document["environment"].update(scale=0.0)
+        document["environment"].update(intensity=0.0)
         document["transport"].update(show="direct")
         document["lights"].update(Panel={**panel, "emission": [5.0, 5.0, 5.0]})
 

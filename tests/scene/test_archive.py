@@ -65,7 +65,7 @@ def test_archive_round_trip_keeps_everything(tmp_path: Path) -> None:
     save_scene(scene, tmp_path / "scene")
     loaded = load_scene(tmp_path / "scene")
     assert (loaded.id, loaded.name, loaded.warnings) == (scene.id, scene.name, scene.warnings)
-    assert [warning.effect for warning in loaded.warnings] == ["simplified"]
+    assert [warning.severity for warning in loaded.warnings] == ["approximated"]
     for field in ("positions", "normals", "tangents", "uvs", "faces"):
         before, after = getattr(scene.meshes[0], field), getattr(loaded.meshes[0], field)
         assert before.dtype == after.dtype

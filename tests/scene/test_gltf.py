@@ -200,7 +200,7 @@ def test_a_varying_roughness_texture_scales_the_width_and_a_plain_one_is_its_mea
     pbr = {"metallicRoughnessTexture": {"index": packed}, "roughnessFactor": 0.8}
     scene = imported(glb.quad({"name": "Clay", "pbrMetallicRoughness": pbr}))
     assert scene.materials[0].terms[1]["params"]["roughness"] == pytest.approx(0.4)
-    assert scene.materials[0].terms[1]["roughness_map"] is True
+    assert scene.materials[0].terms[1]["roughness_map"] == "roughness"
     assert scene.materials[0].textures["roughness"].pixels.tolist() == [[[0], [255]]]
     assert mean_value(scene.materials[0].textures["roughness"]).tolist() == pytest.approx([1.0])
     assert not scene.warnings

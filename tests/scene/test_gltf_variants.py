@@ -142,7 +142,7 @@ def test_a_variant_as_rough_follows_the_map_and_one_with_another_has_its_mean() 
     mappings = [[{"material": 1, "variants": [0]}, {"material": 2, "variants": [1]}]]
     scene = imported(dressed(glb, materials, mappings))
     day, night = (scene.variants[name]["materials"]["own"]["terms"][1] for name in ("day", "night"))
-    assert day["roughness_map"] is True
+    assert day["roughness_map"] == "roughness"
     assert "roughness_map" not in night
     assert night["params"]["roughness"] == pytest.approx(20 / 255, abs=1e-6)
     assert any("roughness" in warning for warning in scene.warnings)

@@ -149,7 +149,7 @@ def test_plastic_of_every_program_reflects_as_a_dielectric(
     assert remark.startswith("Ks of material 'M' is read as ")
     assert "4 % (F0 0.04)" in remark
     assert ("Blender" in remark) == library.startswith("# Blender")
-    assert remark.effect == "simplified"
+    assert remark.severity == "approximated"
 
 
 def test_a_coat_of_the_pbr_extension_is_a_coat(tmp_path: Path) -> None:
@@ -258,10 +258,10 @@ def test_a_lost_map_is_wrong_and_named(tmp_path: Path, line: str, words: tuple[s
     scene = scene_of(tmp_path, f"newmtl M\nKd 1 1 1\n{line}\n")
     assert scene.materials[0].normal_map is None
     (remark,) = scene.warnings
-    assert remark.effect == "wrong"
+    assert remark.severity == "unsupported"
     assert all(word in remark for word in words)
 
 
 def test_a_map_of_ambient_light_is_not_missed(tmp_path: Path) -> None:
     (remark,) = scene_of(tmp_path, "newmtl M\nKd 1 1 1\nmap_Ka x.png\n").warnings
-    assert remark.effect == "unused"
+    assert remark.severity == "ignored"

@@ -130,7 +130,7 @@ def test_a_map_of_roughness_scales_the_width_and_its_mean_is_what_terms_say(tmp_
     half, whole = import_scene(path, "thing", LIGHT).materials
     assert half.terms[1]["params"]["roughness"] == pytest.approx(0.2)
     assert whole.terms[1]["params"]["roughness"] == pytest.approx(0.4)
-    assert half.terms[1]["roughness_map"] is True
+    assert half.terms[1]["roughness_map"] == "roughness"
     np.testing.assert_allclose(get_texture_values(half.textures["roughness"]), [[[0.5], [1.5]]], rtol=1e-6)
 
 

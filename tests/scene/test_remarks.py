@@ -24,9 +24,9 @@ def imported() -> Scene:
 
 
 def test_an_import_tells_the_worst_first() -> None:
-    assert [(warning.effect, str(warning)) for warning in imported().warnings] == [
-        ("wrong", "the material file 'none.mtl' is not beside the scene; import both together"),
-        ("unused", "lines of kind 'l' are not used; only faces are"),
+    assert [(warning.severity, str(warning)) for warning in imported().warnings] == [
+        ("unsupported", "the material file 'none.mtl' is not beside the scene; import both together"),
+        ("ignored", "lines of kind 'l' are not used; only faces are"),
     ]
 
 
@@ -34,8 +34,8 @@ def test_effects_are_kept_with_the_scene(tmp_path: Path) -> None:
     scene = imported()
     save_scene(scene, tmp_path)
     loaded = load_scene(tmp_path)
-    assert [(warning.effect, warning) for warning in loaded.warnings] == [
-        (warning.effect, warning) for warning in scene.warnings
+    assert [(warning.severity, warning) for warning in loaded.warnings] == [
+        (warning.severity, warning) for warning in scene.warnings
     ]
 
 
@@ -45,7 +45,7 @@ def test_scenes_of_before_there_were_effects_still_open(tmp_path: Path) -> None:
     document["warnings"] = ["something is off"]
     (tmp_path / "scene.json").write_text(json.dumps(document))
     (warning,) = load_scene(tmp_path).warnings
-    assert (warning, warning.effect) == ("something is off", "wrong")
+    assert (warning, warning.severity) == ("something is off", "unsupported")
 
 
 def test_what_is_left_out_of_a_long_list_weighs_least() -> None:
@@ -53,10 +53,10 @@ def test_what_is_left_out_of_a_long_list_weighs_least() -> None:
     found = [ignored("a little thing")] * MAX_WARNINGS + [approximated("a mean")] * 3 + [unsupported("a hole")]
     listed = finalize("test", scene.meshes, scene.materials, scene.cameras, LIGHT, found).warnings
     assert listed[:4] == ("a hole", "a mean", "a mean", "a mean")
-    assert (listed[-1], listed[-1].effect, len(listed)) == ("and 4 more of the kind", "unused", MAX_WARNINGS + 1)
+    assert (listed[-1], listed[-1].severity, len(listed)) == ("and 4 more of the kind", "ignored", MAX_WARNINGS + 1)
 
 
 def test_a_remark_survives_documents_and_processes() -> None:
     remark = approximated("a mean")
     for copy in (warning_of(json.loads(json.dumps(remark.document()))), pickle.loads(pickle.dumps(remark))):
-        assert (copy, copy.effect) == (remark, remark.effect)
+        assert (copy, copy.severity) == (remark, remark.severity)

@@ -44,7 +44,7 @@ class Running:
 @contextmanager
 def open_socket(url: str, **opening: Any) -> Iterator[ClientConnection]:
     """A session that has said `opening`, the fields of its first message."""
-    with connect(url, subprotocols=[Subprotocol("relume.v1")], max_size=None, proxy=None) as session:
+    with connect(url, subprotocols=[Subprotocol("relume.v2")], max_size=None, proxy=None) as session:
         session.send(json.dumps({"type": "open", **opening}))
         yield session
 

@@ -122,7 +122,7 @@ class FakeJob:
 
     control: "Control"
     key: str
-    state: str = "freezing"
+    state: str = "precomputing"
     is_refinement: bool = False
     is_resumable: bool = False
 
@@ -143,7 +143,7 @@ class FakeJob:
 def make_advance(tiles: list[Any], exact: bool) -> SimpleNamespace:
     """What a step of a whole picture says."""
     fidelity = "exact" if exact else "approximate"
-    fields = {"exact": exact, "fidelity": fidelity, "complete": True, "was_off": None}
+    fields = {"exact": exact, "fidelity": fidelity, "complete": True, "previous_error": None}
     return SimpleNamespace(tiles=tiles, changed=bool(tiles), **fields)
 
 

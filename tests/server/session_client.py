@@ -39,7 +39,7 @@ class Session:
 
     def edit(self, revision: int, path: str, value: Any, op: str = "replace", control: str | None = None) -> None:
         self.send_message(
-            type="edit", revision=revision, patch=[{"op": op, "path": path, "value": value}], hand=control
+            type="edit", revision=revision, patch=[{"op": op, "path": path, "value": value}], active_control=control
         )
 
     def receive(self) -> dict[str, Any] | Frame:
@@ -63,7 +63,7 @@ class Session:
 
     def wait_until_ready(self, label: str) -> None:
         """Wait until this has been prepared; other jobs may end before it."""
-        while (status := self.text("status"))["state"] != "ready" or status["what"] != label:
+        while (status := self.text("status"))["state"] != "ready" or status["label"] != label:
             pass
 
     def frame(self) -> Frame:
@@ -88,7 +88,7 @@ def open_session(
     client: TestClient, bake: str, *, acknowledges: bool = True, opening: Mapping[str, Any] = NO_FIELDS, **options: Any
 ) -> Iterator[Session]:
     """A session that has said `opening`, the fields of its first message."""
-    options = {"subprotocols": ["relume.v1"], **options}
+    options = {"subprotocols": ["relume.v2"], **options}
     with client.websocket_connect(session_path(bake, opening), **options) as websocket:
         session = Session(websocket, acknowledges)
         session.send_message(type="open", **opening)
@@ -97,5 +97,5 @@ def open_session(
 
 def session_path(bake: str, opening: Mapping[str, Any]) -> str:
     """The address of a session that will say this."""
-    room = opening.get("room") or opening.get("watch")
+    room = opening.get("room") or opening.get("view_token")
     return f"/api/bakes/{bake}/session" + ("" if room is None else f"?room_prefix={room[:8]}")

@@ -47,7 +47,7 @@ def frames_of(client: TestClient, request: dict[str, Any], folder: Path) -> list
 
 @pytest.fixture(scope="module")
 def view(client: TestClient, bake: str) -> dict[str, Any]:
-    with client.websocket_connect(f"/api/bakes/{bake}/session", subprotocols=["relume.v1"]) as session:
+    with client.websocket_connect(f"/api/bakes/{bake}/session", subprotocols=["relume.v2"]) as session:
         session.send_json({"type": "open"})
         found: dict[str, Any] = session.receive_json()["views"][0]
     return found
@@ -58,7 +58,7 @@ def test_a_turntable_goes_once_around_exactly_or_quickly(
 ) -> None:
     request = {"bake": bake, "view": view["name"], "path": {"turntable": 3}, "size": [24, 18]}
     exact = frames_of(client, request, tmp_path)
-    quick = frames_of(client, request | {"exact": False}, tmp_path)
+    quick = frames_of(client, request | {"quality": "interactive"}, tmp_path)
     assert [frame.shape for frame in exact] == [(18, 24, 3)] * 3
     for k in range(3):
         assert np.abs(exact[k] - exact[k - 1]).max() > 0.05
@@ -71,24 +71,26 @@ def test_an_object_turns_under_light_that_stays_and_the_light_alone(
     client: TestClient, scene: dict[str, Any], bake: str, view: dict[str, Any], tmp_path: Path
 ) -> None:
     lamp = {"kind": "point", "position": [2.0, 1.0, 2.0], "emission": [60.0, 30.0, 0.0]}
-    asked = {"bake": bake, "view": view["name"], "exact": False, "looks": [{"lights": {"Lamp": lamp}}]}
+    asked = {"bake": bake, "view": view["name"], "quality": "interactive", "looks": [{"lights": {"Lamp": lamp}}]}
     found = {
-        turns: frames_of(client, asked | {"path": {"turntable": 5, "turns": turns}}, tmp_path)
-        for turns in ("eye", "object", "environment")
+        turns: frames_of(client, asked | {"path": {"turntable": 5, "rotate": turns}}, tmp_path)
+        for turns in ("camera", "object", "environment")
     }
-    first = found["eye"][0]
+    first = found["camera"][0]
     of_frame = {turns: [np.sqrt(np.mean((frame - first) ** 2)) for frame in frames] for turns, frames in found.items()}
     assert max(frames[0] for frames in of_frame.values()) == 0
-    assert max(of_frame["object"]) < 0.3 * min(of_frame["eye"][1:])  # a ball looks alike from all sides, but for facets
+    assert max(of_frame["object"]) < 0.3 * min(
+        of_frame["camera"][1:]
+    )  # a ball looks alike from all sides, but for facets
     assert min(of_frame["environment"][1:]) > 3 * max(of_frame["object"])
     fixed = client.post("/api/bakes", json={"scene": scene["id"], "size": SIZE, "lights": 50}).headers["location"]
     of_fixed = {"bake": wait_until_done(client, fixed)["id"], "view": scene["views"][0]["name"]}
-    turned = frames_of(client, of_fixed | {"path": {"turntable": 3, "turns": "environment"}}, tmp_path)
+    turned = frames_of(client, of_fixed | {"path": {"turntable": 3, "rotate": "environment"}}, tmp_path)
     look = {"environment": {"rotation": 120}}
     (expected,) = frames_of(client, of_fixed | {"looks": [look]}, tmp_path)
     np.testing.assert_array_equal(turned[1], expected)
     told = client.post(
-        "/api/renders/looks", json=of_fixed | {"looks": [{}], "path": {"turntable": 3, "turns": "environment"}}
+        "/api/renders/looks", json=of_fixed | {"looks": [{}], "path": {"turntable": 3, "rotate": "environment"}}
     )
     assert [frame["environment"]["rotation"] for frame in told.json()["looks"]] == [0, 120, -120]
     assert told.json()["cameras"] is None
@@ -102,7 +104,14 @@ def test_a_way_from_camera_to_camera_with_looks_between_looks(
         placed = eye(view, 1, aside)
         eyes.append({"to_world": placed["to_world"], "yfov": math.degrees(placed["yfov"])})
     looks = [of(material, [0.8, 0.0, 0.0]), of(material, [0.0, 0.0, 0.8])]
-    request = {"bake": bake, "view": view["name"], "path": {"eyes": eyes}, "looks": looks, "frames": 3, "exact": False}
+    request = {
+        "bake": bake,
+        "view": view["name"],
+        "path": {"cameras": eyes},
+        "looks": looks,
+        "frames": 3,
+        "quality": "interactive",
+    }
     found = frames_of(client, request, tmp_path)
     assert len(found) == 3
     middle = [frame[SIZE[1] // 2, SIZE[0] // 2] for frame in found]
@@ -111,7 +120,7 @@ def test_a_way_from_camera_to_camera_with_looks_between_looks(
     assert middle[2][2] > 0.01
     assert middle[2][0] < 1e-6
     assert min(middle[1][0], middle[1][2]) > 0.003  # half red and half blue
-    last = frames_of(client, request | {"path": {"eyes": eyes[1:]}, "looks": looks[1:], "frames": None}, tmp_path)
+    last = frames_of(client, request | {"path": {"cameras": eyes[1:]}, "looks": looks[1:], "frames": None}, tmp_path)
     np.testing.assert_array_equal(found[2], last[0])
 
 
@@ -120,13 +129,13 @@ def test_a_way_from_camera_to_camera_with_looks_between_looks(
     [
         {"path": {"turntable": 0}},
         {"path": {"turntable": 1_000_000}},
-        {"path": {"eyes": []}},
+        {"path": {"cameras": []}},
         {"path": {"turntable": 3}, "frames": 4},
-        {"path": {"turntable": 3, "turns": "moon"}},
-        {"path": {"turntable": 3, "about": [0, 0]}},
-        {"path": {"turntable": 3, "about": [0, 0, 1e9]}},
-        {"path": {"eyes": [{"to_world": [0.0] * 16, "yfov": 40.0}]}},
-        {"path": {"eyes": [{"to_world": [1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], "yfov": 180.0}]}},
+        {"path": {"turntable": 3, "rotate": "moon"}},
+        {"path": {"turntable": 3, "pivot": [0, 0]}},
+        {"path": {"turntable": 3, "pivot": [0, 0, 1e9]}},
+        {"path": {"cameras": [{"to_world": [0.0] * 16, "yfov": 40.0}]}},
+        {"path": {"cameras": [{"to_world": [1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], "yfov": 180.0}]}},
         {"frames": 0},
         {"frames": 1, "looks": [{}, {}]},
         {"fps": 0},
@@ -165,7 +174,7 @@ def test_a_video_is_made_where_there_is_an_encoder(
 ) -> None:
     request = {
         "bake": bake, "view": view["name"], "looks": [{}], "format": "mp4", "path": {"turntable": 5}, "size": [33, 25],
-        "exact": False,
+        "quality": "interactive",
     }  # fmt: skip
     monkeypatch.setattr("shutil.which", lambda name: None)
     refused = client.post("/api/renders", json=request)
@@ -223,7 +232,7 @@ def test_looks_of_frames_are_told_as_they_will_be_rendered(
     looks = answer.json()["looks"]
     colors = [look["materials"][material]["terms"][0]["color"] for look in looks]
     np.testing.assert_allclose(colors, [[0.8 - 0.2 * k, 0, 0.2 * k] for k in range(5)], atol=1e-9)
-    small = {"view": view["name"], "size": [20, 15], "exact": False}
+    small = {"view": view["name"], "size": [20, 15], "quality": "interactive"}
     told = frames_of(client, {"bake": bake, "looks": looks, **small}, tmp_path)
     rendered = frames_of(client, {**keys, **small}, tmp_path)
     for one, other in zip(told, rendered, strict=True):
@@ -235,14 +244,14 @@ def test_places_of_frames_are_told_as_they_will_be_rendered(
 ) -> None:
     eyes = [{"to_world": placed["to_world"], "yfov": 40.0} for placed in (eye(view, 1, 0.0), eye(view, 1, 0.4))]
     keys = {"bake": bake, "looks": [{}, {}], "frames": 3, "view": view["name"]}
-    for path in ({"eyes": eyes}, {"turntable": 3, "start": eyes[1]}):
+    for path in ({"cameras": eyes}, {"turntable": 3, "start_camera": eyes[1]}):
         answer = client.post("/api/renders/looks", json={**keys, "path": path})
         assert answer.status_code == 200, answer.text
         told = answer.json()["cameras"]
         assert len(told) == 3
-        small = {"bake": bake, "view": view["name"], "size": [20, 15], "exact": False}
+        small = {"bake": bake, "view": view["name"], "size": [20, 15], "quality": "interactive"}
         rendered = frames_of(client, {**small, "looks": [{}], "path": path, "frames": 3}, tmp_path)
-        alone = frames_of(client, {**small, "looks": [{}, {}, {}], "path": {"eyes": told}}, tmp_path)
+        alone = frames_of(client, {**small, "looks": [{}, {}, {}], "path": {"cameras": told}}, tmp_path)
         np.testing.assert_allclose(alone, rendered, atol=1e-5)
         assert np.abs(rendered[1] - rendered[0]).max() > 0.01
 
@@ -256,7 +265,7 @@ def test_places_of_frames_are_told_as_they_will_be_rendered(
         ({"frames": 601}, "frames"),
         ({"frames": 1}, "looks"),
         ({"looks": [{"materials": {"Nothing": {}}}]}, "/looks/0"),
-        ({"between": "magic"}, "between"),
+        ({"interpolation": "magic"}, "interpolation"),
         ({"bake": "0" * 16}, "bake"),
     ],
 )

@@ -212,9 +212,9 @@ class Counting(JobQueue[RenderRequest]):
         return False
 
     def step(self, work: Any, timer: Any) -> int:
-        self.record_progress(work.id, work.done)
+        self.record_progress(work.id, work.completed)
         self.run_in_process(work, str(work.request.name), {}, ignore)
-        return int(work.done) + 1
+        return int(work.completed) + 1
 
 
 def test_steps_of_clients_alternate_and_each_client_has_a_quota(tmp_path: Path) -> None:

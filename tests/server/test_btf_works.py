@@ -17,7 +17,7 @@ from relume.assets.btf.import_btf import import_btf
 from relume.core.errors import CancelledError
 from relume_server.settings import Settings
 
-WORKS = "/api/materials/btf-works"
+WORKS = "/api/materials/btf/jobs"
 WAIT_S = 60.0
 
 
@@ -53,12 +53,12 @@ def test_images_become_a_material_of_the_library(client: TestClient, settings: S
     (listed,) = client.get("/api/materials/btf").json()
     assert (listed["id"], listed["name"], listed["synthetic"]) == (body["material"], "Felt", None)
     assert listed["error"][-1] <= 0.02
-    wait_until_gone(settings.data / "btf-works" / body["id"] / "images.zip")
+    wait_until_gone(settings.data / "btf-jobs" / body["id"] / "images.zip")
     assert [work["id"] for work in client.get(WORKS).json()] == [body["id"]]
-    assert client.delete(f"{url}?forget=true").status_code == 204
+    assert client.delete(f"{url}?delete_files=true").status_code == 204
     assert client.get(url).status_code == 404
     assert client.get(WORKS).json() == []
-    assert not (settings.data / "btf-works" / body["id"]).exists()
+    assert not (settings.data / "btf-jobs" / body["id"]).exists()
     assert len(client.get("/api/materials/btf").json()) == 1
 
 
@@ -73,7 +73,7 @@ def test_a_container_becomes_a_material_whatever_it_is_called(
     path.write_bytes(path.read_bytes()[:2000])
     body = wait_for(client, send(client, path), "ready", "failed")
     assert "cut off" in body["problem"]
-    wait_until_gone(settings.data / "btf-works" / body["id"])
+    wait_until_gone(settings.data / "btf-jobs" / body["id"])
 
 
 @pytest.mark.slow
@@ -104,7 +104,7 @@ def test_a_mesh_that_is_sent_is_rendered_with_its_period(
     body = wait_for(client, answer.headers["location"], "ready", "failed")
     assert (body["state"], body["geometry"], body["name"]) == ("ready", "mesh", "Roof (synthetic)")
     assert made == [("mesh", 16, SQUARE, 2.5, "Roof (synthetic)")]
-    wait_until_gone(settings.data / "btf-works" / body["id"] / "images.zip")
+    wait_until_gone(settings.data / "btf-jobs" / body["id"] / "images.zip")
 
 
 @pytest.mark.parametrize(

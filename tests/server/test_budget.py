@@ -52,7 +52,7 @@ def test_curve_over_the_budget_while_a_turned_light_is_prepared_does_not_end_the
 ) -> None:
     with open_session(short, bake) as session:
         session.exact(0)
-        session.send_message(type="touch", parameter="/environment/rotation")
+        session.send_message(type="prepare", parameter="/environment/rotation")
         session.edit(1, f"{BALL}/curves", {"theta_h": DRAWN})
         answer(session, 1)
         session.edit(2, f"{BALL}/color", [0.2, 0.2, 0.2])
@@ -96,7 +96,7 @@ def test_edit_too_large_that_a_hand_prepares_for_is_taken_back_and_prepared_for_
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.edit(1, IOR, 2.0)
-        session.send_message(type="touch", parameter=SIGMA)
+        session.send_message(type="prepare", parameter=SIGMA)
         refused = [session.text("problem")["revision"] for _ in range(2)]
         assert refused == [1, None]
         session.edit(2, SIGMA, 0.4)

@@ -63,13 +63,13 @@ def test_a_view_of_a_placed_camera_is_compared_with_truth_from_there(real: TestC
     placed = {"name": "Aside", "to_world": moved, "yfov": front["yfov"]}
     queued = real.post("/api/bakes", json={"scene": scene, "size": [32, 24], "lights": 50, "views": [placed]})
     bake = ready(real, queued.headers["location"])
-    asked = real.post("/api/truths", json={"bake": bake, "view": "Aside", "look": {}, "passes": 4})
+    asked = real.post("/api/comparisons", json={"bake": bake, "view": "Aside", "look": {}, "passes": 4})
     assert asked.status_code in (200, 202), asked.text
     url = asked.headers["location"]
     while (truth := real.get(url).json())["state"] not in ("ready", "failed"):
         time.sleep(0.05)
     assert truth["state"] == "ready", truth["problem"]
-    assert truth["found_of_method"]["rmse"] < 0.2
+    assert truth["error_method_paths"]["rmse"] < 0.2
 
 
 @pytest.mark.parametrize(
@@ -112,17 +112,17 @@ def ready(client: TestClient, url: str) -> str:
 
 
 def test_a_scene_is_shown_from_anywhere_before_it_is_baked(real: TestClient, scene: str) -> None:
-    url = f"/api/scenes/{scene}/finder"
+    url = f"/api/scenes/{scene}/viewport"
     found = real.get(url).json()
-    assert all(low < high for low, high in zip(found["lowest"], found["highest"], strict=True))
-    answer = real.post(url, json={**found["framing"], "size": [80, 60]})
+    assert all(low < high for low, high in zip(found["bounds_min"], found["bounds_max"], strict=True))
+    answer = real.post(url, json={**found["default_camera"], "size": [80, 60]})
     assert answer.headers["content-type"] == "image/jpeg"
     assert Image.open(io.BytesIO(answer.content)).size == (80, 60)
-    pixel = {**found["framing"], "size": [80, 60], "x": 40, "y": 30}
-    assert len(real.post(f"{url}/place", json=pixel).json()["position"]) == 3
-    away = [*found["framing"]["to_world"]]
+    pixel = {**found["default_camera"], "size": [80, 60], "x": 40, "y": 30}
+    assert len(real.post(f"{url}/pick", json=pixel).json()["position"]) == 3
+    away = [*found["default_camera"]["to_world"]]
     away[3], away[7], away[11] = 1e5, 1e5, 1e5
-    assert real.post(f"{url}/place", json=pixel | {"to_world": away, "x": 1, "y": 1}).json() == {"position": None}
+    assert real.post(f"{url}/pick", json=pixel | {"to_world": away, "x": 1, "y": 1}).json() == {"position": None}
     for wrong in ({"size": [1, 60]}, {"size": [80, 100_000]}, {"yfov": 0}, {"to_world": [0.0] * 16}):
-        assert real.post(url, json={**found["framing"], "size": [80, 60]} | wrong).status_code == 422
-    assert real.get(f"/api/scenes/{'0' * 16}/finder").status_code == 404
+        assert real.post(url, json={**found["default_camera"], "size": [80, 60]} | wrong).status_code == 422
+    assert real.get(f"/api/scenes/{'0' * 16}/viewport").status_code == 404

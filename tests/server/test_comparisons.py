@@ -38,7 +38,7 @@ def is_done(body: dict[str, Any]) -> bool:
 
 
 def submit(client: TestClient, baked: Baked, passes: int, **more: Any) -> str:
-    queued = client.post("/api/truths", json={"bake": baked.bake, "view": "front", "passes": passes, **more})
+    queued = client.post("/api/comparisons", json={"bake": baked.bake, "view": "front", "passes": passes, **more})
     assert queued.status_code == 202, queued.text
     return str(queued.headers["location"])
 
@@ -47,16 +47,16 @@ def test_comparison_finds_the_error_and_shows_it(client: TestClient, control: Co
     control.trace_gate.set()
     url = submit(client, baked, 6)
     body = wait_until(client, url, is_done)
-    assert (body["state"], body["passes"], body["progress"]) == ("ready", 6, 1.0)
+    assert (body["state"], body["completed"], body["progress"]) == ("ready", 6, 1.0)
     # the stand-in's truth is the frame's pixel over 1.1, its noise a fiftieth; by all paths it is three quarters
-    assert (body["paths"], body["left_out"], body["untraced"]) == ("all", ["What surfaces reflect."], [])
-    assert body["found"]["error"] == pytest.approx(1 / 3, rel=0.02)
-    found = body["found_of_method"]
+    assert (body["paths"], body["omitted_paths"], body["unsupported_paths"]) == ("all", ["What surfaces reflect."], [])
+    assert body["error_all_paths"]["error"] == pytest.approx(1 / 3, rel=0.02)
+    found = body["error_method_paths"]
     assert found["error"] == pytest.approx(0.1, rel=0.02)
     assert 0 < found["standard_error"] < 0.001
-    assert found["error"] < found["limit"] < 0.11
+    assert found["error"] < found["error_upper_bound"] < 0.11
     assert found["noise"] == pytest.approx(0.02 / np.sqrt(6), rel=0.05)
-    assert found["significant"] > 0.99
+    assert found["significant_pixel_fraction"] > 0.99
     for prefix in ("", "method-"):
         error = np.asarray(Image.open(io.BytesIO(client.get(f"{url}/{prefix}error.png").content)), int)
         assert error.shape == (SIZE[1], SIZE[0], 3)
@@ -77,9 +77,9 @@ def test_the_paths_of_the_method_alone_may_be_asked_for(client: TestClient, cont
     url = submit(client, baked, 4, paths="method")
     body = wait_until(client, url, is_done)
     assert body["paths"] == "method"
-    assert body["found"] == body["found_of_method"]
-    assert body["found"]["error"] == pytest.approx(0.1, rel=0.02)
-    assert body["left_out"] == ["What surfaces reflect."]
+    assert body["error_all_paths"] is None
+    assert body["error_method_paths"]["error"] == pytest.approx(0.1, rel=0.02)
+    assert body["omitted_paths"] == ["What surfaces reflect."]
     assert _brightness(client, f"{url}/reference.png") == _brightness(client, f"{url}/method-reference.png")
 
 
@@ -107,7 +107,7 @@ def test_comparison_goes_on_after_a_restart_and_starts_again_after_an_upgrade(
     later = Control()
     later.trace_gate.set()
     with TestClient(create_app(settings, open_library=later.open_library, open_batches=InThreadBatches)) as restarted:
-        assert wait_until(restarted, url, is_done)["passes"] == 5
+        assert wait_until(restarted, url, is_done)["completed"] == 5
     assert later.requested_passes == asked
 
 
@@ -115,51 +115,51 @@ def test_deleting_stops_the_work_and_forgets_its_files(client: TestClient, contr
     url = submit(client, baked, 1000)
     wait_until(client, url, lambda body: body["state"] == "running")
     assert client.get(f"{url}/error.png").status_code == 409
-    assert client.delete(url, params={"forget": True}).status_code == 204
+    assert client.delete(url, params={"delete_files": True}).status_code == 204
     assert client.get(url).status_code == 404
     control.trace_gate.set()  # the next one is worked on
     assert wait_until(client, submit(client, baked, 2), is_done)["state"] == "ready"
-    folder = client.app.state.services.settings.data / "truths"
+    folder = client.app.state.services.settings.data / "comparisons"
     assert len(list(folder.iterdir())) == 1
 
 
 def test_stopping_keeps_what_was_found_and_it_can_go_on(client: TestClient, control: Control, baked: Baked) -> None:
     control.trace_gate.set()
     url = submit(client, baked, 1000)
-    wait_until(client, url, lambda body: body["passes"] >= 3 and body["found"] is not None)
+    wait_until(client, url, lambda body: body["completed"] >= 3 and body["error_all_paths"] is not None)
     assert client.delete(url).status_code == 204
     stopped = client.get(url).json()
     assert (stopped["state"], stopped["seconds_left"]) == ("stopped", None)
-    assert stopped["found"]["noise"] > 0
+    assert stopped["error_all_paths"]["noise"] > 0
     assert client.get(f"{url}/error.png").status_code == 200
     assert client.delete(url).status_code == 204  # again: nothing more to stop
     assert wait_until(client, submit(client, baked, 2), is_done)["state"] == "ready"  # the next one has its turn
-    passes = client.get(url).json()["passes"]
+    passes = client.get(url).json()["completed"]
     resumed = client.post(f"{url}/resume")
     assert resumed.status_code == 202
     assert resumed.json()["state"] in ("queued", "running")  # the queue may be quicker than the answer
-    on = wait_until(client, url, lambda body: body["passes"] > passes + 1)
+    on = wait_until(client, url, lambda body: body["completed"] > passes + 1)
     assert on["seconds_left"] > 0
     whole = [
         index for index, (_, size) in zip(control.requested_passes, control.pass_cameras, strict=False) if size == SIZE
     ]
     assert len(whole) - len(set(whole)) <= 3  # no finished pass was made again
-    assert client.delete(url, params={"forget": True}).status_code == 204
+    assert client.delete(url, params={"delete_files": True}).status_code == 204
     assert client.post(f"{url}/resume").status_code == 404
 
 
 def test_how_long_it_takes_is_said_before_it_begins(client: TestClient, control: Control, baked: Baked) -> None:
     control.trace_gate.set()
     request = {"bake": baked.bake, "view": "front", "passes": 10, "dry_run": True}
-    planned = client.post("/api/truths", json=request)
+    planned = client.post("/api/comparisons", json=request)
     assert planned.status_code == 200
     assert planned.json()["passes"] == 10
     assert planned.json()["seconds"] > 0
     assert len(control.requested_passes) == 1  # a small picture; the second time its pace is known
-    again = client.post("/api/truths", json=request | {"passes": 20}).json()
+    again = client.post("/api/comparisons", json=request | {"passes": 20}).json()
     assert again["seconds"] == pytest.approx(2 * planned.json()["seconds"])
     assert len(control.requested_passes) == 1
-    assert client.post("/api/truths", json=request | {"view": "nowhere"}).status_code == 422
+    assert client.post("/api/comparisons", json=request | {"view": "nowhere"}).status_code == 422
 
 
 @pytest.mark.parametrize(
@@ -178,7 +178,7 @@ def test_how_long_it_takes_is_said_before_it_begins(client: TestClient, control:
 )
 def test_bad_request_is_refused(client: TestClient, baked: Baked, change: dict[str, Any], status: int) -> None:
     request = {"bake": baked.bake, "view": "front"} | change
-    answer = client.post("/api/truths", json=request)
+    answer = client.post("/api/comparisons", json=request)
     assert answer.status_code == status, answer.text
     assert answer.headers["content-type"] == "application/problem+json"
 
@@ -220,7 +220,7 @@ def test_a_moving_view_is_compared_from_where_its_eye_is(
         {"camera": camera | {"yfov": 180.0}},
         {"camera": camera | {"to_world": [0.0] * 16}},
     ):
-        refused = client.post("/api/truths", json=request | change)
+        refused = client.post("/api/comparisons", json=request | change)
         assert refused.status_code == 422, refused.text
 
 
@@ -229,15 +229,15 @@ def test_an_estimate_waits_for_no_other_and_is_judged_by_other_views_until_it_is
 ) -> None:
     monkeypatch.setattr("relume_server.jobs.comparison_jobs.ANSWER_S", 0.01)
     question = {"bake": baked.bake, "view": "front", "passes": 4, "dry_run": True}
-    guessed = client.post("/api/truths", json=question)  # nothing may be traced
+    guessed = client.post("/api/comparisons", json=question)  # nothing may be traced
     assert (guessed.status_code, guessed.json()["is_measured"]) == (200, False)
     assert guessed.json()["seconds"] == pytest.approx(4 * DEFAULT_PIXEL_S * SIZE[0] * SIZE[1])
-    assert client.post("/api/truths", json=question | {"paths": "method"}).json()["is_measured"] is False
+    assert client.post("/api/comparisons", json=question | {"paths": "method"}).json()["is_measured"] is False
     control.trace_gate.set()
     client.app.state.services.comparisons._sample.result(WAIT_S)  # type: ignore[attr-defined]
-    measured = client.post("/api/truths", json=question).json()
+    measured = client.post("/api/comparisons", json=question).json()
     assert measured["is_measured"] is True
-    assert client.post("/api/truths", json=question).json() == measured
+    assert client.post("/api/comparisons", json=question).json() == measured
     assert len(control.requested_passes) == 1
 
 
@@ -258,7 +258,7 @@ def test_there_is_a_picture_and_progress_while_the_first_pass_is_made(
     url = submit(client, baked, 2)
     assert half_way.wait(WAIT_S)
     body = client.get(url).json()
-    assert (body["passes"], body["progress"], body["found"]) == (0, 0.25, None)
+    assert (body["completed"], body["progress"], body["error_all_paths"]) == (0, 0.25, None)
     for prefix in ("", "method-"):
         picture = Image.open(io.BytesIO(client.get(f"{url}/{prefix}reference.png").content))
         assert picture.size == (SIZE[0] // 4, SIZE[1] // 4)
@@ -272,14 +272,14 @@ def test_brute_force_can_be_looked_at_after_one_pass(client: TestClient, control
     step = queue.step
 
     def once(work: Any, timer: Any) -> Any:
-        if work.done:
+        if work.completed:
             raise CancelledError("one is enough")
         return step(work, timer)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(queue, "step", once)
         url = submit(client, baked, 1000)
-        wait_until(client, url, lambda body: body["passes"] == 1)
+        wait_until(client, url, lambda body: body["completed"] == 1)
         assert Image.open(io.BytesIO(client.get(f"{url}/reference.png").content)).size == SIZE
         assert client.get(f"{url}/error.png").status_code == 409
         client.delete(url)

@@ -81,7 +81,7 @@ def test_what_it_does_not_have_is_refused_before_anything_is_rendered(client: Te
         headers = {"Content-Type": "application/json"}
         assert client.post("/api/renders", content=asked, headers=headers).status_code == 422
     truth = {"bake": baked.bake, "view": "front", "look": request["looks"][1]}
-    assert client.post("/api/truths", json=truth).json()["parameter"] == "/look/display/tone_map"
+    assert client.post("/api/comparisons", json=truth).json()["parameter"] == "/look/display/tone_map"
 
 
 def test_processes_that_render_are_told_the_config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -86,7 +86,7 @@ def test_streamed_picture_is_the_rendered_one(real: TestClient, tmp_path: Path) 
     picture = np.zeros((HEIGHT, WIDTH, 3))
     with open_session(real, bake["id"]) as session:
         session.edit(1, f"/materials/{name}/terms", terms)
-        session.send_message(type="touch", curve=f"/materials/{name}/terms/1/curves/theta_h")
+        session.send_message(type="prepare", curve=f"/materials/{name}/terms/1/curves/theta_h")
         session.edit(2, f"/materials/{name}/terms/1/params/sigma", 0.2)
         while True:
             message = session.receive()
@@ -94,8 +94,8 @@ def test_streamed_picture_is_the_rendered_one(real: TestClient, tmp_path: Path) 
                 put(picture, message)
                 if message.header["exact"] and message.header["revision"] == 2:
                     break
-        session.send_message(type="probe", x=WIDTH // 2, y=HEIGHT // 2)
-        probe = session.text("probe")
+        session.send_message(type="inspect", x=WIDTH // 2, y=HEIGHT // 2)
+        probe = session.text("inspect")
 
     terms[1]["params"] = {"sigma": 0.2}
     looks = [{"materials": {name: {"terms": terms}}}]
@@ -113,10 +113,10 @@ def test_frame_is_true(real: TestClient) -> None:
     bake_request: dict[str, Any] = {"scene": scene["id"], "size": [32, 24], "lights": 1000}
     bake = wait_until_done(real, real.post("/api/bakes", json=bake_request).headers["location"])
     request = {"bake": bake["id"], "view": scene["views"][0]["name"], "passes": 8}
-    truth = wait_until_done(real, real.post("/api/truths", json=request).headers["location"])
+    truth = wait_until_done(real, real.post("/api/comparisons", json=request).headers["location"])
     assert truth["state"] == "ready", truth["problem"]
-    assert truth["found"]["noise"] > 0
-    assert truth["found"]["limit"] < 0.03  # of the error, which may lie below the noise
+    assert truth["error_all_paths"]["noise"] > 0
+    assert truth["error_all_paths"]["error_upper_bound"] < 0.03  # of the error, which may lie below the noise
 
 
 def test_one_drag_changes_two_views_and_both_end_exact(real: TestClient, tmp_path: Path) -> None:
@@ -131,14 +131,14 @@ def test_one_drag_changes_two_views_and_both_end_exact(real: TestClient, tmp_pat
     with open_session(real, bake) as session:
         session.send_message(type="views", names=["front", "left"])
         session.send_message(type="focus", view="left")
-        session.send_message(type="touch", curve="/materials/Ball/terms/1/curves/theta_h")
+        session.send_message(type="prepare", curve="/materials/Ball/terms/1/curves/theta_h")
         for revision in range(1, last + 1):
             session.edit(revision, "/materials/Ball/terms/1/params/sigma", 0.1 + revision / 20)
         while {f.header["view"] for f in frames if f.header["exact"] and f.header["revision"] == last} != set(pictures):
             frame = session.frame()
             put(pictures[frame.header["view"]], frame)
             frames.append(frame)
-        session.edit(last + 1, "/environment/scale", 2.0)  # nothing is to be frozen: the focused view comes first
+        session.edit(last + 1, "/environment/intensity", 2.0)  # nothing is to be frozen: the focused view comes first
         followed = [session.exact(last + 1) for _ in range(2)]
     assert [frame.header["view"] for frame in followed] == ["left", "front"]
 
@@ -162,10 +162,10 @@ def test_view_is_opened_whose_ground_only_catches_shadows_again(real: TestClient
     ground = f"/materials/{scene.materials[-1].name}"
     terms = [{"model": "lambert"}, {"model": "cook_torrance"}]
     with open_session(real, bake) as session:
-        session.edit(1, ground, {"catcher": False, "terms": terms})
-        session.send_message(type="touch", curve=f"{ground}/terms/1/curves/theta_h")
+        session.edit(1, ground, {"shadow_catcher": False, "terms": terms})
+        session.send_message(type="prepare", curve=f"{ground}/terms/1/curves/theta_h")
         session.exact(1)
-        session.edit(2, f"{ground}/catcher", True)
+        session.edit(2, f"{ground}/shadow_catcher", True)
         session.exact(2)
         session.send_message(type="view", name="left")
         assert session.exact(2).header["view"] == "left"
@@ -182,7 +182,7 @@ def test_drag_of_a_slider_shows_pictures_near_the_look_and_ends_exact(real: Test
     with open_session(real, bake) as session:
         session.edit(1, term, ggx)
         put(picture, session.exact(1))
-        session.send_message(type="touch", parameter=f"{term}/params/roughness")
+        session.send_message(type="prepare", parameter=f"{term}/params/roughness")
         session.wait_until_ready("Ball, Roughness")
         session.edit(2, f"{term}/params/roughness", 0.3)
         while not frames or not frames[-1].header["exact"]:
@@ -210,7 +210,7 @@ def test_colour_bleeding_follows_a_dragged_colour_and_ends_exact(real: TestClien
         put(picture, session.exact(1))
         before = picture.copy()
         session.edit(2, color, [0.8, 0.1, 0.1], control=color)
-        while (first := session.frame()).header["fidelity"] != "followed":  # the last rows may still be missing
+        while (first := session.frame()).header["fidelity"] != "incremental":  # the last rows may still be missing
             put(picture, first)
         put(picture, first)
         followed = picture.copy()

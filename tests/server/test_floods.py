@@ -144,7 +144,7 @@ def test_another_sessions_message_is_taken_before_a_flood_is(
             for session in (flooding, other):
                 assert json.loads(session.recv())["type"] == "hello"
             for _ in range(390):
-                flooding.send('{"type":"stream","format":"hdr"}')
+                flooding.send('{"type":"encoding","format":"hdr"}')
             other.send('{"type":"focus","view":"front"}')
             while taken.count("stream") < 390:
                 time.sleep(0.01)

@@ -58,7 +58,7 @@ def run(scenario: Any, told: Told | None = None) -> tuple[list[str], list[str]]:
     return told.states, complaints
 
 
-@pytest.mark.parametrize("state", ["freezing", "shading"])
+@pytest.mark.parametrize("state", ["precomputing", "shading"])
 def test_freeze_is_told_by_its_own_word_and_is_ready_once_handed_over(state: str) -> None:
     told = Told()
 

@@ -53,7 +53,7 @@ def names_in(answer: Any) -> list[str]:
 
 def test_a_batch_that_has_failed_goes_on_where_it_stopped(client: TestClient, failed: str, painting: Painting) -> None:
     body = client.get(failed).json()
-    assert (body["done"], body["problem"]) == (2, "the process was killed; try again")
+    assert (body["completed"], body["problem"]) == (2, "the process was killed; try again")
     assert body["ended"] is not None
     painting.fails = False
     resumed = client.post(f"{failed}/resume")

@@ -51,9 +51,9 @@ def test_another_call_with_the_key_is_refused(client: TestClient, render: dict[s
     other = client.post("/api/renders", json={**render, "format": "exr"}, headers=keyed("one"))
     assert other.status_code == 422
     assert parse_problem(other)["type"].endswith("key-reused")
-    elsewhere = client.post("/api/truths", json=render, headers=keyed("one"))
+    elsewhere = client.post("/api/comparisons", json=render, headers=keyed("one"))
     assert parse_problem(elsewhere)["type"].endswith("key-reused")
-    assert client.get("/api/truths").json() == []
+    assert client.get("/api/comparisons").json() == []
 
 
 def test_what_was_refused_may_be_tried_again(client: TestClient, render: dict[str, Any]) -> None:

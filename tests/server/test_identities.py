@@ -34,7 +34,7 @@ def test_a_ready_bake_is_deleted_only_where_that_is_said(client: TestClient, bak
     url = f"/api/bakes/{baked.bake}"
     refused = client.delete(url)
     assert refused.status_code == 409
-    assert parse_problem(refused)["detail"].endswith("?forget=true deletes it")
+    assert parse_problem(refused)["detail"].endswith("?delete_files=true deletes it")
     assert client.get(url).json()["state"] == "ready"
-    assert client.delete(f"{url}?forget=true").status_code == 204
+    assert client.delete(f"{url}?delete_files=true").status_code == 204
     assert client.get(url).status_code == 404

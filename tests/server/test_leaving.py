@@ -50,16 +50,16 @@ def test_sessions_are_told_and_the_server_goes_when_they_have_left(running: Runn
     with open_socket(url) as session:
         text(session, "hello")
         running.process.handle_exit(signal.SIGTERM, None)
-        assert text(session, "leaving") == {"type": "leaving", "seconds": 60.0}
+        assert text(session, "server_draining") == {"type": "server_draining", "seconds": 60.0}
         with pytest.raises(HTTPError, match="503") as refused:
             urllib.request.urlopen(f"http://127.0.0.1:{running.port}/readyz")
         assert "being stopped" in json.load(refused.value)["detail"]
         with pytest.raises(InvalidStatus) as elsewhere, open_socket(url):
             pass
         answer = elsewhere.value.response
-        assert (answer.status_code, json.loads(answer.body)["type"]) == (503, "urn:relume:problem:leaving")
+        assert (answer.status_code, json.loads(answer.body)["type"]) == (503, "urn:relume:problem:draining")
         edit = {"op": "replace", "path": "/materials/Paper/terms/1/params/sigma", "value": 0.3}
-        session.send(json.dumps({"type": "edit", "revision": 1, "patch": [edit], "hand": None}))
+        session.send(json.dumps({"type": "edit", "revision": 1, "patch": [edit], "active_control": None}))
         while not isinstance(session.recv(timeout=30), bytes):  # it goes on meanwhile
             pass
         assert running.thread.is_alive()

@@ -45,7 +45,7 @@ def filled(client: TestClient, baked: Baked) -> Baked:
         render = {"bake": baked.bake, "view": "front", "format": "png", "looks": [{}], "name": name}
         wait_until(client, client.post("/api/renders", json=render).headers["location"], is_done)
         truth = {"bake": baked.bake, "view": "front", "passes": 2}
-        stopped = client.post("/api/truths", json=truth).headers["location"]
+        stopped = client.post("/api/comparisons", json=truth).headers["location"]
         assert client.delete(stopped).status_code == 204
     return baked
 
@@ -64,7 +64,7 @@ def in_parts(client: TestClient, url: str, limit: int) -> list[Any]:
 
 def test_every_list_is_read_in_parts_that_are_all_of_it(client: TestClient, filled: Baked) -> None:
     paths = lists()
-    assert {"/api/scenes", "/api/bakes", "/api/renders", "/api/truths", "/api/looks", "/api/shares"} <= set(paths)
+    assert {"/api/scenes", "/api/bakes", "/api/renders", "/api/comparisons", "/api/looks", "/api/shares"} <= set(paths)
     for path in paths:
         url = path.replace("{scene}", filled.scene)
         if "{" in url or path in ("/api/audit", "/api/materials/map/at"):  # by number; terms of one material
@@ -98,7 +98,7 @@ def test_filters(client: TestClient, filled: Baked) -> None:
     assert ids(f"/api/renders?bake={filled.bake}&user=") == ["c", "b", "a"]
     for none in ("state=queued", f"bake={'0' * 16}", "user=ann"):
         assert ids(f"/api/renders?{none}") == []
-    assert len(ids("/api/truths?state=stopped")) == 3
+    assert len(ids("/api/comparisons?state=stopped")) == 3
     assert len(ids(f"/api/bakes?state=ready&scene={filled.scene}&user=")) == 3
     assert ids("/api/bakes?state=failed") == []
     assert ids("/api/scenes?name=c") == ["c"]
@@ -112,7 +112,7 @@ def test_works_say_whose_they_are_and_when(client: TestClient, filled: Baked) ->
     render = client.get("/api/renders?name=a").json()[0]
     assert (render["user"], render["name"], render["state"]) == ("", "a", "ready")
     assert render["created"] <= render["started"] <= render["ended"]
-    truth = client.get("/api/truths").json()[0]
+    truth = client.get("/api/comparisons").json()[0]
     assert truth["state"] == "stopped"
     assert truth["ended"] is not None
     assert all(bake["created"] and bake["user"] == "" for bake in client.get("/api/bakes").json())

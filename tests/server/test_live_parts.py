@@ -164,7 +164,7 @@ def test_curve_pointers_are_resolved_or_refused() -> None:
 
 def test_what_a_hand_may_hold_is_of_this_look() -> None:
     document = {**DOCUMENT, "lights": {"Desk / lamp": {}}}
-    for pointer in (f"{TERM}/2/params/nu", "/lights/Desk ~1 lamp", "/environment/scale"):
+    for pointer in (f"{TERM}/2/params/nu", "/lights/Desk ~1 lamp", "/environment/intensity"):
         check_parameter(pointer, document)
     for pointer in (f"{TERM}/2/curves/alpha", f"{TERM}/2/params/sigma", "/lights/Desk", "/environment/size"):
         with pytest.raises(ParameterError):
@@ -182,7 +182,7 @@ def test_a_hand_may_be_on_a_curve_or_on_what_may_be_held() -> None:
 
 def test_of_a_ground_that_only_catches_shadows_there_is_nothing_to_hold() -> None:
     for is_catcher in (False, True):
-        document = {"materials": {"a/b": {**DOCUMENT["materials"]["a/b"], "catcher": is_catcher}}}
+        document = {"materials": {"a/b": {**DOCUMENT["materials"]["a/b"], "shadow_catcher": is_catcher}}}
         for find, pointer in ((find_curve, f"{TERM}/1/curves/theta_h"), (check_parameter, f"{TERM}/1/params/sigma")):
             if is_catcher:
                 with pytest.raises(ParameterError):

@@ -133,16 +133,16 @@ def test_no_logger_writes_down_what_opens_anything(
         token = running.app.state.services.access.tokens.add("Ann", "admin")
         path = f"{running.baked_url()}?room_prefix={secret[:8]}"
         headers = {"Authorization": f"Bearer {token}", "Cookie": f"relume_token={token}"}
-        opening = {"type": "open", "room": secret, "seat": secret, "resume": secret, "name": secret}
-        with connect(path, subprotocols=["relume.v1"], additional_headers=headers, proxy=None) as session:
+        opening = {"type": "open", "room": secret, "participant_token": secret, "resume": secret, "name": secret}
+        with connect(path, subprotocols=["relume.v2"], additional_headers=headers, proxy=None) as session:
             session.send(json.dumps(opening))
             hello = json.loads(session.recv())
-        with connect(f"{running.baked_url()}?resume={secret}", subprotocols=["relume.v1"], proxy=None) as refused:
+        with connect(f"{running.baked_url()}?resume={secret}", subprotocols=["relume.v2"], proxy=None) as refused:
             refused.close()
         url = f"http://127.0.0.1:{running.port}/livez?resume={secret}"
         with urllib.request.urlopen(urllib.request.Request(url, headers=headers)) as answer:
             assert answer.status == 200
     said = capsys.readouterr().err
     assert '"path": "/livez"' in said
-    for each in (secret, token, hello["resume"], hello["room"]["seat"], hello["room"]["watch"]):
+    for each in (secret, token, hello["resume"], hello["room"]["participant_token"], hello["room"]["view_token"]):
         assert each not in said

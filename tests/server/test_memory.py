@@ -76,7 +76,7 @@ def look_at(client: TestClient, bake: str) -> bytes:
     """The exact picture of a bake, one of its curves frozen and moved."""
     with open_session(client, bake) as session:
         session.exact(0)
-        session.send_message(type="touch", curve=CURVE)
+        session.send_message(type="prepare", curve=CURVE)
         # shading adds in another order: the last bits of a picture would tell
         session.wait_until_ready("Ball, half angle θh")
         session.edit(1, SIGMA, 0.3, control=SIGMA)
@@ -146,7 +146,7 @@ def test_what_is_looked_at_is_kept_however_long(real: TestClient, clock: Clock) 
     shown, left = bake_scenes(real, 2)
     look_at(real, left)
     with open_session(real, shown) as session:
-        session.send_message(type="touch", curve=CURVE)
+        session.send_message(type="prepare", curve=CURVE)
         session.edit(1, "/materials/Ball/terms/1/params/sigma", 0.3)
         session.exact(1)
         (transfer,) = [one for one in real.app.state.services.transfers.open_bakes if shown in one.key]
@@ -164,7 +164,7 @@ def test_what_is_looked_at_is_kept_however_long(real: TestClient, clock: Clock) 
 @pytest.mark.slow
 def test_comparisons_and_renders_go_on_while_their_bake_is_let_go(real: TestClient, clock: Clock) -> None:
     bake = bake_scenes(real)[0]
-    truth = real.post("/api/truths", json={"bake": bake, "view": "front", "passes": 2}).headers["location"]
+    truth = real.post("/api/comparisons", json={"bake": bake, "view": "front", "passes": 2}).headers["location"]
     request = {"bake": bake, "view": "front", "format": "png", "looks": [{"display": {"exposure": 1.0}}] * 2}
     render = real.post("/api/renders", json=request).headers["location"]
     works = [truth, render]

@@ -95,7 +95,7 @@ def eye(view: dict[str, Any], number: int, aside: float, size: tuple[int, int] =
     to_world = np.array(view["camera"]["to_world"]).reshape(4, 4)
     to_world[:3, 3] += aside * to_world[:3, 0]
     where = {"to_world": to_world.ravel().tolist(), "yfov": view["camera"]["yfov"]}
-    return {"type": "eye", "view": view["name"], "eye": number, **where, "size": size}
+    return {"type": "camera", "view": view["name"], "seq": number, **where, "size": size}
 
 
 def shown(frame: Frame) -> np.ndarray:
@@ -103,7 +103,7 @@ def shown(frame: Frame) -> np.ndarray:
 
 
 def of_eye(session: Session, number: int) -> Frame:
-    while (frame := session.frame()).header["eye"] != number:
+    while (frame := session.frame()).header["camera_seq"] != number:
         pass
     return frame
 
@@ -111,16 +111,16 @@ def of_eye(session: Session, number: int) -> Frame:
 def test_hello_says_that_the_eye_is_free_and_where_there_is_something(session: Session) -> None:
     found = hello(session)
     (view,) = found["views"]
-    assert (view["eye"], found["method"], "eye" in found["axes"]) == ("free", "probes", True)
+    assert (view["camera_mode"], found["method"], "camera" in found["axes"]) == ("free", "probes", True)
     lowest, highest = np.array(view["bounds"])
     np.testing.assert_allclose([lowest, highest], [[-1] * 3, [1] * 3], atol=0.05)
-    assert 0 < found["moving_error"]["standard_error"] < found["moving_error"]["value"] < 0.5
+    assert 0 < found["free_camera_error"]["standard_error"] < found["free_camera_error"]["value"] < 0.5
 
 
 def test_frames_follow_the_eye_twice_and_say_which_they_show(session: Session) -> None:
     (view,) = hello(session)["views"]
     first = session.frame()
-    assert (first.header["eye"], first.header["exact"]) == (None, False)
+    assert (first.header["camera_seq"], first.header["exact"]) == (None, False)
     while first.header["fidelity"] == "preview":  # light on the points is made beside the frames
         first = session.frame()
     assert first.header["fidelity"] == "approximate"
@@ -136,7 +136,7 @@ def test_frames_follow_the_eye_twice_and_say_which_they_show(session: Session) -
 
 
 def exact_of(session: Session, number: int, revision: int) -> Frame:
-    while (frame := session.exact(revision)).header["eye"] != number:
+    while (frame := session.exact(revision)).header["camera_seq"] != number:
         pass
     return frame
 
@@ -180,7 +180,7 @@ def test_an_edit_a_light_and_an_eye_in_one_burst_are_all_shown(session: Session,
     session.frame()
     terms = [{"model": "lambert", "color": [0.1, 0.5, 0.2]}]
     session.edit(1, f"/materials/{material}/terms", terms)
-    session.edit(2, "/environment/scale", 2.0)
+    session.edit(2, "/environment/intensity", 2.0)
     session.send_message(**eye(view, 3, 0.3))
     frame = of_eye(session, 3)
     while frame.header["revision"] < 2:
@@ -190,9 +190,9 @@ def test_an_edit_a_light_and_an_eye_in_one_burst_are_all_shown(session: Session,
         hello(other)
         other.send_message(**eye(view, 1, 0.3))
         other.edit(1, f"/materials/{material}/terms", terms)
-        other.edit(2, "/environment/scale", 2.0)
+        other.edit(2, "/environment/intensity", 2.0)
         frame = other.frame()
-        while (frame.header["revision"], frame.header["eye"]) != (2, 1):
+        while (frame.header["revision"], frame.header["camera_seq"]) != (2, 1):
             frame = other.frame()
         np.testing.assert_array_equal(shown(frame), burst)
 
@@ -218,9 +218,9 @@ def test_a_render_is_what_the_eye_sees_where_it_begins(
         {"to_world": [0.0] * 16},
         {"to_world": [-1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]},
         {"to_world": [1.0, 0, 0, 0] * 3},
-        {"eye": -1},
-        {"rest": "go"},
-        {"hand": "nonsense"},
+        {"seq": -1},
+        {"refine": "go"},
+        {"active_control": "nonsense"},
     ],
     ids=str,
 )
@@ -251,7 +251,7 @@ def test_fixed_views_have_no_eye_that_moves_and_moving_ones_no_mask(
     fixed = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
     with open_session(client, fixed["id"]) as session:
         (view,) = hello(session)["views"]
-        assert (view["eye"], view["bounds"]) == ("baked", None)
+        assert (view["camera_mode"], view["bounds"]) == ("fixed", None)
         session.send_message(**eye(view, 1, 0.2))
         assert "probes" in session.text("problem")["problem"]["detail"]
     answer = client.get(f"/api/bakes/{bake}/views/{view['name']}/materials.png")
@@ -276,8 +276,8 @@ def test_a_scene_deleted_under_a_moving_view_leaves_what_moves(client: TestClien
             problem = session.text("problem")["problem"]
             assert problem["type"].endswith("not-made")
             assert "the moving picture stays" in problem["detail"]
-        session.send_message(type="probe", view=view["name"], x=SIZE[0] // 2, y=SIZE[1] // 2)
-        assert session.text("probe")["material"] is not None
+        session.send_message(type="inspect", view=view["name"], x=SIZE[0] // 2, y=SIZE[1] // 2)
+        assert session.text("inspect")["material"] is not None
 
 
 def test_a_probe_says_what_the_eye_sees(session: Session) -> None:
@@ -285,20 +285,22 @@ def test_a_probe_says_what_the_eye_sees(session: Session) -> None:
     (view,) = found["views"]
     session.send_message(**eye(view, 4, 0.0))
     of_eye(session, 4)
-    session.send_message(type="probe", view=view["name"], x=SIZE[0] // 2, y=SIZE[1] // 2)
-    answer = session.text("probe")
+    session.send_message(type="inspect", view=view["name"], x=SIZE[0] // 2, y=SIZE[1] // 2)
+    answer = session.text("inspect")
     assert answer["material"] == found["materials"][0]
     assert np.linalg.norm(answer["position"]) == pytest.approx(1.0, abs=0.02)
     session.send_message(
-        type="brush", curve=f"/materials/{answer['material']}/terms/0/curves/theta_h", **{"from": 0, "to": 9}
+        type="highlight_curve_range",
+        curve=f"/materials/{answer['material']}/terms/0/curves/theta_h",
+        **{"from": 0, "to": 9},
     )
     assert session.text("problem")["problem"]["detail"]
 
 
 def arrays_in(frame: Frame) -> dict[str, np.ndarray]:
-    """The arrays of a frame of kind "tables"."""
+    """The arrays of a frame of kind "scene_update"."""
     found, at = {}, 0
-    for info in frame.header["tables"]["arrays"]:
+    for info in frame.header["scene_update"]["arrays"]:
         dtype, size = np.dtype(info["dtype"]), math.prod(info["shape"])
         found[info["name"]] = np.frombuffer(frame.payload, dtype, size, at).reshape(info["shape"])
         at += size * dtype.itemsize
@@ -307,7 +309,7 @@ def arrays_in(frame: Frame) -> dict[str, np.ndarray]:
 
 
 def tables_of(session: Session) -> Frame:
-    while (frame := session.frame()).header["kind"] != "tables":
+    while (frame := session.frame()).header["kind"] != "scene_update":
         pass
     return frame
 
@@ -322,15 +324,15 @@ def test_a_browser_that_draws_itself_gets_what_has_changed_and_no_frame_for_an_e
     found = hello(session)
     (view,), material = found["views"], found["materials"][0]
     session.frame()
-    session.send_message(**eye(view, 1, 0.2), rest="stay")
+    session.send_message(**eye(view, 1, 0.2), refine="none")
     of_eye(session, 1)
-    session.send_message(type="evaluate", by="browser")
+    session.send_message(type="renderer", renderer="client")
     tables = tables_of(session)
     first = arrays_in(tables)
     if tables.header["fidelity"] == "preview":
         until_fine(session, 0)
     assert {"even", "materials", "vectors/0", "sky"} <= set(first)
-    session.send_message(**eye(view, 2, 0.4), rest="stay")
+    session.send_message(**eye(view, 2, 0.4), refine="none")
     assert arrays_in(tables_of(session)) == {}
     session.edit(1, f"/materials/{material}/terms/0/color", [0.1, 0.2, 0.9])
     recoloured = tables_of(session)
@@ -339,11 +341,11 @@ def test_a_browser_that_draws_itself_gets_what_has_changed_and_no_frame_for_an_e
 
 
 def test_what_a_shader_keeps_is_there_once_for_all(client: TestClient, bake: str) -> None:
-    answer = client.get(f"/api/bakes/{bake}/surface")
+    answer = client.get(f"/api/bakes/{bake}/probes")
     assert "immutable" in answer.headers["cache-control"]
     found = answer.json()
-    assert found["functions"] == len(found["ladder"]["order"]) + sum(m > 0 for m in found["ladder"]["order"])
-    arrays = {name: client.get(f"/api/bakes/{bake}/surface/{name}") for name in found["arrays"]}
+    assert found["num_basis"] == len(found["recurrence"]["order"]) + sum(m > 0 for m in found["recurrence"]["order"])
+    arrays = {name: client.get(f"/api/bakes/{bake}/probes/{name}") for name in found["arrays"]}
     assert all("immutable" in each.headers["cache-control"] for each in arrays.values())
     num_points = len(arrays["places"].content) // 16
     assert len(arrays["seen_lights"].content) == num_points * 16  # bits of at most 128 lights
@@ -351,14 +353,14 @@ def test_what_a_shader_keeps_is_there_once_for_all(client: TestClient, bake: str
     assert corners[:, :3].max() < len(arrays["positions"].content) // 16
     sides = np.frombuffer(arrays["sides"].content, np.uint32).reshape(-1, 4)
     assert (len(sides), sides[:, :3].max() < len(arrays["normals"].content) // 8) == (2 * len(corners), True)
-    first = found["first_points"]
+    first = found["first_probes"]
     assert (first[0], first[-1], first == sorted(first)) == (0, num_points, True)
 
 
 def test_there_are_no_other_arrays_and_none_of_fixed_views(
     client: TestClient, bake: str, scene: dict[str, Any]
 ) -> None:
-    missing = client.get(f"/api/bakes/{bake}/surface/lights")
+    missing = client.get(f"/api/bakes/{bake}/probes/lights")
     assert (missing.status_code, "there are corners" in missing.json()["detail"]) == (404, True)
     request = {"scene": scene["id"], "size": SIZE, "lights": 100}
     fixed = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
@@ -369,18 +371,18 @@ def test_there_are_no_other_arrays_and_none_of_fixed_views(
 
 def test_a_browser_may_leave_the_drawing_to_the_server_again_twice(session: Session) -> None:
     (view,) = hello(session)["views"]
-    session.send_message(**eye(view, 1, 0.2), rest="stay")
+    session.send_message(**eye(view, 1, 0.2), refine="none")
     while (first := of_eye(session, 1)).header["fidelity"] == "preview":
         pass
     for _ in range(2):
-        session.send_message(type="evaluate", by="browser")
+        session.send_message(type="renderer", renderer="client")
         assert "vectors/0" in arrays_in(tables_of(session))
-        session.send_message(type="evaluate", by="server")
+        session.send_message(type="renderer", renderer="server")
         while (frame := session.frame()).header["kind"] != "picture":
             pass
         np.testing.assert_array_equal(shown(frame), shown(first))
-    session.send_message(type="evaluate", by="nobody")
-    assert "/by is 'nobody'" in str(session.text("problem"))
+    session.send_message(type="renderer", renderer="nobody")
+    assert "/renderer is 'nobody'" in str(session.text("problem"))
 
 
 def test_where_the_link_is_too_slow_for_tables_a_hand_gets_pictures_twice(
@@ -390,10 +392,10 @@ def test_where_the_link_is_too_slow_for_tables_a_hand_gets_pictures_twice(
     monkeypatch.setattr(FrameWindow, "is_slow_for", lambda self, num_bytes, *, was_slow: num_bytes > 100_000)
     found = hello(session)
     (view,), color = found["views"], f"/materials/{found['materials'][0]}/terms/0/color"
-    session.send_message(**eye(view, 1, 0.05), rest="stay")
+    session.send_message(**eye(view, 1, 0.05), refine="none")
     of_eye(session, 1)
     session.edit(1, "/transport/show", "direct")  # colours would bring other light to all points
-    session.send_message(type="evaluate", by="browser")
+    session.send_message(type="renderer", renderer="client")
     until_fine(session, 1)
     turn, kinds = "/environment/rotation", []
     edits = [(color, [0.1, 0.2, 0.9]), (turn, 20.0), (turn, 50.0), (color, [0.9, 0.8, 0.1])]
@@ -404,18 +406,18 @@ def test_where_the_link_is_too_slow_for_tables_a_hand_gets_pictures_twice(
         kinds.append(first.header["kind"])
         if kinds[-1] == "picture" or first.header["fidelity"] == "preview":
             until_fine(session, revision)
-        session.send_message(**eye(view, revision, 0.1 * revision), rest="stay")
+        session.send_message(**eye(view, revision, 0.1 * revision), refine="none")
         assert arrays_in(tables_of(session)) == {}
-    assert kinds == ["picture", "picture", "picture", "tables"]  # how small those of colours are it learns once
+    assert kinds == ["picture", "picture", "picture", "scene_update"]  # how small those of colours are it learns once
 
 
 def test_tables_follow_a_picture_that_nothing_refines(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(FrameWindow, "is_slow_for", lambda self, num_bytes, *, was_slow: num_bytes > 100_000)
     session.edit(1, "/transport/show", "direct")
-    session.send_message(type="evaluate", by="browser")
+    session.send_message(type="renderer", renderer="client")
     until_fine(session, 1)
     for revision in (2, 3):
-        session.edit(revision, "/environment/scale", 0.5 / revision)
+        session.edit(revision, "/environment/intensity", 0.5 / revision)
         while (first := session.frame()).header["revision"] != revision:
             pass
         assert first.header["kind"] == "picture"

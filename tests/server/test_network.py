@@ -26,7 +26,7 @@ def url(settings: Settings, control: Control) -> Iterator[str]:
 
 def test_session_runs_without_compression(url: str) -> None:
     with open_socket(url) as session:
-        assert session.subprotocol == "relume.v1"
+        assert session.subprotocol == "relume.v2"
         assert session.protocol.extensions == []
         assert json.loads(session.recv())["type"] == "hello"
         frame = session.recv()
@@ -43,7 +43,7 @@ def test_request_with_more_than_is_read_is_refused_and_does_not_wait(
     url: str, headers: dict[str, str], status: int
 ) -> None:
     with pytest.raises(InvalidStatus, match=str(status)):
-        connect(url, subprotocols=["relume.v1"], additional_headers=headers)
+        connect(url, subprotocols=["relume.v2"], additional_headers=headers)
 
 
 def test_request_that_is_none_is_refused(url: str) -> None:
@@ -71,7 +71,7 @@ def test_page_of_another_site_is_refused_in_the_handshake(
         monkeypatch.setattr(root := logging.getLogger(), name, getattr(root, name))  # as it is until now
     set_up("plain", "warning")
     with pytest.raises(InvalidStatus, match="403"):
-        connect(url, subprotocols=["relume.v1"], origin="https://evil.example")
+        connect(url, subprotocols=["relume.v2"], origin="https://evil.example")
     with pytest.raises(InvalidStatus, match="403"):  # then all of the first has been said
-        connect(url, subprotocols=["relume.v1"], origin="https://evil.example")
+        connect(url, subprotocols=["relume.v2"], origin="https://evil.example")
     assert capsys.readouterr().err == ""

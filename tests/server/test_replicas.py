@@ -15,7 +15,7 @@ from replicas_proxy import proxy_to_ports, proxy_to_shared_name
 from websockets.sync.client import connect
 from websockets.sync.server import ServerConnection, serve
 
-from relume_server.collaboration.join import derive_watch_key
+from relume_server.collaboration.join import derive_view_token
 from relume_server.schemas.rooms import MIN_ROOM, ROOM_PREFIX
 
 NUM_SERVERS = 3
@@ -63,7 +63,7 @@ def test_all_of_a_room_come_to_one_server_whatever_their_bakes(proxy: int) -> No
     rooms = [secrets.token_hex(16) for _ in range(12)]
     servers = {}
     for k, room in enumerate(rooms):
-        queries = [f"?room_prefix={name[:ROOM_PREFIX]}" for name in (room, derive_watch_key(room))]
+        queries = [f"?room_prefix={name[:ROOM_PREFIX]}" for name in (room, derive_view_token(room))]
         found = {session(proxy, f"{k:015d}{j}", query) for j, query in enumerate(queries)}
         assert len(found) == 1, room
         servers[room] = found.pop()
@@ -89,7 +89,7 @@ def test_all_on_a_bake_come_to_one_server(proxy: int) -> None:
     found = {}
     for bake in bakes:
         first, again = (session(proxy, bake, query) for query in ("", "?other=abc"))
-        told = _get(f"http://127.0.0.1:{proxy}/api/bakes/{bake}/surface/points")
+        told = _get(f"http://127.0.0.1:{proxy}/api/bakes/{bake}/probes/points")
         assert first == again == told.split()[0]
         found[bake] = first
     assert len(set(found.values())) > 1
@@ -143,7 +143,7 @@ def _get(url: str) -> str:
 
 def test_what_opens_a_room_to_watch_says_its_place_and_no_more() -> None:
     room = "a" * MIN_ROOM
-    assert derive_watch_key(room)[:ROOM_PREFIX] == room[:ROOM_PREFIX]
-    assert derive_watch_key(room)[ROOM_PREFIX] != "a"
-    assert len(derive_watch_key(room)) == 32
-    assert derive_watch_key(room)[ROOM_PREFIX:] not in derive_watch_key(room + "a")
+    assert derive_view_token(room)[:ROOM_PREFIX] == room[:ROOM_PREFIX]
+    assert derive_view_token(room)[ROOM_PREFIX] != "a"
+    assert len(derive_view_token(room)) == 32
+    assert derive_view_token(room)[ROOM_PREFIX:] not in derive_view_token(room + "a")

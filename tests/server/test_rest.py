@@ -49,24 +49,24 @@ def test_scenes_of_other_formats_are_told_apart_by_content_and_files_come_with_t
     body = created.json()
     assert (body["name"], body["variants"]) == ("Leaf", [])
     assert body["materials"][0]["terms"][0]["color"] == [1, 0, 0]
-    assert ["gone.mtl" in warning for warning in body["warnings"]] == [True]
-    assert body["remarks"] == [{"text": body["warnings"][0], "effect": "wrong"}]
+    assert ["gone.mtl" in warning["text"] for warning in body["warnings"]] == [True]
+    assert body["warnings"] == [{"text": body["warnings"][0]["text"], "severity": "unsupported"}]
     refused = client.post("/api/scenes", files={"scene": ("evil.obj", obj.replace(b"gone.mtl", b"../environment.hdr"))})
     assert refused.status_code == 422
     assert "outside the folder" in refused.json()["detail"]
 
 
 def test_built_in_scenes_are_listed_and_taken_by_name(client: TestClient) -> None:
-    listed = client.get("/api/built-ins").json()
+    listed = client.get("/api/example-scenes").json()
     assert [each["name"] for each in listed][:2] == ["still_life", "cornell_box"]
     assert all(each["description"] and each["method"] == "gather" for each in listed)
-    created = client.post("/api/built-ins/cornell_box")
+    created = client.post("/api/example-scenes/cornell_box")
     assert created.status_code == 201, created.text
     scene = created.json()
     assert (scene["name"], scene["warnings"]) == ("Cornell box", [])
     assert created.headers["location"] == f"/api/scenes/{scene['id']}"
-    assert client.post("/api/built-ins/cornell_box").json()["id"] == scene["id"]
-    assert client.post("/api/built-ins/palace").status_code == 404
+    assert client.post("/api/example-scenes/cornell_box").json()["id"] == scene["id"]
+    assert client.post("/api/example-scenes/palace").status_code == 404
     client.delete(f"/api/scenes/{scene['id']}")
 
 
@@ -146,13 +146,13 @@ def test_a_finished_bake_cannot_be_cancelled_and_is_forgotten_where_that_is_said
     client: TestClient, settings: Settings, baked: Baked
 ) -> None:
     refused = client.delete(f"/api/bakes/{baked.bake}")
-    assert (refused.status_code, "?forget=true" in refused.json()["detail"]) == (409, True)
+    assert (refused.status_code, "?delete_files=true" in refused.json()["detail"]) == (409, True)
     assert client.get(f"/api/bakes/{baked.bake}").json()["state"] == "ready"
     store = bake_path(settings.data, baked.bake)
     assert store.exists()
-    assert client.delete(f"/api/bakes/{baked.bake}?forget=true").status_code == 204
+    assert client.delete(f"/api/bakes/{baked.bake}?delete_files=true").status_code == 204
     assert client.get(f"/api/bakes/{baked.bake}").status_code == 404
-    assert client.delete(f"/api/bakes/{baked.bake}?forget=true").status_code == 404
+    assert client.delete(f"/api/bakes/{baked.bake}?delete_files=true").status_code == 404
     assert client.get("/api/bakes").json() == []
     assert not store.exists()
     assert len(client.get("/api/scenes").json()) == 1
@@ -165,11 +165,11 @@ def test_a_disk_that_is_nearly_full_takes_nothing_new_and_lets_go(
     bake = {"scene": baked.scene, "size": [24, 16], "lights": 11}
     image = {"files": {"image": ("a.png", b"")}}
     for refused in (
-        client.post("/api/built-ins/cornell_box"),
+        client.post("/api/example-scenes/cornell_box"),
         client.post("/api/scenes", files={"scene": ("a.glb", b"")}),
         client.post("/api/images", **image),
         client.post("/api/bakes", json=bake),
-        client.post("/api/truths", json={"bake": baked.bake, "view": "front", "look": {}}),
+        client.post("/api/comparisons", json={"bake": baked.bake, "view": "front", "look": {}}),
         client.get("/readyz"),
     ):
         assert (refused.status_code, refused.json()["type"]) == (507, "urn:relume:problem:disk")
@@ -187,13 +187,13 @@ def test_material_ids_are_16_bit_png(client: TestClient, baked: Baked) -> None:
 
 def test_what_moving_views_make_of_terms_is_told(client: TestClient) -> None:
     terms = [{"model": "lambert"}, {"model": "phong", "params": {"exponent": 400.0}}]
-    diffuse, sharp = client.post("/api/models/in-out", json={"terms": terms}).json()
-    assert (diffuse["needed"], diffuse["is_mirror"]) == (1, False)
-    assert (sharp["needed"], sharp["is_mirror"]) == (None, True)
-    assert 0 <= diffuse["missed"] < 0.01 < sharp["missed"] <= 1
+    diffuse, sharp = client.post("/api/models/zernike-fit", json={"terms": terms}).json()
+    assert (diffuse["required_functions"], diffuse["is_mirror"]) == (1, False)
+    assert (sharp["required_functions"], sharp["is_mirror"]) == (None, True)
+    assert 0 <= diffuse["residual"] < 0.01 < sharp["residual"] <= 1
     worded = [{"model": "phong", "params": {"exponent": "x"}}]
     for bad in ([], [{"model": "nothing"}], worded, [{"model": "lambert"}] * 99):
-        answer = client.post("/api/models/in-out", json={"terms": bad})
+        answer = client.post("/api/models/zernike-fit", json={"terms": bad})
         assert answer.status_code == 422, bad
         assert len(answer.json()["detail"]) > 10
 
@@ -202,11 +202,11 @@ def test_what_a_material_sends_back_is_told(client: TestClient) -> None:
     grey = {"model": "lambert", "color": [0.2, 0.5, 0.3]}
     told = client.post("/api/models/albedo", json={"terms": [grey]}).json()
     assert told["mean"] == pytest.approx(grey["color"], rel=1e-3)
-    assert told["most"] == pytest.approx(0.5, rel=0.01)
+    assert told["max"] == pytest.approx(0.5, rel=0.01)
     bright = {"model": "blinn_phong", "color": [0.5, 0.5, 0.5], "params": {"exponent": 20.0}}
     told = client.post("/api/models/albedo", json={"terms": [grey, bright]}).json()
-    assert told["most"] > 1
-    assert 0 <= told["at_deg"] < 90
+    assert told["max"] > 1
+    assert 0 <= told["max_angle_degrees"] < 90
     for bad in ([], [{"model": "nothing"}], [grey] * 99):
         assert client.post("/api/models/albedo", json={"terms": bad}).status_code == 422
 
@@ -224,7 +224,7 @@ def test_a_server_without_a_colour_config_has_no_views(client: TestClient, baked
 def test_models_are_listed(client: TestClient) -> None:
     models = {model["model"]: model for model in client.get("/api/models").json()}
     assert "theta_h" in [curve["name"] for curve in models["cook_torrance"]["curves"]]
-    assert (models["ggx"]["mirrors_below"], models["lambert"]["mirrors_below"]) == (0.06, None)
+    assert (models["ggx"]["specular_below"], models["lambert"]["specular_below"]) == (0.06, None)
 
 
 def test_library_materials_are_listed_and_can_be_put_into_a_look(client: TestClient, baked: Baked) -> None:
@@ -256,7 +256,7 @@ def test_render_batch_gives_frames_and_archive(client: TestClient, baked: Baked)
     assert queued.status_code == 202, queued.text
     url = queued.headers["location"]
     done = wait_until_done(client, url)
-    assert (done["state"], done["done"], done["total"], done["progress"]) == ("ready", 2, 2, 1.0)
+    assert (done["state"], done["completed"], done["total"], done["progress"]) == ("ready", 2, 2, 1.0)
     frame = client.get(f"{url}/frames/1")
     assert frame.headers["content-type"] == "image/png"
     assert Image.open(io.BytesIO(frame.content)).size == (32, 16)

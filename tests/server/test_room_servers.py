@@ -15,11 +15,11 @@ from sqlalchemy import select, update
 from starlette.testclient import WebSocketDenialResponse
 
 from relume_server.app import create_app
-from relume_server.collaboration.join import derive_watch_key
+from relume_server.collaboration.join import derive_view_token
 from relume_server.persistence.tables import RoomRow
 from relume_server.settings import Settings
 
-WATCH = {"watch": derive_watch_key(ROOM_FIELDS["room"])}
+WATCH = {"view_token": derive_view_token(ROOM_FIELDS["room"])}
 RESTART = 1012
 LEASE_S = 600.0  # rounds are made by tests, however long those take
 
@@ -63,7 +63,7 @@ def refusal(server: TestClient, baked: Baked, opening: Mapping[str, str]) -> tup
 
 
 def created(session: Session) -> bool:
-    return bool(session.text("hello")["room"]["created"])
+    return bool(session.text("hello")["room"]["is_new"])
 
 
 def expire(server: TestClient) -> None:
@@ -118,11 +118,11 @@ def test_who_is_in_a_room_that_another_server_has_taken_is_sent_there(
             bob.exact(1)
             for server in (other, client):
                 look_around(server)
-            assert ann.text("leaving")["seconds"] == 0.2
+            assert ann.text("server_draining")["seconds"] == 0.2
             assert refusal(client, baked, ROOM_FIELDS) == (404, "elsewhere")
             with open_session(other, baked.bake, opening=ROOM_FIELDS) as again:
                 hello = again.text("hello")
-                assert not hello["room"]["created"]
+                assert not hello["room"]["is_new"]
                 assert hello["look"]["materials"]["Paper"]["terms"][1]["params"]["sigma"] == 0.31
             with pytest.raises(ConnectionError) as ended:  # who does not go is sent away
                 ann.text("never")
@@ -136,7 +136,7 @@ def test_a_server_that_takes_leave_gives_up_its_rooms_at_once(
         ann.text("hello")
         assert client.portal is not None
         client.portal.call(services(client).drain.start)
-        ann.text("leaving")
+        ann.text("server_draining")
         assert refusal(client, baked, ROOM_FIELDS) == (503, "leaving")
         emptied(other)
         with open_session(other, baked.bake, opening=ROOM_FIELDS) as again:
@@ -146,7 +146,7 @@ def test_a_server_that_takes_leave_gives_up_its_rooms_at_once(
 def test_a_session_is_opened_at_the_address_of_its_room(client: TestClient, baked: Baked) -> None:
     for query in ("", "?room_prefix=elsewher", "?room_prefix=together-on"):
         path = f"/api/bakes/{baked.bake}/session{query}"
-        with client.websocket_connect(path, ["relume.v1"]) as websocket:
+        with client.websocket_connect(path, ["relume.v2"]) as websocket:
             session = Session(websocket, acknowledges=False)
             session.send_message(type="open", **ROOM_FIELDS)
             with pytest.raises(ConnectionError) as ended:

@@ -20,7 +20,7 @@ CHECKS = [not_a_server_error, status_code_conformance, content_type_conformance,
 SCHEMA = schemathesis.openapi.from_dict(create_app(Settings()).openapi())
 # importing a scene starts a process each time, and forms of files are streamed: tests/hostile tries these by hand
 UPLOADS = ["/api/scenes", "/api/materials/measured", "/api/environments", "/api/images"]
-UPLOADS += ["/api/materials/btf-works", "/api/materials/btf-works/geometry"]
+UPLOADS += ["/api/materials/btf/jobs", "/api/materials/btf/jobs/geometry"]
 OPERATIONS = [found.ok() for found in SCHEMA.exclude(path=UPLOADS, method="POST").get_all_operations()]
 
 

@@ -10,7 +10,7 @@ from session_client import Baked
 
 from relume.core.errors import bytes_text
 
-BAKES, RENDERS, SYNTHETIC = "/api/bakes", "/api/renders", "/api/materials/btf-works/synthetic"
+BAKES, RENDERS, SYNTHETIC = "/api/bakes", "/api/renders", "/api/materials/btf/jobs/synthetic"
 SCENE = "0123456789abcdef"
 OF_PYDANTIC = re.compile(r"Input should|Field required|should have at|literal\[|/body|None|Value error|at least 1 item")
 """What is never said."""
@@ -34,8 +34,12 @@ def refused(client: TestClient, url: str, **call: Any) -> dict[str, Any]:
         (RENDERS, {"fps": None}, "/fps is null; give a whole number"),
         (RENDERS, {"layers": "all"}, "/layers is 'all'; give 'light_groups', or true or false"),
         (RENDERS, {"path": {"turntable": 0}}, "/path/turntable is 0; give at least 1"),
-        (RENDERS, {"path": {"turntable": 4, "start": {"yfov": 40}}}, "/path/start/to_world is missing; it is needed"),
-        (RENDERS, {"path": {"eyes": []}}, "/path/eyes is a list of 0; give at least 1 entries"),
+        (
+            RENDERS,
+            {"path": {"turntable": 4, "start_camera": {"yfov": 40}}},
+            "/path/start_camera/to_world is missing; it is needed",
+        ),
+        (RENDERS, {"path": {"cameras": []}}, "/path/cameras is a list of 0; give at least 1 entries"),
         (RENDERS, {"size": "1920x1080"}, "/size is '1920x1080'; give [width, height] in pixels"),
         (RENDERS, {"size": [0, 4]}, "/size/0 is 0; give at least 1"),
         (RENDERS, {"sizes": 3}, "/sizes is not known here; leave it out"),
@@ -72,7 +76,7 @@ def test_forms(client: TestClient) -> None:
         "/scene is a text; give a file, with a file name in its part of the form"
     )
     sent = {"geometry": ("a.obj", b"v 0 0 0")}
-    problem = refused(client, "/api/materials/btf-works/geometry", files=sent, data={"size": "10000", "period": "x"})
+    problem = refused(client, "/api/materials/btf/jobs/geometry", files=sent, data={"size": "10000", "period": "x"})
     assert problem["detail"] == "/period is 'x'; give a number; /size is '10000'; give at most 256"
     assert [place["pointer"] for place in problem["errors"]] == ["/period", "/size"]
 

@@ -30,7 +30,7 @@ def test_hello_comes_first_and_the_first_picture_is_whole_and_exact(client: Test
         assert (hello["scene"], hello["method"]) == (baked.scene, "direct")
         camera = {"to_world": np.eye(4).ravel().tolist(), "yfov": 0.8}
         assert hello["views"] == [
-            {"name": n, "width": WIDTH, "height": HEIGHT, "camera": camera, "eye": "baked", "bounds": None}
+            {"name": n, "width": WIDTH, "height": HEIGHT, "camera": camera, "camera_mode": "fixed", "bounds": None}
             for n in ("front", "left")
         ]
         assert hello["look"]["materials"]["Paper"]["terms"][1]["params"]["sigma"] == 0.2
@@ -174,9 +174,9 @@ def test_what_the_hand_is_on_travels_with_its_edit_to_the_picture(
     patch = [{"op": "replace", "path": SIGMA, "value": 0.31}]
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send_message(type="edit", revision=1, patch=patch, hand=SIGMA)
+        session.send_message(type="edit", revision=1, patch=patch, active_control=SIGMA)
         session.exact(1)
-        session.send_message(type="edit", revision=2, patch=patch, hand=THETA_H)
+        session.send_message(type="edit", revision=2, patch=patch, active_control=THETA_H)
         session.exact(2)
         session.edit(3, SIGMA, 0.4)
         session.exact(3)
@@ -188,7 +188,7 @@ def test_edit_by_a_hand_on_nothing_is_refused_whole(client: TestClient, baked: B
     patch = [{"op": "replace", "path": SIGMA, "value": 0.31}]
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send_message(type="edit", revision=1, patch=patch, hand=hand)
+        session.send_message(type="edit", revision=1, patch=patch, active_control=hand)
         problem = session.text("problem")
         assert (problem["revision"], problem["problem"]["type"]) == (1, "urn:relume:problem:parameter")
         session.edit(1, "/display/exposure", 1.0)
@@ -231,26 +231,28 @@ def test_solo_of_an_edit_that_is_taken_back_is_taken_back(client: TestClient, ba
     assert control.solos[-1] is None
 
 
-@pytest.mark.parametrize("fields", [{}, {"hand": SIGMA}, {"solo": []}, {"solo": ["Lamp"] * 100}, {"solo": "Lamp"}])
+@pytest.mark.parametrize(
+    "fields", [{}, {"active_control": SIGMA}, {"solo": []}, {"solo": ["Lamp"] * 100}, {"solo": "Lamp"}]
+)
 def test_edit_of_nothing_is_refused(client: TestClient, baked: Baked, fields: dict[str, object]) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.send_message(type="edit", revision=1, patch=[], **fields)
-        assert session.text("problem")["problem"]["type"] == "urn:relume:problem:form"
+        assert session.text("problem")["problem"]["type"] == "urn:relume:problem:invalid-request"
 
 
 def test_probe_and_brush_are_answered(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send_message(type="probe", view="front", x=3, y=4)
-        probe = session.text("probe")
+        session.send_message(type="inspect", view="front", x=3, y=4)
+        probe = session.text("inspect")
         assert (probe["x"], probe["y"], probe["material"]) == (3, 4, "Paper")
         assert (probe["position"], probe["normal"]) == ([1.0, 2.0, 3.0], [0.0, 1.0, 0.0])
         assert probe["radiance"] == pytest.approx([0.7] * 3, rel=1e-6)
         assert np.shape(probe["bands"]) == (3, 4)
-        session.send_message(type="brush", curve=THETA_H, **{"from": 9.0, "to": 54.0})
+        session.send_message(type="highlight_curve_range", curve=THETA_H, **{"from": 9.0, "to": 54.0})
         frame = session.frame()
-        assert frame.header["kind"] == "brush"
+        assert frame.header["kind"] == "highlight"
         assert frame.header["format"] == "r8"
         assert frame.payload == bytes([128]) * (WIDTH * HEIGHT)
 
@@ -269,7 +271,7 @@ def test_view_switches_and_sends_the_whole_picture(client: TestClient, baked: Ba
 def test_jpeg_stream_sends_whole_images(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send_message(type="stream", format="jpeg", quality=70)
+        session.send_message(type="encoding", format="jpeg", quality=70)
         session.edit(1, SIGMA, 0.4)
         frame = session.exact(1)
         assert frame.header["format"] == "jpeg"
@@ -291,7 +293,7 @@ def test_jpeg_is_no_larger_than_the_space_that_the_client_has(
     client: TestClient, baked: Baked, space: list[int] | None, sent: tuple[int, int]
 ) -> None:
     with open_session(client, baked.bake) as session:
-        session.send_message(type="stream", format="jpeg")
+        session.send_message(type="encoding", format="jpeg")
         session.send_message(type="view", name="left", size=space)
         session.edit(1, SIGMA, 0.4)
         frame = session.exact(1)
@@ -302,7 +304,7 @@ def test_jpeg_is_no_larger_than_the_space_that_the_client_has(
 
 def test_space_is_of_one_view_until_views_are_shown_otherwise(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
-        session.send_message(type="stream", format="jpeg")
+        session.send_message(type="encoding", format="jpeg")
         session.send_message(type="view", name="left", size=[80, 80])
         session.send_message(type="views", names=["left"])
         session.edit(1, SIGMA, 0.4)

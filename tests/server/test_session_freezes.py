@@ -12,14 +12,14 @@ from session_client import IOR, SIGMA, THETA_D, THETA_H, Baked, Frame, open_sess
 def test_touch_freezes_ahead_says_so_and_sends_the_curve(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send_message(type="touch", curve=THETA_D)
+        session.send_message(type="prepare", curve=THETA_D)
         curve = session.text("curve")
         assert curve["curve"] == THETA_D
         assert len(curve["bands"]) == 3
         assert curve["bands"] == curve["generated"]
         status = session.text("status")
-        assert status["state"] == "freezing"
-        assert status["what"] == "Paper, theta_d"
+        assert status["state"] == "precomputing"
+        assert status["label"] == "Paper, theta_d"
         control.freeze_gate.set()
         while session.text("status")["state"] != "ready":
             pass
@@ -33,10 +33,10 @@ def test_slider_in_hand_freezes_ahead_and_leaves_the_open_curve_open(
 ) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send_message(type="touch", curve=THETA_H)
+        session.send_message(type="prepare", curve=THETA_H)
         assert session.text("curve")["curve"] == THETA_H
-        session.send_message(type="touch", parameter=IOR)
-        assert session.text("status")["what"] == "Paper, ior"
+        session.send_message(type="prepare", parameter=IOR)
+        assert session.text("status")["label"] == "Paper, ior"
         control.freeze_gate.set()
         while session.text("status")["state"] != "ready":
             pass
@@ -48,11 +48,11 @@ def test_a_curve_that_is_opened_again_is_sent_again(client: TestClient, baked: B
     with open_session(client, baked.bake) as session:
         session.exact(0)
         control.freeze_gate.set()
-        session.send_message(type="touch", curve=THETA_H)
+        session.send_message(type="prepare", curve=THETA_H)
         first = session.text("curve")
-        session.send_message(type="touch", parameter=IOR)
-        session.send_message(type="touch", curve=THETA_H)
-        session.edit(1, "/environment/scale", 2.0)
+        session.send_message(type="prepare", parameter=IOR)
+        session.send_message(type="prepare", curve=THETA_H)
+        session.edit(1, "/environment/intensity", 2.0)
         got = []
         while not isinstance(message := session.receive(), Frame) or message.header["revision"] < 1:
             got.append(message)
@@ -64,7 +64,7 @@ def test_rotation_in_hand_is_no_error(client: TestClient, baked: Baked, control:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         control.freeze_gate.set()
-        session.send_message(type="touch", parameter="/environment/rotation")
+        session.send_message(type="prepare", parameter="/environment/rotation")
         session.edit(1, SIGMA, 0.4)
         session.exact(1)
 
@@ -85,7 +85,7 @@ def test_rotation_in_hand_is_no_error(client: TestClient, baked: Baked, control:
 def test_touch_of_nothing_is_refused(client: TestClient, baked: Baked, touch: dict[str, str]) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send_message(type="touch", **touch)
+        session.send_message(type="prepare", **touch)
         assert session.text("problem")["problem"]["detail"]
         session.edit(1, SIGMA, 0.4)
         session.exact(1)
@@ -137,9 +137,9 @@ def test_moving_on_to_another_curve_cancels_the_freeze_and_is_no_fault(
 ) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send_message(type="touch", curve=THETA_D)
+        session.send_message(type="prepare", curve=THETA_D)
         assert control.freeze_started.wait(60)
-        session.send_message(type="touch", curve=THETA_H)
+        session.send_message(type="prepare", curve=THETA_H)
         while session.text("status")["state"] != "ready":
             pass
         assert control.num_cancelled == 1
@@ -151,7 +151,7 @@ def test_edits_that_need_no_freeze_are_painted_while_one_runs(
 ) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send_message(type="touch", curve=THETA_D)
+        session.send_message(type="prepare", curve=THETA_D)
         assert control.freeze_started.wait(60)
         for revision in range(1, 6):
             session.edit(revision, SIGMA, 0.2 + revision / 10)
@@ -167,7 +167,7 @@ def test_edit_that_needs_a_freeze_keeps_the_last_frame_and_others_go_on(
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.edit(1, IOR, 2.0)
-        assert session.text("status")["what"] == "Paper, theta_d"
+        assert session.text("status")["label"] == "Paper, theta_d"
         session.edit(2, SIGMA, 0.3)
         frame = session.frame()  # the first since: revision 1 had nothing to show
         assert (frame.header["revision"], frame.header["exact"]) == (2, False)
@@ -186,8 +186,8 @@ def test_look_that_only_shows_otherwise_is_answered_while_a_freeze_is_awaited(
         session.edit(2, "/display/exposure", 1.0)
         frame = session.frame()
         assert (frame.header["revision"], frame.header["exact"], frame.header["tiles"]) == (2, False, [])
-        session.send_message(type="probe", x=3, y=4)
-        assert session.text("probe")["radiance"] == pytest.approx([0.7] * 3, rel=1e-6)
+        session.send_message(type="inspect", x=3, y=4)
+        assert session.text("inspect")["radiance"] == pytest.approx([0.7] * 3, rel=1e-6)
         control.freeze_gate.set()
         session.exact(2)
 
@@ -211,7 +211,7 @@ def test_editing_the_curve_that_is_frozen_does_not_cancel_it(
 ) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send_message(type="touch", curve=THETA_D)
+        session.send_message(type="prepare", curve=THETA_D)
         assert control.freeze_started.wait(60)
         session.edit(1, IOR, 2.0)
         session.edit(2, IOR, 2.1)
@@ -223,7 +223,7 @@ def test_editing_the_curve_that_is_frozen_does_not_cancel_it(
 def test_another_view_does_not_wait_for_a_freeze(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send_message(type="touch", curve=THETA_D)
+        session.send_message(type="prepare", curve=THETA_D)
         assert control.freeze_started.wait(60)
         session.send_message(type="view", name="left")
         assert session.exact(0).header["view"] == "left"

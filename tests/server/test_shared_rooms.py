@@ -12,10 +12,10 @@ import pytest
 from fastapi.testclient import TestClient
 from session_client import IOR, ROOM_FIELDS, SIGMA, Baked, Session, open_session
 
-from relume_server.collaboration.join import derive_watch_key
+from relume_server.collaboration.join import derive_view_token
 from relume_server.settings import Settings
 
-WATCH = {"watch": derive_watch_key(ROOM_FIELDS["room"])}
+WATCH = {"view_token": derive_view_token(ROOM_FIELDS["room"])}
 LOST = 1001
 EXPOSURE = "/display/exposure"
 EXTINCTION = "/materials/Paper/terms/1/params/extinction"
@@ -35,7 +35,7 @@ def joined(client: TestClient, baked: Baked) -> AbstractContextManager[Session]:
 def told(session: Session, path: str) -> dict[str, Any]:
     """Wait for the message that tells what has become of a path."""
     while True:
-        message = session.text("shared")
+        message = session.text("room_update")
         for operation in message["patch"]:
             if operation["path"] == path:
                 return {**message, "value": operation["value"]}
@@ -52,7 +52,7 @@ def picture(session: Session, revision: int, value: int) -> int:
     """Wait for an exact picture of that value; which change of the look it shows."""
     while value not in np.frombuffer((frame := session.exact(revision)).payload, "<u4")[:1]:
         pass
-    return int(frame.header["shared"])
+    return int(frame.header["room_revision"])
 
 
 def refused(client: TestClient, baked: Baked, opening: Mapping[str, Any]) -> tuple[Any, ...]:
@@ -66,24 +66,31 @@ def test_an_edit_of_one_is_in_the_picture_of_the_other_and_of_nobody_else(client
         contexts = joined(client, baked), joined(client, baked), open_session(client, baked.bake)
         opened = (stack.enter_context(each) for each in contexts)
         ann = next(opened)
-        assert ann.text("hello")["room"]["created"]
+        assert ann.text("hello")["room"]["is_new"]
         bob, alone = opened
-        assert not bob.text("hello")["room"]["created"]
+        assert not bob.text("hello")["room"]["is_new"]
         assert alone.text("hello")["room"] is None
         ann.edit(1, SIGMA, 0.31)
         assert picture(bob, 0, 810) == 1
-        assert ann.text("shared") == {"type": "shared", "revision": 1, "shared": 1, "patch": [], "by": [1]}
+        assert ann.text("room_update") == {
+            "type": "room_update",
+            "revision": 1,
+            "room_revision": 1,
+            "patch": [],
+            "edited_by": [1],
+        }
         bob.edit(1, EXTINCTION, 1.7)
         assert told(ann, EXTINCTION)["revision"] == 1
         alone.edit(1, EXTINCTION, 1.2)
         alone.exact(1)
         ann.edit(2, SIGMA, 0.4)
         news = told(bob, SIGMA)
-        assert (news["revision"], news["shared"], news["by"], news["value"]) == (1, 3, [1], 0.4)
+        assert (news["revision"], news["room_revision"], news["edited_by"], news["value"]) == (1, 3, [1], 0.4)
         with joined(client, baked) as late:
             hello = late.text("hello")
             params, own = (
-                look["materials"]["Paper"]["terms"][1]["params"] for look in (hello["look"], hello["room"]["default"])
+                look["materials"]["Paper"]["terms"][1]["params"]
+                for look in (hello["look"], hello["room"]["default_look"])
             )
             assert (params["sigma"], params["extinction"]) == (0.4, 1.7)
             assert (own["sigma"], own["extinction"]) == (0.2, 0.0)
@@ -103,7 +110,7 @@ def test_of_one_path_all_have_what_came_last(client: TestClient, baked: Baked) -
             for k, session in enumerate((ann, bob)):
                 patch: dict[str, float] = {}
                 while EXTINCTION not in patch:
-                    patch = {each["path"]: each["value"] for each in session.text("shared")["patch"]}
+                    patch = {each["path"]: each["value"] for each in session.text("room_update")["patch"]}
                     has[k] = patch.get(SIGMA, has[k])
         assert last in (0.4, 0.8)
         assert has == [last, last]
@@ -112,7 +119,7 @@ def test_of_one_path_all_have_what_came_last(client: TestClient, baked: Baked) -
 def _sigma_after(session: Session, own: float, revision: int) -> float:
     """What a client has when all its edits, which count up from `own`, are known to be in the room's look."""
     while True:
-        message = session.text("shared")
+        message = session.text("room_update")
         sigma = next((each["value"] for each in message["patch"]), own + message["revision"] / 100)
         if message["revision"] == revision:
             return round(sigma, 6)
@@ -132,10 +139,10 @@ def test_each_has_their_own_exposure_and_who_comes_begins_with_the_last(client: 
 def test_who_is_here_is_told(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake, opening={**ROOM_FIELDS, "name": "Ann"}) as ann:
         (first,) = ann.text("hello")["room"]["people"]
-        assert (first["name"], first["role"], first["here"], first["material"]) == ("Ann", "admin", True, None)
+        assert (first["name"], first["role"], first["online"], first["material"]) == ("Ann", "admin", True, None)
         with joined(client, baked) as bob:
             room = bob.text("hello")["room"]
-            assert (room["you"], [each["name"] for each in room["people"]]) == (2, ["Ann", "Guest 2"])
+            assert (room["self_id"], [each["name"] for each in room["people"]]) == (2, ["Ann", "Guest 2"])
             bob.send_message(type="presence", name="Bob", material="Paper")
             found = people(ann, lambda them: them[-1]["name"] == "Bob")
             assert found[1]["material"] == "Paper"
@@ -146,7 +153,7 @@ def test_who_is_here_is_told(client: TestClient, baked: Baked) -> None:
             assert "printable" in bob.text("problem")["problem"]["detail"]
             bob.websocket.close(LOST)
         # both may be told at once
-        found = people(ann, lambda them: len(them) == 1 or not them[1]["here"])
+        found = people(ann, lambda them: len(them) == 1 or not them[1]["online"])
         assert len(found) == 1 or len(people(ann, lambda them: len(them) == 1)) == 1
 
 
@@ -159,7 +166,7 @@ def test_who_comes_is_told_while_frames_wait(client: TestClient, baked: Baked) -
             client.portal.call(turns.acquire)
         with joined(client, baked) as bob:
             bob.text("hello")
-            assert [each["number"] for each in people(ann, lambda them: len(them) == 2)] == [1, 2]
+            assert [each["id"] for each in people(ann, lambda them: len(them) == 2)] == [1, 2]
             client.portal.call(turns.release)
 
 
@@ -167,16 +174,16 @@ def test_who_says_goodbye_leaves_at_once(client: TestClient, baked: Baked) -> No
     with joined(client, baked) as ann:
         ann.text("hello")
         with joined(client, baked) as bob:
-            seat = bob.text("hello")["room"]["seat"]
-            with open_session(client, baked.bake, opening={**ROOM_FIELDS, "seat": seat}) as finer:
-                assert finer.text("hello")["room"]["you"] == 2
+            seat = bob.text("hello")["room"]["participant_token"]
+            with open_session(client, baked.bake, opening={**ROOM_FIELDS, "participant_token": seat}) as finer:
+                assert finer.text("hello")["room"]["self_id"] == 2
                 bob.websocket.close(1000)
                 finer.send_message(type="presence", name="Bob")
                 found = people(ann, lambda them: them[-1]["name"] == "Bob")
-                assert [each["here"] for each in found] == [True, True]
+                assert [each["online"] for each in found] == [True, True]
                 finer.websocket.close(1000)
                 while len(found := ann.text("room")["people"]) == 2:
-                    assert found[1]["here"]
+                    assert found[1]["online"]
 
 
 def test_presence_is_of_no_use_to_one_alone(client: TestClient, baked: Baked) -> None:
@@ -193,14 +200,14 @@ class TestComingBack:
 
     def test_a_place_is_kept_and_the_room_with_it(self, client: TestClient, baked: Baked) -> None:
         with joined(client, baked) as ann:
-            seat = ann.text("hello")["room"]["seat"]
+            seat = ann.text("hello")["room"]["participant_token"]
             ann.send_message(type="presence", name="Ann")
             ann.edit(1, SIGMA, 0.31)
             ann.exact(1)
             ann.websocket.close(LOST)
-        with open_session(client, baked.bake, opening={**ROOM_FIELDS, "seat": seat}) as again:
+        with open_session(client, baked.bake, opening={**ROOM_FIELDS, "participant_token": seat}) as again:
             hello = again.text("hello")
-            assert (hello["room"]["you"], hello["room"]["created"], hello["revision"]) == (1, False, 0)
+            assert (hello["room"]["self_id"], hello["room"]["is_new"], hello["revision"]) == (1, False, 0)
             assert [each["name"] for each in hello["room"]["people"]] == ["Ann"]
             assert hello["look"]["materials"]["Paper"]["terms"][1]["params"]["sigma"] == 0.31
 
@@ -218,7 +225,11 @@ class TestComingBack:
             stack.close()
             ann.edit(1, EXTINCTION, 1.9)
             ann.exact(1)
-            opening = {**ROOM_FIELDS, "seat": hello["room"]["seat"], "resume": hello["resume"]}
+            opening = {
+                **ROOM_FIELDS,
+                "participant_token": hello["room"]["participant_token"],
+                "resume": hello["resume"],
+            }
             with open_session(client, baked.bake, opening=opening) as again:
                 back = again.text("hello")
                 params = back["look"]["materials"]["Paper"]["terms"][1]["params"]
@@ -237,7 +248,7 @@ def test_who_watches_follows_and_cannot_edit(client: TestClient, baked: Baked) -
     assert refused(client, baked, WATCH)[0] == 1013
     with ExitStack() as stack:
         ann = stack.enter_context(joined(client, baked))
-        assert ann.text("hello")["room"]["watch"] == WATCH["watch"]
+        assert ann.text("hello")["room"]["view_token"] == WATCH["view_token"]
         vera = stack.enter_context(open_session(client, baked.bake, opening=WATCH))
         hello = vera.text("hello")
         assert (hello["role"], hello["room"]["id"]) == ("view", None)
@@ -253,7 +264,7 @@ def test_who_watches_follows_and_cannot_edit(client: TestClient, baked: Baked) -
 
 def test_names_are_bounded(client: TestClient, baked: Baked) -> None:
     rooms = ("", "a" * 23, "a" * 65, "a b" * 10, "ä" * 24)
-    for opening in (*({"room": room} for room in rooms), {"watch": "ä" * 24}, {**ROOM_FIELDS, "name": "a" * 41}):
+    for opening in (*({"room": room} for room in rooms), {"view_token": "ä" * 24}, {**ROOM_FIELDS, "name": "a" * 41}):
         assert refused(client, baked, opening)[0] == 1008
 
 
@@ -272,7 +283,7 @@ class Person:
 
     def hear(self) -> None:
         """The next word on what the look has become, on top of one's own edits up to its revision."""
-        message = self.session.text("shared")
+        message = self.session.text("room_update")
         own = [patch for revision, patch in self._sent if revision <= message["revision"]]
         self._sent = self._sent[len(own) :]
         for patch in [*own, message["patch"]]:

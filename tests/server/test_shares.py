@@ -34,9 +34,9 @@ def test_a_link_shows_what_was_shared(client: TestClient, baked: Baked) -> None:
     assert (found["scene"], found["bake"], found["view"], found["views"]) == (
         baked.scene, baked.bake, "left", ["front", "left"],
     )  # fmt: skip
-    assert (found["solo"], found["solo_light"], found["paths"], found["lacking"]) == ("Paper", "", PATHS, [])
+    assert (found["solo"], found["solo_light"], found["paths"], found["missing"]) == ("Paper", "", PATHS, [])
     assert found["look"]["transport"]["show"] == "all"
-    assert found["eyes"] == {}
+    assert found["cameras"] == {}
     plain = client.get(client.post("/api/shares", json=body(baked)).headers["location"]).json()
     assert (plain["solo"], plain["solo_light"], plain["paths"]) == (None, None, None)
 
@@ -51,15 +51,15 @@ def test_a_link_keeps_the_order_in_which_lights_were_added(client: TestClient, b
 
 def test_a_link_keeps_where_eyes_are(client: TestClient, baked: Baked) -> None:
     eyes = {"left": {"to_world": [1.0, 0, 0, 2, 0, 1, 0, 3, 0, 0, 1, 4, 0, 0, 0, 1], "yfov": 40.0}}
-    made = client.post("/api/shares", json=body(baked, eyes=eyes, sizes={"left": [90, 60]}))
+    made = client.post("/api/shares", json=body(baked, cameras=eyes, sizes={"left": [90, 60]}))
     found = client.get(made.headers["location"]).json()
-    assert (found["eyes"], found["sizes"]) == (eyes, {"left": [90, 60]})
+    assert (found["cameras"], found["sizes"]) == (eyes, {"left": [90, 60]})
     mirrored = [-1.0, *eyes["left"]["to_world"][1:]]
     for refused in (
-        {"eyes": {"left": {"to_world": [], "yfov": 1}}},
-        {"eyes": {"left": eyes["left"] | {"yfov": 180.0}}},
-        {"eyes": {"left": eyes["left"] | {"to_world": mirrored}}},
-        {"eyes": {"nobody": eyes["left"]}},
+        {"cameras": {"left": {"to_world": [], "yfov": 1}}},
+        {"cameras": {"left": eyes["left"] | {"yfov": 180.0}}},
+        {"cameras": {"left": eyes["left"] | {"to_world": mirrored}}},
+        {"cameras": {"nobody": eyes["left"]}},
         {"sizes": {"left": [10**6, 1]}},
         {"sizes": {"left": [16384, 16384]}},
         {"sizes": {"nobody": [90, 60]}},
@@ -132,7 +132,7 @@ def test_a_link_says_what_is_gone(client: TestClient, baked: Baked) -> None:
     made = client.post("/api/shares", json=body(baked)).json()["id"]
     bakes = client.app.state.services.bakes
     delete_scene(bakes.data_dir, bakes.ledger, baked.scene)
-    (lacking,) = client.get(f"/api/shares/{made}").json()["lacking"]
+    (lacking,) = client.get(f"/api/shares/{made}").json()["missing"]
     assert "scene" in lacking
     for unknown in ("aaaaaaaaaa", "a" * 33, "ABC", "..%2f"):
         assert client.get(f"/api/shares/{unknown}").status_code in (404, 422)

@@ -80,7 +80,7 @@ def test_the_files_quota_and_state_of_a_work_that_was_taken_over_stay(
     first, second = Server(ledger, tmp_path, outcome), Server(ledger, tmp_path, finishes)
     request = BtfRequest(name="Felt", error=0.05)
     work = first.queue.submit(request, prepare=lambda into: (into / UPLOAD_FILE).write_bytes(b"sent"))
-    folder = tmp_path / "btf-works" / work
+    folder = tmp_path / "btf-jobs" / work
     first.queue.start()
     assert first.has_begun.wait(WAIT_S)
     assert first.is_wanted()

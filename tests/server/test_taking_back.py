@@ -13,10 +13,10 @@ from fastapi.testclient import TestClient
 from server_fakes import Control
 from session_client import IOR, ROOM_FIELDS, SIGMA, Baked, Frame, Session, open_session
 
-from relume_server.collaboration.join import derive_watch_key
+from relume_server.collaboration.join import derive_view_token
 from relume_server.settings import Settings
 
-WATCH = {"watch": derive_watch_key(ROOM_FIELDS["room"])}
+WATCH = {"view_token": derive_view_token(ROOM_FIELDS["room"])}
 EXPOSURE, ROTATION = "/display/exposure", "/environment/rotation"  # the bake cannot follow the rotation
 COLOR = "/materials/Paper/terms/0/color"
 EXTINCTION = "/materials/Paper/terms/1/params/extinction"
@@ -64,7 +64,7 @@ class Client:
         message = self.session.receive()
         if isinstance(message, dict) and message["type"] == "problem":
             self._sent.pop(message["revision"], None)
-        elif isinstance(message, dict) and message["type"] == "shared":
+        elif isinstance(message, dict) and message["type"] == "room_update":
             own = [self._sent.pop(each) for each in sorted(self._sent) if each <= message["revision"]]
             for patch in [*own, message["patch"]]:
                 jsonpatch.apply_patch(self.look, patch, in_place=True)
@@ -86,7 +86,7 @@ class Client:
     def comes_to(self, look: dict[str, Any]) -> None:
         """Hear until the look is this one."""
         while not self.has(look):
-            self.hear("shared")
+            self.hear("room_update")
 
 
 @contextmanager
@@ -195,8 +195,8 @@ def test_what_others_have_put_on_top_goes_where_there_is_nothing_under_it(client
             bob.edit("/lights/Lamp", lamp, op="add")
             bob.edit(ROTATION, 30.0)
             bob.asks()
-            ann.hear("shared")
-            ann.edit("/lights/Lamp/scale", 3.0)
+            ann.hear("room_update")
+            ann.edit("/lights/Lamp/intensity", 3.0)
             ann.edit(SIGMA, 0.31)
             ann.asks()
         while bob.hear("problem")["revision"] is None:
@@ -218,7 +218,7 @@ def test_ways_of_looking_of_a_moment_that_failed_are_told_to_whose_they_are(clie
         assert bob.hear("problem")["revision"] == 2
         bob.edit(SIGMA, 0.31)
         while not bob.is_confirmed:
-            bob.hear("shared")
+            bob.hear("room_update")
         assert bob.look["display"]["exposure"] == 0.0
 
 

@@ -64,7 +64,7 @@ def test_an_edit_is_traced_from_the_socket_to_the_frame(
     with open_session(client, baked.bake, headers={"X-Request-ID": "r-1"}) as session:
         hello = session.text("hello")
         session.exact(0)
-        session.send_message(type="touch", curve=THETA_D)
+        session.send_message(type="prepare", curve=THETA_D)
         control.freeze_gate.set()
         while (status := session.text("status"))["state"] != "ready":
             pass
@@ -91,7 +91,7 @@ def test_an_edit_is_traced_from_the_socket_to_the_frame(
     assert (times[0], times[-1]) == (root.start_time_unix_nano, root.end_time_unix_nano)
     (refused,) = (span for span in spans if span.name == "edit" and span.status.code)
     assert "old revision" in refused.status.message
-    assert {about(span)["relume.label"] for span in spans if span.name == "freeze"} == {status["what"]}
+    assert {about(span)["relume.label"] for span in spans if span.name == "freeze"} == {status["label"]}
 
 
 def test_a_collector_that_is_away_is_said_once_and_that_it_is_back(

@@ -70,19 +70,19 @@ def test_freezes_go_in_the_same_order_and_name_their_view(client: TestClient, ba
 def test_touch_reaches_all_views_and_a_brush_is_answered_by_each(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         show_both(session)
-        session.send_message(type="brush", curve=THETA_H, **{"from": 9.0, "to": 54.0})
+        session.send_message(type="highlight_curve_range", curve=THETA_H, **{"from": 9.0, "to": 54.0})
         frames = [session.frame() for _ in range(2)]
-        assert [frame.header["kind"] for frame in frames] == ["brush", "brush"]
+        assert [frame.header["kind"] for frame in frames] == ["highlight", "highlight"]
         assert [frame.header["view"] for frame in frames] == ["left", "front"]
 
 
 def test_probe_is_of_the_view_it_names_or_of_the_focused_one(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         show_both(session)
-        session.send_message(type="probe", x=1, y=1)
-        assert session.text("probe")["view"] == "left"
-        session.send_message(type="probe", view="front", x=1, y=1)
-        assert session.text("probe")["view"] == "front"
+        session.send_message(type="inspect", x=1, y=1)
+        assert session.text("inspect")["view"] == "left"
+        session.send_message(type="inspect", view="front", x=1, y=1)
+        assert session.text("inspect")["view"] == "front"
 
 
 def test_view_that_has_no_room_for_the_open_curve_is_shown_without(
@@ -91,7 +91,7 @@ def test_view_that_has_no_room_for_the_open_curve_is_shown_without(
     control.views_over_budget = {"left"}
     with open_session(client, baked.bake) as session:
         session.exact(0)
-        session.send_message(type="touch", curve=THETA_H)
+        session.send_message(type="prepare", curve=THETA_H)
         session.text("curve")
         session.send_message(type="view", name="left")
         assert session.text("problem")["revision"] is None
@@ -114,13 +114,13 @@ def test_one_view_again_is_alone(client: TestClient, baked: Baked) -> None:
 def test_resume_brings_the_views_back(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         hello = session.text("hello")
-        assert (hello["shown"], hello["view"]) == (["front"], "front")
+        assert (hello["visible_views"], hello["focused_view"]) == (["front"], "front")
         show_both(session)
         session.edit(1, SIGMA, 0.4)
         exact_of_all(session, 1)
     with open_session(client, baked.bake, opening={"resume": hello["resume"]}) as session:
         hello = session.text("hello")
-        assert (hello["shown"], hello["view"]) == (["front", "left"], "left")
+        assert (hello["visible_views"], hello["focused_view"]) == (["front", "left"], "left")
         assert exact_of_all(session, 1)[0].header["view"] == "left"
 
 
@@ -132,7 +132,7 @@ def test_look_that_cannot_be_followed_is_taken_back_in_all_views(
         show_both(session)
         session.edit(1, "/environment/rotation", 30.0)
         assert session.text("problem")["revision"] == 1
-        session.send_message(type="touch", curve=THETA_D)
+        session.send_message(type="prepare", curve=THETA_D)
         session.edit(2, SIGMA, 0.4)
         for frame in exact_of_all(session, 2):
             assert np.frombuffer(frame.payload, "<u4")[0] == 900
@@ -189,7 +189,7 @@ def test_what_is_out_of_sight_does_not_come_while_the_picture_is_on_its_way(
         num_tiles = len(session.exact(0).header["tiles"])
         session.send_message(type="region", view="front", rect=[0, 0, 3, 2])
         session.edit(1, IOR, 2.0)
-        assert session.text("status")["state"] == "freezing"
+        assert session.text("status")["state"] == "precomputing"
         session.edit(2, SIGMA, 0.5)
         frames = [session.frame().header]
         while frames[-1]["revision"] < 2:

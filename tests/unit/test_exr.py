@@ -58,7 +58,7 @@ def test_alpha_and_layers_are_channels_of_their_names(tmp_path):
 
 
 def test_a_layer_for_each_light_that_shines_and_each_kind_of_path():
-    lights = {"Key": POINT, "Off": POINT | {"on": False}, "Black": POINT | {"scale": 0}}
+    lights = {"Key": POINT, "Off": POINT | {"enabled": False}, "Black": POINT | {"intensity": 0}}
     look = look_with(lights=lights)
     lit = ["light_environment", "light_Key"]
     assert names_of(light_and_path_layers(look, has_indirect=False)) == lit
@@ -69,14 +69,15 @@ def test_a_layer_for_each_light_that_shines_and_each_kind_of_path():
     assert names_of(light_and_path_layers(look_with(transport={"bounces": 1}), has_indirect=True)) == paths[:2]
     assert names_of(light_and_path_layers(look_with(transport={"show": "first_bounce"}), has_indirect=True)) == []
     assert (
-        names_of(light_and_path_layers(look_with(lights=lights, environment={"scale": 0.0}), has_indirect=False)) == []
+        names_of(light_and_path_layers(look_with(lights=lights, environment={"intensity": 0.0}), has_indirect=False))
+        == []
     )
 
 
 def test_light_groups_are_direct_and_reflected_light_of_each_light():
-    look = look_with(lights={"Key": POINT, "Off": POINT | {"on": False}})
+    look = look_with(lights={"Key": POINT, "Off": POINT | {"enabled": False}})
     groups = light_group_layers(look, has_indirect=True)
-    both = ["light_environment_direct", "light_environment_reflected", "light_Key_direct", "light_Key_reflected"]
+    both = ["light_environment_direct", "light_environment_indirect", "light_Key_direct", "light_Key_indirect"]
     assert names_of(groups) == both
     assert [layer.look.transport.paths for layer in groups[:2]] == [(True, 1, 0), (False, 1, 24)]
     assert names_of(light_group_layers(look, has_indirect=False)) == both[::2]
@@ -92,7 +93,7 @@ def test_light_groups_are_direct_and_reflected_light_of_each_light():
 def test_names_of_light_groups_keep_what_they_end_with():
     names = ["x" * 79, "x" * 80, "a b", "a_b"]
     groups = names_of(light_group_layers(look_with(lights=dict.fromkeys(names, POINT)), has_indirect=True))[2:]
-    assert all(name.endswith(("_direct", "_reflected")) for name in groups)
+    assert all(name.endswith(("_direct", "_indirect")) for name in groups)
     assert len({name.casefold() for name in groups}) == 2 * len(names)
     assert max(map(len, groups)) == 29
     assert "light_a_b_2_direct" in groups
@@ -108,7 +109,7 @@ def test_a_background_of_one_colour_is_a_layer_of_its_own_and_catchers_leave_non
     assert all(layer.look.background.color == (0, 0, 0) for layer in lit)
     assert light_and_path_layers(look_with(background={"kind": "color"}), has_indirect=False) == []
     catching = look.model_dump()
-    catching["materials"]["Floor"]["catcher"] = True
+    catching["materials"]["Floor"]["shadow_catcher"] = True
     for layering in (True, "light_groups", False):
         assert make_layers(layering, Look.model_validate(catching), has_indirect=True) == []
     assert names_of(make_layers(True, look, has_indirect=True)) == names_of(
@@ -135,7 +136,7 @@ def test_layer_names_are_plain_short_and_different(names):
 
 
 def test_the_picture_of_a_light_has_that_light_alone():
-    look = look_with(lights={"Key": POINT, "Fill": POINT, "Off": POINT | {"on": False}})
+    look = look_with(lights={"Key": POINT, "Fill": POINT, "Off": POINT | {"enabled": False}})
     for layer in light_and_path_layers(look, has_indirect=False):
         shining = [name for name, light in layer.look.lights.items() if any(light.gain)]
         shining += ["environment"] if any(layer.look.environment.gain) else []
@@ -169,7 +170,7 @@ def test_attributes_say_where_the_picture_comes_from(tmp_path):
 def test_a_ground_is_told_as_what_it_was_shown(catcher):
     camera, scene = make_camera("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8), with_ground(still_life())
     default, ground = default_look(scene.materials), scene.materials[-1].name
-    look = validate({"materials": {ground: {"catcher": catcher}}}, default)
+    look = validate({"materials": {ground: {"shadow_catcher": catcher}}}, default)
     attributes = build_attributes(Provenance("5" * 16, "grounded", "b" * 16), camera, SIZE, look, [])
     assert validate(json.loads(attributes["relume:look"]), default) == look
 

@@ -58,11 +58,11 @@ def test_how_many_wait_before_a_bake(tmp_path: Path) -> None:
     recipes = [replace(RECIPE, num_lights=lights) for lights in (8, 16, 24, 32)]
     plans = [Plan(1, rays, 1, 1) for rays in (LARGE, 1000, LARGE, LARGE)]  # the tiny one has a lane of its own
     ids = [service.ledger.submit(tiny_scene().id, *one) for one in zip(recipes, plans, strict=True)]
-    assert [service.get(identity).ahead for identity in ids] == [0, 0, 1, 2]
-    assert {status.id: status.ahead for status in service.bakes()} == dict(zip(ids, [0, 0, 1, 2], strict=True))
+    assert [service.get(identity).queue_position for identity in ids] == [0, 0, 1, 2]
+    assert {status.id: status.queue_position for status in service.bakes()} == dict(zip(ids, [0, 0, 1, 2], strict=True))
     service.ledger.claim(ids[0], "host/1/nonce/1")
     service.cancel(ids[2])
-    assert [service.get(identity).ahead for identity in ids] == [0, 0, 0, 1]
+    assert [service.get(identity).queue_position for identity in ids] == [0, 0, 0, 1]
     service.close()
 
 
@@ -97,7 +97,7 @@ def test_command_line_says_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
     def status(state: Any, phase: Any, seconds_left: float | None = None, ahead: int = 0) -> BakeStatus:
         return BakeStatus(
-            id="", scene="", state=state, progress=0.0, phase=phase, phase_since=1000.0, ahead=ahead,
+            id="", scene="", state=state, progress=0.0, phase=phase, phase_since=1000.0, queue_position=ahead,
             seconds_left=seconds_left, recipe=RECIPE, plan=plan, **none,
         )  # fmt: skip
 

@@ -340,7 +340,7 @@ def _status(row: BakeRow, queue_positions: Mapping[str, int]) -> BakeStatus:
         progress=row.progress,
         phase=cast("Phase | None", row.phase),
         phase_since=row.phase_since if row.phase else None,
-        ahead=queue_positions.get(row.id, 0) if row.state == "queued" else 0,
+        queue_position=queue_positions.get(row.id, 0) if row.state == "queued" else 0,
         rays_per_second=row.rays_per_second,
         seconds_left=row.seconds_left,
         bytes=row.bytes,

@@ -16,7 +16,7 @@ from sqlalchemy.exc import IntegrityError
 
 from relume.core.errors import DiskFullError, NotFoundError
 from relume.core.filesystem import remove_folder
-from relume.core.import_warnings import ImportRemark, warning_of
+from relume.core.import_warnings import ImporterWarning, warning_of
 from relume.scene.model import Scene
 from relume.scene.scene_folder import save_scene
 from relume.scene.triplanar import find_triplanar
@@ -34,8 +34,8 @@ class SceneRecord:
     Attributes:
         created: seconds since 1970.
         views: camera names, in order. aspects: of each the width ÷ height that its file says, or None.
-        materials: {"name", "terms", "catcher", "is_projected", "is_glass"} each, in the order of material ids; old ones
-            lack the last three.
+        materials: {"name", "terms", "shadow_catcher", "is_projected", "is_glass"} each, in the order of material ids;
+            old ones lack the last three.
         variants: partial looks that the file brought, by name.
         lights: names of the scene's own.
     """
@@ -45,7 +45,7 @@ class SceneRecord:
     created: float
     views: tuple[str, ...]
     materials: tuple[dict[str, Any], ...]
-    warnings: tuple[ImportRemark, ...]
+    warnings: tuple[ImporterWarning, ...]
     num_triangles: int
     variants: dict[str, dict[str, Any]]
     lights: tuple[str, ...] = ()
@@ -76,7 +76,7 @@ def summarize_scene(scene: Scene) -> dict[str, Any]:
             {
                 "name": material.name,
                 "terms": list(material.terms),
-                "catcher": material.shadow_catcher,
+                "shadow_catcher": material.shadow_catcher,
                 "is_projected": is_triplanar,
                 "is_glass": material.glass is not None,
             }

@@ -37,7 +37,7 @@ class BakeStatus:
     Attributes:
         progress: 0 to 1.
         phase: what it does now, None where it does not run. phase_since: seconds since 1970.
-        ahead: bakes that will run before it, where it is queued.
+        queue_position: bakes that will run before it, where it is queued.
         rays_per_second, seconds_left: None where nothing was measured yet.
         bytes: size of the published store, 0 before.
         problem: one sentence with what to do about it, or why it has started again; None where all is well.
@@ -52,7 +52,7 @@ class BakeStatus:
     progress: float
     phase: Phase | None
     phase_since: float | None
-    ahead: int
+    queue_position: int
     rays_per_second: float | None
     seconds_left: float | None
     bytes: int

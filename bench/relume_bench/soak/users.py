@@ -20,7 +20,7 @@ from websockets.sync.client import ClientConnection, connect
 from relume_bench.soak.server import Server
 
 EDITS = 15
-SPEAKS = Subprotocol("relume.v1")
+SPEAKS = Subprotocol("relume.v2")
 DONE = ("ready", "failed", "cancelled")
 
 
@@ -36,8 +36,8 @@ class Users:
         self.counts, self.failures = Counter[str](), list[str]()
         self._killed_s = -1e9
         self._stop, self._lock = threading.Event(), threading.Lock()
-        persistent_scene, self._transient_scene = (entry["name"] for entry in server.call("/api/built-ins")[:2])
-        scene = server.call(f"/api/built-ins/{persistent_scene}", {})["id"]
+        persistent_scene, self._transient_scene = (entry["name"] for entry in server.call("/api/example-scenes")[:2])
+        scene = server.call(f"/api/example-scenes/{persistent_scene}", {})["id"]
         self._bake, self._materials = self._baked(scene, 40), list[str]()
         self._threads = [
             threading.Thread(target=self._repeat, args=(act, k))
@@ -84,8 +84,8 @@ class Users:
         """A session by oneself: edits, a question, and an end in order or not."""
         with self._session(self._bake) as session:
             self._drag(session, rng)
-            session.send(json.dumps({"type": "probe", "x": 3, "y": 4}))
-            _text(session, "probe")
+            session.send(json.dumps({"type": "inspect", "x": 3, "y": 4}))
+            _text(session, "inspect")
             if rng.random() < 0.3:
                 session.socket.close()  # as a lost network does
 
@@ -95,12 +95,12 @@ class Users:
         with self._session(self._bake, room) as ann, self._session(self._bake, room) as bob:
             _text(bob, "hello")
             self._drag(ann, rng)
-            _text(bob, "shared")
+            _text(bob, "room_update")
 
     def _make_and_delete(self, rng: random.Random) -> None:
         """A scene comes, is baked and looked at, and goes."""
         call = self._server.call
-        scene = call(f"/api/built-ins/{self._transient_scene}", {})["id"]
+        scene = call(f"/api/example-scenes/{self._transient_scene}", {})["id"]
         bake = self._baked(scene, rng.choice((60, 90, 120)), size=rng.choice((64, 128)))
         if not self._stop.is_set():
             with self._session(bake) as session:

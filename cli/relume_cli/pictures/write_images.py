@@ -136,8 +136,6 @@ def check_turntable(
     from relume_server.batch.frame_sequence import check_animation
     from relume_server.schemas.renders import Animation, Turntable
 
-    path = Turntable(
-        turntable=turntable_plan.frames, turns="eye" if turntable_plan.subject == "camera" else turntable_plan.subject
-    )
+    path = Turntable(turntable=turntable_plan.frames, rotate=turntable_plan.subject)
     animation = Animation(bake=source.bake.id, looks=[planned_file.document], path=path)
     return animation, check_animation(animation, source.view, source.transfer)

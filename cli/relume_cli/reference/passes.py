@@ -173,17 +173,17 @@ def document(subject: ComparisonSubject, passes: ReferencePasses, paths: str) ->
     return {
         "view": subject.view,
         "size": list(subject.size),
-        "left_out": list(passes.omitted_paths) if reports_method else [],
-        "untraced": list(passes.unsupported_paths),
-        "found": errors.get("all"),
-        "found_of_method": errors.get("method"),
+        "omitted_paths": list(passes.omitted_paths) if reports_method else [],
+        "unsupported_paths": list(passes.unsupported_paths),
+        "error_all_paths": errors.get("all"),
+        "error_method_paths": errors.get("method"),
     }
 
 
 def _error_text(comparison: Comparison) -> str:
     noise = f"noise of brute force {percent(comparison.noise)}"
     if comparison.error is None or comparison.standard_error is None:
-        return f"no error beyond the noise, below {percent(comparison.limit)} (relative RMSE); {noise}"
+        return f"no error beyond the noise, below {percent(comparison.error_upper_bound)} (relative RMSE); {noise}"
     return f"errs by {percent(comparison.error, comparison.standard_error)} (relative RMSE); {noise}"
 
 

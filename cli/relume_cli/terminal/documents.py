@@ -26,8 +26,7 @@ def scene_document(record: SceneRecord, bakes: Sequence[BakeStatus]) -> dict[str
         "materials": list(record.materials),
         "lights": list(record.lights),
         "variants": [{"name": name, "look": look} for name, look in record.variants.items()],
-        "warnings": list(record.warnings),
-        "remarks": [warning.document() for warning in record.warnings],
+        "warnings": [warning.document() for warning in record.warnings],
         "triangles": record.num_triangles,
         "bakes": [status.id for status in bakes],
     }
@@ -45,7 +44,7 @@ def bake_document(status: BakeStatus, service: BakeService) -> dict[str, Any]:
         "progress": status.progress,
         "phase": status.phase,
         "phase_seconds": since_s,
-        "ahead": status.ahead,
+        "queue_position": status.queue_position,
         "rays_per_second": status.rays_per_second,
         "seconds_left": status.seconds_left,
         "bytes": status.bytes,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.core.import_warnings import ImportRemark
+from relume.core.import_warnings import ImporterWarning
 
 
 @dataclass(frozen=True)
@@ -23,4 +23,4 @@ class Environment:
 
     name: str
     radiance: NDArray[np.float32]
-    warnings: tuple[ImportRemark, ...] = ()
+    warnings: tuple[ImporterWarning, ...] = ()

@@ -21,7 +21,7 @@ from relume.assets.environments.environment import Environment
 from relume.assets.environments.read_environment import read_environment
 from relume.core.cache import asset_cached
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImportRemark, warning_of
+from relume.core.import_warnings import ImporterWarning, warning_of
 
 STORE = AssetStore("imported environment", "env:", "environment.json", SceneError, max_entries=500)
 MAX_WIDTH = 2048  # a texel of 0.18°: finer than what a bake divides light into, and weighed in seconds
@@ -39,7 +39,7 @@ class EnvironmentRecord:
     id: str
     name: str
     created: float
-    warnings: tuple[ImportRemark, ...]
+    warnings: tuple[ImporterWarning, ...]
 
     @property
     def map(self) -> str:
@@ -66,7 +66,7 @@ def store_environment(folder: Path, source: Path, name: str) -> EnvironmentRecor
     def fill(staged_folder: Path) -> dict[str, Any]:
         np.save(staged_folder / _RADIANCE, environment.radiance)
         write_thumbnail(staged_folder / _THUMBNAIL, environment.radiance)
-        return {"warnings": [remark.document() for remark in environment.warnings]}
+        return {"warnings": [warning.document() for warning in environment.warnings]}
 
     return get_record(folder, STORE.store(folder, source, name, fill))
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from relume.assets.environments.environment import Environment
 from relume.assets.environments.hdr_header import read_header
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImportRemark, approximated, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, unsupported
 from relume.image_io.downsample import downsample
 from relume.image_io.primaries import convert
 from relume.image_io.read_linear import EXR_MAGIC, check_claim, read_strips
@@ -63,7 +63,7 @@ class _MapReader:
     def __init__(self, name: str, max_width: int) -> None:
         self._name, self._max_width = name, max_width
         self._strip_pixels: list[F32] = []
-        self._warnings: list[ImportRemark] = []
+        self._warnings: list[ImporterWarning] = []
         self._num_broken = self._num_negative = self._num_texels = 0
         self._is_bright = False
         self.width, self._reduction = 0, 1

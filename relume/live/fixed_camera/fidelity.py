@@ -24,7 +24,7 @@ class Fidelity(IntEnum):
     EXACT = 5
 
 
-FidelityLabel = Literal["preview", "approximate", "followed", "near", "exact"]
+FidelityLabel = Literal["preview", "approximate", "incremental", "near_exact", "exact"]
 """What a frame says of its picture, worst first; "approximate": it shows an older look, or not all coefficients yet."""
 
 _ORDER: tuple[FidelityLabel, ...] = get_args(FidelityLabel)
@@ -37,8 +37,8 @@ def fidelity_label(fidelity: Fidelity, *, is_current: bool) -> FidelityLabel:
     if not is_current:
         return "approximate"
     if fidelity <= Fidelity.COARSE:
-        return "followed"
-    return "near" if fidelity == Fidelity.NEARLY_EXACT else "exact"
+        return "incremental"
+    return "near_exact" if fidelity == Fidelity.NEARLY_EXACT else "exact"
 
 
 def worst(labels: Iterable[FidelityLabel]) -> FidelityLabel:

@@ -169,7 +169,7 @@ def _environment_gain(look: Look, solo_sources: frozenset[str] | None) -> Rgb:
 def _lit_local_lights(look: Look, solo_sources: frozenset[str] | None) -> Iterator[LightSource]:
     """Local lights that give any light."""
     for name, light in look.lights.items():
-        gain = light.gain if solo_sources is None else light.model_copy(update={"on": name in solo_sources}).gain
+        gain = light.gain if solo_sources is None else light.model_copy(update={"enabled": name in solo_sources}).gain
         if any(gain):
             yield LightSource(light.geometry, gain)
 

@@ -51,7 +51,7 @@ class Job(Protocol):
     @property
     def label(self) -> str: ...
     @property
-    def state(self) -> Literal["freezing", "shading", "following"]: ...
+    def state(self) -> Literal["precomputing", "shading", "following"]: ...
     @property
     def key(self) -> tuple[Hashable, ...]: ...
     @property
@@ -113,7 +113,7 @@ class PrecomputeOperator:
     light: Illumination
     form: OperatorForm
     is_refinement: bool
-    state: Literal["freezing", "shading"] = "freezing"
+    state: Literal["precomputing", "shading"] = "precomputing"
     is_resumable = False
 
     @classmethod
@@ -219,7 +219,7 @@ class Shade:
     light_components: Sequence[LightComponent]
     is_default: bool
     is_refinement: bool
-    state: Literal["freezing", "shading"] = "shading"
+    state: Literal["precomputing", "shading"] = "shading"
     is_resumable = True
 
     @classmethod
@@ -363,7 +363,7 @@ class Resum:
     sum_into: Callable[[F32], object] = field(repr=False)
     rounding: float = 0.0
     is_refinement: bool = True
-    state: Literal["freezing", "shading"] = "shading"
+    state: Literal["precomputing", "shading"] = "shading"
     is_resumable = False
 
     @property

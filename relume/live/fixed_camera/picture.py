@@ -38,14 +38,14 @@ class Progress:
     Attributes:
         tiles: x, y, width, height of the picture's tiles that are new. exact: the picture shows its look exactly.
         fidelity: how nearly it shows it, in what is seen of it. complete: something of every term is shown.
-        was_off: how far the picture that an exact one replaces was from it, relative RMS, where its eye moved.
+        previous_error: how far the picture that an exact one replaces was from it, relative RMS, where its eye moved.
     """
 
     tiles: list[Tile]
     exact: bool
     fidelity: FidelityLabel
     complete: bool
-    was_off: float | None = None
+    previous_error: float | None = None
 
     @property
     def changed(self) -> bool:

@@ -35,7 +35,7 @@ class ShadeRegion:
 
     whole: Shade
     region: Tile
-    state: Literal["freezing", "shading"] = "shading"
+    state: Literal["precomputing", "shading"] = "shading"
     is_resumable = True
 
     @property

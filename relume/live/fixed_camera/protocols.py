@@ -34,13 +34,13 @@ class EditAxis(Enum):
     LIGHT = "light"
     ENVIRONMENT = "environment"
     BOUNCES = "bounces"
-    CAMERA = "eye"
+    CAMERA = "camera"
 
 
 class CameraMode(Enum):
     """Where its pictures are seen from: places that were baked, or any."""
 
-    FIXED = "baked"
+    FIXED = "fixed"
     FREE = "free"
 
 

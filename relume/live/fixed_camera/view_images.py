@@ -49,7 +49,7 @@ _WHITE = complete_term(("terms", 0), {"model": "lambert", "texture": None}, None
 def material_documents(look: Look, material: str) -> Sequence[TermLook]:
     """The terms whose images make a material's picture; of a catcher what arrives at it, as a white surface has it."""
     material_look = look.materials[material]
-    return (cast(TermLook, _WHITE),) if material_look.catcher else material_look.terms
+    return (cast(TermLook, _WHITE),) if material_look.shadow_catcher else material_look.terms
 
 
 class ViewImages:
@@ -149,7 +149,7 @@ class ViewImages:
         something else than before."""
         names = {index: self.transfer.material_names[index] for index in self.mirrors.materials}
         documents = {
-            k: None if look.materials[name].catcher else self.by_name[name].mirrors for k, name in names.items()
+            k: None if look.materials[name].shadow_catcher else self.by_name[name].mirrors for k, name in names.items()
         }
         return self.mirrors.update_emission(documents)
 

@@ -240,7 +240,7 @@ def finish_rays(
 def only_materials_differ(before: FrameRequestState, after: FrameRequestState) -> bool:
     """Whether two frames of one eye differ in what materials send alone, without any whose light comes otherwise."""
     first, second = before.look, after.look
-    catchers = (material.catcher for look in (first, second) for material in look.materials.values())
+    catchers = (material.shadow_catcher for look in (first, second) for material in look.materials.values())
     return (
         before.incident is after.incident
         and [first.normals for first in before.materials.overrides]
@@ -446,7 +446,7 @@ def _prefiltered_environment(transfer: FreeCameraTransfer, light: Illumination) 
 
 def _shadow_catcher(transfer: FreeCameraTransfer, state: FrameRequestState, gbuffer: GBuffer) -> ShadowCatcher:
     """What would arrive at catchers if nothing were in the way."""
-    is_shadow_catcher = np.array([state.look.materials[name].catcher for name in transfer.material_names])
+    is_shadow_catcher = np.array([state.look.materials[name].shadow_catcher for name in transfer.material_names])
     if not is_shadow_catcher.any():
         return ShadowCatcher(is_shadow_catcher, np.empty((0, 3), np.float32))
     unoccluded = np.zeros((transfer.stored_scene.probes.num_points, 3), np.float32)

@@ -42,7 +42,7 @@ def make_layers(layering: Layering, look: Look, *, has_indirect: bool) -> list[L
     Args:
         layering: which. look: of which they are parts. has_indirect: whether light between surfaces was baked.
     """
-    if not layering or any(material.catcher for material in look.materials.values()):
+    if not layering or any(material.shadow_catcher for material in look.materials.values()):
         return []
     return (light_group_layers if layering == "light_groups" else light_and_path_layers)(
         look, has_indirect=has_indirect
@@ -73,13 +73,13 @@ def light_and_path_layers(look: Look, *, has_indirect: bool) -> list[Layer]:
 
 
 def light_group_layers(look: Look, *, has_indirect: bool) -> list[Layer]:
-    """One layer for each light and each of direct and reflected light; all of them together are the picture.
+    """One layer for each light and each of direct and indirect light; all of them together are the picture.
 
     Args:
         look, has_indirect: as of `make_layers`.
     """
     paths = look.transport.supported_by(has_indirect=has_indirect)
-    included: dict[PathFilter, bool] = {"direct": paths.direct, "reflected": paths.has_indirect}
+    included: dict[PathFilter, bool] = {"direct": paths.direct, "indirect": paths.has_indirect}
     classes = [path_kind for path_kind, is_included in included.items() if is_included]
     whole = look.transport.show == "all"
     unnamed_layers = [
@@ -121,8 +121,11 @@ def _background_layers(look: Look) -> list[_UnnamedLayer]:
 
 def _lit_only_by(look: Look, source: str | None) -> Look:
     """The look with one of its lights alone; None: its environment."""
-    lights = {name: light.model_copy(update={"on": light.on and name == source}) for name, light in look.lights.items()}
-    environment = look.environment if source is None else look.environment.model_copy(update={"scale": 0.0})
+    lights = {
+        name: light.model_copy(update={"enabled": light.enabled and name == source})
+        for name, light in look.lights.items()
+    }
+    environment = look.environment if source is None else look.environment.model_copy(update={"intensity": 0.0})
     return look.model_copy(update={"lights": lights, "environment": environment})
 
 
@@ -137,7 +140,7 @@ def _only_path_kind(look: Look, path_kind: PathFilter) -> Look:
 def _path_kinds(look: Look) -> list[PathFilter]:
     """The kinds of light paths that a look shows."""
     kinds = _PATH_KINDS[: 1 + min(look.transport.bounces, 2)]
-    return {"all": list(kinds), "reflected": list(kinds[1:])}.get(look.transport.show, [look.transport.show])
+    return {"all": list(kinds), "indirect": list(kinds[1:])}.get(look.transport.show, [look.transport.show])
 
 
 def _name_layers(unnamed_layers: list[_UnnamedLayer]) -> list[Layer]:

@@ -91,7 +91,7 @@ def _shade(
     num = len(shading_points.normal)
     radiance = np.zeros((num, 3))
     for given in documents:
-        document = {**given, "texture": None, "roughness_map": False}
+        document = {**given, "texture": None, "roughness_map": None}
         target = TargetTerm.from_document(document, lambda: np.arccos(shading_points.normal[:, 2].astype(np.float64)))
         shaded_term = shade(target.term, target.bands, _lights(), shading_points, lambda share: None, lambda: False)
         rows = shaded_term.rows(num) * np.asarray(document["color"])

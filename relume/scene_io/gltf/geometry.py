@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImportRemark, approximated, ignored, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, ignored, unsupported
 from relume.scene.model import F32, U32
 from relume.scene_io.gltf.accessors import AccessorReader
 from relume.scene_io.gltf.document import Document, Primitive
@@ -52,7 +52,7 @@ def count_corners(document: Document, primitive: Primitive) -> int:
 
 
 def read_primitive(
-    reader: AccessorReader, primitive: Primitive, label: str, warnings: list[ImportRemark]
+    reader: AccessorReader, primitive: Primitive, label: str, warnings: list[ImporterWarning]
 ) -> GltfGeometry | None:
     """The primitive's triangles with only the vertices they use; None where it has none (a warning says so).
 
@@ -95,7 +95,7 @@ def _read_attributes(
     faces: I64,
     positions: F32,
     label: str,
-    warnings: list[ImportRemark],
+    warnings: list[ImporterWarning],
 ) -> GltfGeometry:
     def attribute(name: str, *widths: int) -> F32 | None:
         if name not in primitive.attributes:
@@ -157,7 +157,7 @@ def is_usable(values: NDArray[np.floating]) -> bool:
 
 
 def find_nondegenerate(
-    positions: NDArray[np.floating], faces: I64, label: str, warnings: list[ImportRemark]
+    positions: NDArray[np.floating], faces: I64, label: str, warnings: list[ImporterWarning]
 ) -> NDArray[np.bool_]:
     """Which triangles have area, measured against their longest edge.
 

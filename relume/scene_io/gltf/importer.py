@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from relume.assets.environments.environment import Environment
 from relume.assets.environments.studio import studio
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImportRemark, approximated, ignored, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, ignored, unsupported
 from relume.scene.collect_lights import LightCollector
 from relume.scene.finalize import finalize
 from relume.scene.merge_meshes import merge_by_material
@@ -90,7 +90,7 @@ class _SceneBuilder:
     def __init__(self, container: GltfContainer) -> None:
         self._document = container.document
         self._accessors = AccessorReader(container)
-        self.warnings: list[ImportRemark] = []
+        self.warnings: list[ImporterWarning] = []
         self._material_reader = MaterialReader(ImageReader(container), self.warnings)
         self._collector = LightCollector(self.warnings)
         self._light_reader = LightReader(container.document, self._collector, self.warnings)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImportRemark, unsupported
+from relume.core.import_warnings import ImporterWarning, unsupported
 from relume.scene_io.gltf.accessors import AccessorReader
 from relume.scene_io.gltf.document import Index, Node
 from relume.scene_io.gltf.nodes import rotations
@@ -26,7 +26,7 @@ class Instancing(BaseModel, frozen=True):
     attributes: dict[str, Index] = Field(max_length=64)
 
 
-def read_instances(node: Node, accessors: AccessorReader, max_instances: int, warnings: list[ImportRemark]) -> F64:
+def read_instances(node: Node, accessors: AccessorReader, max_instances: int, warnings: list[ImporterWarning]) -> F64:
     """Find where a node shows its mesh, seen from itself.
 
     Args:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImportRemark, approximated, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, unsupported
 from relume.scene.collect_lights import LightCollector
 from relume.scene.validate import MAX_METERS
 from relume.scene_io.gltf.document import Document, Factor, Index, Name, Node, Number
@@ -61,7 +61,7 @@ class _LightReference(BaseModel, frozen=True):
 class LightReader:
     """Reads the lamps at the nodes of one file."""
 
-    def __init__(self, document: Document, collector: LightCollector, warnings: list[ImportRemark]) -> None:
+    def __init__(self, document: Document, collector: LightCollector, warnings: list[ImporterWarning]) -> None:
         self._collector = collector
         self._warnings = warnings
         try:

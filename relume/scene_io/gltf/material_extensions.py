@@ -11,7 +11,7 @@ from typing import Annotated, TypeVar
 
 from pydantic import BaseModel, Field, ValidationError
 
-from relume.core.import_warnings import ImportRemark, unsupported
+from relume.core.import_warnings import ImporterWarning, unsupported
 from relume.scene_io.gltf.document import Extensions, Factor, Number, TextureInfo
 
 Weight = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1e6)]
@@ -98,7 +98,7 @@ class MaterialExtensions(BaseModel, frozen=True):
 MATERIAL_EXTENSIONS = {f"KHR_materials_{name}" for name in MaterialExtensions.model_fields}
 
 
-def read_extensions(extensions: Extensions, label: str, warnings: list[ImportRemark]) -> MaterialExtensions:
+def read_extensions(extensions: Extensions, label: str, warnings: list[ImporterWarning]) -> MaterialExtensions:
     """A material's extensions as far as they are understood.
 
     Args:

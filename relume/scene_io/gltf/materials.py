@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImportRemark, approximated, ignored, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, ignored, unsupported
 from relume.scene.model import Glass, Material, Opacity, Texture, TextureEncoding
 from relume.scene.opacity import make_opacity
 from relume.scene.texture_encoding import mean_value
@@ -68,7 +68,7 @@ WHITE = VertexColors()
 class MaterialReader:
     """Turns the materials of one file into relume's, counting the texels it makes."""
 
-    def __init__(self, images: ImageReader, warnings: list[ImportRemark]) -> None:
+    def __init__(self, images: ImageReader, warnings: list[ImporterWarning]) -> None:
         self._images = images
         self._warnings = warnings
         self._names: dict[str, int] = {}

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImportRemark, unsupported
+from relume.core.import_warnings import ImporterWarning, unsupported
 from relume.scene_io.gltf.document import Document, Node
 
 F64 = NDArray[np.float64]
@@ -20,7 +20,7 @@ MAX_NODES = 100_000
 _MAX_WARNINGS = 20  # nodes that a warning is given for
 
 
-def walk_nodes(document: Document, warnings: list[ImportRemark]) -> Iterator[tuple[Node, F64]]:
+def walk_nodes(document: Document, warnings: list[ImporterWarning]) -> Iterator[tuple[Node, F64]]:
     """Every node of the default scene (of all root nodes where no scene is given) with its transform to world (4, 4).
 
     A node that is reached again, by another parent or as its own ancestor, is shown at the first place alone.

@@ -19,6 +19,7 @@ from relume.brdf.fresnel import schlick
 from relume.brdf.registry import TERMS
 from relume.brdf.specular import SOFT
 from relume.brdf.term import Term
+from relume.brdf.texture_slots import ROUGHNESS
 from relume.math.angle_bands import band_averages
 from relume.scene.model import Texture
 from relume.scene_io.gltf.sheen import sheen_attenuation, sheen_term
@@ -97,7 +98,7 @@ def _highlight(surface: PbrSurface, anisotropy: float) -> dict[str, Any]:
         params = _clamp_params(TERMS["ggx"], roughness=surface.roughness, f0=f0)
         # mirrors are pictures, which nothing widens
         needs_roughness_map = surface.has_normal_map and surface.roughness >= SOFT
-        roughness_map = {"roughness_map": True} if "roughness" in surface.textures or needs_roughness_map else {}
+        roughness_map = {"roughness_map": ROUGHNESS} if "roughness" in surface.textures or needs_roughness_map else {}
         return {"model": "ggx", "color": color, "params": params, **roughness_map}
     across = max(surface.roughness**2, 1e-3)
     along = across + (1 - across) * anisotropy**2

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
-from relume.core.import_warnings import ImportRemark, unsupported
+from relume.core.import_warnings import ImporterWarning, unsupported
 from relume.scene.model import F32, U32
 from relume.scene_io.gltf.document import Index, Number, TextureInfo
 
@@ -55,7 +55,7 @@ class UvTransforms:
         candidate: what the meshes carry.
     """
 
-    def __init__(self, textures: Sequence[TextureInfo], label: str, warnings: list[ImportRemark]) -> None:
+    def __init__(self, textures: Sequence[TextureInfo], label: str, warnings: list[ImporterWarning]) -> None:
         """Choose the placement.
 
         Args:
@@ -120,7 +120,7 @@ def tiling(slot: UvSlot, base_slot: UvSlot) -> Tiling | None:
     return (across, down), (right, below)
 
 
-def _read_slot(texture: TextureInfo, label: str, warnings: list[ImportRemark]) -> UvSlot:
+def _read_slot(texture: TextureInfo, label: str, warnings: list[ImporterWarning]) -> UvSlot:
     extension = texture.extensions.get("KHR_texture_transform")
     if extension is None:
         return UvSlot(texture.texCoord)

@@ -14,7 +14,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from relume.brdf.term_validation import complete_term
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImportRemark, approximated
+from relume.core.import_warnings import ImporterWarning, approximated
 from relume.scene.model import F32, Texture
 from relume.scene.texture_encoding import F64, decode_rows, mean_value
 from relume.scene.unique_names import unique_name
@@ -83,7 +83,7 @@ def variant_looks(
     names: Sequence[str],
     scene_materials: Sequence[tuple[ReadMaterial, Choices]],
     variant_materials: Mapping[int, ReadMaterial],
-    warnings: list[ImportRemark],
+    warnings: list[ImporterWarning],
 ) -> dict[str, dict[str, Any]]:
     """A partial look for each variant, the terms in it complete.
 
@@ -103,7 +103,7 @@ def variant_looks(
 
 
 def _variant_terms(
-    target: ReadMaterial, source: ReadMaterial, variant: str, warnings: list[ImportRemark]
+    target: ReadMaterial, source: ReadMaterial, variant: str, warnings: list[ImporterWarning]
 ) -> list[dict[str, Any]]:
     """The other material's terms, their textures looked for among those that the own material has baked."""
     label = f"variant {variant!r} of material {target.material.name!r}"
@@ -127,7 +127,7 @@ def _variant_terms(
 
 
 def _drop_unmatched_roughness(
-    target: ReadMaterial, source: ReadMaterial, term: dict[str, Any], label: str, warnings: list[ImportRemark]
+    target: ReadMaterial, source: ReadMaterial, term: dict[str, Any], label: str, warnings: list[ImporterWarning]
 ) -> dict[str, Any]:
     """A term that follows a map of roughness follows none where the own material has not the same."""
     target_has_map, source_has_map = (

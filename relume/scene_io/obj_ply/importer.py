@@ -11,7 +11,7 @@ import numpy as np
 from relume.assets.environments.environment import Environment
 from relume.assets.environments.studio import studio
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImportRemark, approximated, ignored, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, ignored, unsupported
 from relume.scene.collect_lights import F64, LightCollector
 from relume.scene.finalize import finalize
 from relume.scene.model import F32, Light, Material, Mesh, Scene, Texture, TextureEncoding
@@ -39,7 +39,7 @@ def import_obj(data: bytes, name: str, environment: Environment | None, companio
     Raises:
         SceneError: it is damaged, too large, or has no triangles.
     """
-    warnings: list[ImportRemark] = []
+    warnings: list[ImporterWarning] = []
     obj = read_obj(data)
     library = _library(obj, companions, warnings)
     warnings.extend(
@@ -87,7 +87,7 @@ def import_ply(data: bytes, name: str, environment: Environment | None) -> Scene
 
 
 def _scan(
-    corners: Corners, colors: F32 | None, name: str, environment: Environment | None, warnings: list[ImportRemark]
+    corners: Corners, colors: F32 | None, name: str, environment: Environment | None, warnings: list[ImporterWarning]
 ) -> Scene:
     """A mesh of one material, with the colours of its vertices."""
     corners, material = _apply_vertex_colors(corners, colors, MaterialMaker(NoFiles(), warnings), warnings)
@@ -96,7 +96,7 @@ def _scan(
 
 
 def _apply_vertex_colors(
-    corners: Corners, colors: F32 | None, maker: MaterialMaker, warnings: list[ImportRemark]
+    corners: Corners, colors: F32 | None, maker: MaterialMaker, warnings: list[ImporterWarning]
 ) -> tuple[Corners, Material]:
     """A material with the colours of vertices (num_positions, 3), in an image where they differ; corners with places
     in it."""
@@ -129,7 +129,7 @@ def _apply_vertex_colors(
     return textured, replace(material, terms=terms, textures={"diffuse": texture})
 
 
-def _library(obj: Obj, companions: Companions, warnings: list[ImportRemark]) -> dict[str, MtlMaterial]:
+def _library(obj: Obj, companions: Companions, warnings: list[ImporterWarning]) -> dict[str, MtlMaterial]:
     """All materials of all libraries; the first of a name wins."""
     if len(obj.libraries) > MAX_LIBRARIES:
         raise SceneError(f"the .obj file names more than {MAX_LIBRARIES} material files; join them")
@@ -151,7 +151,7 @@ def _scene(
     meshes: list[Mesh],
     materials: Sequence[Material],
     environment: Environment | None,
-    warnings: list[ImportRemark],
+    warnings: list[ImporterWarning],
     lights: Sequence[Light] = (),
 ) -> Scene:
     if not meshes:

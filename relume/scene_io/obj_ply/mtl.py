@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImportRemark, approximated, ignored, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, ignored, unsupported
 from relume.image_io.decode import U8, Decoder
 from relume.scene.model import Material, Opacity, Texture, TextureEncoding
 from relume.scene.opacity import make_opacity
@@ -90,7 +90,7 @@ def _image_name(tokens: list[str]) -> str:
 class MaterialMaker:
     """Turns described materials into relume's, each image decoded once."""
 
-    def __init__(self, companions: Companions, warnings: list[ImportRemark]) -> None:
+    def __init__(self, companions: Companions, warnings: list[ImporterWarning]) -> None:
         self._companions = companions
         self._warnings = warnings
         self._decoder = Decoder()

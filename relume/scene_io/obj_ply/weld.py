@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImportRemark, unsupported
+from relume.core.import_warnings import ImporterWarning, unsupported
 from relume.scene.model import F32, Material, Mesh
 from relume.scene_io.gltf.geometry import find_nondegenerate, is_usable
 from relume.scene_io.gltf.uvs import compute_tangents
@@ -35,7 +35,7 @@ class Corners:
 
 
 def make_mesh(
-    corners: Corners, name: str, number: int, material: Material, label: str, warnings: list[ImportRemark]
+    corners: Corners, name: str, number: int, material: Material, label: str, warnings: list[ImporterWarning]
 ) -> Mesh | None:
     """A mesh with own vertices for each corner; None where no triangle is left (a warning says so).
 
@@ -73,7 +73,7 @@ def make_mesh(
     return Mesh(name, flat, normals, tangents, uvs, faces, number)
 
 
-def _gather_values(values: F64, indices: I64, width: int, label: str, warnings: list[ImportRemark]) -> F32:
+def _gather_values(values: F64, indices: I64, width: int, label: str, warnings: list[ImporterWarning]) -> F32:
     """Values of the corners, zeros where a corner has none or none that is finite. (num_corners, width)"""
     flat = indices.reshape(-1)
     gathered = np.zeros((len(flat), width))
@@ -84,7 +84,7 @@ def _gather_values(values: F64, indices: I64, width: int, label: str, warnings: 
     return gathered.astype(np.float32)
 
 
-def _normals(corners: Corners, triangles: I64, points: F32, label: str, warnings: list[ImportRemark]) -> F32:
+def _normals(corners: Corners, triangles: I64, points: F32, label: str, warnings: list[ImporterWarning]) -> F32:
     """Unit normals of the corners: the file's, and creased ones where it has none. (num_corners, 3)"""
     file_normals = _gather_values(corners.normals, triangles[..., 2], 3, f"normals of {label}", warnings).astype(
         np.float64

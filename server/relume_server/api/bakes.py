@@ -123,7 +123,7 @@ class _Events(EventSourceResponse):
 async def _events(bake: str, services: Services, caller: Caller) -> AsyncIterator[ServerSentEvent]:
     """For as long as the caller may stay; whom a proxy named comes by it again after a while."""
     last_status: BakeStatus | None = None
-    until_s = time.monotonic() + (PROXY_REVALIDATION_S if caller.by == "proxy" else math.inf)
+    until_s = time.monotonic() + (PROXY_REVALIDATION_S if caller.auth_method == "proxy" else math.inf)
     while (
         (last_status is None or not last_status.final)
         and time.monotonic() < until_s
@@ -142,13 +142,13 @@ async def _events(bake: str, services: Services, caller: Caller) -> AsyncIterato
 
 
 @router.delete("/{bake}", status_code=204)
-def cancel_bake(bake: Id, services: ServicesDep, forget: bool = False) -> Response:
-    """Cancel; what was finished is kept for a resume. With `forget` the bake is deleted, finished or not."""
-    if forget:
+def cancel_bake(bake: Id, services: ServicesDep, delete_files: bool = False) -> Response:
+    """Cancel; what was finished is kept for a resume. With `delete_files` the bake is deleted, finished or not."""
+    if delete_files:
         services.bakes.delete(bake)
         services.access.quotas.disown("bake", bake)
     elif not services.bakes.cancel(bake) and (state := services.bakes.get(bake).state) != "cancelled":
-        raise NotReadyError(f"the bake is {state}, there is nothing to cancel; ?forget=true deletes it")
+        raise NotReadyError(f"the bake is {state}, there is nothing to cancel; ?delete_files=true deletes it")
     return Response(status_code=204)
 
 

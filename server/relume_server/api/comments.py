@@ -56,7 +56,7 @@ def _add(services: Services, scene: str, request: CommentRequest, caller: Caller
     if request.x >= request.size[0] or request.y >= request.size[1]:
         raise ParameterError("/x", [request.x, request.y], "a pixel of a picture of that size")
     if request.camera is not None:
-        make_custom_camera("eye", request.camera.to_world, request.camera.yfov)
+        make_custom_camera("camera", request.camera.to_world, request.camera.yfov)
     picture = None if request.picture is None else small_picture(request.picture)
     pin = request.model_dump(include={"bake", "view", "x", "y", "size", "camera"})
     author = caller.person or check_person(request.author or "Guest")

@@ -1,4 +1,4 @@
-"""/api/truths: a frame against brute force, pass by pass."""
+"""/api/comparisons: a frame against brute force, pass by pass."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from relume_server.schemas.base import Id, JobState
 from relume_server.schemas.bodies import ComparisonBody, ComparisonPlanBody, ComparisonRequest
 from relume_server.services import Services, ServicesDep
 
-router = APIRouter(prefix="/api/truths", tags=["truths"])
+router = APIRouter(prefix="/api/comparisons", tags=["comparisons"])
 Picture = Literal["error", "reference", "method-error", "method-reference"]
 
 
@@ -43,7 +43,7 @@ async def submit_comparison(
             return ComparisonPlanBody(passes=request.passes, **foreseen._asdict())
     await run_in_threadpool(services.access.quotas.check_room)
     identity = await run_in_threadpool(services.comparisons.submit, request, caller.name)
-    response.headers["Location"] = f"/api/truths/{identity}"
+    response.headers["Location"] = f"/api/comparisons/{identity}"
     return await run_in_threadpool(lambda: _body(services.comparisons.get(identity), services))
 
 
@@ -72,43 +72,43 @@ def list_comparisons(
     return [_body(job, services) for job in list_jobs(services.comparisons, job_filter, page)]
 
 
-@router.get("/{truth}")
-def get_comparison(truth: Id, services: ServicesDep) -> ComparisonBody:
+@router.get("/{comparison}")
+def get_comparison(comparison: Id, services: ServicesDep) -> ComparisonBody:
     """State, progress, and what was found so far."""
-    return _body(services.comparisons.get(truth), services)
+    return _body(services.comparisons.get(comparison), services)
 
 
-@router.delete("/{truth}", status_code=204)
-def stop_comparison(truth: Id, services: ServicesDep, forget: bool = False) -> Response:
-    """Stop a comparison; what was found so far is kept, unless `forget` says that nobody needs it."""
-    (services.comparisons.delete if forget else services.comparisons.stop)(truth)
+@router.delete("/{comparison}", status_code=204)
+def stop_comparison(comparison: Id, services: ServicesDep, delete_files: bool = False) -> Response:
+    """Stop a comparison; what was found so far is kept, unless `delete_files` is true."""
+    (services.comparisons.delete if delete_files else services.comparisons.stop)(comparison)
     return Response(status_code=204)
 
 
-@router.post("/{truth}/resume", status_code=202)
-def resume_comparison(truth: Id, services: ServicesDep) -> ComparisonBody:
+@router.post("/{comparison}/resume", status_code=202)
+def resume_comparison(comparison: Id, services: ServicesDep) -> ComparisonBody:
     """Go on with a comparison that was stopped or has failed, after its last finished pass."""
-    services.comparisons.resume(truth)
-    return _body(services.comparisons.get(truth), services)
+    services.comparisons.resume(comparison)
+    return _body(services.comparisons.get(comparison), services)
 
 
 @router.get(
-    "/{truth}/{name}.png",
+    "/{comparison}/{name}.png",
     response_class=Download,
     name="get_comparison_picture",
     responses=files("image/png"),
 )
 def get_picture(
-    truth: Id, name: Picture, services: ServicesDep, passes: Annotated[int | None, Query(ge=0)] = None
+    comparison: Id, name: Picture, services: ServicesDep, passes: Annotated[int | None, Query(ge=0)] = None
 ) -> Download:
     """Where the frame differs, or the brute force so far, by the paths that were asked for or by those that the bake's
     method follows. Brute force from the first pass on, where the frame differs from the second. `passes` only makes the
     address change when the picture does."""
-    job = services.comparisons.get(truth)
-    path = services.comparisons.picture_path(truth, name)
+    job = services.comparisons.get(comparison)
+    path = services.comparisons.picture_path(comparison, name)
     if not path.exists():
         needed = "one pass is" if name.endswith("reference") else "two passes are"
-        raise NotReadyError(f"{needed} needed, {job.done} are done; wait a little")
+        raise NotReadyError(f"{needed} needed, {job.completed} are done; wait a little")
     return Download(path, media_type="image/png", headers={"Cache-Control": "no-store"})
 
 
@@ -116,6 +116,6 @@ def _body(job: ComparisonJob, services: Services) -> ComparisonBody:
     request = job.request
     figures = dict(services.comparisons.figures(job.id))
     return ComparisonBody.from_object(
-        job, bake=request.bake, view=request.view, paths=request.paths, passes=job.done,
+        job, bake=request.bake, view=request.view, paths=request.paths, completed=job.completed,
         **format_timestamps(job), **figures,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""/api/built-ins: the scenes made by code, and taking one of them."""
+"""/api/example-scenes: the scenes made by code, and taking one of them."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from relume_server.io.import_request import ImportRequest
 from relume_server.schemas.bodies import ExampleSceneBody, SceneBody
 from relume_server.services import ServicesDep
 
-router = APIRouter(prefix="/api/built-ins", tags=["scenes"])
+router = APIRouter(prefix="/api/example-scenes", tags=["scenes"])
 ExampleName = Annotated[str, Path(max_length=256)]
 
 
-@router.get("", name="list_built_ins")
+@router.get("", name="list_example_scenes")
 def list_examples(page: PageDep) -> list[ExampleSceneBody]:
     """All of them, in the order in which they are shown."""
     return [
@@ -29,7 +29,7 @@ def list_examples(page: PageDep) -> list[ExampleSceneBody]:
     ]
 
 
-@router.post("/{name}", status_code=201, name="take_built_in")
+@router.post("/{name}", status_code=201, name="import_example_scene")
 async def import_example(name: ExampleName, services: ServicesDep, caller: CallerDep, response: Response) -> SceneBody:
     """Make it and register it like an imported one; a second time it is the same scene."""
     if name not in BUILT_IN:

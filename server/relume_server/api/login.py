@@ -28,8 +28,8 @@ async def me(caller: CallerDep, services: ServicesDep, response: Response) -> Me
         login=settings.login,
         name=caller.person,
         role=role,
-        by=caller.by,
-        viewers_comment=settings.allow_viewer_comments,
+        auth_method=caller.auth_method,
+        allow_viewer_comments=settings.allow_viewer_comments,
     )
 
 

@@ -23,12 +23,12 @@ router = APIRouter(prefix="/api/models", tags=["models"])
 def list_models(page: PageDep) -> list[ModelBody]:
     """Every BRDF term."""
     terms = page.in_order(registry.describe())
-    return [ModelBody(**term, mirrors_below=specular_threshold(term["model"])) for term in terms]
+    return [ModelBody(**term, specular_below=specular_threshold(term["model"])) for term in terms]
 
 
-@router.post("/in-out")
+@router.post("/zernike-fit")
 async def get_zernike_fit(request: TermsRequest) -> list[ZernikeFitBody]:
-    """How terms are sent in views whose eye moves: the in-out factorisation of each (Mahajan 2008)."""
+    """How terms are sent in views whose eye moves: the Zernike factorization of each (Mahajan 2008)."""
     return await run_in_threadpool(_zernike_fit, _complete(request))
 
 
@@ -46,7 +46,7 @@ def _albedo(terms: list[dict[str, Any]]) -> AlbedoBody:
     theta, albedo = directional_albedo(terms)
     mean = np.sum([reflectance(term) for term in terms], axis=0)
     row = int(albedo.max(axis=1).argmax())
-    return AlbedoBody(mean=mean.tolist(), most=float(albedo[row].max()), at_deg=math.degrees(theta[row]))
+    return AlbedoBody(mean=mean.tolist(), max=float(albedo[row].max()), max_angle_degrees=math.degrees(theta[row]))
 
 
 def _zernike_fit(terms: list[dict[str, Any]]) -> list[ZernikeFitBody]:

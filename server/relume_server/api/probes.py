@@ -1,4 +1,4 @@
-"""/api/bakes/{id}/surface: what a browser keeps of a bake to draw its moving views itself; nothing of it changes."""
+"""/api/bakes/{id}/probes: what a browser keeps of a bake to draw its moving views itself; nothing of it changes."""
 
 from __future__ import annotations
 
@@ -30,10 +30,8 @@ class ArrayResponse(Response):
     media_type = "application/octet-stream"
 
 
-@router.get("/{bake}/surface")
-async def describe_surface(
-    bake: Id, services: ServicesDep, response: Response, layout: Layout = None
-) -> FreeCameraBody:
+@router.get("/{bake}/probes")
+async def describe_probes(bake: Id, services: ServicesDep, response: Response, layout: Layout = None) -> FreeCameraBody:
     """Of a moving view: what its shaders are written from, and the names of the arrays that they keep."""
     await run_in_threadpool(require_ready_bake, services, bake)
     async with services.transfers.acquire(bake, services.bakes.store_path(bake)) as transfer:
@@ -42,8 +40,8 @@ async def describe_surface(
     return FreeCameraBody(**constants, arrays=list(arrays))
 
 
-@router.get("/{bake}/surface/{array}", response_class=ArrayResponse)
-async def surface_array(
+@router.get("/{bake}/probes/{array}", response_class=ArrayResponse)
+async def get_probe_array(
     bake: Id, array: Annotated[str, Path(max_length=64)], services: ServicesDep, layout: Layout = None
 ) -> Response:
     """One of them: so many texels of 1, 2 or 4 numbers (docs/api.md)."""

@@ -29,7 +29,7 @@ from relume_server.jobs.render_jobs import RenderJob, planned_bytes
 from relume_server.openapi import files
 from relume_server.schemas.base import MAX_NAME, Id, JobState, Name
 from relume_server.schemas.cameras import CameraFrame
-from relume_server.schemas.protocol import MAX_EYE_PIXELS
+from relume_server.schemas.protocol import MAX_CAMERA_PIXELS
 from relume_server.schemas.renders import (
     MAX_FRAMES,
     MAX_LISTED_BYTES,
@@ -125,8 +125,8 @@ def baked_view(name: str, transfer: OpenBake) -> Any:
 
 def check_picture_size(size: tuple[int, int] | None) -> None:
     """Whether pictures of a moving eye may be so large; None: as baked. Raises ParameterError."""
-    if size is not None and size[0] * size[1] > MAX_EYE_PIXELS:
-        raise ParameterError("size", list(size), f"at most {MAX_EYE_PIXELS} pixels in all")
+    if size is not None and size[0] * size[1] > MAX_CAMERA_PIXELS:
+        raise ParameterError("size", list(size), f"at most {MAX_CAMERA_PIXELS} pixels in all")
 
 
 def check_look(partial: dict[str, Any], transfer: OpenBake, pointer: str) -> None:

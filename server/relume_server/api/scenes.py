@@ -39,7 +39,7 @@ from relume_worker.status import BakeStatus
 from relume_worker.storage import fetch_if_missing
 
 router = APIRouter(prefix="/api/scenes", tags=["scenes"])
-_MATERIAL_DEFAULTS = {"catcher": False, "is_projected": False, "is_glass": False}  # which do not say it
+_MATERIAL_DEFAULTS = {"shadow_catcher": False, "is_projected": False, "is_glass": False}  # which do not say it
 DEFAULT_ASPECT = 4 / 3  # of cameras that say only their height
 SceneFile = Annotated[
     UploadFile, File(description="a .glb, .gltf, .obj or .ply file, or a .zip with one and the files it names")
@@ -172,8 +172,7 @@ def _body(record: SceneRecord, bakes: Sequence[BakeStatus], placed: Sequence[str
         materials=[SceneMaterial(**{**_MATERIAL_DEFAULTS, **material}) for material in record.materials],
         lights=list(record.lights),
         variants=[SceneVariant(name=name, look=look) for name, look in record.variants.items()],
-        warnings=list(record.warnings),
-        remarks=[SceneWarning(text=str(warning), effect=warning.effect) for warning in record.warnings],
+        warnings=[SceneWarning(text=str(warning), severity=warning.severity) for warning in record.warnings],
         triangles=record.num_triangles,
         thumbnail=f"/api/scenes/{record.id}/thumbnail.webp?bake={bake}" if bake else None,
         bakes=[status.id for status in bakes],

@@ -41,9 +41,9 @@ async def create_share(request: ShareRequest, services: ServicesDep, response: R
 
 def _complete(request: ShareRequest, transfer: OpenBake) -> dict[str, Any]:
     """The whole look, so that it stays what it is whatever defaults become."""
-    for name in {request.view, *request.views, *request.eyes, *request.sizes}:
+    for name in {request.view, *request.views, *request.cameras, *request.sizes}:
         baked_view(name, transfer)
-    for name, frame in request.eyes.items():
+    for name, frame in request.cameras.items():
         make_custom_camera(name, frame.to_world, frame.yfov)
     for size in request.sizes.values():
         check_picture_size(size)
@@ -72,7 +72,7 @@ def get_share(share: ShareId, services: ServicesDep, response: Response) -> Shar
     return ShareBody(
         id=record.id,
         created=format_timestamp(record.created),
-        lacking=_missing_assets(record.document, services),
+        missing=_missing_assets(record.document, services),
         **record.document,
     )
 

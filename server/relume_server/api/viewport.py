@@ -1,4 +1,4 @@
-"""/api/scenes/{id}/finder: the scene in plain colours from anywhere, to place cameras by before anything is baked."""
+"""/api/scenes/{id}/viewport: the scene in plain colours from anywhere, to place cameras by before anything is baked."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from relume_server.services import Services, ServicesDep
 from relume_worker.paths import scene_path
 from relume_worker.scenes import get_scene
 
-router = APIRouter(prefix="/api/scenes/{scene}/finder", tags=["scenes"])
+router = APIRouter(prefix="/api/scenes/{scene}/viewport", tags=["scenes"])
 
 JPEG_QUALITY = 85
 
@@ -33,12 +33,14 @@ class JpegResponse(Response):
 async def get_viewport(scene: Id, services: ServicesDep) -> ViewportBody:
     """Where the scene is; reads it, which may take seconds."""
     viewport = await _open_viewport(scene, services)
-    framing = viewport.framing
+    framing = viewport.default_camera
     frame = CameraFrame(to_world=framing.to_world.ravel().tolist(), yfov=math.degrees(framing.yfov))
-    return ViewportBody(lowest=viewport.lowest.tolist(), highest=viewport.highest.tolist(), framing=frame)
+    return ViewportBody(
+        bounds_min=viewport.bounds_min.tolist(), bounds_max=viewport.bounds_max.tolist(), default_camera=frame
+    )
 
 
-@router.post("", response_class=JpegResponse, name="draw_finder")
+@router.post("", response_class=JpegResponse, name="draw_viewport")
 async def draw_viewport(scene: Id, view: ViewportRequest, services: ServicesDep) -> JpegResponse:
     """What a camera would see, in plain colours."""
     camera, viewport = _camera(view), await _open_viewport(scene, services)
@@ -51,7 +53,7 @@ async def draw_viewport(scene: Id, view: ViewportRequest, services: ServicesDep)
     return JpegResponse(await run_in_threadpool(encode_jpeg), headers={"Cache-Control": "no-store"})
 
 
-@router.post("/place", name="place_in_finder")
+@router.post("/pick", name="pick_in_viewport")
 async def pick(scene: Id, pixel: ViewportPixel, services: ServicesDep) -> PickBody:
     """What a position of that picture shows."""
     camera, viewport = _camera(pixel), await _open_viewport(scene, services)

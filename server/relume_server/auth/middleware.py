@@ -156,7 +156,7 @@ class AuthMiddleware:
 
 def _caller_bucket(caller: Caller) -> str:
     """Who is counted: a user, by how they are known, else an address; a token may be called as an address is."""
-    return f"{caller.by} {caller.name}" if caller.name else f"address {bucket_name(caller.address)}"
+    return f"{caller.auth_method} {caller.name}" if caller.name else f"address {bucket_name(caller.address)}"
 
 
 def _truncate_reason(text: str) -> str:

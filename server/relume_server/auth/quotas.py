@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from relume_server.settings import Settings
 
 log = logging.getLogger(__name__)
-OwnedKind = Literal["upload", "scene", "environment", "material", "btf-work", "btf", "image", "bake", "render"]
+OwnedKind = Literal["upload", "scene", "environment", "material", "btf-job", "btf", "image", "bake", "render"]
 _ACTIVE = ("queued", "running")
 MAX_STREAMS_EACH = 32
 """Streams of events that one caller may have open."""

@@ -38,14 +38,14 @@ class Caller:
         name: by which quotas, turns and the audit know them; empty where nobody logs in. Names that proxies say begin
             with `PROXY`, which no token's name does: whom a proxy calls Ann is not who has Ann's token.
         role: what they may do. address: where the request came from.
-        by: how they are known: no login is asked for, they have not logged in, a token, a proxy.
+        auth_method: how they are known: no login is asked for, they have not logged in, a token, a proxy.
         token: id of the token. watches: they have come by a link that lets nobody edit.
     """
 
     name: str
     role: Role
     address: str
-    by: Literal["open", "nobody", "token", "proxy"]
+    auth_method: Literal["open", "nobody", "token", "proxy"]
     token: str | None = None
     watches: bool = False
 
@@ -61,7 +61,7 @@ class Caller:
     @property
     def person(self) -> str:
         """As other people read it in a room and beside a comment; empty where nobody logs in."""
-        return self.name.removeprefix(PROXY) if self.by == "proxy" else self.name
+        return self.name.removeprefix(PROXY) if self.auth_method == "proxy" else self.name
 
     @property
     def display_name(self) -> str:

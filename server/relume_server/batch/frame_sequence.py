@@ -38,18 +38,18 @@ def check_animation(request: Animation, view: str, transfer: OpenBake) -> Sequen
         raise ParameterError("path", _path_text(path), allowed)
     if isinstance(path, Turntable) and request.frames not in (None, path.turntable):
         raise ParameterError("frames", request.frames, f"{path.turntable}, as the turntable says, or nothing")
-    num_cameras = 0 if path is None or isinstance(path, Turntable) else len(path.eyes)
+    num_cameras = 0 if path is None or isinstance(path, Turntable) else len(path.cameras)
     if num_cameras > num_frames:
-        raise ParameterError("path/eyes", f"{num_cameras} keyframes", f"at most as many as frames, {num_frames}")
+        raise ParameterError("path/cameras", f"{num_cameras} keyframes", f"at most as many as frames, {num_frames}")
     return cameras_of(request, view, transfer)
 
 
 def _path_text(path: Turntable | CameraPath) -> str:
-    return f"turntable {path.turntable}" if isinstance(path, Turntable) else f"{len(path.eyes)} cameras"
+    return f"turntable {path.turntable}" if isinstance(path, Turntable) else f"{len(path.cameras)} cameras"
 
 
 def _has_fixed_camera(path: Turntable | CameraPath) -> bool:
-    return isinstance(path, Turntable) and path.turns == "environment" and path.start is None
+    return isinstance(path, Turntable) and path.rotate == "environment" and path.start_camera is None
 
 
 def cameras_of(request: Animation, name: str, transfer: OpenBake) -> Sequence[Camera | None]:
@@ -67,10 +67,10 @@ def cameras_of(request: Animation, name: str, transfer: OpenBake) -> Sequence[Ca
 
     if isinstance(request.path, Turntable):
         start = _start_camera(request.path, view)
-        if request.path.turns == "environment":
+        if request.path.rotate == "environment":
             return [start] * request.num_frames
         return turntable(start, _turntable_pivot(request.path, view, transfer), request.num_frames)
-    return interpolate_cameras([_camera_of_frame(view, frame) for frame in request.path.eyes], request.num_frames)
+    return interpolate_cameras([_camera_of_frame(view, frame) for frame in request.path.cameras], request.num_frames)
 
 
 def _camera_of_frame(view: CameraView, frame: CameraFrame) -> Camera:
@@ -85,24 +85,24 @@ def comparison_camera(request: ComparisonRequest, transfer: OpenBake) -> tuple[C
 
 
 def _start_camera(path: Turntable, view: FreeView) -> Camera:
-    return view.camera if path.start is None else _camera_of_frame(view, path.start)
+    return view.camera if path.start_camera is None else _camera_of_frame(view, path.start_camera)
 
 
 def _turntable_pivot(path: Turntable, view: FreeView, transfer: OpenBake) -> NDArray[np.float64]:
     from relume.live.free_camera.camera_paths import pivot_of
 
-    if path.about is not None:
-        return np.array(path.about)
+    if path.pivot is not None:
+        return np.array(path.pivot)
     return pivot_of(cast("FreeCameraTransfer", transfer), _start_camera(path, view))
 
 
 def with_pivot(request: LooksRequest, transfer: OpenBake) -> LooksRequest:
     """The same where an object turns, about a place that is found once rather than for each frame."""
     path = request.path
-    if request.view is None or not isinstance(path, Turntable) or path.turns != "object":
+    if request.view is None or not isinstance(path, Turntable) or path.rotate != "object":
         return request
     pivot = _turntable_pivot(path, cast("FreeView", transfer.views[request.view]), transfer)
-    return request.model_copy(update={"path": path.model_copy(update={"about": pivot.tolist()})})
+    return request.model_copy(update={"path": path.model_copy(update={"pivot": pivot.tolist()})})
 
 
 def look_at_frame(request: Animation, view: str, transfer: OpenBake, index: int) -> Look:
@@ -114,10 +114,10 @@ def look_at_frame(request: Animation, view: str, transfer: OpenBake, index: int)
 def look_document_at_frame(request: Animation, view: str | None, transfer: OpenBake, index: int) -> Mapping[str, Any]:
     """The complete look of a frame, see `look_of`; `view` may be None where there is no path."""
     document = _interpolated_document(request, transfer.default_look, index)
-    if not isinstance(request.path, Turntable) or request.path.turns == "eye":
+    if not isinstance(request.path, Turntable) or request.path.rotate == "camera":
         return document
     degrees = 360 * index / request.num_frames
-    if request.path.turns == "environment":
+    if request.path.rotate == "environment":
         return rotated_environment(document, degrees)
     pivot = _turntable_pivot(request.path, cast("FreeView", transfer.views[cast("str", view)]), transfer)
     return rotated_lights(document, degrees, pivot.tolist())
@@ -130,4 +130,4 @@ def _interpolated_document(request: Keyframes, default: Mapping[str, Any], index
     position = index / max(1, request.num_frames - 1)
     first, second, weight = enclosing_keyframes(len(request.looks), position)
     keys = dict.fromkeys((first, second))  # one of them where the frame is a keyframe
-    return interpolate_looks([looks.complete(request.looks[k], default) for k in keys], weight, request.between)
+    return interpolate_looks([looks.complete(request.looks[k], default) for k in keys], weight, request.interpolation)

@@ -55,7 +55,7 @@ def paint_frame(
     def render(look: Any, progress: Progress) -> F32:
         image = context.library.render(
             transfer, render_request.view, look, progress=progress, for_display=render_request.format != "exr",
-            is_canceled=is_canceled, camera_and_size=camera_and_size, exact=render_request.exact,
+            is_canceled=is_canceled, camera_and_size=camera_and_size, exact=render_request.quality == "exact",
         )  # fmt: skip
         return (
             image

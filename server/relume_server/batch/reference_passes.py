@@ -202,13 +202,16 @@ def _write_figures(
     folder: Path, frame: F32, estimates: _Estimates, requested_paths: str, reference: ReferenceImage, display: Any
 ) -> None:
     """Say what the passes so far say of the frame."""
-    figures: dict[str, Any] = {"left_out": reference.omitted_paths, "untraced": reference.unsupported_paths}
+    figures: dict[str, Any] = {
+        "omitted_paths": reference.omitted_paths,
+        "unsupported_paths": reference.unsupported_paths,
+    }
     if estimates["method"].passes >= 2:
         comparisons = {
             paths: _write_comparison(folder, frame, path_estimate, paths != requested_paths, display)
             for paths, path_estimate in estimates.items()
         }
-        figures |= {"found": asdict(comparisons[requested_paths]), "found_of_method": asdict(comparisons["method"])}
+        figures |= {f"error_{paths}_paths": asdict(comparison) for paths, comparison in comparisons.items()}
     else:
         for paths, estimate in estimates.items():
             _write_reference(folder, estimate, paths != requested_paths, display)

@@ -24,7 +24,9 @@ class LookState:
 
     def target(self, shared: int = 0) -> Target:
         """The look as something to show; `shared` as in `Target`."""
-        return Target(self._read(self.document), self.document, self.revision, None, solo=self.solo, shared=shared)
+        return Target(
+            self._read(self.document), self.document, self.revision, None, solo=self.solo, room_revision=shared
+        )
 
     def apply(self, message: EditMessage, received_s: float) -> Target:
         """Apply an edit that came at `received_s`, whole or not at all.
@@ -36,14 +38,16 @@ class LookState:
             raise EditError(f"old revision: {message.revision} is not newer than {self.revision}; count on from there")
         patch = [operation.model_dump(exclude_unset=True) for operation in message.patch]
         document = looks.apply_patch(self.document, patch, self.default)
-        if message.hand is not None:
-            check_active_pointer(message.hand, document)
+        if message.active_control is not None:
+            check_active_pointer(message.active_control, document)
         look = self._read(document)
         self.document, self.revision = document, message.revision
         if message.changes_solo:
             self.solo = None if message.solo is None else frozenset(message.solo)
         applied_s = time.perf_counter()
-        return Target(look, document, message.revision, received_s, message.hand, self.solo, applied_s=applied_s)
+        return Target(
+            look, document, message.revision, received_s, message.active_control, self.solo, applied_s=applied_s
+        )
 
     def adopt(self, document: dict[str, Any], source: Target) -> Target:
         """Show a document that somebody else's edit led to, as they see it; the revision stays."""
@@ -56,13 +60,20 @@ class LookState:
             source.received_s,
             source.active_pointer,
             self.solo,
-            source.shared,
+            source.room_revision,
             source.applied_s,
         )
 
     def reverted(self, document: dict[str, Any], previous: Target) -> Target:
         """What would be shown if the look became this document, and what is alone as it was when `previous` was."""
-        return Target(self._read(document), document, self.revision, None, solo=previous.solo, shared=previous.shared)
+        return Target(
+            self._read(document),
+            document,
+            self.revision,
+            None,
+            solo=previous.solo,
+            room_revision=previous.room_revision,
+        )
 
     def revert(self, previous: Target) -> None:
         """Go back to the look that is shown; the revision stays, so that the client counts on."""

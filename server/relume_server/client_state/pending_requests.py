@@ -19,7 +19,7 @@ class PendingRequests:
         space: width and height that the client has for the view that it shows alone; None: as much as it is large.
         camera_states: newest eye of each view that has been given one; it stays.
         regions: what is on the client's screen of each view, where it has said so: x, y, width, height in pixels.
-        evaluator: who finds the pixels of views whose eye moves.
+        renderer: who renders views whose camera moves.
         prepare_curve, active_parameter: pointers of a curve that was opened, of a parameter whose slider is in hand.
     """
 
@@ -32,7 +32,7 @@ class PendingRequests:
     highlight: HighlightMessage | None = None
     form: Literal["hdr", "jpeg", "auto"] = "auto"
     quality: int = 80
-    evaluator: Literal["browser", "server"] = "server"
+    renderer: Literal["client", "server"] = "server"
     space: tuple[int, int] | None = None
     changed: asyncio.Event = field(default_factory=asyncio.Event)
 

@@ -63,5 +63,5 @@ def check_active_pointer(pointer: str, document: Mapping[str, Any]) -> None:
 def _term(pointer: CurvePointer | ParameterPointer, document: Mapping[str, Any]) -> dict[str, Any] | None:
     """The term that a pointer goes into, where there is one; of a catcher's terms no picture shows anything."""
     material = document["materials"].get(pointer.material)
-    terms: list[dict[str, Any]] = material["terms"] if material and not material.get("catcher") else []
+    terms: list[dict[str, Any]] = material["terms"] if material and not material.get("shadow_catcher") else []
     return terms[pointer.term] if pointer.term < len(terms) else None

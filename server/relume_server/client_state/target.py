@@ -18,7 +18,7 @@ class Target:
         received_s: when the edit came in; None for a look that no edit asked for. applied_s: when it had been applied.
         active_pointer: pointer to what the hand was on that made it, where the client said so.
         solo: names of sources of light that alone are shown; None: all.
-        shared: how often a room's look had changed by then; 0 where nobody shares it.
+        room_revision: how often a room's look had changed by then; 0 where nobody shares it.
     """
 
     look: Any
@@ -27,7 +27,7 @@ class Target:
     received_s: float | None
     active_pointer: str | None = None
     solo: frozenset[str] | None = None
-    shared: int = 0
+    room_revision: int = 0
     applied_s: float = 0.0
 
 

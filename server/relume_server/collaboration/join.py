@@ -17,19 +17,19 @@ class JoinRequest:
 
     Attributes:
         room: its id; None for who has only what opens it to watch.
-        watch: what opens it to watch; it follows from the id, and the id not from it.
+        view_token: what opens it to watch; it follows from the id, and the id not from it.
         participant_token: token of the place that somebody had. name: how they are called.
     """
 
     room: str | None
-    watch: str
+    view_token: str
     participant_token: str | None
     name: str | None
 
     @property
     def prefix(self) -> str:
         """What of it stands in the address."""
-        return self.watch[:ROOM_PREFIX]
+        return self.view_token[:ROOM_PREFIX]
 
 
 def parse_join_request(opening: OpenMessage, room_prefix: str) -> JoinRequest | None:
@@ -42,9 +42,9 @@ def parse_join_request(opening: OpenMessage, room_prefix: str) -> JoinRequest | 
     """
     name = None if opening.name is None else check_person(opening.name)
     if opening.room is not None:
-        join_request = JoinRequest(opening.room, derive_watch_key(opening.room), opening.seat, name)
-    elif opening.watch is not None:
-        join_request = JoinRequest(None, opening.watch, opening.seat, name)
+        join_request = JoinRequest(opening.room, derive_view_token(opening.room), opening.participant_token, name)
+    elif opening.view_token is not None:
+        join_request = JoinRequest(None, opening.view_token, opening.participant_token, name)
     else:
         return None
     if room_prefix != join_request.prefix:
@@ -53,7 +53,7 @@ def parse_join_request(opening: OpenMessage, room_prefix: str) -> JoinRequest | 
     return join_request
 
 
-def derive_watch_key(room: str) -> str:
+def derive_view_token(room: str) -> str:
     """What opens a room to watch: it begins as the room's name does, and the rest of the name nobody finds."""
     return room[:ROOM_PREFIX] + hashlib.sha256(b"relume watch " + room.encode()).hexdigest()[ROOM_PREFIX:32]
 

@@ -79,12 +79,12 @@ class RoomMember:
         """What hello says of the room."""
         return RoomInfo(
             id=self._entry.join_request.room,
-            watch=self._entry.join_request.watch,
-            seat=self._participant.token,
-            you=self._participant.number,
-            created=self._entry.is_new,
+            view_token=self._entry.join_request.view_token,
+            participant_token=self._participant.token,
+            self_id=self._participant.id,
+            is_new=self._entry.is_new,
             people=self._sent_people,
-            default=self._look.default,
+            default_look=self._look.default,
         )
 
     def accepted(self, target: Target, patch: Sequence[Operation]) -> Target:
@@ -105,16 +105,16 @@ class RoomMember:
             changes = diff_looks(self._room.document, target.document, LOCAL_SECTIONS)
             self._room.document = target.document
             self._room.num_changes += bool(changes)
-        target = replace(target, shared=self._room.num_changes)
-        self._note(self._participant.number)
+        target = replace(target, room_revision=self._room.num_changes)
+        self._note(self._participant.id)
         for member in self._room.members:
             if changes and member is not self:
-                member.on_remote_edit(target, self._participant.number, changes)
+                member.on_remote_edit(target, self._participant.id, changes)
         return target
 
     def on_painting(self, target: Target) -> None:
         """The session's pictures are about to be given this look: the room's, or an older one that they could show."""
-        is_newest = target.shared == self._room.num_changes
+        is_newest = target.room_revision == self._room.num_changes
         self._painting = self._room.document if is_newest else self._painted
 
     def on_painted(self) -> None:
@@ -167,15 +167,15 @@ class RoomMember:
             people = self._room.people()
             if people != self._sent_people:
                 self._sent_people = people
-                await socket.send(RoomMessage(you=self._participant.number, people=people))
+                await socket.send(RoomMessage(self_id=self._participant.id, people=people))
             if self.has_comments:
                 self.has_comments = False
                 await socket.send(CommentsMessage())
-            if (shared := self._shared()) is not None:
+            if (shared := self._room_update()) is not None:
                 await socket.send(shared)
             await asyncio.sleep(SEND_INTERVAL_S)
 
-    def _shared(self) -> RoomUpdate | None:
+    def _room_update(self) -> RoomUpdate | None:
         """What the look has become besides what the client did by itself; of that only how far it was accepted."""
         document, revision = self._look.document, self._look.revision
         patch = diff_looks(self._client, document)
@@ -184,7 +184,7 @@ class RoomMember:
             return None
         self._client, self._client_revision = document, revision
         operations = [SharedOperation(**each) for each in patch]
-        return RoomUpdate(revision=revision, shared=self._room.num_changes, patch=operations, by=authors)
+        return RoomUpdate(revision=revision, room_revision=self._room.num_changes, patch=operations, edited_by=authors)
 
     def leave(self, *, is_for_good: bool) -> None:
         """The session has ended; `is_for_good` where the client said so, else it may come back."""

@@ -16,13 +16,13 @@ class Participant:
     """Who somebody is to the others.
 
     Attributes:
-        number: from 1 on, in the order of coming. num_sessions: that are open now.
+        id: from 1 on, in the order of coming. num_sessions: that are open now.
         name: that others read. owner: whose it is, as quotas name them; empty if nobody logs in.
         removal: takes the place away in a while, where none is.
     """
 
     token: str
-    number: int
+    id: int
     color: str
     name: str
     role: Role
@@ -34,10 +34,10 @@ class Participant:
     def person(self) -> Person:
         """As it is told."""
         return Person(
-            number=self.number,
+            id=self.id,
             name=self.name,
             color=self.color,
             material=self.material,
             role=self.role.label,
-            here=self.num_sessions > 0,
+            online=self.num_sessions > 0,
         )

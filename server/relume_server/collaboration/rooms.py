@@ -40,7 +40,7 @@ class Rooms:
         Raises:
             BusyError: there are as many rooms, or people in this one, as may be; or nobody has made it yet.
         """
-        key = scene, join_request.watch
+        key = scene, join_request.view_token
         room = self._rooms.get(key)
         is_new = room is None
         if room is None:

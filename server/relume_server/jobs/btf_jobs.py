@@ -23,7 +23,7 @@ BtfJob = Job[BtfRequest]
 
 
 class BtfQueue(JobQueue[BtfRequest]):
-    """BTFs in the database, what is found so far in `data`/btf-works/<id>/; all of one is a step, done in turns."""
+    """BTFs in the database, what is found so far in `data`/btf-jobs/<id>/; all of one is a step, done in turns."""
 
     row, noun, request_type = BtfRow, "BTF", BtfRequest
     resumable = ("stopped",)
@@ -44,7 +44,7 @@ class BtfQueue(JobQueue[BtfRequest]):
             report_ready: called with the id of a work that is done, that of the BTF, and how many bytes it takes.
             report_failed: called with the id of a work that has failed; nothing of it takes bytes any more.
         """
-        super().__init__(sessions, data / "btf-works", run, quota)
+        super().__init__(sessions, data / "btf-jobs", run, quota)
         self._btfs, self._report_ready, self._report_failed = btfs_path(data), report_ready, report_failed
 
     def steps(self, request: BtfRequest) -> int:

@@ -29,10 +29,10 @@ _Kind = tuple[str, str, tuple[int, int] | None, str]
 class Figures(Body):
     """What a comparison has found; fields as of `ComparisonBody`."""
 
-    left_out: Annotated[list[str], Field(default_factory=list)]
-    untraced: Annotated[list[str], Field(default_factory=list)]
-    found: ComparisonFigures | None = None
-    found_of_method: ComparisonFigures | None = None
+    omitted_paths: Annotated[list[str], Field(default_factory=list)]
+    unsupported_paths: Annotated[list[str], Field(default_factory=list)]
+    error_all_paths: ComparisonFigures | None = None
+    error_method_paths: ComparisonFigures | None = None
 
 
 class DurationEstimate(NamedTuple):
@@ -43,7 +43,7 @@ class DurationEstimate(NamedTuple):
 
 
 class ComparisonQueue(JobQueue[ComparisonRequest]):
-    """Comparisons in the database, what they found in `data`/truths/<id>/; a step is a pass."""
+    """Comparisons in the database, what they found in `data`/comparisons/<id>/; a step is a pass."""
 
     row, noun, request_type = ComparisonRow, "comparison", ComparisonRequest
 
@@ -53,7 +53,7 @@ class ComparisonQueue(JobQueue[ComparisonRequest]):
             sessions: of the database. data: directory of scenes, bakes and what is found.
             run: does the steps. quota: how much may wait.
         """
-        super().__init__(sessions, data / "truths", run, quota)
+        super().__init__(sessions, data / "comparisons", run, quota)
         self._pass_s: dict[_Kind, float] = {}
         self._pixel_s = DEFAULT_PIXEL_S
         self._sampler, self._sampling = ThreadPoolExecutor(1, "relume-pace"), threading.Lock()
@@ -123,7 +123,7 @@ class ComparisonQueue(JobQueue[ComparisonRequest]):
         """Make the frame where it is missing, and a pass."""
         request = job.request
         values: dict[str, Any] = {"request": request.model_dump(mode="json"), "folder": str(self.folder / job.id)}
-        self.record_progress(job.id, job.done)
+        self.record_progress(job.id, job.completed)
         done = int(self.run_in_process(job, "frame of a comparison", values, lambda share: None)["passes"])
         if done >= job.total:
             return job.total

@@ -34,7 +34,7 @@ class Job(Generic[Request]):
 
     Attributes:
         request: the body of the call that asked for it. user: who called; "" where nobody logs in.
-        done, total: steps. progress: 0…1; what is done of the step at hand counts too.
+        completed, total: steps. progress: 0…1; what is done of the step at hand counts too.
         seconds_left: None where the work does not run, or nothing was measured yet.
         problem: why it failed, one sentence.
         created, started, ended: seconds since 1970; None: not yet, or an older relume has not written it down.
@@ -44,7 +44,7 @@ class Job(Generic[Request]):
     request: Request
     user: str
     state: str
-    done: int
+    completed: int
     total: int
     progress: float
     seconds_left: float | None

@@ -7,13 +7,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from relume.core.import_warnings import Effect
+from relume.core.import_warnings import Severity
 from relume.look.document import MAX_BOUNCES
 from relume.look.model import PathFilter
 from relume_server.schemas.base import Body, Id, JobState, Name
 from relume_server.schemas.cameras import CameraBody, CameraFrame
 from relume_server.schemas.comments import MAX_PICTURE_TEXT
-from relume_server.schemas.protocol import MAX_VIEWS_SHOWN
+from relume_server.schemas.protocol import MAX_VISIBLE_VIEWS
 from relume_server.schemas.renders import Side
 from relume_worker.status import Phase
 
@@ -43,7 +43,7 @@ class SceneMaterial(Body):
 
     name: str
     terms: list[dict[str, Any]]
-    catcher: bool
+    shadow_catcher: bool
     is_projected: bool
     is_glass: bool
 
@@ -56,16 +56,17 @@ class SceneVariant(Body):
 
 
 class SceneWarning(Body):
-    """What the import has to say: `wrong` in the picture, `simplified`, or `unused` without harm to it."""
+    """A warning of the import. `severity`: what `text` is about is missing or wrong in the picture ("unsupported"),
+    looks much the same ("approximated"), or does not change the picture ("ignored")."""
 
     text: str
-    effect: Effect
+    severity: Severity
 
 
 class SceneBody(Body):
     """A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first.
 
-    `remarks` are the `warnings` with what each does to the picture, the worst first.
+    `warnings`: the worst first.
     """
 
     id: str
@@ -75,8 +76,7 @@ class SceneBody(Body):
     materials: list[SceneMaterial]
     lights: list[str]
     variants: list[SceneVariant]
-    warnings: list[str]
-    remarks: list[SceneWarning]
+    warnings: list[SceneWarning]
     triangles: int
     thumbnail: str | None
     bakes: list[str]
@@ -229,7 +229,8 @@ class RecipeBody(Body):
 class BakeBody(Body):
     """A bake; `progress` 0…1, `problem` one sentence where it failed, or had to start again.
 
-    `phase`: what it does while it runs, and for how many seconds already. `ahead`: bakes that a queued one waits for.
+    `phase`: what it does while it runs, and for how many seconds already. `queue_position`: bakes that a queued one
+    waits for.
     `is_current`: whether the code that made it, which `code` names, is the server's own; others can be used, but might
     come out otherwise if it were baked again. `user` asked for it first, `created` says when.
     """
@@ -242,7 +243,7 @@ class BakeBody(Body):
     progress: float
     phase: Phase | None
     phase_seconds: float | None
-    ahead: int
+    queue_position: int
     rays_per_second: float | None
     seconds_left: float | None
     bytes: int
@@ -290,19 +291,19 @@ class ShareRequest(Body):
     """What a link shows: a look of a bake, the views beside each other and the one in hand.
 
     `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. `paths`: the light
-    paths that are looked at; null: those of the look. `eyes`: from where views are seen whose eye moves, by name;
+    paths that are looked at; null: those of the look. `cameras`: of views whose camera is free, by name;
     `sizes`: of their pictures, pixels, where they are not as large as was baked.
     """
 
     bake: Id
     view: Name
-    views: Annotated[list[Name], Field(min_length=1, max_length=MAX_VIEWS_SHOWN)]
+    views: Annotated[list[Name], Field(min_length=1, max_length=MAX_VISIBLE_VIEWS)]
     look: dict[str, Any]
     solo: Name | None = None
     solo_light: Annotated[str, Field(max_length=256)] | None = None
     paths: SharedPaths | None = None
-    eyes: Annotated[dict[Name, CameraFrame], Field(default_factory=dict, max_length=MAX_VIEWS_SHOWN)]
-    sizes: Annotated[dict[Name, tuple[Side, Side]], Field(default_factory=dict, max_length=MAX_VIEWS_SHOWN)]
+    cameras: Annotated[dict[Name, CameraFrame], Field(default_factory=dict, max_length=MAX_VISIBLE_VIEWS)]
+    sizes: Annotated[dict[Name, tuple[Side, Side]], Field(default_factory=dict, max_length=MAX_VISIBLE_VIEWS)]
 
 
 class ShareEntry(Body):
@@ -320,12 +321,12 @@ class ShareListEntry(ShareEntry):
 
 
 class ShareBody(ShareRequest):
-    """What a link shows; `lacking`: what of it is not here any more, one sentence each."""
+    """What a link shows; `missing`: what of it is not here any more, one sentence each."""
 
     id: str
     created: str
     scene: str
-    lacking: list[str]
+    missing: list[str]
 
 
 class ComparisonRequest(Body):
@@ -361,25 +362,26 @@ class ComparisonFigures(Body):
     """Each relative to the truth's root mean square over pixels and channels; see docs/accuracy.md.
 
     `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off, and its
-    `standard_error`: null where that cannot be told from the noise, `limit` is what it is below then. `significant`:
-    share of pixels whose difference the noise does not explain, at most a hundredth of them by chance.
+    `standard_error`: null where that cannot be told from the noise, `error_upper_bound` is what it is below then.
+    `significant_pixel_fraction`: share of pixels whose difference the noise does not explain, at most a hundredth of
+    them by chance.
     """
 
     rmse: float
     noise: float
     error: float | None
     standard_error: float | None
-    limit: float
-    significant: float
+    error_upper_bound: float
+    significant_pixel_fraction: float
 
 
 class ComparisonBody(Body):
-    """A comparison; `passes` are done. `seconds_left`: null where it does not run or nothing was measured yet. `user`
-    asked for it; `created`, `started` and `ended` are times; null: not yet.
+    """A comparison; `completed` of `total` passes are done. `seconds_left`: null where it does not run or nothing was
+    measured yet. `user` asked for it; `created`, `started` and `ended` are times; null: not yet.
 
-    `found`: against the light paths that were asked for, `paths`; `found_of_method`: against those that the method
-    follows. `left_out`: which paths the method leaves out of what the look shows; `untraced`: which brute
-    force leaves out, too. In sentences; both are empty before the first pass.
+    `error_all_paths`: against all light paths, null where only the method's were asked for; `error_method_paths`:
+    against those that the method follows. `omitted_paths`: which paths the method leaves out of what the look shows;
+    `unsupported_paths`: which brute force leaves out, too. In sentences; both are empty before the first pass.
     """
 
     id: str
@@ -390,13 +392,13 @@ class ComparisonBody(Body):
     created: str
     started: str | None
     ended: str | None
-    passes: int
+    completed: int
     total: int
     progress: float
     seconds_left: float | None
     paths: Literal["all", "method"]
-    left_out: list[str]
-    untraced: list[str]
-    found: ComparisonFigures | None
-    found_of_method: ComparisonFigures | None
+    omitted_paths: list[str]
+    unsupported_paths: list[str]
+    error_all_paths: ComparisonFigures | None
+    error_method_paths: ComparisonFigures | None
     problem: str | None

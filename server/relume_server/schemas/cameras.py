@@ -34,11 +34,11 @@ class CameraEntry(CameraBody):
 
 
 class ViewportBody(Body):
-    """The corners of a scene, metres, and a camera that sees all of it."""
+    """The bounds of a scene, metres, and a camera that sees all of it."""
 
-    lowest: list[float]
-    highest: list[float]
-    framing: CameraFrame
+    bounds_min: list[float]
+    bounds_max: list[float]
+    default_camera: CameraFrame
 
 
 class ViewportRequest(CameraFrame):

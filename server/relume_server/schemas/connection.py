@@ -15,15 +15,15 @@ Token = Annotated[str, Field(min_length=1, max_length=64)]
 class OpenMessage(Message):
     """client → server: first message, and sent once. All of it may be left out; null is the same.
 
-    `room`, or to watch only `watch`, names the room in which others share the look; the address then has the first
-    eight characters of it as `room_prefix`. `seat`: token of the place that this client has in it. `name`: how to be
+    `room`, or to watch only `view_token`, names the room in which others share the look; the address then has the first
+    eight characters of it as `room_prefix`. `participant_token`: this client's in that room. `name`: how to be
     called, where nobody logs in. `share`, or `look`: the shared or saved look to begin with. `resume`: token of a
     session that was lost."""
 
     type: Literal["open"]
     room: RoomName | None = None
-    watch: RoomName | None = None
-    seat: Token | None = None
+    view_token: RoomName | None = None
+    participant_token: Token | None = None
     name: PersonName | None = None
     share: Token | None = None
     look: Name | None = None
@@ -46,5 +46,5 @@ class DrainMessage(Message):
     """server → client: the server is being stopped. Open the session again, there or on another server, within so many
     seconds; until then it goes on. The look is the client's to bring, where the new server does not know the token."""
 
-    type: Literal["leaving"] = "leaving"
+    type: Literal["server_draining"] = "server_draining"
     seconds: float

@@ -18,14 +18,14 @@ class LoginRequest(Body):
 
 
 class MeBody(Body):
-    """Who calls. `login`: whether people log in here; `by`: how this one is known (`open`: nobody is asked).
-    `viewers_comment`: whether those who only look may write comments."""
+    """Who calls. `login`: whether people log in here; `auth_method`: how this one is known (`open`: nobody is asked).
+    `allow_viewer_comments`: whether those who only look may write comments."""
 
     login: bool
     name: str
     role: AnyRoleName
-    by: Literal["open", "nobody", "token", "proxy"]
-    viewers_comment: bool
+    auth_method: Literal["open", "nobody", "token", "proxy"]
+    allow_viewer_comments: bool
 
 
 class AuditEntry(Body):

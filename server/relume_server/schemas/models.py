@@ -13,8 +13,8 @@ from relume_server.schemas.base import Body, Name
 class ParameterBody(Body):
     """A number that generates curves; `scale` says how a slider moves.
 
-    One that is `fixed` at freeze has one value for all channels, and a change of it takes as long as a freeze. Values
-    are multiples of `step`, where it is given.
+    One that `requires_new_operator` has one value for all channels; a change of it precomputes the operator anew.
+    Values are multiples of `step`, where it is given.
     """
 
     name: str
@@ -26,24 +26,24 @@ class ParameterBody(Body):
     scale: Literal["linear", "log"]
     help: str
     step: float | None
-    fixed: bool
+    requires_new_operator: bool
 
 
 class CurveBody(Body):
-    """An editable factor of a term; an outgoing one multiplies the finished pixel."""
+    """An editable factor of a term; a `view_dependent` one multiplies the finished pixel."""
 
     name: str
     label: str
     angle: str
     parameters: list[str]
     bands: int
-    outgoing: bool
+    view_dependent: bool
 
 
 class ModelBody(Body):
-    """A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured, `width` the
-    parameter that maps of roughness scale, `width_power` the power of a roughness that it grows with,
-    `mirrors_below` where it makes a mirror, and `data_prefix` how the names of such data begin (see `data`)."""
+    """A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured, `width_parameter`
+    the one that maps of roughness scale, `width_power` the power of a roughness that it grows with, `specular_below`
+    where it makes a mirror, and `data_prefix` how the names of such data begin (see `data`)."""
 
     model: str
     label: str
@@ -51,9 +51,9 @@ class ModelBody(Body):
     source: str
     texture: str
     needs_data: bool
-    width: str | None
+    width_parameter: str | None
     width_power: float | None
-    mirrors_below: float | None
+    specular_below: float | None
     data_prefix: str | None
     parameters: list[ParameterBody]
     curves: list[CurveBody]
@@ -72,20 +72,20 @@ class BallRequest(TermsRequest):
 
 
 class ZernikeFitBody(Body):
-    """How a term is sent in views whose eye moves: by so many `functions` of the incoming light, which miss that share
-    of it (cosine-weighted RMS); `needed`: how many would miss a twentieth, null where more than these; `is_mirror`: as
-    a blurred mirror instead."""
+    """How a term is sent in views whose eye moves: by so many `functions` of the incident light, with a `residual`
+    (cosine-weighted relative RMS); `required_functions`: how many would miss a twentieth, null where more than these;
+    `is_mirror`: as a blurred mirror instead."""
 
     functions: int
-    missed: float
-    needed: int | None
+    residual: float
+    required_functions: int | None
     is_mirror: bool
 
 
 class AlbedoBody(Body):
     """What share of even light a material sends back, its textures white: the `mean` over all directions, and the
-    `most` in any channel, which is sent `at_deg` from the normal."""
+    `max` in any channel, at `max_angle_degrees` from the normal."""
 
     mean: list[float]
-    most: float
-    at_deg: float
+    max: float
+    max_angle_degrees: float

@@ -19,51 +19,52 @@ MAX_FRAMES = 3600
 MAX_LISTED_FRAMES = 600  # frames whose looks are told at once
 MAX_LISTED_BYTES = 16 << 20
 Frames = Annotated[int, Field(ge=1, le=MAX_FRAMES)]
-TurntableSubject = Literal["eye", "object", "environment"]
+TurntableSubject = Literal["camera", "object", "environment"]
 Metres = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 
 
 class Turntable(Body):
-    """Once around an upright line, in so many frames; `start`: the first of them, by default where the view begins.
+    """Once around an upright line, in so many frames; `start_camera`: the first of them, by default where the view
+    begins.
 
-    `about`: a place on the line, metres; by default in the middle of the first picture, as deep as what it shows.
-    `turns`: what goes around: the `eye`; or, before an eye that stays, the `object`, under an environment and lamps
-    that stay, too; or the `environment` alone, which needs no bake whose eye moves.
+    `pivot`: a place on the line, metres; by default in the middle of the first picture, as deep as what it shows.
+    `rotate`: the `camera`; or, before a camera that stays, the `object`, under an environment and lights that stay,
+    too; or the `environment` alone, which needs no bake with a free camera.
     """
 
     turntable: Frames
-    start: CameraFrame | None = None
-    about: Annotated[list[Metres], Field(min_length=3, max_length=3)] | None = None
-    turns: TurntableSubject = "eye"
+    start_camera: CameraFrame | None = None
+    pivot: Annotated[list[Metres], Field(min_length=3, max_length=3)] | None = None
+    rotate: TurntableSubject = "camera"
 
 
 class CameraPath(Body):
     """From camera to camera, at even shares of the frames; one frame each where no number of frames is given."""
 
-    eyes: Annotated[list[CameraFrame], Field(min_length=1, max_length=MAX_LOOKS)]
+    cameras: Annotated[list[CameraFrame], Field(min_length=1, max_length=MAX_LOOKS)]
 
 
 def _path_kind(path: Any) -> str:
     """Which way is meant, so that nobody is told what the other lacks."""
     is_round = isinstance(path, Turntable) or (isinstance(path, dict) and "turntable" in path)
-    return "turntable" if is_round else "eyes"
+    return "turntable" if is_round else "cameras"
 
 
 Path = Annotated[
-    Annotated[Turntable, Tag("turntable")] | Annotated[CameraPath, Tag("eyes")],
+    Annotated[Turntable, Tag("turntable")] | Annotated[CameraPath, Tag("cameras")],
     Discriminator(_path_kind),
 ]
 
 
 class Keyframes(Body):
     """Looks, perhaps partial, of a bake. With `frames` they are keyframes at even shares of so many, and what is
-    between goes from one to the next. `between`: from parameter to parameter, or across the material map (GET
+    between goes from one to the next. `interpolation`: from parameter to parameter, or across the material map (GET
     /api/materials/map) where both are of its kind."""
 
     bake: Id
     looks: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=MAX_LOOKS)]
     frames: Frames | None = None
-    between: InterpolationMode = "parameters"
+    interpolation: InterpolationMode = "parameters"
 
     @property
     def num_frames(self) -> int:
@@ -83,7 +84,7 @@ class Animation(Keyframes):
             return self.path.turntable
         if self.frames is not None:
             return self.frames
-        return max(len(self.looks), len(self.path.eyes) if self.path is not None else 1)
+        return max(len(self.looks), len(self.path.cameras) if self.path is not None else 1)
 
 
 class LooksRequest(Animation):
@@ -108,7 +109,8 @@ class RenderRequest(Animation):
     and `color_space`, a linear one of the server's OpenColorIO config (GET /api/color), else linear Rec. 709.
 
     Of an animation: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video of them, `fps`
-    frames a second. `exact`: false shows moving eyes' frames as they look while the eye moves, a hundred times sooner.
+    frames a second. `quality`: "interactive" renders frames of a free camera as they look while it moves, a hundred
+    times sooner.
     """
 
     view: Name
@@ -119,7 +121,7 @@ class RenderRequest(Animation):
     precision: Literal["half", "float"] = "half"
     color_space: Name | None = None
     fps: Annotated[int, Field(ge=1, le=120)] = 25
-    exact: bool = True
+    quality: Literal["exact", "interactive"] = "exact"
 
     @property
     def picture_format(self) -> ImageFormat:
@@ -128,7 +130,7 @@ class RenderRequest(Animation):
 
 
 class RenderBody(Body):
-    """A batch; `done` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too.
+    """A batch; `completed` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too.
 
     `seconds_left`: null where it does not run or nothing was measured yet. `user` asked for it; "" where nobody logs
     in. `created`, `started` and `ended` are times; null: not yet.
@@ -145,7 +147,7 @@ class RenderBody(Body):
     created: str
     started: str | None
     ended: str | None
-    done: int
+    completed: int
     total: int
     progress: float
     seconds_left: float | None

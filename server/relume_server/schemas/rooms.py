@@ -18,7 +18,7 @@ RoomName = Annotated[str, Field(min_length=MIN_ROOM, max_length=MAX_ROOM, patter
 
 class PresenceMessage(Message):
     """client → server: what others in the room see of this one: the name, where nobody logs in (left out: as it was),
-    and the material in hand."""
+    and the selected material."""
 
     type: Literal["presence"]
     name: PersonName | None = None
@@ -26,35 +26,35 @@ class PresenceMessage(Message):
 
 
 class Person(Message):
-    """Somebody in a room. `number`: theirs as long as they are in it. `here`: false while their connection is lost."""
+    """Somebody in a room. `id`: theirs as long as they are in it. `online`: false while their connection is lost."""
 
-    number: int
+    id: int
     name: str
     color: str
     material: str | None
     role: RoleName
-    here: bool
+    online: bool
 
 
 class RoomInfo(Message):
-    """The room of a session. `id` opens it to edit, null for who only watches; `watch` opens it to watch. `seat`: a
-    token that comes back to the same place, `you` is its number. `created`: nobody was in it, so that it has the look
-    that this session brings. `default`: the scene's own look, as everything is that nobody has edited."""
+    """The room of a session. `id` opens it to edit, null for who only watches; `view_token` opens it to watch.
+    `participant_token` comes back as the same person, `self_id` is their id. `is_new`: nobody was in it, so that it has
+    the look that this session brings. `default_look`: the scene's own look, as everything is that nobody has edited."""
 
     id: str | None
-    watch: str
-    seat: str
-    you: int
-    created: bool
+    view_token: str
+    participant_token: str
+    self_id: int
+    is_new: bool
     people: list[Person]
-    default: dict[str, Any]
+    default_look: dict[str, Any]
 
 
 class RoomMessage(Message):
-    """server → client: who is in the room now, of these the one at `you`."""
+    """server → client: who is in the room now, of these oneself at `self_id`."""
 
     type: Literal["room"] = "room"
-    you: int
+    self_id: int
     people: list[Person]
 
 
@@ -75,11 +75,11 @@ class SharedOperation(Message):
 
 class RoomUpdate(Message):
     """server → client: what the room's look has become since the last such message, or `hello`, with this session's own
-    edits up to `revision` in it. The `patch` is empty where there were no others. `shared` counts its changes, and
-    frames say which they show. `by`: numbers of those who edited."""
+    edits up to `revision` in it. The `patch` is empty where there were no others. `room_revision` counts its changes,
+    and frames say which they show. `edited_by`: ids of those who edited."""
 
-    type: Literal["shared"] = "shared"
+    type: Literal["room_update"] = "room_update"
     revision: Revision
-    shared: int
+    room_revision: int
     patch: list[SharedOperation]
-    by: list[int]
+    edited_by: list[int]

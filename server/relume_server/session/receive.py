@@ -110,7 +110,7 @@ class MessageReceiver:
             case protocol.CameraMessage():
                 self._set_camera(message, received_s)
             case protocol.RendererMessage():
-                self._pending.evaluator = message.by
+                self._pending.renderer = message.renderer
             case PresenceMessage():
                 self._update_presence(message)
             case OpenMessage():
@@ -148,24 +148,24 @@ class MessageReceiver:
     def _set_camera(self, message: protocol.CameraMessage, received_s: float) -> None:
         """Take note of an eye; a number that is not newer than the last says nothing."""
         if self._transfer.camera_mode is not CameraMode.FREE:
-            raise ParameterError("view", message.view, "a view whose eye is free; bake the scene by method probes")
+            raise ParameterError("view", message.view, "a view whose camera is free; bake the scene by method probes")
         self._check_view(message.view)
         width, height = message.size
-        if not (width >= 1 and height >= 1 and width * height <= protocol.MAX_EYE_PIXELS):
-            allowed = f"at least 1×1 pixels, at most {protocol.MAX_EYE_PIXELS} in all"
+        if not (width >= 1 and height >= 1 and width * height <= protocol.MAX_CAMERA_PIXELS):
+            allowed = f"at least 1×1 pixels, at most {protocol.MAX_CAMERA_PIXELS} in all"
             raise ParameterError("size", list(message.size), allowed)
-        camera = make_custom_camera("eye", message.to_world, math.degrees(message.yfov)).camera
+        camera = make_custom_camera("camera", message.to_world, math.degrees(message.yfov)).camera
         previous = self._pending.camera_states.get(message.view)
-        if previous is None or message.eye > previous.seq:
+        if previous is None or message.seq > previous.seq:
             self._pending.camera_states[message.view] = CameraState(
-                message.eye, camera, message.size, received_s, message.rest == "exact"
+                message.seq, camera, message.size, received_s, message.refine == "exact"
             )
 
     def _look_at(self, message: protocol.RegionMessage) -> None:
         """Take note of what is on the screen of a view."""
         self._check_view(message.view)
         if self._transfer.camera_mode is CameraMode.FREE:
-            raise ParameterError("view", message.view, "a view whose eye is baked")
+            raise ParameterError("view", message.view, "a view whose camera is fixed")
         if message.rect is None:
             self._pending.regions.pop(message.view, None)
             return
@@ -188,10 +188,11 @@ class MessageReceiver:
 def _permission_key(message: protocol.ClientMessage) -> str:
     """What a message is to the table of roles."""
     match message:
-        case protocol.EditMessage(patch=patch, hand=hand) if all(
-            is_local_setting(path) for path in (*(operation.path for operation in patch), *((hand,) if hand else ()))
+        case protocol.EditMessage(patch=patch, active_control=control) if all(
+            is_local_setting(path)
+            for path in (*(operation.path for operation in patch), *((control,) if control else ()))
         ):
-            return "seen"
+            return "edit_local"
         case protocol.PrepareMessage(curve=None):
-            return "hold"
+            return "prepare_parameter"
     return message.type

@@ -171,14 +171,14 @@ def _hello(session: str, bake: str, state: SessionState, token: str, resumed: bo
         solo=None if look.solo is None else sorted(look.solo),
         revision=look.revision,
         resumed=resumed,
-        view=visible_views.focus,
-        shown=list(visible_views.names),
+        focused_view=visible_views.focus,
+        visible_views=list(visible_views.names),
         views=views,
         materials=list(transfer.material_names),
         resume=token,
         role=state.caller.role.label,
         room=None if state.member is None else state.member.info(),
-        moving_error=_free_camera_error(transfer),
+        free_camera_error=_free_camera_error(transfer),
     )
 
 
@@ -196,7 +196,9 @@ def _view_info(view: CameraView, transfer: OpenBake) -> ViewInfo:
         lowest, highest = cast("FreeView", view).bounds
         bounds = lowest.tolist(), highest.tolist()
     camera_mode = transfer.camera_mode.value
-    return ViewInfo(name=view.name, width=view.width, height=view.height, camera=camera, eye=camera_mode, bounds=bounds)
+    return ViewInfo(
+        name=view.name, width=view.width, height=view.height, camera=camera, camera_mode=camera_mode, bounds=bounds
+    )
 
 
 async def _run(services: SessionServices, websocket: WebSocket, bake: str, state: SessionState) -> None:
@@ -208,7 +210,7 @@ async def _run(services: SessionServices, websocket: WebSocket, bake: str, state
         asyncio.create_task(services.access.until_revoked(state.caller)),
         asyncio.create_task(_send_drain(services, state.socket)),
     ]
-    if state.caller.by == "proxy":
+    if state.caller.auth_method == "proxy":
         tasks.append(asyncio.create_task(_require_proxy_login(services, state.socket)))
     if state.audit_writer is not None:
         tasks.append(asyncio.create_task(state.audit_writer.run()))

@@ -40,7 +40,7 @@ def never_at_rest(page: Page, sizes: list[int]) -> None:
                 sizes.append(len(message))
             socket.send(message)
 
-        socket.on_message(lambda text: server.send(str(text).replace('"rest":"exact"', '"rest":"stay"')))
+        socket.on_message(lambda text: server.send(str(text).replace('"refine":"exact"', '"refine":"none"')))
         server.on_message(down)
 
     page.route_web_socket(re.compile(".*"), connect)
@@ -90,7 +90,7 @@ def choose(page: Page, who: str) -> None:
 
 def draw_here(page: Page) -> None:
     before = num_drawn(page)
-    choose(page, "browser")
+    choose(page, "client")
     page.wait_for_function("n => window.relumeStats.drawnHere > n", arg=before, timeout=DRAWN_MS)
 
 

@@ -150,7 +150,7 @@ def test_a_light_is_switched_off_and_seen_alone(editor: Editor) -> None:
     with page.expect_request("**/api/renders") as asked:
         page.get_by_role("button", name="EXR", exact=True).click()
     (exported,) = asked.value.post_data_json["looks"]
-    assert exported["environment"]["scale"] == 0
+    assert exported["environment"]["intensity"] == 0
     expect(page.get_by_text("Rendering the EXR on the server: only the light of Point…")).to_be_visible()
     page.get_by_role("button", name="Environment alone").click()
     assert changed(dark, editor.pixels()) < 0.01

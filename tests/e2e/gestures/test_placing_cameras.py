@@ -16,7 +16,7 @@ SEEN = "canvas => canvas.toDataURL()"
 @pytest.fixture
 def scene(server: Server) -> Iterator[str]:
     """A scene of its own, which is gone afterwards with its bakes: they would be opened instead of the others'."""
-    identity = server.call("/api/built-ins/cornell_box", {})["id"]
+    identity = server.call("/api/example-scenes/cornell_box", {})["id"]
     yield identity
     server.delete(f"/api/scenes/{identity}")
 

@@ -75,7 +75,7 @@ def test_the_pointer_is_told_to_the_server_and_probes_its_own_view(both: Editor)
         both.page.wait_for_function("() => !document.querySelector('.probe.quiet')")
         both.page.wait_for_timeout(200)
         assert f'{{"type":"focus","view":"{view}"}}' in sent
-        assert any(f'"probe","view":"{view}"' in message for message in sent)
+        assert any(f'"inspect","view":"{view}"' in message for message in sent)
     both.page.mouse.click(*at(both, 1, 0.5, 0.5))
     expect(both.page.locator("[role=option][aria-selected=true]")).to_have_text("Ball")
     expect(both.page.locator(".cell.active .cell-name")).to_have_text("left")

@@ -111,7 +111,7 @@ def grounded(server: Server, browser: Browser) -> Iterator[Editor]:
     expect(page.get_by_role("button", name=f"Open {scene['name']} on a ground")).to_be_visible()
     made = next(each for each in server.call("/api/scenes") if each["id"] != scene["id"])
     try:
-        assert [material["catcher"] for material in made["materials"]] == [False, False, False, True]
+        assert [material["shadow_catcher"] for material in made["materials"]] == [False, False, False, True]
         expect(page.get_by_role("button", name=f"Put {made['name']} on a ground")).to_have_count(0)
         bake = server.call("/api/bakes", {"scene": made["id"], "views": ["front"], "size": SIZE, "lights": 200})
         while bake["state"] in ("queued", "running"):

@@ -85,7 +85,7 @@ def test_people_log_in_and_roles_say_what_they_may_do(
 def test_who_may_only_look_chooses_light_paths_and_hears_no_objection(
     server: Server, asking: Server, access: AuthServices, browser: Browser
 ) -> None:
-    scene = str(server.call("/api/built-ins/cornell_box", {})["id"])
+    scene = str(server.call("/api/example-scenes/cornell_box", {})["id"])
     server.bake({"scene": scene, "method": "gather", "size": (96, 96), "lights": 100})
     with opened_page(browser) as page:
         page.goto(asking.url)

@@ -34,6 +34,6 @@ def test_truth_says_how_long_it_takes_and_can_be_stopped_and_gone_on_with(editor
     expect(picture).to_have_attribute("src", re.compile("/method-error.png"))
     panel.get_by_role("button", name="Go on").press("Enter")
     expect(panel).to_contain_text(re.compile(r"pass \d+ of 16, \d.* left"))
-    with page.expect_request(lambda request: request.method == "DELETE" and "forget=true" in request.url):
+    with page.expect_request(lambda request: request.method == "DELETE" and "delete_files=true" in request.url):
         panel.get_by_role("button", name="Close").click()
     expect(panel).to_have_count(0)

@@ -76,7 +76,7 @@ class Background:
         emitter_radiance = self._images.mirrors.mirror_emitters(light)
         state = _BackgroundState(background, light.environment, factor, light.paths.direct, lit_rectangles(light))
         for name, material in self._images.by_name.items():
-            if material.num_samples and look.materials[name].catcher:
+            if material.num_samples and look.materials[name].shadow_catcher:
                 self._update_catcher(material, state, light)
             else:
                 material.set_factor(None, None, None, None)

@@ -46,7 +46,7 @@ class PrecomputeRows:
     light: Illumination
     num_bytes: int
 
-    state: Literal["freezing", "shading"] = "freezing"
+    state: Literal["precomputing", "shading"] = "precomputing"
     is_refinement = is_resumable = False
 
     def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> IndirectOperator:

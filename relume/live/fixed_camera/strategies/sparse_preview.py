@@ -156,7 +156,7 @@ class SparsePreview:
     detail: int = 0
     is_refinement: bool = False
 
-    state: Literal["freezing", "shading"] = "shading"
+    state: Literal["precomputing", "shading"] = "shading"
     is_resumable = False
 
     @classmethod

@@ -40,7 +40,7 @@ class SumTexels:
     btf_ref: BtfRef
     light: Illumination
     key: tuple[Hashable, ...]
-    state: Literal["freezing", "shading"] = "freezing"
+    state: Literal["precomputing", "shading"] = "precomputing"
     is_refinement = False
     is_resumable = False
 

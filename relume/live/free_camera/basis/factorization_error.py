@@ -16,14 +16,14 @@ class FactorizationError(NamedTuple):
     """How a term is sent in moving views.
 
     Attributes:
-        functions: K, of the in-basis. missed: what these miss of the term, cosine-weighted RMS over its own.
-        needed: how many functions miss at most `BOUND`; None where K do not.
+        functions: K, of the in-basis. residual: what these miss of the term, cosine-weighted RMS over its own.
+        required_functions: how many functions miss at most `BOUND`; None where K do not.
         is_mirror: it is sent as a blurred mirror instead, since K functions miss too much.
     """
 
     functions: int
-    missed: float
-    needed: int | None
+    residual: float
+    required_functions: int | None
     is_mirror: bool
 
 

@@ -30,20 +30,31 @@ MAX_TEXELS = 1 << 24  # of textures, all levels: finer ones are left out, finest
 
 
 def constants(transfer: FreeCameraTransfer) -> dict[str, Any]:
-    """What shaders are written from: the ladder of the in-basis, expansions of leaning normals, sizes of tables
-    and of lists of lights.
+    """What shaders are written from: the recurrence of the Zernike basis, its gradients for mapped normals, sizes of
+    tables and of lists of lights.
 
-    `first_points` are those of the materials, and one more at the end. `has_alpha_tested_surfaces` says that surfaces
-    have some, which shaders do not know of.
+    `first_probes`: index of the first probe of each material, and one more at the end. `has_alpha_test`: surfaces
+    have alpha masks, which shaders do not know of.
     """
     recurrence_fields = {name: field.tolist() for name, field in recurrence()._asdict().items()}
-    sizes = {"functions": NUM_FUNCTIONS, "rows": NUM_ROWS, "columns": NUM_COLUMNS}
+    sizes = {"num_basis": NUM_FUNCTIONS, "table_rows": NUM_ROWS, "table_columns": NUM_COLUMNS}
     first = first_probes(transfer).tolist()
-    texts = {"ladder": recurrence_fields, "expansions": basis_gradients().tolist(), "first_points": first}
-    lists: dict[str, float] = {"side": SIDE, "listed": NUM_LISTED, "lights_a_lamp": LIGHTS_PER_BRIGHT_LIGHT}
-    lists |= {"narrowest": MIN_SIGMA, "widths": NUM_WIDTHS}
-    shapes = {"rings": NUM_RINGS, "spokes": NUM_AZIMUTHS, "widths": len(WIDTHS), "least_bits": int(LEAST_BITS)}
-    return {**sizes, **texts, "lobe_lists": lists, "shapes": shapes, "has_holes": transfer.has_alpha_tested_surfaces}
+    texts = {"recurrence": recurrence_fields, "gradient_basis": basis_gradients().tolist(), "first_probes": first}
+    lists: dict[str, float] = {"bins_per_side": SIDE, "max_listed": NUM_LISTED}
+    lists |= {"lights_per_bright_light": LIGHTS_PER_BRIGHT_LIGHT, "min_width": MIN_SIGMA, "widths": NUM_WIDTHS}
+    shapes = {
+        "elevation_rings": NUM_RINGS,
+        "azimuths": NUM_AZIMUTHS,
+        "widths": len(WIDTHS),
+        "min_bits": int(LEAST_BITS),
+    }
+    return {
+        **sizes,
+        **texts,
+        "lobe_lists": lists,
+        "shapes": shapes,
+        "has_alpha_test": transfer.has_alpha_tested_surfaces,
+    }
 
 
 def first_probes(transfer: FreeCameraTransfer) -> NDArray[np.int64]:

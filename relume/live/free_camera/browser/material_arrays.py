@@ -48,15 +48,15 @@ class ShaderConstants(NamedTuple):
     """What a frame needs besides: as `SceneUpdate` of the wire says."""
 
     gain: list[float]
-    sky_gain: list[float]
+    environment_gain: list[float]
     background_gain: list[float]
-    sky_turn: float
-    sky_levels: list[list[int]]
-    lamps: list[list[float]]
+    environment_rotation: float
+    environment_mips: list[list[int]]
+    bright_lights: list[list[float]]
     background: str
     background_color: list[float]
     background_size: list[int]
-    is_direct: bool
+    shows_direct: bool
 
 
 def array_blocks(
@@ -69,7 +69,7 @@ def array_blocks(
     """
     look, light = state.look, state.light
     lobes, background = state.materials.lobes, look.background
-    catchers = tuple(k for k, name in enumerate(transfer.material_names) if look.materials[name].catcher)
+    catchers = tuple(k for k, name in enumerate(transfer.material_names) if look.materials[name].shadow_catcher)
     blocks = {
         "materials": ArrayBlock(
             (versions[0], light.local, light.paths.direct, catchers), lambda: _materials(transfer, state)
@@ -117,15 +117,15 @@ def shader_constants(transfer: FreeCameraTransfer, state: FrameRequestState) -> 
     radiance, blur = look.background, look.background.blur if look.background.kind == "blurred" else 0.0
     return ShaderConstants(
         gain=[float(x) for x in state.gain],
-        sky_gain=[float(x) for x in environment_gain],
+        environment_gain=[float(x) for x in environment_gain],
         background_gain=[float(a * b) for a, b in zip(light.environment_gain, state.gain, strict=True)],
-        sky_turn=float(rotation_of(light.environment.rotation)),
-        sky_levels=transfer.prefiltered(light.environment.map).levels.tolist(),
-        lamps=transfer.bright_lights(light.environment).tolist(),
+        environment_rotation=float(rotation_of(light.environment.rotation)),
+        environment_mips=transfer.prefiltered(light.environment.map).levels.tolist(),
+        bright_lights=transfer.bright_lights(light.environment).tolist(),
         background=radiance.kind,
         background_color=[float(x) for x in radiance.color],
         background_size=list(transfer.environment_map(light.environment.map, blur).shape[:2]),
-        is_direct=light.paths.direct,
+        shows_direct=light.paths.direct,
     )
 
 
@@ -209,7 +209,7 @@ def _material_rows(
     out[:, 1:NUM_GROUPS, 3] = material_textures[:, : len(TEXTURES)]
     out[:, NUM_GROUPS, 0] = lobes.lobe_index
     out[:, NUM_GROUPS, 1] = material_textures[:, NORMAL_MAP]
-    out[:, NUM_GROUPS, 2] = [state.look.materials[name].catcher for name in transfer.material_names]
+    out[:, NUM_GROUPS, 2] = [state.look.materials[name].shadow_catcher for name in transfer.material_names]
     emission = [(*material_emission(state.light, name), 0) for name in transfer.material_names]
     out[:, NUM_GROUPS + 1] = np.array(emission, np.float32).view(np.int32)
     out[:, NUM_GROUPS + 1, 3] = material_textures[:, EMISSION]

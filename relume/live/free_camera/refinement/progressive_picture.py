@@ -186,7 +186,9 @@ class ProgressivePicture:
         if not step.exact:
             return self._free_camera_picture.advance(max_coefficients)
         self._is_static = True
-        return replace(step, tiles=self._static_picture.all_tiles(), was_off=self._relative_error(self._static_picture))
+        return replace(
+            step, tiles=self._static_picture.all_tiles(), previous_error=self._relative_error(self._static_picture)
+        )
 
     def _relative_error(self, static_picture: Picture) -> float | None:
         """How far the moving picture is from a still, relative RMS; None where it has not caught up, or all is dark."""

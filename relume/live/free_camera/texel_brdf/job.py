@@ -23,7 +23,7 @@ class TablesJob:
     on_done: Callable[[], None]
 
     label = "measured texture"
-    state: ClassVar[Literal["freezing"]] = "freezing"
+    state: ClassVar[Literal["precomputing"]] = "precomputing"
     is_refinement = False
     is_resumable = True
 

@@ -1,4 +1,4 @@
-"""/api/materials/btf-works: BTFs are rendered or imported, which takes minutes; followed, stopped, gone on with."""
+"""/api/materials/btf/jobs: BTFs are rendered or imported, which takes minutes; followed, stopped, gone on with."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from relume_server.schemas.base import Id, JobState
 from relume_server.schemas.btfs import BOUND, TEXELS, Bound, BtfJobBody, BtfRequest, Period, SyntheticBtfRequest, Texels
 from relume_server.services import Services, ServicesDep
 
-PREFIX = "/api/materials/btf-works"
+PREFIX = "/api/materials/btf/jobs"
 router = APIRouter(prefix=PREFIX, tags=["materials"])
 ImagesFile = Annotated[
     UploadFile, File(description="zip of images named by light and view (UBO2003), or .btf container (UBO2014)")
@@ -74,7 +74,7 @@ def _submit(
 ) -> str:
     """Queue a work that is its caller's from the beginning: it may be done before the next line is reached."""
     identity = new_id()
-    with reservation.owner_assigned("btf-work", identity, num_bytes):
+    with reservation.owner_assigned("btf-job", identity, num_bytes):
         return services.btfs.submit(request, reservation.owner, prepare, identity)
 
 
@@ -139,26 +139,26 @@ def list_btf_jobs(
     return [_body(job, services) for job in jobs]
 
 
-@router.get("/{work}")
-def get_btf_job(work: Id, services: ServicesDep) -> BtfJobBody:
+@router.get("/{job}")
+def get_btf_job(job: Id, services: ServicesDep) -> BtfJobBody:
     """State and progress."""
-    return _body(services.btfs.get(work), services)
+    return _body(services.btfs.get(job), services)
 
 
-@router.delete("/{work}", status_code=204)
-def stop_btf_job(work: Id, services: ServicesDep, forget: bool = False) -> Response:
-    """Stop it; what was found so far is kept, unless `forget` says that nobody needs it. A BTF that is ready stays."""
-    (services.btfs.delete if forget else services.btfs.stop)(work)
-    if forget:
-        services.access.quotas.disown("btf-work", work)
+@router.delete("/{job}", status_code=204)
+def stop_btf_job(job: Id, services: ServicesDep, delete_files: bool = False) -> Response:
+    """Stop it; what was found so far is kept, unless `delete_files` is true. A BTF that is ready stays."""
+    (services.btfs.delete if delete_files else services.btfs.stop)(job)
+    if delete_files:
+        services.access.quotas.disown("btf-job", job)
     return Response(status_code=204)
 
 
-@router.post("/{work}/resume", status_code=202)
-def resume_btf_job(work: Id, services: ServicesDep) -> BtfJobBody:
+@router.post("/{job}/resume", status_code=202)
+def resume_btf_job(job: Id, services: ServicesDep) -> BtfJobBody:
     """Go on with what was stopped."""
-    services.btfs.resume(work)
-    return _body(services.btfs.get(work), services)
+    services.btfs.resume(job)
+    return _body(services.btfs.get(job), services)
 
 
 def _body(job: BtfJob, services: Services) -> BtfJobBody:

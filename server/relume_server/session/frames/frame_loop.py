@@ -124,7 +124,7 @@ class FrameLoop:
     def _due_s(self, viewport: Viewport) -> float:
         """When a view is to be painted: at once with a new look, refined when the hand rests."""
         pending = self._pending
-        is_asked = viewport.needs_camera_update(pending) or viewport.has_new_evaluator(pending)
+        is_asked = viewport.needs_camera_update(pending) or viewport.has_new_renderer(pending)
         if viewport.is_outdated(pending.target) or is_asked or viewport.has_new_region(pending):
             return 0.0
         return float("inf") if viewport.is_converged else max(self._refine_at_s, viewport.not_before_s)
@@ -244,7 +244,7 @@ class FrameLoop:
         """Whether the user has moved on; an image of an older look is still worth showing where there is none."""
         if viewport not in self._viewports.values():
             return True
-        is_optional = job.state == "freezing" or job.is_refinement
+        is_optional = job.state == "precomputing" or job.is_refinement
         return is_optional and (viewport.job is None or viewport.job.key != job.key)
 
     async def _answer(self) -> bool:
@@ -262,7 +262,7 @@ class FrameLoop:
                 is_focused = viewport.name == self._visible_views.focus
                 frame = await self._answers.answer_highlight(viewport, self._window.next_frame, is_focused)
                 if frame is not None:
-                    await self._send_frame(viewport, frame, "brush", "r8")
+                    await self._send_frame(viewport, frame, "highlight", "r8")
                 return True
         return has_answered
 

@@ -31,7 +31,7 @@ def trace_fields(
         "view": request.view,
         "frame": request.frame,
         "revision": request.target.revision,
-        "room_revision": request.target.shared,
+        "room_revision": request.target.room_revision,
         "active_control": request.target.active_pointer or "",
         "format": request.form,
         "fidelity": painted.progress.fidelity,

@@ -188,14 +188,14 @@ def _header(request: FrameRequest, progress: Progress, ms: FrameTimes, fields: M
     return FrameHeader(
         frame=request.frame,
         revision=request.target.revision,
-        shared=request.target.shared,
+        room_revision=request.target.room_revision,
         view=request.view,
         width=request.size[0],
         height=request.size[1],
         fidelity=progress.fidelity,
         complete=progress.complete,
-        eye=request.camera_seq,
-        was_off=progress.was_off,
+        camera_seq=request.camera_seq,
+        previous_error=progress.previous_error,
         ms=ms,
         **fields,
     )
@@ -222,7 +222,13 @@ def _pack_scene_update(
     scene_update = SceneUpdate(**shader_arrays._asdict(), arrays=infos)
     payload = b"".join(array.tobytes() for array in arrays.values())
     encode_ms = (time.perf_counter() - updated_s) * 1e3
-    update_fields = {"tiles": [], "format": "arrays", "kind": "tables", "tables": scene_update, "exact": progress.exact}
+    update_fields = {
+        "tiles": [],
+        "format": "arrays",
+        "kind": "scene_update",
+        "scene_update": scene_update,
+        "exact": progress.exact,
+    }
     header = _header(request, progress, times(_waited_ms(request, start_s), update_ms, encode_ms), update_fields)
     new_client_keys = {**client_keys, **{name: block.key for name, block in blocks.items()}}
     return Painted(job, progress, pack(header, payload), update_ms, start_s, encode_ms, new_client_keys)
@@ -252,7 +258,7 @@ def encode_jpeg(picture: Picture, display: DisplayLook, size: tuple[int, int], q
 
 
 def encode_highlight(picture: Picture, pointer: str, from_degrees: float, to_degrees: float) -> bytes:
-    """The payload of a brush frame: how much of each pixel comes from that stretch of the curve, 0…255."""
+    """The payload of a highlight frame: how much of each pixel comes from that stretch of the curve, 0…255."""
     return to_bytes(picture.highlight_pixels(pointer, from_degrees, to_degrees)).tobytes()
 
 

@@ -98,7 +98,7 @@ class Precomputer:
     async def send_ready(self, viewport: Viewport, job: Job) -> None:
         """Tell the client that this is not waited for any more: it has been handed over, or given up."""
         if job.state != "following":
-            await self._socket.send(StatusMessage(state="ready", view=viewport.name, what=job.label, progress=1.0))
+            await self._socket.send(StatusMessage(state="ready", view=viewport.name, label=job.label, progress=1.0))
 
     async def end(self) -> None:
         """Cancel what runs and wait for its thread; nobody asks for its result any more."""
@@ -120,7 +120,7 @@ class Precomputer:
             fraction = round(min(1.0, max(0.0, progress[0])), 2)
             if fraction != last_fraction:
                 last_fraction = fraction
-                await self._socket.send(StatusMessage(state=job.state, view=view, what=job.label, progress=fraction))
+                await self._socket.send(StatusMessage(state=job.state, view=view, label=job.label, progress=fraction))
             await asyncio.wait({future}, timeout=STATUS_INTERVAL_S)
 
 

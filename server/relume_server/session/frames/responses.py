@@ -102,7 +102,7 @@ class QueryResponder:
         header = FrameHeader(
             frame=frame,
             revision=viewport.target.revision,
-            shared=viewport.target.shared,
+            room_revision=viewport.target.room_revision,
             view=viewport.name,
             width=width,
             height=height,
@@ -111,7 +111,7 @@ class QueryResponder:
             exact=viewport.is_exact,
             fidelity=progress.fidelity,
             complete=progress.complete,
-            kind="brush",
+            kind="highlight",
             ms=times(0.0, 0.0, (time.perf_counter() - start_s) * 1e3),
         )
         return pack(header, payload)

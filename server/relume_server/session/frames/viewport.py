@@ -58,7 +58,7 @@ class Viewport:
         self.served_s = 0.0
         self._all_tiles = self._missing_tiles = frozenset(picture.all_tiles())
         self.camera_state: CameraState | None = None
-        self._is_free_camera, self._evaluator = is_free_camera, "server"
+        self._is_free_camera, self._renderer = is_free_camera, "server"
         self._client_render_state = ClientRenderState()
         self._is_blank = not is_free_camera  # nothing of it has been shaded: a frame would be black
         self._has_unsent = self._is_link_slow = False
@@ -73,9 +73,9 @@ class Viewport:
         """Whether it has not been painted with its newest eye."""
         return pending.camera_states.get(self.name) is not self.camera_state
 
-    def has_new_evaluator(self, pending: PendingRequests) -> bool:
+    def has_new_renderer(self, pending: PendingRequests) -> bool:
         """Whether its pixels are to be found elsewhere than they were."""
-        return self._is_free_camera and pending.evaluator != self._evaluator
+        return self._is_free_camera and pending.renderer != self._renderer
 
     def has_new_region(self, pending: PendingRequests) -> bool:
         """Whether something else of it is on the client's screen than was."""
@@ -102,9 +102,9 @@ class Viewport:
         """The next frame: of a new look whatever can be shown, else what refines it."""
         camera_state = pending.camera_states.get(self.name)
         has_moved = self.needs_camera_update(pending)
-        if self.has_new_evaluator(pending):
-            self._evaluator, self._client_render_state, self._missing_tiles = (
-                pending.evaluator,
+        if self.has_new_renderer(pending):
+            self._renderer, self._client_render_state, self._missing_tiles = (
+                pending.renderer,
                 ClientRenderState(),
                 self._all_tiles,
             )
@@ -163,7 +163,7 @@ class Viewport:
 
     @property
     def _has_shader(self) -> bool:
-        return self._is_free_camera and self._evaluator == "browser"
+        return self._is_free_camera and self._renderer == "client"
 
     def on_painted(self, request: FrameRequest, painted: Painted, pending: PendingRequests) -> None:
         """Remember what the client has when `painted` is sent."""
