@@ -68,4 +68,4 @@ def set_only_spot_light(document):
 
 def set_only_emissive_ball(document):
     document["environment"]["intensity"] = 0.0
-    document["lights"]["Ball"]["on"] = True
+    document["lights"]["Ball"]["enabled"] = True

@@ -10,9 +10,9 @@ export interface BackgroundLook {
 
 /** Light from infinitely far that travels along `direction`; emission is irradiance across it, W/m². */
 export interface DirectionalLook {
-  scale: number;
+  intensity: number;
   color: [number, number, number];
-  on: boolean;
+  enabled: boolean;
   emission: [number, number, number];
   kind: "directional";
   direction: [number, number, number];
@@ -34,10 +34,10 @@ export interface DrawnCurve {
   channels?: string;
 }
 
-/** The light around: multiplied by `scale` and `color`, turned about +Y by `rotation` degrees, counter-clockwise seen from above. `map` names it, see `relume.assets.environments`; None: the scene's own. */
+/** The light around: multiplied by `intensity` and `color`, turned about +Y by `rotation` degrees, counter-clockwise seen from above. `map` names it, see `relume.assets.environments`; None: the scene's own. */
 export interface EnvironmentLook {
   map: string | null;
-  scale: number;
+  intensity: number;
   color: [number, number, number];
   rotation: number;
 }
@@ -55,15 +55,15 @@ export interface Look {
 /** A material is the sum of its terms. A `catcher` does not show them: it shows what lies behind it, as dark as its shadows and as bright as what is reflected onto it. `normal_map` stands in the place of the scene's own. */
 export interface MaterialLook {
   terms: TermLook[];
-  catcher?: boolean;
+  shadow_catcher?: boolean;
   normal_map?: NormalMapLook | null;
 }
 
 /** All surfaces of a material shine, and are seen to; emission is radiance. */
 export interface MeshLook {
-  scale: number;
+  intensity: number;
   color: [number, number, number];
-  on: boolean;
+  enabled: boolean;
   emission: [number, number, number];
   kind: "mesh";
   material: string;
@@ -83,9 +83,9 @@ export interface OcioView {
 
 /** Shines alike in all directions; emission is radiant intensity, W/sr. */
 export interface PointLook {
-  scale: number;
+  intensity: number;
   color: [number, number, number];
-  on: boolean;
+  enabled: boolean;
   emission: [number, number, number];
   kind: "point";
   position: [number, number, number];
@@ -93,9 +93,9 @@ export interface PointLook {
 
 /** Shines to the side that `direction` points to; emission is radiance. The camera does not see it. `rotation` turns it about `direction`, degrees; at 0 its height lies in the plane of `direction` and +Y, or +Z where `direction` is vertical. `size`: width and height, metres. */
 export interface RectangleLook {
-  scale: number;
+  intensity: number;
   color: [number, number, number];
-  on: boolean;
+  enabled: boolean;
   emission: [number, number, number];
   kind: "rectangle";
   position: [number, number, number];
@@ -106,9 +106,9 @@ export interface RectangleLook {
 
 /** A point that shines into a cone of half-angles inner and outer, degrees; emission is W/sr along the axis. */
 export interface SpotLook {
-  scale: number;
+  intensity: number;
   color: [number, number, number];
-  on: boolean;
+  enabled: boolean;
   emission: [number, number, number];
   kind: "spot";
   position: [number, number, number];
@@ -116,20 +116,20 @@ export interface SpotLook {
   cone: [number, number];
 }
 
-/** One term: colour · texture · quotient · Π curves; drawn curves stand in for those that `params` would give. `data` names the measured material, for models that need one and for no other. `roughness_map`: the width of the term is scaled by the material's map of roughness, where it has one, or by "image:<id>", one that was sent. `texture` names one of the material's own images by its channel, or one that was sent. */
+/** One term: colour · texture · quotient · Π curves; drawn curves stand in for those that `params` would give. `data` names the measured material, for models that need one and for no other. `roughness_map`: what scales the width of the term: "roughness", the material's own map where it has one, or "image:<id>", one that was sent; null: nothing. `texture` names one of the material's own images by its channel, or one that was sent. */
 export interface TermLook {
   model: string;
   data?: string;
   color: [number, number, number];
   texture: string | null;
-  roughness_map?: boolean | string;
+  roughness_map?: string | null;
   params: Record<string, number | [number, number, number]>;
   curves: Record<string, DrawnCurve | DrawnCurve[]>;
 }
 
 /** Which light is shown: `bounces` reflections between surfaces at most, and of such paths all, those without any, those with any, those with one, or those with more. */
 export interface TransportLook {
-  show: "all" | "direct" | "reflected" | "first_bounce" | "further_bounces";
+  show: "all" | "direct" | "indirect" | "first_bounce" | "further_bounces";
   bounces: number;
 }
 
@@ -144,15 +144,15 @@ type LightsByKind = { readonly [K in LightLook["kind"]]: Extract<LightLook, { ki
 
 /** A light of each kind, complete. */
 export const DEFAULT_LIGHTS: LightsByKind = {
-  point: { kind: "point", scale: 1, color: [1, 1, 1], on: true, emission: [1, 1, 1], position: [0, 1, 0] },
-  spot: { kind: "spot", scale: 1, color: [1, 1, 1], on: true, emission: [1, 1, 1], position: [0, 1, 0], direction: [0, -1, 0], cone: [20, 30] },
-  directional: { kind: "directional", scale: 1, color: [1, 1, 1], on: true, emission: [1, 1, 1], direction: [0, -1, 0] },
-  rectangle: { kind: "rectangle", scale: 1, color: [1, 1, 1], on: true, emission: [1, 1, 1], position: [0, 1, 0], direction: [0, -1, 0], rotation: 0, size: [0.5, 0.5] },
-  mesh: { kind: "mesh", scale: 1, color: [1, 1, 1], on: true, emission: [1, 1, 1], material: "" },
+  point: { kind: "point", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], position: [0, 1, 0] },
+  spot: { kind: "spot", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], position: [0, 1, 0], direction: [0, -1, 0], cone: [20, 30] },
+  directional: { kind: "directional", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], direction: [0, -1, 0] },
+  rectangle: { kind: "rectangle", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], position: [0, 1, 0], direction: [0, -1, 0], rotation: 0, size: [0.5, 0.5] },
+  mesh: { kind: "mesh", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], material: "" },
 };
 
 export const DEFAULTS: Readonly<Pick<Look, "environment" | "background" | "transport" | "display">> = {
-  environment: { map: null, scale: 1, color: [1, 1, 1], rotation: 0 },
+  environment: { map: null, intensity: 1, color: [1, 1, 1], rotation: 0 },
   background: { kind: "map", color: [0.5, 0.5, 0.5], blur: 10 },
   transport: { show: "all", bounces: 24 },
   display: { exposure: 0, tone_map: "agx" },
@@ -160,11 +160,11 @@ export const DEFAULTS: Readonly<Pick<Look, "environment" | "background" | "trans
 
 /** What numbers may be, each of those of a field. */
 export const RANGES = {
-  environment: { scale: { minimum: 0, maximum: 10000 }, color: { minimum: 0, maximum: 10000 }, rotation: { minimum: -360, maximum: 360 } },
+  environment: { intensity: { minimum: 0, maximum: 10000 }, color: { minimum: 0, maximum: 10000 }, rotation: { minimum: -360, maximum: 360 } },
   background: { color: { minimum: 0, maximum: 10000 }, blur: { minimum: 2, maximum: 60 } },
   transport: { bounces: { minimum: 0, maximum: 24 } },
   display: { exposure: { minimum: -20, maximum: 20 } },
-  light: { scale: { minimum: 0, maximum: 10000 }, color: { minimum: 0, maximum: 10000 }, emission: { minimum: 0, maximum: 1000000 }, position: { minimum: -1000000, maximum: 1000000 }, direction: { minimum: -1000000, maximum: 1000000 }, rotation: { minimum: -360, maximum: 360 }, size: { minimum: 0.0001, maximum: 10000 }, cone: { minimum: 0, maximum: 90 } },
+  light: { intensity: { minimum: 0, maximum: 10000 }, color: { minimum: 0, maximum: 10000 }, emission: { minimum: 0, maximum: 1000000 }, position: { minimum: -1000000, maximum: 1000000 }, direction: { minimum: -1000000, maximum: 1000000 }, rotation: { minimum: -360, maximum: 360 }, size: { minimum: 0.0001, maximum: 10000 }, cone: { minimum: 0, maximum: 90 } },
   term: { color: { minimum: 0, maximum: 10000 } },
 } as const;
 

@@ -1,17 +1,17 @@
 // Written by `python -m relume_server.typescript` from the server's models. Do not edit.
 
 
-export const SUBPROTOCOL = "relume.v1";
+export const SUBPROTOCOL = "relume.v2";
 
 export const MAX_MESSAGE_BYTES = 65536;
 
 export const MAX_FRAMES_IN_FLIGHT = 2;
 
-export const MAX_VIEWS_SHOWN = 4;
+export const MAX_VISIBLE_VIEWS = 4;
 
-export const MAX_EYE_PIXELS = 2304000;
+export const MAX_CAMERA_PIXELS = 2304000;
 
-export const SURFACE_LAYOUT = 3;
+export const PROBES_LAYOUT = 3;
 
 export const MAX_PERSON_NAME = 40;
 
@@ -58,21 +58,21 @@ export interface CameraFrame {
   yfov: number;
 }
 
-/** client → server: see a view whose eye is "free" from here, in a picture of this size; the latest wins, and frames name the `eye` that they show. `to_world`, by row, and `yfov`: as in `CameraInfo`. `hand` is what the hand is on, as in an edit; nothing is prepared for it. `rest`: "exact", an exact picture from there follows when the eye rests, and edits go on in it; "stay", none does. */
+/** client → server: see a view whose camera is "free" from here, in a picture of this size; the latest wins, and frames name its `seq` as `camera_seq`. `to_world`, by row, and `yfov`: as in `CameraInfo`. `active_control`: as in an edit; nothing is prepared for it. `refine`: "exact", an exact picture from there follows when the camera stops, and edits go on in it; "none", none does. */
 export interface CameraMessage {
-  type: "eye";
+  type: "camera";
   view: string;
-  eye: number;
+  seq: number;
   to_world: number[];
   yfov: number;
   size: [number, number];
-  hand?: string | null;
-  rest?: "exact" | "stay";
+  active_control?: string | null;
+  refine?: "exact" | "none";
 }
 
 /** From camera to camera, at even shares of the frames; one frame each where no number of frames is given. */
 export interface CameraPath {
-  eyes: CameraFrame[];
+  cameras: CameraFrame[];
 }
 
 /** Whether a comment is settled. */
@@ -105,18 +105,18 @@ export interface ComparisonRequest {
   dry_run?: boolean;
 }
 
-/** client → server: change the look; `revision` must be newer than the last. `hand` is what the hand is on: a curve, or what a touch may name as `parameter`, in the look after the edit; null for all other edits. `solo` names sources of light, local lights and "environment", that alone are shown from now on, without being part of the look; null: all. Left out, it stays as it was. An edit that says `solo` may have an empty patch. */
+/** client → server: change the look; `revision` must be newer than the last. `active_control` is what is being dragged: a curve, or what `PrepareMessage` may name as `parameter`, in the look after the edit; null for all other edits. `solo` names sources of light, local lights and "environment", that alone are shown from now on, without being part of the look; null: all. Left out, it stays as it was. An edit that says `solo` may have an empty patch. */
 export interface EditMessage {
   type: "edit";
   revision: number;
   patch: PatchOperation[];
-  hand?: string | null;
+  active_control?: string | null;
   solo?: string[] | null;
 }
 
 /** client → server: how pictures are sent. "auto": HDR, JPEG while moving where the link is too slow for it. */
 export interface EncodingMessage {
-  type: "stream";
+  type: "encoding";
   format: "hdr" | "jpeg" | "auto";
   quality?: number;
 }
@@ -127,9 +127,9 @@ export interface FocusMessage {
   view: string;
 }
 
-/** client → server: which pixels does this stretch of a curve light? Each shown view answers by a frame "brush". */
+/** client → server: which pixels does this stretch of a curve light? Each shown view answers by a frame "highlight". */
 export interface HighlightMessage {
-  type: "brush";
+  type: "highlight_curve_range";
   curve: string;
   from: number;
   to: number;
@@ -137,7 +137,7 @@ export interface HighlightMessage {
 
 /** client → server: what makes up this pixel? Of a shown view, the focused one by itself; see `InspectAnswer`. */
 export interface InspectMessage {
-  type: "probe";
+  type: "inspect";
   view?: string | null;
   x: number;
   y: number;
@@ -148,17 +148,17 @@ export interface LooksRequest {
   bake: string;
   looks: Record<string, unknown>[];
   frames?: number | null;
-  between?: "parameters" | "map";
+  interpolation?: "parameters" | "map";
   path?: Turntable | CameraPath | null;
   view?: string | null;
 }
 
-/** client → server: first message, and sent once. All of it may be left out; null is the same. `room`, or to watch only `watch`, names the room in which others share the look; the address then has the first eight characters of it as `room_prefix`. `seat`: token of the place that this client has in it. `name`: how to be called, where nobody logs in. `share`, or `look`: the shared or saved look to begin with. `resume`: token of a session that was lost. */
+/** client → server: first message, and sent once. All of it may be left out; null is the same. `room`, or to watch only `view_token`, names the room in which others share the look; the address then has the first eight characters of it as `room_prefix`. `participant_token`: this client's in that room. `name`: how to be called, where nobody logs in. `share`, or `look`: the shared or saved look to begin with. `resume`: token of a session that was lost. */
 export interface OpenMessage {
   type: "open";
   room?: string | null;
-  watch?: string | null;
-  seat?: string | null;
+  view_token?: string | null;
+  participant_token?: string | null;
   name?: string | null;
   share?: string | null;
   look?: string | null;
@@ -179,31 +179,31 @@ export interface PingMessage {
 
 /** client → server: one of two: the user opened this `curve`: freeze it ahead and send its `CurveMessage` from now on; or has in hand what moves this `parameter`, which may also be a light (/lights/NAME) or a field of the environment: prepare for it, the open curve stays open. */
 export interface PrepareMessage {
-  type: "touch";
+  type: "prepare";
   curve?: string | null;
   parameter?: string | null;
 }
 
-/** client → server: what others in the room see of this one: the name, where nobody logs in (left out: as it was), and the material in hand. */
+/** client → server: what others in the room see of this one: the name, where nobody logs in (left out: as it was), and the selected material. */
 export interface PresenceMessage {
   type: "presence";
   name?: string | null;
   material?: string | null;
 }
 
-/** client → server: of a view whose eye is "baked" this region is on the screen: x, y, width, height in pixels of its picture. It is exact before the rest, frames of what is on its way bring its tiles alone, and `fidelity` is that of what is in it. null: all of the picture, as it is before anything is said. */
+/** client → server: of a view whose camera is "fixed" this region is on the screen: x, y, width, height in pixels of its picture. It is exact before all else, frames of what is on its way bring its tiles alone, and `fidelity` is that of what is in it. null: all of the picture, as it is before anything is said. */
 export interface RegionMessage {
   type: "region";
   view: string;
   rect: [number, number, number, number] | null;
 }
 
-/** A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by default the scene and the view. Of EXR alone: `layers` beside the picture, one for each light and each kind of light path, or "light_groups", direct and reflected light of each light, together the picture; `precision` of the values; and `color_space`, a linear one of the server's OpenColorIO config (GET /api/color), else linear Rec. 709. Of an animation: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video of them, `fps` frames a second. `exact`: false shows moving eyes' frames as they look while the eye moves, a hundred times sooner. */
+/** A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by default the scene and the view. Of EXR alone: `layers` beside the picture, one for each light and each kind of light path, or "light_groups", direct and reflected light of each light, together the picture; `precision` of the values; and `color_space`, a linear one of the server's OpenColorIO config (GET /api/color), else linear Rec. 709. Of an animation: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video of them, `fps` frames a second. `quality`: "interactive" renders frames of a free camera as they look while it moves, a hundred times sooner. */
 export interface RenderRequest {
   bake: string;
   looks: Record<string, unknown>[];
   frames?: number | null;
-  between?: "parameters" | "map";
+  interpolation?: "parameters" | "map";
   path?: Turntable | CameraPath | null;
   view: string;
   format: "exr" | "png" | "webp" | "mp4";
@@ -213,16 +213,16 @@ export interface RenderRequest {
   precision?: "half" | "float";
   color_space?: string | null;
   fps?: number;
-  exact?: boolean;
+  quality?: "exact" | "interactive";
 }
 
-/** client → server: who finds the pixels of views whose eye is "free" while they move. "browser": from now on frames of kind "tables" bring what a shader needs, beside what GET /api/bakes/{id}/surface gave once, each part again where it has changed; no frame comes for an eye alone. Exact pictures come as ever. */
+/** client → server: who renders views whose camera is "free" while they move. "client": from now on frames of kind "scene_update" bring what a shader needs, beside what GET /api/bakes/{id}/probes gave once, each part again where it has changed; no frame comes for a camera alone. Exact pictures come as ever. */
 export interface RendererMessage {
-  type: "evaluate";
-  by: "browser" | "server";
+  type: "renderer";
+  renderer: "client" | "server";
 }
 
-/** What a link shows: a look of a bake, the views beside each other and the one in hand. `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. `paths`: the light paths that are looked at; null: those of the look. `eyes`: from where views are seen whose eye moves, by name; `sizes`: of their pictures, pixels, where they are not as large as was baked. */
+/** What a link shows: a look of a bake, the views beside each other and the one in hand. `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. `paths`: the light paths that are looked at; null: those of the look. `cameras`: of views whose camera is free, by name; `sizes`: of their pictures, pixels, where they are not as large as was baked. */
 export interface ShareRequest {
   bake: string;
   view: string;
@@ -231,13 +231,13 @@ export interface ShareRequest {
   solo?: string | null;
   solo_light?: string | null;
   paths?: SharedPaths | null;
-  eyes?: Record<string, CameraFrame>;
+  cameras?: Record<string, CameraFrame>;
   sizes?: Record<string, [number, number]>;
 }
 
 /** Light paths that are looked at; as a look's `transport`. */
 export interface SharedPaths {
-  show: "all" | "direct" | "reflected" | "first_bounce" | "further_bounces";
+  show: "all" | "direct" | "indirect" | "first_bounce" | "further_bounces";
   bounces: number;
 }
 
@@ -254,12 +254,12 @@ export interface TermsRequest {
   terms: Record<string, unknown>[];
 }
 
-/** Once around an upright line, in so many frames; `start`: the first of them, by default where the view begins. `about`: a place on the line, metres; by default in the middle of the first picture, as deep as what it shows. `turns`: what goes around: the `eye`; or, before an eye that stays, the `object`, under an environment and lamps that stay, too; or the `environment` alone, which needs no bake whose eye moves. */
+/** Once around an upright line, in so many frames; `start_camera`: the first of them, by default where the view begins. `pivot`: a place on the line, metres; by default in the middle of the first picture, as deep as what it shows. `rotate`: the `camera`; or, before a camera that stays, the `object`, under an environment and lights that stay, too; or the `environment` alone, which needs no bake with a free camera. */
 export interface Turntable {
   turntable: number;
-  start?: CameraFrame | null;
-  about?: number[] | null;
-  turns?: "eye" | "object" | "environment";
+  start_camera?: CameraFrame | null;
+  pivot?: number[] | null;
+  rotate?: "camera" | "object" | "environment";
 }
 
 /** client → server: show this view alone. `size` is the space that the client has, in pixels: JPEGs are scaled down to fit into it, until views are shown otherwise; all other frames come in the baked size. */
@@ -275,21 +275,21 @@ export interface ViewsMessage {
   names: string[];
 }
 
-/** What share of even light a material sends back, its textures white: the `mean` over all directions, and the `most` in any channel, which is sent `at_deg` from the normal. */
+/** What share of even light a material sends back, its textures white: the `mean` over all directions, and the `max` in any channel, at `max_angle_degrees` from the normal. */
 export interface AlbedoBody {
   mean: number[];
-  most: number;
-  at_deg: number;
+  max: number;
+  max_angle_degrees: number;
 }
 
-/** An array of a payload or of GET /api/bakes/{id}/surface: so many texels of 1, 2 or 4 numbers. */
+/** An array of a payload or of GET /api/bakes/{id}/probes: so many texels of 1, 2 or 4 numbers. */
 export interface ArrayInfo {
   name: string;
   dtype: "float32" | "float16" | "uint32" | "int32";
   shape: [number, number];
 }
 
-/** A bake; `progress` 0…1, `problem` one sentence where it failed, or had to start again. `phase`: what it does while it runs, and for how many seconds already. `ahead`: bakes that a queued one waits for. `is_current`: whether the code that made it, which `code` names, is the server's own; others can be used, but might come out otherwise if it were baked again. `user` asked for it first, `created` says when. */
+/** A bake; `progress` 0…1, `problem` one sentence where it failed, or had to start again. `phase`: what it does while it runs, and for how many seconds already. `queue_position`: bakes that a queued one waits for. `is_current`: whether the code that made it, which `code` names, is the server's own; others can be used, but might come out otherwise if it were baked again. `user` asked for it first, `created` says when. */
 export interface BakeBody {
   id: string;
   user: string;
@@ -299,7 +299,7 @@ export interface BakeBody {
   progress: number;
   phase: "starting" | "loading" | "reading" | "building" | "compiling" | "sampling" | "tracing" | "publishing" | null;
   phase_seconds: number | null;
-  ahead: number;
+  queue_position: number;
   rays_per_second: number | null;
   seconds_left: number | null;
   bytes: number;
@@ -400,7 +400,7 @@ export interface CommentsMessage {
   type: "comments";
 }
 
-/** A comparison; `passes` are done. `seconds_left`: null where it does not run or nothing was measured yet. `user` asked for it; `created`, `started` and `ended` are times; null: not yet. `found`: against the light paths that were asked for, `paths`; `found_of_method`: against those that the method follows. `left_out`: which paths the method leaves out of what the look shows; `untraced`: which brute force leaves out, too. In sentences; both are empty before the first pass. */
+/** A comparison; `completed` of `total` passes are done. `seconds_left`: null where it does not run or nothing was measured yet. `user` asked for it; `created`, `started` and `ended` are times; null: not yet. `error_all_paths`: against all light paths, null where only the method's were asked for; `error_method_paths`: against those that the method follows. `omitted_paths`: which paths the method leaves out of what the look shows; `unsupported_paths`: which brute force leaves out, too. In sentences; both are empty before the first pass. */
 export interface ComparisonBody {
   id: string;
   user: string;
@@ -410,26 +410,26 @@ export interface ComparisonBody {
   created: string;
   started: string | null;
   ended: string | null;
-  passes: number;
+  completed: number;
   total: number;
   progress: number;
   seconds_left: number | null;
   paths: "all" | "method";
-  left_out: string[];
-  untraced: string[];
-  found: ComparisonFigures | null;
-  found_of_method: ComparisonFigures | null;
+  omitted_paths: string[];
+  unsupported_paths: string[];
+  error_all_paths: ComparisonFigures | null;
+  error_method_paths: ComparisonFigures | null;
   problem: string | null;
 }
 
-/** Each relative to the truth's root mean square over pixels and channels; see docs/accuracy.md. `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off, and its `standard_error`: null where that cannot be told from the noise, `limit` is what it is below then. `significant`: share of pixels whose difference the noise does not explain, at most a hundredth of them by chance. */
+/** Each relative to the truth's root mean square over pixels and channels; see docs/accuracy.md. `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off, and its `standard_error`: null where that cannot be told from the noise, `error_upper_bound` is what it is below then. `significant_pixel_fraction`: share of pixels whose difference the noise does not explain, at most a hundredth of them by chance. */
 export interface ComparisonFigures {
   rmse: number;
   noise: number;
   error: number | null;
   standard_error: number | null;
-  limit: number;
-  significant: number;
+  error_upper_bound: number;
+  significant_pixel_fraction: number;
 }
 
 /** The answer to a dry run: nothing was queued. `seconds` that it will take, once it has its turn. `is_measured`: false where nothing of this view was timed yet, and pictures of others tell; ask again in a moment. */
@@ -439,14 +439,14 @@ export interface ComparisonPlanBody {
   is_measured: boolean;
 }
 
-/** An editable factor of a term; an outgoing one multiplies the finished pixel. */
+/** An editable factor of a term; a `view_dependent` one multiplies the finished pixel. */
 export interface CurveBody {
   name: string;
   label: string;
   angle: string;
   parameters: string[];
   bands: number;
-  outgoing: boolean;
+  view_dependent: boolean;
 }
 
 /** server → client: the touched curve at this revision, band averages per channel, over 0…`max_degrees`. */
@@ -467,7 +467,7 @@ export interface DisplayBody {
 
 /** server → client: the server is being stopped. Open the session again, there or on another server, within so many seconds; until then it goes on. The look is the client's to bring, where the new server does not know the token. */
 export interface DrainMessage {
-  type: "leaving";
+  type: "server_draining";
   seconds: number;
 }
 
@@ -497,24 +497,24 @@ export interface ExampleSceneBody {
   method: string;
 }
 
-/** Header of a binary frame. `shared`: as in the last `RoomUpdate` whose look it shows. `eye`: number of the eye that it shows, null before the first and of fixed views. `was_off`: of the first exact frame where an eye rests, how far the moving picture was from it, relative RMS. `tables`: of kind "tables" alone. */
+/** Header of a binary frame. `room_revision`: of the last `RoomUpdate` whose look it shows. `camera_seq`: of the camera that it shows, null before the first and of fixed views. `exact`: all that the client has of the picture is; `fidelity`: of what is in its region. `complete`: something of every term is shown. `previous_error`: of the first exact frame after the camera stopped, how far the approximate picture was from it, relative RMS. `scene_update`: of kind "scene_update" alone. */
 export interface FrameHeader {
   frame: number;
   revision: number;
-  shared: number;
+  room_revision: number;
   view: string;
   width: number;
   height: number;
   tiles: [number, number, number, number][];
   format: "rgb9e5" | "jpeg" | "f32" | "r8" | "arrays";
   exact: boolean;
-  fidelity: "preview" | "approximate" | "followed" | "near" | "exact";
+  fidelity: "preview" | "approximate" | "incremental" | "near_exact" | "exact";
   complete: boolean;
-  kind: "picture" | "brush" | "tables";
+  kind: "picture" | "highlight" | "scene_update";
   alpha: boolean;
-  eye: number | null;
-  was_off: number | null;
-  tables: SceneUpdate | null;
+  camera_seq: number | null;
+  previous_error: number | null;
+  scene_update: SceneUpdate | null;
   ms: FrameTimes;
 }
 
@@ -525,17 +525,17 @@ export interface FrameTimes {
   encode: number;
 }
 
-/** Sizes of the tables: K functions, rows over θo, columns over φo. `expansions` of leaning normals, (3, K). `first_points`: where those of each material begin, and one more at the end. `arrays` are the names of what GET /api/bakes/{id}/surface/{array} gives. `has_holes`: some surfaces are not everywhere, which the arrays do not say: pictures of the server show it. */
+/** Sizes of the tables: `num_basis` K functions, rows over θo, columns over φo. `gradient_basis` for mapped normals, (3, K). `first_probes`: where those of each material begin, and one more at the end. `arrays` are the names of what GET /api/bakes/{id}/probes/{array} gives. `has_alpha_test`: some surfaces are not everywhere, which the arrays do not say: pictures of the server show it. */
 export interface FreeCameraBody {
-  functions: number;
-  rows: number;
-  columns: number;
-  ladder: RecurrenceBody;
-  expansions: number[][];
-  first_points: number[];
+  num_basis: number;
+  table_rows: number;
+  table_columns: number;
+  recurrence: RecurrenceBody;
+  gradient_basis: number[][];
+  first_probes: number[];
   lobe_lists: LobeListsBody;
   shapes: LobeShapesBody;
-  has_holes: boolean;
+  has_alpha_test: boolean;
   arrays: string[];
 }
 
@@ -545,26 +545,26 @@ export interface FreeCameraError {
   standard_error: number;
 }
 
-/** server → client: first message. `revision` and `solo` are the last ones of a resumed session, else 0 and null. `shown` are the views that frames come of, `view` is the focused one; `views` are all that were baked. `method`: the light of the bake; `axes`: what can be changed in its pictures. `role`: who may only `view` sends no edits. `room`: where others share the look, null for a session of one. `moving_error`: null where no eye moves, of bakes of before, and where it could not be measured. */
+/** server → client: first message. `revision` and `solo` are the last ones of a resumed session, else 0 and null. `visible_views` are the views that frames come of, `focused_view` is one of them; `views` are all that were baked. `method`: the light of the bake; `axes`: what can be changed in its pictures. `role`: who may only `view` sends no edits. `room`: where others share the look, null for a session of one. `free_camera_error`: null where no camera is free, and where it could not be measured. */
 export interface HelloMessage {
   type: "hello";
   session: string;
   bake: string;
   method: string;
-  axes: ("curve" | "parameter" | "light" | "environment" | "bounces" | "eye")[];
+  axes: ("curve" | "parameter" | "light" | "environment" | "bounces" | "camera")[];
   scene: string;
   look: Record<string, unknown>;
   solo: string[] | null;
   revision: number;
   resumed: boolean;
-  view: string;
-  shown: string[];
+  focused_view: string;
+  visible_views: string[];
   views: ViewInfo[];
   materials: string[];
   resume: string;
   role: "view" | "edit" | "admin";
   room: RoomInfo | null;
-  moving_error: FreeCameraError | null;
+  free_camera_error: FreeCameraError | null;
 }
 
 /** An image that looks may name in the place of a material's own: `texture` or `roughness_map` of its terms, its `normal_map`. `size`: width and height. `warnings`: what was changed when its file was read. `roughness`: the mean of its green, how rough a material is that has it as its map. `metalness`: of one that was made and not sent, the image that says where it is metal; `base`: its base colour, an image, "diffuse" or "scene" of the scene's own textures, or null where that is the same everywhere. */
@@ -583,7 +583,7 @@ export interface ImageBody {
 
 /** server → client: one pixel; `bands` is each band's contribution of the active curve, per channel. `position` and `normal` are of the surface that covers most of it, world space; null for background. */
 export interface InspectAnswer {
-  type: "probe";
+  type: "inspect";
   view: string;
   x: number;
   y: number;
@@ -595,21 +595,21 @@ export interface InspectAnswer {
   bands: number[][] | null;
 }
 
-/** Lists of lights that lobes look for: `side` of the map of directions, how many are `listed` for each and how many `lights_a_lamp`; the `narrowest` σ, radians, of so many `widths`, each √2 times the one before. */
+/** Lists of lights that lobes look for: `bins_per_side` of the map of directions, `max_listed` for each bin, `lights_per_bright_light`; `min_width` is the least σ, radians, of so many `widths`, each √2 times the one before. */
 export interface LobeListsBody {
-  side: number;
-  listed: number;
-  lights_a_lamp: number;
-  narrowest: number;
+  bins_per_side: number;
+  max_listed: number;
+  lights_per_bright_light: number;
+  min_width: number;
   widths: number;
 }
 
-/** Sizes of tables of highlights, see `relume.live.free_camera.basis.lobe_shapes`. Rings, half an octave each, from the float that has the bits `least_bits`; spokes; widths of lights. */
+/** Sizes of tables of highlights, see `relume.live.free_camera.basis.lobe_shapes`. Rings, half an octave each, from the float that has the bits `min_bits`; azimuths; widths of lights. */
 export interface LobeShapesBody {
-  rings: number;
-  spokes: number;
+  elevation_rings: number;
+  azimuths: number;
   widths: number;
-  least_bits: number;
+  min_bits: number;
 }
 
 /** A saved look in the list of them. `created`: when it was saved first, which editors sort by. `thumbnail`: address of the picture of this version, relative to the server, null where there is none. */
@@ -652,13 +652,13 @@ export interface MaterialMapBody {
   triangles: [number, number, number][];
 }
 
-/** Who calls. `login`: whether people log in here; `by`: how this one is known (`open`: nobody is asked). `viewers_comment`: whether those who only look may write comments. */
+/** Who calls. `login`: whether people log in here; `auth_method`: how this one is known (`open`: nobody is asked). `allow_viewer_comments`: whether those who only look may write comments. */
 export interface MeBody {
   login: boolean;
   name: string;
   role: "anyone" | "view" | "edit" | "admin";
-  by: "open" | "nobody" | "token" | "proxy";
-  viewers_comment: boolean;
+  auth_method: "open" | "nobody" | "token" | "proxy";
+  allow_viewer_comments: boolean;
 }
 
 /** A measured material; looks name it by `data`, `terms` is how it begins. `lobes_error` (measured_lv + measured_hd) and `homomorphic_error` (measured_hf): of the curves alone, per channel. */
@@ -678,7 +678,7 @@ export interface MetalnessBody {
   terms: Record<string, unknown>[];
 }
 
-/** A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured, `width` the parameter that maps of roughness scale, `width_power` the power of a roughness that it grows with, `mirrors_below` where it makes a mirror, and `data_prefix` how the names of such data begin (see `data`). */
+/** A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured, `width_parameter` the one that maps of roughness scale, `width_power` the power of a roughness that it grows with, `specular_below` where it makes a mirror, and `data_prefix` how the names of such data begin (see `data`). */
 export interface ModelBody {
   model: string;
   label: string;
@@ -686,15 +686,15 @@ export interface ModelBody {
   source: string;
   texture: string;
   needs_data: boolean;
-  width: string | null;
+  width_parameter: string | null;
   width_power: number | null;
-  mirrors_below: number | null;
+  specular_below: number | null;
   data_prefix: string | null;
   parameters: ParameterBody[];
   curves: CurveBody[];
 }
 
-/** A number that generates curves; `scale` says how a slider moves. One that is `fixed` at freeze has one value for all channels, and a change of it takes as long as a freeze. Values are multiples of `step`, where it is given. */
+/** A number that generates curves; `scale` says how a slider moves. One that `requires_new_operator` has one value for all channels; a change of it precomputes the operator anew. Values are multiples of `step`, where it is given. */
 export interface ParameterBody {
   name: string;
   label: string;
@@ -705,17 +705,17 @@ export interface ParameterBody {
   scale: "linear" | "log";
   help: string;
   step: number | null;
-  fixed: boolean;
+  requires_new_operator: boolean;
 }
 
-/** Somebody in a room. `number`: theirs as long as they are in it. `here`: false while their connection is lost. */
+/** Somebody in a room. `id`: theirs as long as they are in it. `online`: false while their connection is lost. */
 export interface Person {
-  number: number;
+  id: number;
   name: string;
   color: string;
   material: string | null;
   role: "view" | "edit" | "admin";
-  here: boolean;
+  online: boolean;
 }
 
 /** World space, metres; null where nothing is there. */
@@ -766,7 +766,7 @@ export interface RecipeBody {
   cameras: CameraBody[];
 }
 
-/** How the functions of the in-basis follow from each other; see `relume.math.zernike.Recurrence`. */
+/** How the functions of the Zernike basis follow from each other; see `relume.math.zernike.Recurrence`. */
 export interface RecurrenceBody {
   order: number[];
   norm: number[];
@@ -777,7 +777,7 @@ export interface RecurrenceBody {
   c: number[];
 }
 
-/** A batch; `done` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too. `seconds_left`: null where it does not run or nothing was measured yet. `user` asked for it; "" where nobody logs in. `created`, `started` and `ended` are times; null: not yet. */
+/** A batch; `completed` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too. `seconds_left`: null where it does not run or nothing was measured yet. `user` asked for it; "" where nobody logs in. `created`, `started` and `ended` are times; null: not yet. */
 export interface RenderBody {
   id: string;
   name: string | null;
@@ -790,41 +790,41 @@ export interface RenderBody {
   created: string;
   started: string | null;
   ended: string | null;
-  done: number;
+  completed: number;
   total: number;
   progress: number;
   seconds_left: number | null;
   problem: string | null;
 }
 
-/** The room of a session. `id` opens it to edit, null for who only watches; `watch` opens it to watch. `seat`: a token that comes back to the same place, `you` is its number. `created`: nobody was in it, so that it has the look that this session brings. `default`: the scene's own look, as everything is that nobody has edited. */
+/** The room of a session. `id` opens it to edit, null for who only watches; `view_token` opens it to watch. `participant_token` comes back as the same person, `self_id` is their id. `is_new`: nobody was in it, so that it has the look that this session brings. `default_look`: the scene's own look, as everything is that nobody has edited. */
 export interface RoomInfo {
   id: string | null;
-  watch: string;
-  seat: string;
-  you: number;
-  created: boolean;
+  view_token: string;
+  participant_token: string;
+  self_id: number;
+  is_new: boolean;
   people: Person[];
-  default: Record<string, unknown>;
+  default_look: Record<string, unknown>;
 }
 
-/** server → client: who is in the room now, of these the one at `you`. */
+/** server → client: who is in the room now, of these oneself at `self_id`. */
 export interface RoomMessage {
   type: "room";
-  you: number;
+  self_id: number;
   people: Person[];
 }
 
-/** server → client: what the room's look has become since the last such message, or `hello`, with this session's own edits up to `revision` in it. The `patch` is empty where there were no others. `shared` counts its changes, and frames say which they show. `by`: numbers of those who edited. */
+/** server → client: what the room's look has become since the last such message, or `hello`, with this session's own edits up to `revision` in it. The `patch` is empty where there were no others. `room_revision` counts its changes, and frames say which they show. `edited_by`: ids of those who edited. */
 export interface RoomUpdate {
-  type: "shared";
+  type: "room_update";
   revision: number;
-  shared: number;
+  room_revision: number;
   patch: SharedOperation[];
-  by: number[];
+  edited_by: number[];
 }
 
-/** A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first. `remarks` are the `warnings` with what each does to the picture, the worst first. */
+/** A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first. `warnings`: the worst first. */
 export interface SceneBody {
   id: string;
   name: string;
@@ -833,8 +833,7 @@ export interface SceneBody {
   materials: SceneMaterial[];
   lights: string[];
   variants: SceneVariant[];
-  warnings: string[];
-  remarks: SceneWarning[];
+  warnings: SceneWarning[];
   triangles: number;
   thumbnail: string | null;
   bakes: string[];
@@ -844,23 +843,23 @@ export interface SceneBody {
 export interface SceneMaterial {
   name: string;
   terms: Record<string, unknown>[];
-  catcher: boolean;
+  shadow_catcher: boolean;
   is_projected: boolean;
   is_glass: boolean;
 }
 
-/** What a shader needs for a look besides arrays. `gain`: of the picture; `sky_gain`, `background_gain`: of what lobes see of the sky, and of the sky itself, per channel. `sky_turn`: added to u. `sky_levels`: first texel, height and width of each. `lamps`: of the sky, that lobes show apart: direction, light, spread. `is_direct`: light that comes straight is shown, and with it the background. `arrays` are those of the payload; those that are not named are as they were. */
+/** What a shader needs for a look besides arrays. `gain`: of the picture; `environment_gain`, `background_gain`: of the prefiltered environment that lobes look up, and of the background, per channel. `environment_rotation`: added to u. `environment_mips`: first texel, height and width of each. `bright_lights`: of the environment, which lobes evaluate separately: direction, radiance, spread. `shows_direct`: direct light is shown, and with it the background. `arrays` are those of the payload; those that are not named are as they were. */
 export interface SceneUpdate {
   gain: [number, number, number];
-  sky_gain: [number, number, number];
+  environment_gain: [number, number, number];
   background_gain: [number, number, number];
-  sky_turn: number;
-  sky_levels: [number, number, number][];
-  lamps: [number, number, number, number, number, number, number][];
+  environment_rotation: number;
+  environment_mips: [number, number, number][];
+  bright_lights: [number, number, number, number, number, number, number][];
   background: "map" | "blurred" | "color" | "transparent";
   background_color: [number, number, number];
   background_size: [number, number];
-  is_direct: boolean;
+  shows_direct: boolean;
   arrays: ArrayInfo[];
 }
 
@@ -877,13 +876,13 @@ export interface SceneView {
   is_placed: boolean;
 }
 
-/** What the import has to say: `wrong` in the picture, `simplified`, or `unused` without harm to it. */
+/** A warning of the import. `severity`: what `text` is about is missing or wrong in the picture ("unsupported"), looks much the same ("approximated"), or does not change the picture ("ignored"). */
 export interface SceneWarning {
   text: string;
-  effect: "wrong" | "simplified" | "unused";
+  severity: "unsupported" | "approximated" | "ignored";
 }
 
-/** What a link shows; `lacking`: what of it is not here any more, one sentence each. */
+/** What a link shows; `missing`: what of it is not here any more, one sentence each. */
 export interface ShareBody {
   bake: string;
   view: string;
@@ -892,12 +891,12 @@ export interface ShareBody {
   solo: string | null;
   solo_light: string | null;
   paths: SharedPaths | null;
-  eyes: Record<string, CameraFrame>;
+  cameras: Record<string, CameraFrame>;
   sizes: Record<string, [number, number]>;
   id: string;
   created: string;
   scene: string;
-  lacking: string[];
+  missing: string[];
 }
 
 /** A link that was made; `url` is relative to the server. */
@@ -913,12 +912,12 @@ export interface SharedOperation {
   value: unknown;
 }
 
-/** server → client: something takes time; `progress` 0…1. A curve is frozen for its edits, or a term is shaded because the picture has no image of it yet; "ready": that has ended. What does not wait for it goes on meanwhile. */
+/** server → client: something takes time; `progress` 0…1. A curve is precomputed for its edits (`label` names it), or a term is shaded because the picture has no image of it yet; "ready": that has ended. What does not wait for it goes on meanwhile. */
 export interface StatusMessage {
   type: "status";
-  state: "freezing" | "shading" | "ready";
+  state: "precomputing" | "shading" | "ready";
   view: string;
-  what: string;
+  label: string;
   progress: number;
 }
 
@@ -928,28 +927,28 @@ export interface ViewBody {
   view: string;
 }
 
-/** A view, its size in pixels and its camera; `eye`: seen from where it was baked alone, or from anywhere. Then `bounds` are the lowest and the highest corner of what there is to see, metres. */
+/** A view, its size in pixels and its camera; `camera_mode`: seen from where it was baked alone, or from anywhere. Then `bounds` are the lowest and the highest corner of what there is to see, metres. */
 export interface ViewInfo {
   name: string;
   width: number;
   height: number;
   camera: CameraInfo;
-  eye: "baked" | "free";
+  camera_mode: "fixed" | "free";
   bounds: [number[], number[]] | null;
 }
 
-/** The corners of a scene, metres, and a camera that sees all of it. */
+/** The bounds of a scene, metres, and a camera that sees all of it. */
 export interface ViewportBody {
-  lowest: number[];
-  highest: number[];
-  framing: CameraFrame;
+  bounds_min: number[];
+  bounds_max: number[];
+  default_camera: CameraFrame;
 }
 
-/** How a term is sent in views whose eye moves: by so many `functions` of the incoming light, which miss that share of it (cosine-weighted RMS); `needed`: how many would miss a twentieth, null where more than these; `is_mirror`: as a blurred mirror instead. */
+/** How a term is sent in views whose eye moves: by so many `functions` of the incident light, with a `residual` (cosine-weighted relative RMS); `required_functions`: how many would miss a twentieth, null where more than these; `is_mirror`: as a blurred mirror instead. */
 export interface ZernikeFitBody {
   functions: number;
-  missed: number;
-  needed: number | null;
+  residual: number;
+  required_functions: number | null;
   is_mirror: boolean;
 }
 

@@ -55,7 +55,7 @@ export type {
   Turntable,
 } from "./protocol.gen";
 export type { BackgroundLook as Background, DrawnCurve, LightLook as Light, OcioView, TransportLook as Transport } from "./look.gen";
-export { LUT_GAIN, LUT_SIZE, MAX_COMMENT, MAX_EYE_PIXELS, MAX_MESSAGE_BYTES, MAX_PERSON_NAME, MAX_VIEWS_SHOWN, ROOM_PREFIX, SUBPROTOCOL, SURFACE_LAYOUT } from "./protocol.gen";
+export { LUT_GAIN, LUT_SIZE, MAX_COMMENT, MAX_CAMERA_PIXELS, MAX_MESSAGE_BYTES, MAX_PERSON_NAME, MAX_VISIBLE_VIEWS, ROOM_PREFIX, SUBPROTOCOL, PROBES_LAYOUT } from "./protocol.gen";
 
 export type Rgb = [number, number, number];
 export type Triple = [x: number, y: number, z: number];

@@ -20,8 +20,8 @@ describe("words of a bake", () => {
 
   test("how many it waits for", () => {
     const queued: BakeStatus = { ...running, state: "queued", phase: null };
-    expect(bakeProgressText({ ...queued, ahead: 2 }, 0)).toBe("waits for 2 bakes before it");
-    expect(bakeProgressText({ ...queued, ahead: 1 }, 0)).toBe("waits for 1 bake before it");
+    expect(bakeProgressText({ ...queued, queue_position: 2 }, 0)).toBe("waits for 2 bakes before it");
+    expect(bakeProgressText({ ...queued, queue_position: 1 }, 0)).toBe("waits for 1 bake before it");
     expect(bakeProgressText(queued, 0)).toBe("waits for its turn");
     expect(bakeProgressText({ ...queued, state: "failed" }, 0)).toBe("bake failed");
   });

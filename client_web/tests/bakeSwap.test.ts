@@ -79,10 +79,10 @@ beforeEach(() => {
 test("a new bake is seen at once from where a hand has put the eye", async () => {
   const camera = { to_world: [1], yfov: 0.5 };
   storeCamera("front", { camera, size: [8, 6] });
-  VIEWS[0] = { ...VIEWS[0], eye: "free" } as never;
+  VIEWS[0] = { ...VIEWS[0], camera_mode: "free" } as never;
   const session = await newBake();
-  const cameraMessages = session.sent.filter(({ type }) => type === "eye");
-  expect(cameraMessages).toMatchObject([{ view: "front", ...camera, size: [8, 6], rest: "exact" }]);
+  const cameraMessages = session.sent.filter(({ type }) => type === "camera");
+  expect(cameraMessages).toMatchObject([{ view: "front", ...camera, size: [8, 6], refine: "exact" }]);
   storeCamera("front", null);
 });
 

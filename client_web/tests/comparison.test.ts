@@ -1,10 +1,10 @@
 import { describe, expect, it } from "vitest";
 import { mapSentences, omittedPathSentences, formatPercentWithError, comparisonPlanText, comparisonProgressText, errorSentences } from "../src/panels/compare/comparisonMessages";
 
-const stats = { rmse: 0.02, noise: 0.012, error: 0.0163, standard_error: 0.0021, limit: 0.018, significant: 0.032 };
+const stats = { rmse: 0.02, noise: 0.012, error: 0.0163, standard_error: 0.0021, error_upper_bound: 0.018, significant_pixel_fraction: 0.032 };
 const whole = { ...stats, error: 0.3271, standard_error: 0.0004 };
 const left = ["Light that surfaces reflect onto each other."];
-const body = { found: whole, found_of_method: stats, left_out: left, untraced: [] };
+const body = { error_all_paths: whole, error_method_paths: stats, omitted_paths: left, unsupported_paths: [] };
 
 describe("how true a picture is, in words", () => {
   it("tells both errors, against all paths and against the method's, each with its standard error", () => {
@@ -15,12 +15,12 @@ describe("how true a picture is, in words", () => {
   });
 
   it("tells one error where the method follows all paths", () => {
-    expect(errorSentences({ ...body, left_out: [] })).toHaveLength(1);
-    expect(omittedPathSentences({ left_out: [], untraced: ["Caustics."] })).toEqual(["Brute force leaves out, too: caustics."]);
+    expect(errorSentences({ ...body, omitted_paths: [] })).toHaveLength(1);
+    expect(omittedPathSentences({ omitted_paths: [], unsupported_paths: ["Caustics."] })).toEqual(["Brute force leaves out, too: caustics."]);
   });
 
   it("never tells a number that is below the noise", () => {
-    const [, method] = errorSentences({ ...body, found_of_method: { ...stats, error: null, standard_error: null, significant: 0 } });
+    const [, method] = errorSentences({ ...body, error_method_paths: { ...stats, error: null, standard_error: null, significant_pixel_fraction: 0 } });
     expect(method).toContain("the error is less than the noise, below 1.8 %");
     expect(method).not.toContain("errs by");
   });
@@ -28,7 +28,7 @@ describe("how true a picture is, in words", () => {
   it("says what the map shows, and how much is noise", () => {
     expect(mapSentences(stats)[0]).toContain("3.2 % of the pixels differ");
     expect(mapSentences(stats)[1]).toContain("1.2 %");
-    expect(mapSentences({ ...stats, significant: 0 })[0]).toContain("no difference");
+    expect(mapSentences({ ...stats, significant_pixel_fraction: 0 })[0]).toContain("no difference");
   });
 
   it("shows as many digits as are known", () => {
@@ -39,19 +39,19 @@ describe("how true a picture is, in words", () => {
   });
 
   it("counts the pass that is being made, and never beyond the last", () => {
-    const at = (passes: number, progress: number) =>
-      comparisonProgressText({ state: "running", passes, total: 16, progress, problem: null, seconds_left: null }, 7.8);
+    const at = (completed: number, progress: number) =>
+      comparisonProgressText({ state: "running", completed, total: 16, progress, problem: null, seconds_left: null }, 7.8);
     expect(at(0, 0)).toBe("Preparing the picture, 7 s so far");
     expect(at(0, 0.02)).toBe("Brute force: pass 1 of 16, 32 % of it, 7 s so far");
     expect(at(16, 1)).toContain("pass 16 of 16, 0 % of it");
-    const failed = { state: "failed" as const, passes: 0, total: 16, progress: 0, problem: "The disk is full.", seconds_left: null };
+    const failed = { state: "failed" as const, completed: 0, total: 16, progress: 0, problem: "The disk is full.", seconds_left: null };
     expect(comparisonProgressText(failed, 1)).toBe("The disk is full.");
   });
 
   it("says how long it takes, before and on the way, and where it was stopped", () => {
     expect(comparisonPlanText({ passes: 16, seconds: 90, is_measured: true })).toMatch(/16 passes .* about [^,]*\.$/);
     expect(comparisonPlanText({ passes: 16, seconds: 90, is_measured: false })).toMatch(/about .*, judged by other pictures/);
-    const on = { state: "running" as const, passes: 4, total: 16, progress: 0.3, problem: null, seconds_left: 61 };
+    const on = { state: "running" as const, completed: 4, total: 16, progress: 0.3, problem: null, seconds_left: 61 };
     expect(comparisonProgressText(on, 3)).toContain("left");
     expect(comparisonProgressText({ ...on, state: "stopped", seconds_left: null }, 3)).toBe("Stopped after 4 of 16 passes");
   });

@@ -21,7 +21,7 @@ test("a stretch is asked about when the eye rests, and not at all where the poin
   requestBrush(3, 7);
   fidelity.value = "exact";
   vi.advanceTimersByTime(1000);
-  expect(send.mock.calls).toEqual([[{ type: "brush", curve: "/materials/A/terms/0/curves/theta_h", from: 3, to: 7 }]]);
+  expect(send.mock.calls).toEqual([[{ type: "highlight_curve_range", curve: "/materials/A/terms/0/curves/theta_h", from: 3, to: 7 }]]);
 });
 
 test("a stretch of a curve that is being frozen is asked about when it is there", async () => {
@@ -29,7 +29,7 @@ test("a stretch of a curve that is being frozen is asked about when it is there"
   const { freezeStatus } = await import("../src/state/connection");
   send.mockClear();
   fidelity.value = "exact";
-  freezeStatus.value = { state: "freezing", view: "front", label: "A, half angle", progress: 0.2 };
+  freezeStatus.value = { state: "precomputing", view: "front", label: "A, half angle", progress: 0.2 };
   requestBrush(3, 7);
   vi.advanceTimersByTime(5000);
   expect(send).not.toHaveBeenCalled();

@@ -35,7 +35,7 @@ describe("EditQueue", () => {
       queue.setTarget(targetOf(look, 1), change);
     };
     queue.setTarget(targetOf(LOOK, 0));
-    const light = { kind: "point", scale: 1, color: [1, 1, 1], on: true, emission: [1, 1, 1], position: [0, 1, 0] };
+    const light = { kind: "point", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], position: [0, 1, 0] };
     edit("/lights/Point", light);
     for (let i = 1; i <= 50; i++) edit("/lights/Point/position", [i, 1, 0]);
     for (let i = 1; i <= 50; i++) edit(SIGMA, i / 100);

@@ -4,7 +4,7 @@ import { emissionForWatts, LUMENS_PER_WATT, unitsOf, wattsOf } from "../src/pane
 import { withKelvin, kelvinOf, planckian, rgbOfKelvin } from "../src/panels/lights/temperature";
 import type { Light } from "../src/protocol";
 
-const common = { scale: 1, color: [1, 1, 1], on: true, emission: [1, 1, 1] } as const;
+const common = { intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1] } as const;
 const light = (fields: object) => ({ ...common, ...fields }) as unknown as Light;
 
 /** Power of a spot by adding up directions, with the falloff that images have. */
@@ -28,12 +28,12 @@ describe("the power of a light", () => {
   });
 
   test("counts intensity and tint, and luminance alone", () => {
-    expect(wattsOf(light({ kind: "directional", scale: 3, color: [0, 1, 0] }))).toBeCloseTo(3 * luminance([0, 1, 0]), 9);
+    expect(wattsOf(light({ kind: "directional", intensity: 3, color: [0, 1, 0] }))).toBeCloseTo(3 * luminance([0, 1, 0]), 9);
     expect(unitsOf(light({ kind: "directional" })).lumens).toBe("lx");
   });
 
   test("a bulb of 806 lumens has them after they were typed", () => {
-    const bulb = light({ kind: "point", emission: [3, 2, 1], scale: 0.5 });
+    const bulb = light({ kind: "point", emission: [3, 2, 1], intensity: 0.5 });
     const emission = emissionForWatts(bulb, 806 / LUMENS_PER_WATT);
     expect(LUMENS_PER_WATT * wattsOf({ ...bulb, emission } as Light)).toBeCloseTo(806, 2);
     expect((emission?.[0] ?? 0) / (emission?.[2] ?? 1)).toBeCloseTo(3, 4); // the same color
@@ -41,7 +41,7 @@ describe("the power of a light", () => {
 
   test("a dark light becomes white, one that is turned down to nothing stays as it is", () => {
     expect(emissionForWatts(light({ kind: "directional", emission: [0, 0, 0] }), 2)).toEqual([2, 2, 2]);
-    expect(emissionForWatts(light({ kind: "point", scale: 0 }), 2)).toBeNull();
+    expect(emissionForWatts(light({ kind: "point", intensity: 0 }), 2)).toBeNull();
   });
 });
 

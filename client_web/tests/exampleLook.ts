@@ -12,7 +12,7 @@ export const LOOK: Look = {
     },
     "a/b~c": { terms: [{ model: "lambert", color: [0.5, 0.5, 0.5] }] },
   },
-  environment: { map: null, scale: 1, color: [1, 1, 1], rotation: 0 },
+  environment: { map: null, intensity: 1, color: [1, 1, 1], rotation: 0 },
   background: { kind: "map", color: [0.5, 0.5, 0.5], blur: 10 },
   lights: {},
   transport: { show: "all", bounces: 24 },

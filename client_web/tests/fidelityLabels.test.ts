@@ -9,7 +9,7 @@ import { fidelityMarks } from "../src/viewport/fidelityLabels";
 beforeEach(() => {
   vi.useFakeTimers();
   shownViews.value = ["front"];
-  views.value = [{ name: "front", eye: "free" } as never];
+  views.value = [{ name: "front", camera_mode: "free" } as never];
   activeViewName.value = "front";
   fidelity.value = "exact";
   fidelity.value = "approximate";
@@ -31,7 +31,7 @@ test("until the eye has rested it is what the bake has measured, with its standa
 
 test("while a time line plays it is said to play, whichever way its frames come", () => {
   isPlaying.value = true;
-  for (const rough of ["preview", "approximate", "followed"] as const) {
+  for (const rough of ["preview", "approximate", "incremental"] as const) {
     fidelity.value = rough;
     vi.advanceTimersByTime(1000);
     expect(labels()).toEqual(["Playing"]);
@@ -53,7 +53,7 @@ test("a bake of direct light says that objects are not reflected, also where its
 test("a picture of before the newest edit says so until one of after it is there", () => {
   fidelity.value = "exact";
   [isConverged.value, isConverged.value] = [false, true];
-  views.value = [{ name: "front", eye: "baked" } as never];
+  views.value = [{ name: "front", camera_mode: "fixed" } as never];
   isOutdated.value = true;
   vi.advanceTimersByTime(200);
   expect(labels()).toEqual([]); // nothing flickers during a drag

@@ -6,7 +6,7 @@ import { applyFrame, brushImage, emptyPixels, normalizeWeights } from "../src/re
 const HEADER = {
   frame: 12,
   revision: 7,
-  shared: 0,
+  room_revision: 0,
   view: "front",
   width: 4,
   height: 3,
@@ -72,9 +72,9 @@ describe("parseFrame", () => {
   });
 });
 
-describe("tables", () => {
+describe("scene updates", () => {
   const array = { name: "even", dtype: "float32", shape: [2, 4] };
-  const tables = (arrays: unknown) => ({ ...HEADER, tiles: [], format: "arrays", kind: "tables", tables: { arrays } });
+  const tables = (arrays: unknown) => ({ ...HEADER, tiles: [], format: "arrays", kind: "scene_update", scene_update: { arrays } });
 
   test("keep their payload whole", () => {
     const frame = parseFrame(pack(tables([array, { name: "vectors", dtype: "float16", shape: [1, 4] }]), new Uint8Array(40)));
@@ -84,7 +84,7 @@ describe("tables", () => {
   test("are refused where arrays and bytes do not agree, or a form is unknown", () => {
     const bad = [[], [{ ...array, dtype: "float64" }], [{ ...array, shape: [2, 3] }], [{ ...array, shape: [-2, 4] }], undefined];
     for (const arrays of bad) expect(() => parseFrame(pack(tables(arrays), new Uint8Array(32)))).toThrow(FrameError);
-    expect(() => parseFrame(pack({ ...tables([array]), tables: null }, new Uint8Array(32)))).toThrow(FrameError);
+    expect(() => parseFrame(pack({ ...tables([array]), scene_update: null }, new Uint8Array(32)))).toThrow(FrameError);
   });
 });
 
@@ -129,7 +129,7 @@ describe("applyFrame", () => {
   });
 
   test("a brush has one byte a pixel", () => {
-    const frame = parseFrame(pack({ ...HEADER, kind: "brush", format: "r8" }, Uint8Array.from([10, 20, 30, 40])));
+    const frame = parseFrame(pack({ ...HEADER, kind: "highlight", format: "r8" }, Uint8Array.from([10, 20, 30, 40])));
     expect([...brushImage(frame)]).toEqual([0, 0, 0, 0, 0, 10, 20, 0, 0, 30, 40, 0]);
     expect(Math.max(...normalizeWeights(brushImage(frame)))).toBe(255);
     expect(Math.max(...normalizeWeights(Uint8Array.from([0, 1])))).toBe(51);

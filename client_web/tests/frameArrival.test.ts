@@ -50,7 +50,7 @@ describe("a view's first picture", () => {
 });
 
 test("several pictures are as true as the worst of them", () => {
-  expect(worstFidelity(["exact", "near", "followed"])).toBe("followed");
+  expect(worstFidelity(["exact", "near_exact", "incremental"])).toBe("incremental");
   expect(worstFidelity(["approximate", "preview"])).toBe("preview");
   expect(worstFidelity([])).toBe("exact");
 });

@@ -74,8 +74,8 @@ describe("files for the library", () => {
   afterEach(() => vi.unstubAllGlobals());
 
   it.each([
-    ["felt.zip", "/api/materials/btf-works"],
-    ["carpet01_W400xH400.BTF", "/api/materials/btf-works"],
+    ["felt.zip", "/api/materials/btf/jobs"],
+    ["carpet01_W400xH400.BTF", "/api/materials/btf/jobs"],
     ["gold.binary", "/api/materials/measured"],
   ])("%s goes where it is read", async (name, path) => {
     const requests: string[] = [];

@@ -16,12 +16,12 @@ const camera = projectionCameraOf({
   name: "front",
   width: 200,
   height: 100,
-  eye: "baked",
+  camera_mode: "fixed",
   bounds: null,
   camera: { to_world: [1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 1, 5, 0, 0, 0, 1], yfov: Math.PI / 2 },
 });
 const close = (a: readonly number[], b: readonly number[]) => a.forEach((v, i) => expect(v).toBeCloseTo(b[i] as number, 9));
-const common = { scale: 1, color: [1, 1, 1], on: true, emission: [1, 1, 1] } as const;
+const common = { intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1] } as const;
 const spot = { kind: "spot", ...common, position: [0, 2, 0], direction: [0, -2, 0], cone: [20, 45] } as unknown as Light;
 const sun = { kind: "directional", ...common, direction: [0, -1, 0] } as unknown as Light;
 
@@ -92,7 +92,7 @@ describe("a new light", () => {
 
   test("stands off the surface and shines on it", () => {
     for (const kind of ["spot", "rectangle"] as const) {
-      expect(on(kind)).toMatchObject({ kind, position: [0, 1, 0], direction: [0, -1, 0], on: true });
+      expect(on(kind)).toMatchObject({ kind, position: [0, 1, 0], direction: [0, -1, 0], enabled: true });
     }
     expect(on("point")).toMatchObject({ position: [0, 1, 0], emission: [3, 3, 3] });
     expect(on("directional")).toMatchObject({ direction: [0, -1, 0] });
@@ -151,17 +151,17 @@ describe("the inspector's fields", () => {
 });
 
 test("a saved look may say only what it changes of a light", () => {
-  expect(completeLight({ scale: 2 }, spot)).toEqual({ ...spot, scale: 2 });
+  expect(completeLight({ intensity: 2 }, spot)).toEqual({ ...spot, intensity: 2 });
   expect(completeLight({ kind: "point" }, spot)).toEqual({ kind: "point", ...common, position: [0, 1, 0] });
 });
 
 describe("one light alone", () => {
-  const lit = { ...LOOK, lights: { Spot: { ...spot, on: false }, Sun: sun } };
+  const lit = { ...LOOK, lights: { Spot: { ...spot, enabled: false }, Sun: sun } };
 
   test("shines, the others and the environment do not", () => {
     soloLight.value = "Spot";
     const alone = visibleLookOf(lit);
-    expect([alone.lights["Spot"]?.on, alone.lights["Sun"]?.on, alone.environment.scale]).toEqual([true, false, 0]);
+    expect([alone.lights["Spot"]?.enabled, alone.lights["Sun"]?.enabled, alone.environment.intensity]).toEqual([true, false, 0]);
     expect(soloSources(lit)).toEqual(["Spot"]);
     soloLight.value = ENVIRONMENT_SOURCE;
     expect(visibleLookOf(lit).environment).toBe(lit.environment);

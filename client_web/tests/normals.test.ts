@@ -6,7 +6,7 @@ import { models } from "../src/state/scene";
 const IMAGE = "image:0123456789abcdef";
 models.value = [
   { model: "lambert", width: null, parameters: [] },
-  { model: "ggx", width: "roughness", mirrors_below: 0.06, parameters: [] },
+  { model: "ggx", width_parameter: "roughness", specular_below: 0.06, parameters: [] },
   { model: "ward", width: "alpha", parameters: [] },
 ] as unknown as ModelBody[];
 
@@ -18,7 +18,7 @@ const own: MaterialLook = { terms: [lambert, ggx(0.3), ggx(0.01), { model: "ward
 
 test("bumps widen highlights that are no mirrors, as of files that have a normal map", () => {
   const [first, second, ...otherTerms] = own.terms as [Term, Term, Term, Term];
-  const terms = [first, { ...second, roughness_map: true }, ...otherTerms];
+  const terms = [first, { ...second, roughness_map: "roughness" }, ...otherTerms];
   expect(withNormals(own, IMAGE)).toEqual({ terms, normal_map: { image: IMAGE, scale: 1 } });
 });
 
@@ -28,6 +28,6 @@ test("another image is as strong as the one before it", () => {
 
 test("without it terms follow what they did", () => {
   expect(withoutNormals(withNormals(own, IMAGE), own)).toEqual(own);
-  const mapped = { terms: [ggx(0.3, true), ggx(0.3, "image:rough"), ggx(0.3, false)] };
+  const mapped = { terms: [ggx(0.3, "roughness"), ggx(0.3, "image:rough"), ggx(0.3, null)] };
   expect(withoutNormals(withNormals(mapped, IMAGE), mapped)).toEqual(mapped);
 });

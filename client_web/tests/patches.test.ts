@@ -59,7 +59,7 @@ describe("a change", () => {
 
   test("to what is there already is none", () => {
     expect(changeValue(LOOK, "/environment/color", [1, 1, 1]).patch).toEqual([]);
-    expect(changeValue(LOOK, "/environment", { rotation: 0, scale: 1, color: [1, 1, 1], map: null }).patch).toEqual([]);
+    expect(changeValue(LOOK, "/environment", { rotation: 0, intensity: 1, color: [1, 1, 1], map: null }).patch).toEqual([]);
     expect(changeValue(LOOK, CURVE, undefined).patch).toEqual([]);
     expect(changeValue(LOOK, CURVE, undefined).after).toBe(LOOK);
   });

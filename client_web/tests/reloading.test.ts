@@ -82,7 +82,7 @@ test("an export that was stopped is not gone on with, and another may begin at o
 
 test("a comparison goes on after a reload, and while the server is away", async () => {
   answer = state("running");
-  storage.set("relume.truth", JSON.stringify({ id: "a", look: "of then" }));
+  storage.set("relume.comparison", JSON.stringify({ id: "a", look: "of then" }));
   const { loadComparison, activeComparison } = await page();
   void loadComparison(REQUEST.bake);
   await vi.advanceTimersByTimeAsync(100);
@@ -96,7 +96,7 @@ test("a comparison goes on after a reload, and while the server is away", async 
 
 test("a comparison of a bake that is not shown any more is given up", async () => {
   answer = state("running");
-  storage.set("relume.truth", JSON.stringify({ id: "a", look: "of then" }));
+  storage.set("relume.comparison", JSON.stringify({ id: "a", look: "of then" }));
   const { loadComparison, activeComparison } = await page();
   void loadComparison("another");
   await vi.advanceTimersByTimeAsync(100);

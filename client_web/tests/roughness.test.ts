@@ -7,12 +7,12 @@ import { models } from "../src/state/scene";
 const image = { texture: "image:0123456789abcdef", roughness: 0.6 } as ImageBody;
 const width = (name: string, power: number, minimum = 0.01, maximum = 1) => ({
   texture: "specular",
-  width: name,
+  width_parameter: name,
   width_power: power,
   parameters: [{ name, minimum, maximum, default: 0.4 }],
 });
 models.value = [
-  { model: "lambert", texture: "diffuse", width: null, width_power: null, parameters: [] },
+  { model: "lambert", texture: "diffuse", width_parameter: null, width_power: null, parameters: [] },
   { model: "ggx", ...width("roughness", 1) },
   { model: "ward", ...width("alpha", 2) },
   { model: "phong", ...width("exponent", -4, 1, 1000) },
@@ -22,7 +22,7 @@ const term = (model: string, params: Term["params"] = {}, roughness_map?: Term["
   ({ model, params, texture: null, ...(roughness_map === undefined ? {} : { roughness_map }) }) as Term;
 
 test("an image is for the terms that follow the scene's map, else for all that have a width", () => {
-  expect(roughTermIndices([term("lambert"), term("ggx", {}, true), term("ggx")])).toEqual([1]);
+  expect(roughTermIndices([term("lambert"), term("ggx", {}, "roughness"), term("ggx")])).toEqual([1]);
   expect(roughTermIndices([term("lambert"), term("ggx"), term("ward")])).toEqual([1, 2]);
   expect(roughTermIndices([term("lambert")])).toEqual([]);
 });
@@ -39,17 +39,17 @@ test("sliders show the mean of the image, in their own measure where that is a p
 
 test("terms of a material follow one map", () => {
   const otherTerm = "image:fedcba9876543210";
-  const given = [term("ggx", {}, true), term("ggx", {}, false), term("ggx", {}, true)];
+  const given = [term("ggx", {}, "roughness"), term("ggx", {}, null), term("ggx", {}, "roughness")];
   const made = withMap(given, 0, otherTerm);
-  expect(made).toEqual([term("ggx", {}, otherTerm), term("ggx", {}, false), term("ggx", {}, otherTerm)]);
+  expect(made).toEqual([term("ggx", {}, otherTerm), term("ggx", {}, null), term("ggx", {}, otherTerm)]);
   expect(roughnessImage(made)).toBe(otherTerm);
-  expect(withMap(made, 2, true)).toEqual(given);
-  expect(withMap(made, 0, false)).toEqual([term("ggx", {}, false), term("ggx", {}, false), term("ggx", {}, otherTerm)]);
-  expect(withMap(given, 0, false)).toEqual([term("ggx", {}, false), term("ggx", {}, false), term("ggx", {}, true)]);
+  expect(withMap(made, 2, "roughness")).toEqual(given);
+  expect(withMap(made, 0, null)).toEqual([term("ggx", {}, null), term("ggx", {}, null), term("ggx", {}, otherTerm)]);
+  expect(withMap(given, 0, null)).toEqual([term("ggx", {}, null), term("ggx", {}, null), term("ggx", {}, "roughness")]);
 });
 
 test("without it the scene's own map and slider are back", () => {
-  const own = [term("lambert"), term("ggx", { roughness: 0.2 }, true), term("ward", { alpha: 0.1 })];
+  const own = [term("lambert"), term("ggx", { roughness: 0.2 }, "roughness"), term("ward", { alpha: 0.1 })];
   expect(withoutRoughnessImage(withRoughnessImage(own, [1, 2], image), own)).toEqual(own);
 });
 

@@ -53,12 +53,12 @@ const handlers = {
   frame: vi.fn(() => Promise.resolve()),
   status: vi.fn(),
   problem: vi.fn(),
-  probe: vi.fn(),
+  inspect: vi.fn(),
   curve: vi.fn(),
   bake: vi.fn(),
   room: vi.fn(),
   comments: vi.fn(),
-  shared: vi.fn(),
+  roomUpdate: vi.fn(),
   onEditSent: vi.fn(),
   readOnly: vi.fn(),
   ended: vi.fn(),
@@ -129,7 +129,7 @@ test("the first edit goes at once, more of them once in an animation frame", () 
   look = edit(look, SIGMA, 0.4);
   edit(look, SIGMA, 0.5);
   expect(socket().edits).toEqual([
-    { type: "edit", revision: 1, patch: [{ op: "replace", path: SIGMA, value: 0.3 }], hand: SIGMA, solo: null },
+    { type: "edit", revision: 1, patch: [{ op: "replace", path: SIGMA, value: 0.3 }], active_control: SIGMA, solo: null },
   ]);
   animate();
   expect(socket().edits[1]).toMatchObject({ revision: 2, patch: [{ op: "replace", path: SIGMA, value: 0.5 }] });
@@ -168,7 +168,7 @@ test("while two edits wait for a frame the next grows newer, until one comes or 
   animate();
   expect(sent()).toEqual([0.3, 0.4, 0.6]);
   drag(0.7);
-  expect(session.sendAfterEdits({ type: "probe", x: 1, y: 2 })).toBe(true);
+  expect(session.sendAfterEdits({ type: "inspect", x: 1, y: 2 })).toBe(true);
   expect(sent()).toEqual([0.3, 0.4, 0.6, 0.7]);
   drag(0.8);
   vi.advanceTimersByTime(100);
@@ -184,27 +184,27 @@ test("who may only look sends no edits and takes hold of nothing", () => {
   animate();
   expect(handlers.readOnly).toHaveBeenCalledTimes(1);
   expect(session.hasPendingEdits).toBe(false);
-  expect(session.send({ type: "touch", parameter: SIGMA })).toBe(false);
-  expect(session.send({ type: "touch", curve: "/materials/A/terms/0/curves/theta_h" })).toBe(true); // to be told its values
+  expect(session.send({ type: "prepare", parameter: SIGMA })).toBe(false);
+  expect(session.send({ type: "prepare", curve: "/materials/A/terms/0/curves/theta_h" })).toBe(true); // to be told its values
   session.setTarget({ look, activeControl: null, solo: ["environment"], inputTime: 0 });
-  expect(session.send({ type: "probe", x: 1, y: 2 })).toBe(true);
+  expect(session.send({ type: "inspect", x: 1, y: 2 })).toBe(true);
   animate();
   const direct = { ...look.transport, show: "direct" as const };
   session.setTarget({ look: { ...look, transport: direct }, activeControl: null, solo: ["environment"], inputTime: 0 });
   animate();
   expect(handlers.readOnly).toHaveBeenCalledTimes(1);
   expect(socket().sent).toEqual([
-    { type: "touch", curve: "/materials/A/terms/0/curves/theta_h" },
-    { type: "edit", revision: 1, patch: [], hand: null, solo: ["environment"] },
-    { type: "probe", x: 1, y: 2 },
-    { type: "edit", revision: 2, patch: [{ op: "replace", path: "/transport/show", value: "direct" }], hand: null, solo: ["environment"] },
+    { type: "prepare", curve: "/materials/A/terms/0/curves/theta_h" },
+    { type: "edit", revision: 1, patch: [], active_control: null, solo: ["environment"] },
+    { type: "inspect", x: 1, y: 2 },
+    { type: "edit", revision: 2, patch: [{ op: "replace", path: "/transport/show", value: "direct" }], active_control: null, solo: ["environment"] },
   ]);
 });
 
 test("a server that is being stopped is left, and the look goes to the one that comes", () => {
   greet();
   const left = socket();
-  left.says({ type: "leaving", seconds: 10 });
+  left.says({ type: "server_draining", seconds: 10 });
   expect(handlers.connection).toHaveBeenLastCalledWith("reconnecting", expect.any(Number), undefined);
   const look = edit(LOOK, SIGMA, 0.3);
   left.onclose({ code: 1000, reason: "" });
@@ -226,7 +226,7 @@ test("a session begins with what it is asked to, each time it connects", () => {
 
 test("of a room the address has what finds its server, and nothing that opens it", () => {
   const room = "0123456789abcdef0123456789abcdef";
-  for (const parameters of [{ room, seat: "s" }, { watch: room }]) {
+  for (const parameters of [{ room, participant_token: "s" }, { view_token: room }]) {
     new Session("b1", handlers, () => parameters).connect();
     socket().onopen();
     expect(socket().opening).toEqual({ type: "open", ...parameters, resume: null });

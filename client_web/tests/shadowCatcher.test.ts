@@ -7,9 +7,9 @@ import { LOOK } from "./exampleLook";
 
 test("no curve is open on a ground that only catches shadows, and the same one again on its surface", () => {
   models.value = [{ model: "cook_torrance", curves: [{ name: "theta_h" }] }] as unknown as ModelBody[];
-  const withGround = (catcher: boolean) => ({
+  const withGround = (isCatcher: boolean) => ({
     ...LOOK,
-    materials: { ...LOOK.materials, Teapot: { ...LOOK.materials.Teapot!, catcher } },
+    materials: { ...LOOK.materials, Teapot: { ...LOOK.materials.Teapot!, shadow_catcher: isCatcher } },
   });
   [selectedMaterial.value, selectedTerm.value, selectedCurve.value] = ["Teapot", 1, "theta_h"];
   look.value = withGround(false);

@@ -15,7 +15,7 @@ vi.mock("../src/session/scene/openScene", () => ({
   },
 }));
 
-const OF_THE_SERVER = { id: "a", created: "", scene: "s", lacking: [] };
+const OF_THE_SERVER = { id: "a", created: "", scene: "s", missing: [] };
 const PATHS = { show: "first_bounce", bounces: 24 } as const;
 let saved: ShareRequest;
 
@@ -29,7 +29,7 @@ beforeEach(() => {
   vi.stubGlobal("navigator", { clipboard: { writeText: () => Promise.resolve() } });
   vi.stubGlobal("fetch", (_path: string, init?: RequestInit) => {
     if (init?.method !== "POST") {
-      const body: ShareBody = { solo: null, solo_light: null, paths: null, eyes: {}, sizes: {}, ...saved, ...OF_THE_SERVER, look: LOOK };
+      const body: ShareBody = { solo: null, solo_light: null, paths: null, cameras: {}, sizes: {}, ...saved, ...OF_THE_SERVER, look: LOOK };
       return Promise.resolve(Response.json(body));
     }
     saved = JSON.parse(init.body as string) as ShareRequest;
@@ -53,12 +53,12 @@ test("a link carries what is looked at, and a visitor's own gives way to it", as
 test("a link carries from where a view is seen whose eye moves", async () => {
   const turned = { to_world: [0, 0, 1, 4, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 0, 1], yfov: Math.PI / 6 };
   const info = { name: "front", width: 4, height: 3, camera: turned };
-  views.value = [{ ...info, eye: "free" }, { ...info, name: "left", eye: "fixed" }] as unknown as typeof views.value;
+  views.value = [{ ...info, camera_mode: "free" }, { ...info, name: "left", camera_mode: "fixed" }] as unknown as typeof views.value;
   shownViews.value = ["front", "left"];
   await copyShareLink();
-  expect(Object.keys(saved.eyes ?? {})).toEqual(["front"]);
-  expect(saved.eyes?.front?.to_world).toEqual(turned.to_world);
-  expect(saved.eyes?.front?.yfov).toBeCloseTo(30);
+  expect(Object.keys(saved.cameras ?? {})).toEqual(["front"]);
+  expect(saved.cameras?.front?.to_world).toEqual(turned.to_world);
+  expect(saved.cameras?.front?.yfov).toBeCloseTo(30);
   expect(saved.sizes).toEqual({});
   vi.stubGlobal("requestAnimationFrame", () => 1);
   vi.stubGlobal("cancelAnimationFrame", () => undefined);

@@ -18,7 +18,7 @@ test("a material offers the images that its own terms take, in their order", () 
 
 test("a material that was no mirror when it was baked reflects softly once it is polished", () => {
   const curves = ["theta_h", "theta_d", "theta_i"].map((name) => ({ name, angle: name }));
-  models.value = [{ model: "ggx", width: "roughness", mirrors_below: 0.06, curves }] as unknown as ModelBody[];
+  models.value = [{ model: "ggx", width_parameter: "roughness", specular_below: 0.06, curves }] as unknown as ModelBody[];
   const ggx = (roughness: number | Rgb, fields: Partial<Term> = {}): Term => ({
     model: "ggx", color: [1, 1, 1], params: { roughness }, texture: "specular", ...fields,
   });
@@ -32,7 +32,7 @@ test("a material that was no mirror when it was baked reflects softly once it is
   expect(isSoftMirror("Paint", ggx([0.3, 0.3, 0.05]))).toBe(true);
   expect(isSoftMirror("Paint", ggx(0.06))).toBe(false);
   expect(isSoftMirror("Paint", ggx(0.05, { texture: "diffuse" }))).toBe(false);
-  expect(isSoftMirror("Paint", ggx(0.05, { roughness_map: true }))).toBe(false);
+  expect(isSoftMirror("Paint", ggx(0.05, { roughness_map: "roughness" }))).toBe(false);
   expect(isSoftMirror("Paint", ggx(0.05, { curves: { theta_h: drawn } }))).toBe(false);
   expect(isSoftMirror("Paint", ggx(0.05, { curves: { theta_d: drawn } }))).toBe(true);
   expect(isSoftMirror("Paint", ggx(0.05, { curves: { theta_i: drawn } }))).toBe(true);
@@ -42,8 +42,8 @@ test("a material that was no mirror when it was baked reflects softly once it is
 });
 
 test("that more light is sent back than arrives is said, and nothing else", () => {
-  expect(albedoMessage({ mean: [0.5, 0.5, 0.5], most: 1.01, at_deg: 89 })).toBeNull();
-  expect(albedoMessage({ mean: [0.7, 0.2, 0.4], most: 1.234, at_deg: 80.6 })).toBe(
+  expect(albedoMessage({ mean: [0.5, 0.5, 0.5], max: 1.01, max_angle_degrees: 89 })).toBeNull();
+  expect(albedoMessage({ mean: [0.7, 0.2, 0.4], max: 1.234, max_angle_degrees: 80.6 })).toBe(
     "Sends back more light than meets it: 123 % of it 81° from the normal, 70 % on average. No real surface does.",
   );
 });

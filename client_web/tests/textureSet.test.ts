@@ -70,7 +70,7 @@ test("one message says what is used and what is not, and a step has the name tha
 test("a material with a set has all of it at once", () => {
   models.value = [
     { model: "lambert", texture: "diffuse", parameters: [] },
-    { model: "ggx", texture: "specular", width: "roughness", width_power: 1, parameters: [{ name: "roughness", minimum: 0, maximum: 1 }] },
+    { model: "ggx", texture: "specular", width_parameter: "roughness", width_power: 1, parameters: [{ name: "roughness", minimum: 0, maximum: 1 }] },
   ] as unknown as ModelBody[];
   const image = (name: string) => ({ texture: `image:${name}`, roughness: 0.7 }) as ImageBody;
   const set = new Map<Slot, ImageBody>([["base color", image("c")], ["roughness", image("r")], ["normals", image("n")]]);

@@ -186,14 +186,14 @@ test("a pause and a play within one frame do not play twice as fast", async () =
 test("the eye goes from where one key is seen to where the other is, and rests where the playing ends", async () => {
   const at = (x: number, yfov = 40) => ({ to_world: [1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, 4, 0, 0, 0, 1], yfov });
   const bounds = [[-1, -1, -1], [1, 1, 1]];
-  views.value = [{ name: "front", width: 4, height: 3, eye: "free", bounds, camera: at(0, 0.5) } as never];
+  views.value = [{ name: "front", width: 4, height: 3, camera_mode: "free", bounds, camera: at(0, 0.5) } as never];
   [shownViews.value, activeViewName.value, cameraPathMode.value] = [["front"], "front", "along"];
   const path = Array.from({ length: numFrames.value }, (_, k) => at(k));
   await prepared(path);
   setKeyframeCamera(1, at(100));
-  expect(renderPath("along", 9)).toMatchObject({ eyes: [{ to_world: at(0).to_world }, at(100)] });
-  expect(renderPath("around", 9)).toMatchObject({ turntable: 9, start: { to_world: at(0).to_world } });
-  expect(renderPath("object", 9)).toMatchObject({ turns: "object", start: { to_world: at(0).to_world } });
+  expect(renderPath("along", 9)).toMatchObject({ cameras: [{ to_world: at(0).to_world }, at(100)] });
+  expect(renderPath("around", 9)).toMatchObject({ turntable: 9, start_camera: { to_world: at(0).to_world } });
+  expect(renderPath("object", 9)).toMatchObject({ rotate: "object", start_camera: { to_world: at(0).to_world } });
   expect(renderPath("still", 9)).toBeNull();
   await vi.waitFor(() => expect(frameLookList.value).not.toBeNull());
   const x = () => views.value[0]?.camera.to_world[3];
@@ -216,7 +216,7 @@ test("one look is enough where the environment turns, and a view that was baked 
   timelineOpen.value = true;
   addKeyframe({ name: "Dark", look: LOOK });
   await vi.waitFor(() => expect(frameLookList.value).not.toBeNull());
-  expect(renderPath("environment", 9)).toEqual({ turntable: 9, turns: "environment", start: null });
+  expect(renderPath("environment", 9)).toEqual({ turntable: 9, rotate: "environment", start_camera: null });
   seek(1);
   expect(look.value?.environment.rotation).toBe(numFrames.value - 1);
   expect(activeControl.value).toBe("/environment/rotation");

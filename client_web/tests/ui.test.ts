@@ -99,9 +99,9 @@ describe("terms", () => {
     source: "",
     texture: "specular",
     needs_data: false,
-    width: name === "flat" ? null : "roughness",
+    width_parameter: name === "flat" ? null : "roughness",
     width_power: name === "flat" ? null : 1,
-    mirrors_below: null,
+    specular_below: null,
     data_prefix: null,
     parameters: parameters.map((p) => ({
       name: p,
@@ -113,15 +113,15 @@ describe("terms", () => {
       scale: "linear",
       help: "",
       step: null,
-      fixed: false,
+      requires_new_operator: false,
     })),
     curves: [],
   });
   const models = [model("ggx", ["roughness", "f0"]), model("schlick", ["roughness", "r"]), model("flat", [])];
 
   test("the map of roughness stays where the new model has a width", () => {
-    const term = { ...defaultTerm(models[0] as ModelBody), roughness_map: true };
-    expect(withModel(term, "schlick", models).roughness_map).toBe(true);
+    const term = { ...defaultTerm(models[0] as ModelBody), roughness_map: "roughness" };
+    expect(withModel(term, "schlick", models).roughness_map).toBe("roughness");
     expect(withModel(term, "flat", models)).not.toHaveProperty("roughness_map");
   });
 

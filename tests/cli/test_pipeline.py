@@ -276,9 +276,9 @@ def test_an_import_prints_its_id_and_what_was_read(run: Any, tmp_path: Path) -> 
     assert "  2 × 1 × 0 m, +Y is up" in said
     assert "  material M: lambert + ggx" in said
     assert [line.partition(":")[0] for line in said.splitlines() if "warning" in line] == [
-        "warning, wrong",
-        "warning, simplified",
-        "warning, unused",
+        "warning, unsupported",
+        "warning, approximated",
+        "warning, ignored",
     ]
     (scene,) = parsed(run("import", str(tmp_path / "t.obj"), "--json", data=tmp_path / "data")[1])
     assert scene["id"] == text.strip()

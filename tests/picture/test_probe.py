@@ -76,7 +76,7 @@ def test_probe_of_background_and_outside(transfer):
             picture.inspect(x, y)
 
 
-@pytest.mark.parametrize(("intensity", "color"), [(2.0, [1.0, 1.0, 1.0]), (0.5, [1.0, 0.2, 3.0])])
+@pytest.mark.parametrize(("scale", "color"), [(2.0, [1.0, 1.0, 1.0]), (0.5, [1.0, 0.2, 3.0])])
 def test_scaled_and_coloured_light_changes_probe_and_picture_alike_without_freezing(transfer, scale, color):
     def brighten(document):
         document["environment"] |= {"intensity": scale, "color": color}

@@ -38,18 +38,18 @@ const TURNTABLE_EXPORTS: ExportOption[] = [
   {
     label: "Turntable, quick",
     help: `${TURNTABLE_FRAMES} frames once around, as the view looks while it moves; PNG in a ZIP`,
-    run: () => exportTurntable("png", false),
+    run: () => exportTurntable("png", "interactive"),
   },
   {
     label: "Turntable, exact",
     help: `Each of ${TURNTABLE_FRAMES} frames as where the eye rests; takes as long for each`,
-    run: () => exportTurntable("png", true),
+    run: () => exportTurntable("png", "exact"),
   },
-  { label: "Turntable as a video", help: "The quick one as MP4", run: () => exportTurntable("mp4", false) },
+  { label: "Turntable as a video", help: "The quick one as MP4", run: () => exportTurntable("mp4", "interactive") },
 ];
 
 const TURNTABLE_LABELS: Record<TurntableRotation, string> = {
-  eye: "the eye goes around",
+  camera: "the eye goes around",
   object: "the object turns, under light that stays",
   environment: "the environment turns alone",
 };

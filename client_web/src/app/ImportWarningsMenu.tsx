@@ -5,13 +5,13 @@ import { scene } from "../state/scene";
 
 export function ImportWarningsMenu() {
   const [open, setOpen] = useState(false);
-  const warnings = scene.value?.remarks ?? [];
+  const warnings = scene.value?.warnings ?? [];
   if (warnings.length === 0) return null;
   const label = `What the import says: ${warningCounts(warnings)}`;
   return (
     <div class="menu" onKeyDown={(event) => event.key === "Escape" && setOpen(false)}>
       <button
-        class={warnings.some(({ effect }) => effect === "wrong") ? "remark-mark is-wrong" : "remark-mark"}
+        class={warnings.some(({ severity }) => severity === "unsupported") ? "remark-mark is-wrong" : "remark-mark"}
         aria-expanded={open}
         aria-label={label}
         title={label}

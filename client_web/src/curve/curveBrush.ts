@@ -24,7 +24,7 @@ export function clearBrush(): void {
 const isPointBrush = () => hasFreeCamera.peek() && (fidelity.peek() === "approximate" || fidelity.peek() === "preview");
 
 /** Whether the operator of the open curve is being precomputed. */
-const isPending = () => freezeStatus.peek()?.state === "freezing" || isPointBrush();
+const isPending = () => freezeStatus.peek()?.state === "precomputing" || isPointBrush();
 
 /** Request the pixels of an interval; at first only when the pointer stops, then at most every `EVERY_MS`; when the curve is
  * precomputed, and in a free-camera view when the camera has stopped. */
@@ -40,7 +40,7 @@ export function requestBrush(from: number, to: number): void {
     }
     last = performance.now();
     brushedRange.value = [from, to];
-    sendToShown({ type: "brush", curve, from: Math.max(0, from), to: Math.min(90, to) });
+    sendToShown({ type: "highlight_curve_range", curve, from: Math.max(0, from), to: Math.min(90, to) });
   };
   timer = window.setTimeout(request, wait);
 }

@@ -49,7 +49,7 @@ export class ViewImage {
   /** Take a frame and draw it; an image of another size replaces what was there. Resolves when it is drawn. */
   async show(frame: Frame): Promise<void> {
     const { width, height, kind, format, revision } = frame.header;
-    if (kind === "brush") return this.showBrush(frame);
+    if (kind === "highlight") return this.showBrush(frame);
     if (format === "jpeg") return this.showJpeg(frame);
     if (this.pixels.width !== width || this.pixels.height !== height) {
       this.pixels = emptyPixels(width, height);

@@ -30,7 +30,7 @@ export async function showFrame(source: BakeConnection, frame: Frame): Promise<v
   const { view, kind } = frame.header;
   const isShown = source === connections.shown;
   if (source !== connections.incoming && !(isShown && shownViews.peek().includes(view))) return;
-  if (!source.pendingFrames.isDisplayed(view)) return kind === "brush" ? undefined : receiveFirstFrames(source, frame);
+  if (!source.pendingFrames.isDisplayed(view)) return kind === "highlight" ? undefined : receiveFirstFrames(source, frame);
   await stage.imageOf(view).show(frame).catch(showError);
   if (kind === "picture" && source === connections.shown) recordShownFrame(source, frame.header);
 }
@@ -40,7 +40,7 @@ async function receiveFirstFrames(source: BakeConnection, frame: Frame): Promise
   const { view } = frame.header;
   const isNew = source.pendingFrames.get(view) === undefined;
   const pendingFrame = source.pendingFrames.addFrame(frame);
-  const isFixed = source.hello?.views.find(({ name }) => name === view)?.eye !== "free"; // else its pixels are of no place
+  const isFixed = source.hello?.views.find(({ name }) => name === view)?.camera_mode !== "free"; // else its pixels are of no place
   if (isNew && isFixed && stage.imageOf(view).idsOf !== source.bake) void loadMaterialIds(source.bake, view, pendingFrame);
   if (!pendingFrame.isComplete) return;
   if (source === connections.shown) return showCompleteView(source, view);
@@ -63,7 +63,7 @@ async function showCompleteView(bakeConnection: BakeConnection, view: string): P
 /** Follow a connection from now on: its bake and views. */
 export function applyBake(bakeConnection: BakeConnection): void {
   if (bakeConnection.hello === null) return;
-  const { views: baked, method: light, axes: changeable, moving_error: error } = bakeConnection.hello;
+  const { views: baked, method: light, axes: changeable, free_camera_error: error } = bakeConnection.hello;
   const shownBake = shownViewsOf(bakeConnection.hello);
   batch(() => {
     views.value = baked;

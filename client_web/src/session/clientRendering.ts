@@ -1,12 +1,12 @@
 /** Free-camera views that this browser draws itself: a moving camera needs no network. The server sends
- * what a look makes (frames of kind "tables"), and sends exact images as ever; where it has not caught up, or the
+ * what a look makes (frames of kind "scene_update"), and sends exact images as ever; where it has not caught up, or the
  * browser cannot draw, it sends all images. */
 import { computed, effect, signal } from "@preact/signals";
 import { FreeCameraRenderer } from "../render/freeCamera/freeCameraRenderer";
 import { isSoftwareRenderer } from "../render/freeCamera/isSoftwareRenderer";
 import { getJson, request } from "./net/api";
 import type { Frame } from "./net/binaryFrame";
-import { MAX_EYE_PIXELS, SURFACE_LAYOUT, type FrameHeader, type FreeCameraBody } from "../protocol";
+import { MAX_CAMERA_PIXELS, PROBES_LAYOUT, type FrameHeader, type FreeCameraBody } from "../protocol";
 import { recordClientFrame } from "../state/latency";
 import { usesTexelShading } from "../state/look";
 import { views } from "../state/views";
@@ -14,7 +14,7 @@ import { showNote } from "../ui/toasts";
 import { connections, type BakeConnection } from "./connections";
 import { showFrame } from "./bakeSwap";
 
-export type RendererMode = "auto" | "browser" | "server";
+export type RendererMode = "auto" | "client" | "server";
 
 const RENDERER_KEY = "relume.drawnBy";
 const MAX_RENDER_MS = 80;
@@ -59,7 +59,7 @@ let renderDurations: number[] = [];
 function loadRendererChoice(): RendererMode {
   try {
     const stored = localStorage.getItem(RENDERER_KEY);
-    return stored === "browser" || stored === "server" ? stored : "auto";
+    return stored === "client" || stored === "server" ? stored : "auto";
   } catch {
     return "auto"; // a browser without storage
   }
@@ -72,7 +72,7 @@ export function setRenderer(choice: RendererMode): void {
 
 /** The size of a free-camera view's images. */
 export function limitRenderSize(width: number, height: number): [number, number] {
-  const scale = Math.min(1, Math.sqrt(MAX_EYE_PIXELS / (width * height)));
+  const scale = Math.min(1, Math.sqrt(MAX_CAMERA_PIXELS / (width * height)));
   return [Math.floor(width * scale), Math.floor(height * scale)];
 }
 
@@ -101,8 +101,8 @@ export function renderIfPossible(view: string): boolean {
 
 /** Take a frame of a server. */
 export async function onFrame(source: BakeConnection, frame: Frame): Promise<void> {
-  const { view, kind, eye: cameraSeq } = frame.header;
-  if (kind === "tables") return onTables(source, frame);
+  const { view, kind, camera_seq: cameraSeq } = frame.header;
+  if (kind === "scene_update") return onTables(source, frame);
   const isRenderedHere = isClientRendering.peek() && clientRenderer?.bakeConnection === source && kind === "picture";
   const isLate = isRenderedHere && (movingViews.has(view) || (cameraSeqs.has(view) && cameraSeq !== null && cameraSeqs.get(view) !== cameraSeq));
   if (isLate) return;
@@ -116,8 +116,8 @@ export async function onFrame(source: BakeConnection, frame: Frame): Promise<voi
 
 async function onTables(source: BakeConnection, frame: Frame): Promise<void> {
   const { header, payload } = frame;
-  if (clientRenderer?.bakeConnection !== source || header.tables === null) return;
-  clientRenderer.renderer.setTables(header.tables, payload);
+  if (clientRenderer?.bakeConnection !== source || header.scene_update === null) return;
+  clientRenderer.renderer.setTables(header.scene_update, payload);
   clientRenderer.headers.set(header.view, header);
   if (clientRenderer.renderer.lacksVisibleLights) {
     try {
@@ -176,7 +176,7 @@ async function renderFrame({ renderer, headers }: ClientRenderer, name: string):
   const { width, height, encoded, coverage } = await renderer.draw(view.camera, ...limitRenderSize(view.width, view.height));
   recordClientFrame();
   const fullFrame = { tiles: [[0, 0, width, height]] as FrameHeader["tiles"], format: "rgb9e5" as const, kind: "picture" as const };
-  return { header: { ...header, ...fullFrame, width, height, alpha: coverage !== null, tables: null }, payload: encoded, alpha: coverage };
+  return { header: { ...header, ...fullFrame, width, height, alpha: coverage !== null, scene_update: null }, payload: encoded, alpha: coverage };
 }
 
 /** Where it was not asked for, drawing here goes on only as long as it is quick. */
@@ -212,13 +212,13 @@ function releaseToServer(): void {
   staleViews.clear();
   movingViews.clear();
   renderer.release();
-  bakeConnection.session.send({ type: "evaluate", by: "server" });
+  bakeConnection.session.send({ type: "renderer", renderer: "server" });
   bakeConnection.isRenderingAnnounced = false;
 }
 
 /** An image of a view is shown: from now on this browser may draw it. */
 async function offerClientRendering(bakeConnection: BakeConnection, view: string): Promise<void> {
-  const isFree = bakeConnection.hello?.views.find(({ name }) => name === view)?.eye === "free";
+  const isFree = bakeConnection.hello?.views.find(({ name }) => name === view)?.camera_mode === "free";
   if (!isFree || bakeConnection !== connections.shown || isServerRendering.peek() || rejectedConnections.has(bakeConnection)) return;
   if (clientRenderer?.bakeConnection === bakeConnection) return announceClientRendering(clientRenderer);
   if (loadingConnection === bakeConnection) return;
@@ -233,7 +233,7 @@ async function offerClientRendering(bakeConnection: BakeConnection, view: string
     announceClientRendering(newRenderer);
   } catch (error) {
     rejectedConnections.add(bakeConnection);
-    if (rendererChoice.peek() === "browser") showNote(`${(error as Error).message}; the server draws instead.`);
+    if (rendererChoice.peek() === "client") showNote(`${(error as Error).message}; the server draws instead.`);
   } finally {
     loadingConnection = null;
   }
@@ -243,7 +243,7 @@ async function offerClientRendering(bakeConnection: BakeConnection, view: string
 function announceClientRendering({ bakeConnection, headers }: ClientRenderer): void {
   if (bakeConnection.isRenderingAnnounced) return;
   headers.clear();
-  bakeConnection.isRenderingAnnounced = bakeConnection.session.send({ type: "evaluate", by: "browser" });
+  bakeConnection.isRenderingAnnounced = bakeConnection.session.send({ type: "renderer", renderer: "client" });
   isClientRendering.value = bakeConnection.isRenderingAnnounced;
 }
 
@@ -256,7 +256,7 @@ async function loadClientRenderer(bakeConnection: BakeConnection): Promise<Clien
     return null;
   }
   const surface = await getJson<FreeCameraBody>(arrayUrl(bakeConnection));
-  if (surface.has_holes) throw new Error("This browser cannot draw glass or surfaces with holes");
+  if (surface.has_alpha_test) throw new Error("This browser cannot draw glass or surfaces with holes");
   const names = surface.arrays.filter((name) => name !== LOBE_LIGHTS_ARRAY);
   const arrays = await Promise.all(names.map(async (name) => [name, await loadArray(bakeConnection, name)] as const));
   return { bakeConnection, renderer: new FreeCameraRenderer(gl, surface, new Map(arrays)), headers: new Map(), lobeLightsLoading: null };
@@ -267,7 +267,7 @@ async function loadArray(bakeConnection: BakeConnection, name: string): Promise<
 }
 
 const arrayUrl = ({ bake }: BakeConnection, array = ""): string =>
-  `/api/bakes/${encodeURIComponent(bake)}/surface${array}?layout=${SURFACE_LAYOUT}`;
+  `/api/bakes/${encodeURIComponent(bake)}/probes${array}?layout=${PROBES_LAYOUT}`;
 
 effect(() => {
   const choice = rendererChoice.value;

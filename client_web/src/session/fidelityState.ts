@@ -24,9 +24,9 @@ export function resetExactness(viewNames: string[]): void {
 export function recordShownFrame(bakeConnection: BakeConnection, header: FrameHeader): void {
   const image = stage.imageOf(header.view);
   image.exactRevision = header.exact ? header.revision : -1;
-  image.exactShared = header.exact ? header.shared : -1;
+  image.exactShared = header.exact ? header.room_revision : -1;
   image.fidelity = header.fidelity;
-  if (header.was_off !== null) freeCameraError.value = header.was_off;
+  if (header.previous_error !== null) freeCameraError.value = header.previous_error;
   updateFidelity();
   updateExactness(bakeConnection);
 }

@@ -17,7 +17,7 @@ export function requestPixelProbe(view: string, x: number, y: number): Promise<I
       clearTimeout(timer);
       probeListeners.delete(onAnswer);
     };
-    const sendRequest = () => sendToShown({ type: "probe", view, x, y });
+    const sendRequest = () => sendToShown({ type: "inspect", view, x, y });
     const onAnswer = (answer: InspectAnswer): void => {
       if (answer.view !== view || answer.x !== x || answer.y !== y) return void sendRequest();
       finish();

@@ -9,7 +9,7 @@ import { sendToShown } from "./connections";
 /** The pointer has come to the control of a parameter, a light or a field of the environment. */
 export function beginDrag(parameter: string): void {
   activeControl.value = parameter;
-  sendToShown({ type: "touch", parameter });
+  sendToShown({ type: "prepare", parameter });
 }
 
 /** The pointer has come back to the open curve, which the server may have evicted meanwhile. */
@@ -20,7 +20,7 @@ export function beginCurveDrag(): void {
 
 function prepareCurve(curve: string): void {
   activeControl.value = curve;
-  sendToShown({ type: "touch", curve });
+  sendToShown({ type: "prepare", curve });
 }
 
 effect(() => {

@@ -22,11 +22,11 @@ function withOwnView(sharedLook: Look): Look {
 function updateRoom({ room }: HelloMessage): void {
   const currentJoin = joinState.peek();
   members.value = room?.people ?? [];
-  selfNumber.value = room?.you ?? null;
+  selfNumber.value = room?.self_id ?? null;
   if (room === null || currentJoin === null) return;
-  if (!room.created && loadMemberToken(currentJoin) === null) history.clear();
-  saveMemberToken(currentJoin, room.seat);
-  joinState.value = { ...currentJoin, watch: room.watch };
+  if (!room.is_new && loadMemberToken(currentJoin) === null) history.clear();
+  saveMemberToken(currentJoin, room.participant_token);
+  joinState.value = { ...currentJoin, watch: room.view_token };
 }
 
 /** Join a room: if it exists, its look replaces the own one; else it begins with the own look, and
@@ -34,7 +34,7 @@ function updateRoom({ room }: HelloMessage): void {
 export function joinRoom(bakeConnection: BakeConnection, hello: HelloMessage): boolean {
   updateRoom(hello);
   const shared = bakeConnection.session.look;
-  if (hello.room === null || hello.room.created || shared === null) return false;
+  if (hello.room === null || hello.room.is_new || shared === null) return false;
   if (bakeConnection !== connections.shown) return true; // it takes over later
   previewedStep.value = null;
   look.value = hello.role === "view" ? shared : withOwnView(shared);

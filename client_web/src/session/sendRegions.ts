@@ -14,7 +14,7 @@ const SETTLE_MS = 150;
 export function sendRegions(bakeConnection: BakeConnection | null): void {
   if (!bakeConnection?.hello) return;
   const connection = shownViewsOf(bakeConnection.hello);
-  for (const { name, eye: cameraMode, width, height } of bakeConnection.hello.views) {
+  for (const { name, camera_mode: cameraMode, width, height } of bakeConnection.hello.views) {
     const screen = stage.imageOf(name).screen;
     if (cameraMode === "free" || screen === null || !connection.includes(name)) continue;
     const canvas = { ...screen.size(), aspect: width / height };

@@ -6,9 +6,9 @@ import { connections, type BakeConnection } from "./connections";
 import { resetExactness } from "./fidelityState";
 
 /** Of a bake's views, those that the user wants to see. */
-export function shownViewsOf({ views, view }: HelloMessage): string[] {
+export function shownViewsOf({ views, focused_view }: HelloMessage): string[] {
   const names = views.map(({ name }) => name);
-  return availableViews(shownViews.peek(), names, names.includes(view) ? view : (names[0] ?? view));
+  return availableViews(shownViews.peek(), names, names.includes(focused_view) ? focused_view : (names[0] ?? focused_view));
 }
 
 /** The view that will have the focus when a bake is shown. */
@@ -32,10 +32,10 @@ export function sendViews(bakeConnection: BakeConnection, shownNames: string[], 
 /** Send the placed cameras of free-camera views: a pending bake is rendered from there at once. */
 export function sendCameras(bakeConnection: BakeConnection, hello: HelloMessage): void {
   const shownNames = shownViewsOf(hello);
-  for (const { name, eye: cameraMode } of hello.views) {
+  for (const { name, camera_mode: cameraMode } of hello.views) {
     const placedCamera = cameraMode === "free" && shownNames.includes(name) ? placedCameraOf(name) : null;
     if (placedCamera === null) continue;
     const { camera, size } = placedCamera;
-    bakeConnection.session.send({ type: "eye", view: name, eye: Date.now(), ...camera, size, hand: null, rest: "exact" });
+    bakeConnection.session.send({ type: "camera", view: name, seq: Date.now(), ...camera, size, active_control: null, refine: "exact" });
   }
 }

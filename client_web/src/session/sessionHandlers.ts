@@ -52,7 +52,7 @@ function adoptLook(serverLook: Look): void {
 /** What a new connection needs to know: which views, how to stream, and the look where it has another one. */
 function handleHello(bakeConnection: BakeConnection, hello: HelloMessage): void {
   bakeConnection.onHello(hello);
-  defaultLook.value ??= (hello.room?.default ?? hello.look) as unknown as Look;
+  defaultLook.value ??= (hello.room?.default_look ?? hello.look) as unknown as Look;
   if (!joinRoom(bakeConnection, hello)) {
     adoptLook(hello.look as unknown as Look);
     requestFrames(bakeConnection, look.peek() as Look, performance.now());
@@ -64,9 +64,9 @@ function handleHello(bakeConnection: BakeConnection, hello: HelloMessage): void 
     freezeStatus.value = null;
     applyBake(bakeConnection);
   }
-  bakeConnection.session.send({ type: "stream", format: "auto", quality: 80 });
+  bakeConnection.session.send({ type: "encoding", format: "auto", quality: 80 });
   const curve = curvePath.peek();
-  if (curve !== null) bakeConnection.session.send({ type: "touch", curve });
+  if (curve !== null) bakeConnection.session.send({ type: "prepare", curve });
 }
 
 /** The server has refused the edit that was made last: what it took before is shown again. */
@@ -91,7 +91,7 @@ export function makeSessionHandlers(source: BakeConnection): SessionHandlers {
     },
     hello: (message) => handleHello(source, message),
     frame: (frame) => onFrame(source, frame),
-    status({ state, view, what: label, progress }) {
+    status({ state, view, label, progress }) {
       if (isShown()) freezeStatus.value = state === "ready" ? null : { state, view, label, progress };
     },
     problem({ problem, revision }, lastGood) {
@@ -99,7 +99,7 @@ export function makeSessionHandlers(source: BakeConnection): SessionHandlers {
       else showError(`${problemText(problem)} The look is as it was before.`, "edit");
       if (isShown() && revision !== null) revertLook(source, lastGood);
     },
-    probe(message) {
+    inspect(message) {
       deliverProbe(message);
       const pixel = pixelProbe.peek();
       if (isShown() && pixel?.view === message.view) pixelProbe.value = { ...pixel, answer: message };
@@ -110,10 +110,10 @@ export function makeSessionHandlers(source: BakeConnection): SessionHandlers {
     room(message) {
       if (!isShown() || joinState.peek() === null) return;
       members.value = message.people;
-      selfNumber.value = message.you;
+      selfNumber.value = message.self_id;
     },
     comments: () => onComments(),
-    shared: (message, shared) => onRoomUpdate(source, message, shared),
+    roomUpdate: (message, sharedLook) => onRoomUpdate(source, message, sharedLook),
     bake({ bake: id, state, progress, phase, seconds_left }) {
       if (state === "ready") onBakeReady(id);
       else pendingBake.value = { id, state: state as "running", progress, phase, seconds_left, problem: null };

@@ -36,7 +36,7 @@ export function BakeDialog({ scene, onClose, onOpen }: BakeDialogProps) {
       <p>
         A preview opens the editor at once; the bake you choose takes its place when it is ready, and no edit is lost.
       </p>
-      {scene.remarks.length > 0 && <ImportWarnings warnings={scene.remarks} />}
+      {scene.warnings.length > 0 && <ImportWarnings warnings={scene.warnings} />}
       <Presets
         key={scene.id}
         scene={scene}

@@ -1,18 +1,18 @@
 /** What an import has to say about its file, grouped by what it does to the image. */
 import type { SceneBody } from "../protocol";
 
-type ImportWarning = SceneBody["remarks"][number];
-type WarningEffect = ImportWarning["effect"];
+type ImportWarning = SceneBody["warnings"][number];
+type Severity = ImportWarning["severity"];
 
-const WARNING_GROUPS: readonly { effect: WarningEffect; title: string; short: string }[] = [
-  { effect: "wrong", title: "Looks other than in the file", short: "wrong" },
-  { effect: "simplified", title: "Simplified: looks much the same", short: "simplified" },
-  { effect: "unused", title: "Not used: the picture is the same without", short: "unused" },
+const WARNING_GROUPS: readonly { severity: Severity; title: string; short: string }[] = [
+  { severity: "unsupported", title: "Looks other than in the file", short: "wrong" },
+  { severity: "approximated", title: "Simplified: looks much the same", short: "simplified" },
+  { severity: "ignored", title: "Not used: the picture is the same without", short: "unused" },
 ];
 
 /** How many there are of each kind: "2 wrong, 1 simplified". */
 export function warningCounts(warnings: readonly ImportWarning[]): string {
-  const counts = WARNING_GROUPS.map(({ effect, short }) => [warnings.filter((each) => each.effect === effect).length, short]);
+  const counts = WARNING_GROUPS.map(({ severity, short }) => [warnings.filter((each) => each.severity === severity).length, short]);
   return counts
     .filter(([count]) => count !== 0)
     .map(([count, short]) => `${count} ${short}`)
@@ -22,11 +22,11 @@ export function warningCounts(warnings: readonly ImportWarning[]): string {
 export function ImportWarnings({ warnings }: { warnings: readonly ImportWarning[] }) {
   return (
     <div class="remarks" role="group" aria-label="What the import says" tabIndex={0}>
-      {WARNING_GROUPS.map(({ effect, title }) => {
-        const groupWarnings = warnings.filter((warning) => warning.effect === effect);
+      {WARNING_GROUPS.map(({ severity, title }) => {
+        const groupWarnings = warnings.filter((warning) => warning.severity === severity);
         return (
           groupWarnings.length > 0 && (
-            <section key={effect} class={`remark-${effect}`} aria-label={title}>
+            <section key={severity} class={`remark-${severity}`} aria-label={title}>
               <h3>
                 {title} <span class="count">{groupWarnings.length}</span>
               </h3>

@@ -42,16 +42,16 @@ export function SceneCard({ scene, onOpen, onBake, onDelete, onAddGround, onRead
           {scene.materials.length === 1 ? "material" : "materials"} · {scene.views.length}&nbsp;
           {scene.views.length === 1 ? "view" : "views"}
         </small>
-        {scene.remarks.length > 0 && (
+        {scene.warnings.length > 0 && (
           <details>
-            <summary>Not as in the file: {warningCounts(scene.remarks)}</summary>
-            <ImportWarnings warnings={scene.remarks} />
+            <summary>Not as in the file: {warningCounts(scene.warnings)}</summary>
+            <ImportWarnings warnings={scene.warnings} />
           </details>
         )}
       </div>
       <div class="scene-actions" inert={!mayEdit.value}>
         <button onClick={onBake}>Bake…</button>
-        {!scene.materials.some(({ catcher }) => catcher) && (
+        {!scene.materials.some(({ shadow_catcher }) => shadow_catcher) && (
           <button
             onClick={onAddGround}
             aria-label={`Put ${scene.name} on a ground`}

@@ -5,7 +5,7 @@ import { CameraPlacement } from "../viewport/cameras/CameraPlacement";
 import { removeCamera } from "../viewport/cameras/savedCameras";
 import type { CameraPose } from "../viewport/cameras/orbit";
 import { getScene } from "../session/net/api";
-import { MAX_VIEWS_SHOWN, type SceneBody, type SceneView } from "../protocol";
+import { MAX_VISIBLE_VIEWS, type SceneBody, type SceneView } from "../protocol";
 import { IconButton } from "../ui/IconButton";
 import { reportErrors } from "../ui/toasts";
 
@@ -62,7 +62,7 @@ export function ViewPicker({ scene, from, selected, onChoose }: ViewPickerProps)
   return (
     <fieldset class="bake-views">
       <legend>
-        Views{views.length > MAX_VIEWS_SHOWN && `, of which the editor shows ${MAX_VIEWS_SHOWN} at once`}
+        Views{views.length > MAX_VISIBLE_VIEWS && `, of which the editor shows ${MAX_VISIBLE_VIEWS} at once`}
       </legend>
       {views.map(({ name, is_placed }) => (
         <span class="bake-view" key={name}>

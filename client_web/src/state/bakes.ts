@@ -4,7 +4,7 @@ import type { BakeBody, HelloMessage } from "../protocol";
 
 /** What is known of a bake that is not ready yet. */
 export type BakeStatus = Pick<BakeBody, "id" | "state" | "progress" | "phase" | "seconds_left" | "problem"> &
-  Partial<Pick<BakeBody, "phase_seconds" | "ahead">>;
+  Partial<Pick<BakeBody, "phase_seconds" | "queue_position">>;
 
 export const bakes = signal<BakeBody[]>([]);
 /** The bake that the image shows, which light it has, and what can be changed in its images. */

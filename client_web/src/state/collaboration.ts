@@ -22,8 +22,8 @@ export const isInRoom = computed(() => selfNumber.value !== null);
 
 /** The other members as text that changes seldom; null if alone. */
 export const membersText = computed(() => {
-  const otherMembers = members.value.filter(({ number }) => number !== selfNumber.value);
-  const memberNames = otherMembers.map(({ name, here }) => (here ? name : `${name}, whose connection is lost`));
+  const otherMembers = members.value.filter(({ id }) => id !== selfNumber.value);
+  const memberNames = otherMembers.map(({ name, online }) => (online ? name : `${name}, whose connection is lost`));
   return memberNames.length === 0 ? null : `Together with ${memberNames.join(", ")}`;
 });
 

@@ -10,7 +10,7 @@ export const isOffline = signal(false);
 export const rejectionMessage = signal<string | null>(null);
 /** What takes time on the server: a curve that is frozen, or a term that is shaded for the first time. */
 export const freezeStatus = signal<{
-  state: "freezing" | "shading";
+  state: "precomputing" | "shading";
   view: string;
   label: string;
   progress: number;

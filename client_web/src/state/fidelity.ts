@@ -14,10 +14,10 @@ export const fidelity = signal<Fidelity>("exact");
 /** How far the free-camera image was from the exact one where a camera rested last, relative RMS; null before. */
 export const freeCameraError = signal<number | null>(null);
 /** The same as it was measured in the bake, in the scene's own look; null where that is not known. */
-export const bakedFreeCameraError = signal<HelloMessage["moving_error"]>(null);
+export const bakedFreeCameraError = signal<HelloMessage["free_camera_error"]>(null);
 
 /** As the server ranks them, worst first. */
-const FIDELITY_ORDER: Fidelity[] = ["preview", "approximate", "followed", "near", "exact"];
+const FIDELITY_ORDER: Fidelity[] = ["preview", "approximate", "incremental", "near_exact", "exact"];
 
 export function worstFidelity(fidelities: Fidelity[]): Fidelity {
   return FIDELITY_ORDER[Math.min(...fidelities.map((each) => FIDELITY_ORDER.indexOf(each)), FIDELITY_ORDER.length - 1)] as Fidelity;

@@ -22,7 +22,7 @@ export const curvePath = computed(() => {
   const [material, curve] = [selectedMaterial.value, selectedCurve.value];
   const term = selectedTerms.value[selectedTerm.value];
   if (material === null || curve === null || term === undefined) return null;
-  if (look.value?.materials[material]?.catcher) return null; // a shadow catcher's terms are invisible
+  if (look.value?.materials[material]?.shadow_catcher) return null; // a shadow catcher's terms are invisible
   if (!modelOf(term)?.curves.some((info) => info.name === curve)) return null;
   return jsonPointer("materials", material, "terms", selectedTerm.value, "curves", curve);
 });
@@ -47,7 +47,7 @@ export function selectMaterial(material: string | null): void {
   selectedLight.value = null;
   if (material === selectedMaterial.value) return;
   const materialLook = material === null ? undefined : look.value?.materials[material];
-  const materialTerms = materialLook === undefined || materialLook.catcher ? [] : materialLook.terms; // a shadow catcher's terms are invisible
+  const materialTerms = materialLook === undefined || materialLook.shadow_catcher ? [] : materialLook.terms; // a shadow catcher's terms are invisible
   const index = Math.max(
     0,
     materialTerms.findIndex((term) => modelOf(term)?.texture !== "diffuse"),

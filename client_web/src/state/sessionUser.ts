@@ -3,7 +3,7 @@ import { computed, signal } from "@preact/signals";
 import type { MeBody } from "../protocol";
 import { ownName, isWatching } from "./collaboration";
 
-export const sessionUser = signal<MeBody>({ login: false, name: "", role: "admin", by: "open", viewers_comment: false });
+export const sessionUser = signal<MeBody>({ login: false, name: "", role: "admin", auth_method: "open", allow_viewer_comments: false });
 
 const hasEditRole = computed(() => sessionUser.value.role === "edit" || sessionUser.value.role === "admin");
 
@@ -22,14 +22,14 @@ export const readOnlyMessage = computed(() =>
 
 /** Who only looks may comment where the server lets them, and is known by a name. */
 export const mayComment = computed(
-  () => mayEdit.value || (sessionUser.value.viewers_comment && (sessionUser.value.name !== "" || ownName.value !== "")),
+  () => mayEdit.value || (sessionUser.value.allow_viewer_comments && (sessionUser.value.name !== "" || ownName.value !== "")),
 );
 
 /** Why no comment can be written; null where one can. */
 export const noCommentMessage = computed(() =>
   mayComment.value
     ? null
-    : sessionUser.value.viewers_comment
+    : sessionUser.value.allow_viewer_comments
       ? "Say your name under “Work together” to comment."
       : "Who only looks reads comments here, and does not write them.",
 );

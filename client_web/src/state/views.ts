@@ -1,6 +1,6 @@
 /** Which views are shown, and which of them has the focus. */
 import { batch, computed, signal } from "@preact/signals";
-import { MAX_VIEWS_SHOWN, type HelloMessage } from "../protocol";
+import { MAX_VISIBLE_VIEWS, type HelloMessage } from "../protocol";
 
 /** Those that the shown bake has. */
 export const views = signal<HelloMessage["views"]>([]);
@@ -19,13 +19,13 @@ export const activeView = computed(() => views.value.find((v) => v.name === acti
 
 /** As many views as fit, in their order, the active one among them. */
 export function chooseSideBySide(all: readonly string[], active: string): string[] {
-  const first = all.slice(0, MAX_VIEWS_SHOWN);
+  const first = all.slice(0, MAX_VISIBLE_VIEWS);
   return first.includes(active) || !all.includes(active) ? first : [...first.slice(0, -1), active];
 }
 
 /** Of the views that are to be shown those that there are; where there are none, one. */
 export function availableViews(requested: readonly string[], all: readonly string[], fallback: string): string[] {
-  const available = requested.filter((name) => all.includes(name)).slice(0, MAX_VIEWS_SHOWN);
+  const available = requested.filter((name) => all.includes(name)).slice(0, MAX_VISIBLE_VIEWS);
   return available.length > 0 ? available : [fallback];
 }
 
@@ -53,4 +53,4 @@ export function setFocus(name: string): void {
 }
 
 /** Whether the camera of a shown view moves. */
-export const hasFreeCamera = computed(() => views.value.some(({ name, eye: cameraMode }) => cameraMode === "free" && shownViews.value.includes(name)));
+export const hasFreeCamera = computed(() => views.value.some(({ name, camera_mode: cameraMode }) => cameraMode === "free" && shownViews.value.includes(name)));

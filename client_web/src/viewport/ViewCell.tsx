@@ -127,7 +127,7 @@ export function ViewCell({ view }: { view: string }) {
   const { canvas, screen, failure } = useScreen(view);
   const pointer = useViewPointer(screen, view);
   const isGrid = sideBySide.value;
-  const moves = views.value.find(({ name }) => name === view)?.eye === "free";
+  const moves = views.value.find(({ name }) => name === view)?.camera_mode === "free";
   const label = isGrid ? `The view ${view}. Enter shows it alone.` : "The picture.";
   return (
     <div class={`cell ${isGrid && view === activeViewName.value ? "active" : ""}`}>

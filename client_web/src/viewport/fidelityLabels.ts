@@ -17,8 +17,8 @@ export interface FidelityMark {
 const MARKS: Record<Exclude<Fidelity, "exact">, FidelityMark> = {
   preview: { label: "Preview", title: "A few points are shaded, the others guessed from them. All are shaded next." },
   approximate: { label: "Updating…", title: "The picture is of a moment ago; what the new one needs is being made." },
-  followed: { label: "Followed closely", title: "What the hand changes is followed roughly. Exact at rest." },
-  near: { label: "Nearly exact", title: "What the hand changes is followed closely. Exact at rest." },
+  incremental: { label: "Followed closely", title: "What the hand changes is followed roughly. Exact at rest." },
+  near_exact: { label: "Nearly exact", title: "What the hand changes is followed closely. Exact at rest." },
 };
 const OTHER_LIGHT_MARK: FidelityMark = {
   label: "Baked for other light",

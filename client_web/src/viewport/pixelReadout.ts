@@ -20,7 +20,7 @@ function sendProbe(): void {
   const position = pixelProbe.peek();
   if (position === null || isMoving(position.view)) return; // the server has the previous camera: the probe is sent when both have stopped
   lastRequest = performance.now();
-  sendToShown({ type: "probe", view: position.view, x: position.x, y: position.y });
+  sendToShown({ type: "inspect", view: position.view, x: position.x, y: position.y });
 }
 
 function scheduleProbe(): void {

@@ -213,7 +213,7 @@ def test_the_exact_picture_takes_over_where_the_eye_rests_twice(
     server: Server, browser: Browser, moving_scene: str
 ) -> None:
     with opened_page(browser) as page:
-        page.add_init_script("localStorage.setItem('relume.drawnBy', 'browser')")
+        page.add_init_script("localStorage.setItem('relume.drawnBy', 'client')")
         page.goto(f"{server.url}/?scene={moving_scene}")
         editor = Editor(page)
         editor.wait_until_exact()

@@ -4,13 +4,13 @@ import { reportErrors } from "../../ui/toasts";
 import { logOut } from "./account";
 
 export function Account() {
-  const { login, name, role, by } = sessionUser.value;
+  const { login, name, role, auth_method } = sessionUser.value;
   if (!login) return null;
   return (
     <div class="account" title={`Logged in as ${name}, role: ${role}`}>
       <span class="account-name">{name}</span>
       <small>{role}</small>
-      {by === "token" && <button onClick={() => void reportErrors(logOut)}>Log out</button>}
+      {auth_method === "token" && <button onClick={() => void reportErrors(logOut)}>Log out</button>}
     </div>
   );
 }

@@ -11,23 +11,23 @@ import { startRoom, leaveRoom, createRoomLink } from "./memberPresence";
 const MAX_CHIPS = 3;
 
 /** A member's status as text. */
-export function memberStatus({ here: isOnline, role, material }: Person): string {
+export function memberStatus({ online: isOnline, role, material }: Person): string {
   if (!isOnline) return "connection lost";
   if (role === "view") return "watches";
   return material === null ? "nothing in hand" : `has ${material} in hand`;
 }
 
 function MemberDot({ person }: { person: Person }) {
-  return <i class={`dot ${person.here ? "" : "away"}`} style={{ "--person": person.color }} aria-hidden="true" />;
+  return <i class={`dot ${person.online ? "" : "away"}`} style={{ "--person": person.color }} aria-hidden="true" />;
 }
 
 function MemberChips() {
-  const otherMembers = members.value.filter(({ number }) => number !== selfNumber.value);
+  const otherMembers = members.value.filter(({ id }) => id !== selfNumber.value);
   if (otherMembers.length === 0) return <span class="alone">Nobody else yet</span>;
   return (
     <>
       {otherMembers.slice(0, MAX_CHIPS).map((person) => (
-        <span key={person.number} class="chip" title={`${person.name}: ${memberStatus(person)}`}>
+        <span key={person.id} class="chip" title={`${person.name}: ${memberStatus(person)}`}>
           <MemberDot person={person} />
           <span class="who">{person.name}</span>
           {person.material !== null && <small>{person.material}</small>}
@@ -42,11 +42,11 @@ function MemberList() {
   return (
     <ul class="people" aria-label="People who share this look">
       {members.value.map((person) => (
-        <li key={person.number}>
+        <li key={person.id}>
           <MemberDot person={person} />
           <span class="who">{person.name}</span>
           <span class="status-words">
-            {person.number === selfNumber.value && "you, "}
+            {person.id === selfNumber.value && "you, "}
             {memberStatus(person)}
           </span>
         </li>
@@ -63,7 +63,7 @@ function OwnNameField() {
       <input
         type="text"
         maxLength={MAX_PERSON_NAME}
-        value={ownName.value || members.value.find(({ number }) => number === selfNumber.value)?.name}
+        value={ownName.value || members.value.find(({ id }) => id === selfNumber.value)?.name}
         onChange={(event) => (ownName.value = event.currentTarget.value.trim())}
       />
     </label>

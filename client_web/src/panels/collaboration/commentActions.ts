@@ -68,7 +68,7 @@ export async function saveComment(text: string): Promise<boolean> {
   if (pin === null || sceneId === undefined || bakeId === null || current === null) return false;
   const snapshot = renderThumbnail(stage.imageOf(pin.view).pixels, current.display, SNAPSHOT_WIDTH);
   const isSaved = await reportErrors(async () => {
-    const memberName = members.peek().find(({ number }) => number === selfNumber.peek())?.name; // as others see this one
+    const memberName = members.peek().find(({ id }) => id === selfNumber.peek())?.name; // as others see this one
     const author = ownName.peek() || memberName || null;
     const created = await api.addComment(sceneId, { ...pin, bake: bakeId, camera: cameraOf(pin.view), text, author, picture: snapshot });
     pendingPin.value = null;

@@ -52,8 +52,8 @@ function ComparisonButtons({ isOld: isOutdated }: { isOld: boolean }) {
 function ComparisonResult({ body }: { body: ComparisonBody }) {
   const [view, setView] = useState<ComparisonView>("error");
   const [selectedPaths, setPaths] = useState<ComparedPaths>("all");
-  const paths = body.left_out.length === 0 ? "all" : selectedPaths;
-  const errorStats = paths === "all" ? body.found : body.found_of_method;
+  const paths = body.omitted_paths.length === 0 ? "all" : selectedPaths;
+  const errorStats = paths === "all" ? body.error_all_paths : body.error_method_paths;
   if (errorStats === null) return null;
   const file = paths === "all" ? view : (`method-${view}` as const);
   return (
@@ -63,8 +63,8 @@ function ComparisonResult({ body }: { body: ComparisonBody }) {
           <li key={sentence}>{sentence}</li>
         ))}
       </ul>
-      {body.left_out.length > 0 && <RadioRow label="Light paths" choices={COMPARED_PATHS} selected={selectedPaths} onSelect={(value) => setPaths(value)} />}
-      <img src={comparisonImageUrl(body.id, file, body.passes)} alt={view === "error" ? "Error map" : "Brute force"} />
+      {body.omitted_paths.length > 0 && <RadioRow label="Light paths" choices={COMPARED_PATHS} selected={selectedPaths} onSelect={(value) => setPaths(value)} />}
+      <img src={comparisonImageUrl(body.id, file, body.completed)} alt={view === "error" ? "Error map" : "Brute force"} />
       <RadioRow label="Picture shown" choices={COMPARISON_VIEWS} selected={view} onSelect={(value) => setView(value)} />
       {view === "error" && <ErrorScale />}
       <ul class="truth-notes" aria-live="polite" aria-label="What the map shows">
@@ -80,9 +80,9 @@ function ComparisonResult({ body }: { body: ComparisonBody }) {
 function FirstPass({ body }: { body: ComparisonBody }) {
   return (
     <>
-      <img src={comparisonImageUrl(body.id, "reference", body.passes)} alt="Brute force" />
+      <img src={comparisonImageUrl(body.id, "reference", body.completed)} alt="Brute force" />
       <p class="truth-scale">
-        {body.passes === 0 ? "A small brute force of few samples meanwhile." : "Brute force after one pass."} From the second pass
+        {body.completed === 0 ? "A small brute force of few samples meanwhile." : "Brute force after one pass."} From the second pass
         on it is compared.
       </p>
     </>
@@ -113,8 +113,8 @@ export function ComparisonPanel() {
           {isInProgress(body) && (
             <progress max={1} value={body.progress > 0 ? body.progress : undefined} aria-label="Brute force" />
           )}
-          {body.found !== null && <ComparisonResult body={body} />}
-          {body.found === null && body.progress > 0 && <FirstPass body={body} />}
+          {body.error_all_paths !== null && <ComparisonResult body={body} />}
+          {body.error_all_paths === null && body.progress > 0 && <FirstPass body={body} />}
         </>
       )}
       {isOld && <p class="truth-old">The picture has changed since.</p>}

@@ -16,7 +16,7 @@ import { activeViewName, views } from "../../state/views";
 import { reportErrors } from "../../ui/toasts";
 
 const POLL_MS = 1000;
-const COMPARISON_KEY = "relume.truth";
+const COMPARISON_KEY = "relume.comparison";
 
 /** What a comparison would take; null while that is being found out. */
 export const comparisonPlan = signal<ComparisonPlanBody | "unknown" | null>(null);

@@ -18,7 +18,7 @@ export function comparisonPlanText(plan: ComparisonPlanBody | "unknown" | null):
   return `${plan.passes} passes of brute force: ${formatEstimatedTime(plan.seconds)}${estimateNote}.`;
 }
 
-type ComparisonProgress = Pick<ComparisonBody, "state" | "passes" | "total" | "progress" | "problem" | "seconds_left">;
+type ComparisonProgress = Pick<ComparisonBody, "state" | "completed" | "total" | "progress" | "problem" | "seconds_left">;
 
 /** What it is at; `elapsed`: seconds that somebody has waited. */
 export function comparisonProgressText(progress: ComparisonProgress, elapsed: number): string {
@@ -29,35 +29,35 @@ export function comparisonProgressText(progress: ComparisonProgress, elapsed: nu
     case "running": {
       if (progress.progress === 0) return `Preparing the picture, ${soFar}`;
       const left = progress.seconds_left === null ? "" : `, ${formatSeconds(progress.seconds_left)} left`;
-      const passPercent = Math.round(100 * Math.min(1, Math.max(0, progress.progress * progress.total - progress.passes)));
-      return `Brute force: pass ${Math.min(progress.passes + 1, progress.total)} of ${progress.total}, ${passPercent} % of it, ${soFar}${left}`;
+      const passPercent = Math.round(100 * Math.min(1, Math.max(0, progress.progress * progress.total - progress.completed)));
+      return `Brute force: pass ${Math.min(progress.completed + 1, progress.total)} of ${progress.total}, ${passPercent} % of it, ${soFar}${left}`;
     }
     case "ready":
       return `Brute force: ${progress.total} passes`;
     case "stopped":
-      return `Stopped after ${progress.passes} of ${progress.total} passes`;
+      return `Stopped after ${progress.completed} of ${progress.total} passes`;
     case "failed":
       return progress.problem ?? "The comparison failed.";
   }
 }
 
-type ErrorStats = NonNullable<ComparisonBody["found"]>;
+type ErrorStats = NonNullable<ComparisonBody["error_all_paths"]>;
 export type ComparedPaths = ComparisonBody["paths"];
 
 const PATH_LABELS = { all: "all light paths", method: "the method's light paths" };
 
 function errorText(stats: ErrorStats): string {
   if (stats.error === null || stats.standard_error === null) {
-    return `the error is less than the noise, below ${formatPercentWithError(stats.limit)}`;
+    return `the error is less than the noise, below ${formatPercentWithError(stats.error_upper_bound)}`;
   }
   return `the frame errs by ${formatPercentWithError(stats.error, stats.standard_error)}`;
 }
 
 /** How far the frame is from brute force, by both kinds of paths. */
-export function errorSentences(body: Pick<ComparisonBody, "found" | "found_of_method" | "left_out">): string[] {
-  const { found: errorOfAll, found_of_method: errorOfMethod } = body;
+export function errorSentences(body: Pick<ComparisonBody, "error_all_paths" | "error_method_paths" | "omitted_paths">): string[] {
+  const { error_all_paths: errorOfAll, error_method_paths: errorOfMethod } = body;
   if (errorOfAll === null || errorOfMethod === null) return [];
-  if (body.left_out.length === 0) return [`Against all light paths, which the method follows: ${errorText(errorOfAll)} (relative RMSE).`];
+  if (body.omitted_paths.length === 0) return [`Against all light paths, which the method follows: ${errorText(errorOfAll)} (relative RMSE).`];
   return [
     `Against ${PATH_LABELS.all}: ${errorText(errorOfAll)} (relative RMSE).`,
     `Against ${PATH_LABELS.method}: ${errorText(errorOfMethod)} (relative RMSE).`,
@@ -65,10 +65,10 @@ export function errorSentences(body: Pick<ComparisonBody, "found" | "found_of_me
 }
 
 /** What no figure, or only the first, knows of. */
-export function omittedPathSentences(body: Pick<ComparisonBody, "left_out" | "untraced">): string[] {
+export function omittedPathSentences(body: Pick<ComparisonBody, "omitted_paths" | "unsupported_paths">): string[] {
   return [
-    ...body.left_out.map((pathName) => `The method leaves out: ${lowerFirst(pathName)}`),
-    ...body.untraced.map((pathName) => `Brute force leaves out, too: ${lowerFirst(pathName)}`),
+    ...body.omitted_paths.map((pathName) => `The method leaves out: ${lowerFirst(pathName)}`),
+    ...body.unsupported_paths.map((pathName) => `Brute force leaves out, too: ${lowerFirst(pathName)}`),
   ];
 }
 
@@ -79,6 +79,6 @@ function lowerFirst(sentence: string): string {
 /** What the map shows: whether pixels differ, and what the noise would hide. */
 export function mapSentences(stats: ErrorStats): string[] {
   const noise = `The noise of brute force is ${formatPercentWithError(stats.noise)}; more passes lower it.`;
-  if (stats.significant === 0) return ["In the map no difference is found.", noise];
-  return [`In the map ${formatPercentWithError(stats.significant)} of the pixels differ by more than noise explains: they are coloured.`, noise];
+  if (stats.significant_pixel_fraction === 0) return ["In the map no difference is found.", noise];
+  return [`In the map ${formatPercentWithError(stats.significant_pixel_fraction)} of the pixels differ by more than noise explains: they are coloured.`, noise];
 }

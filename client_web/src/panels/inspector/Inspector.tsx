@@ -49,7 +49,7 @@ function AddTerm({ material }: { material: string }) {
 
 /** A ground shows shadows alone, in front of what is behind it, or is a surface like others. */
 function ShadowCatcherToggle({ material }: { material: string }) {
-  const catcher = look.value?.materials[material]?.catcher;
+  const catcher = look.value?.materials[material]?.shadow_catcher;
   if (catcher === undefined) return null;
   return (
     <div class="catcher">
@@ -59,7 +59,7 @@ function ShadowCatcherToggle({ material }: { material: string }) {
           checked={catcher}
           onChange={(event) => {
             const only = event.currentTarget.checked;
-            editValue(only ? "Shadows only" : "A surface to see", jsonPointer("materials", material, "catcher"), only);
+            editValue(only ? "Shadows only" : "A surface to see", jsonPointer("materials", material, "shadow_catcher"), only);
           }}
         />
         Shadows only
@@ -105,7 +105,7 @@ function MaterialInspector() {
   }
   const original = defaultLook.value?.materials[material];
   const materialLook = look.value?.materials[material];
-  const isShadowCatcher = materialLook?.catcher === true;
+  const isShadowCatcher = materialLook?.shadow_catcher === true;
   return (
     <div class="panel inspector">
       <header class="panel-head">

@@ -58,7 +58,7 @@ export function ParamRow({ info, value, initial, onChange, onHold }: Props) {
       ) : (
         <Slider {...range} label={info.label} value={value} initial={meanOf(initial)} onChange={onChange} onHold={onHold} />
       )}
-      {info.fixed ? null : link}
+      {info.requires_new_operator ? null : link}
     </div>
   );
 }

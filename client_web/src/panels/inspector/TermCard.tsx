@@ -96,7 +96,7 @@ function TextureRow({ channels, value, onChange }: TextureProps) {
 
 /** What becomes of the map that a term follows. */
 function MapWidthRow({ term, model }: { term: Term; model: ModelBody }) {
-  const width = model.width as string;
+  const width = model.width_parameter as string;
   if (model.curves.some((curve) => curve.parameters.includes(width) && term.curves?.[curve.name] !== undefined)) {
     return <p class="aside">Curves that are drawn replace the map.</p>;
   }
@@ -115,7 +115,7 @@ export function TermCard({ material, term, index, onRemove }: Props) {
   const initial = defaultLook.value?.materials[material]?.terms[index];
   const same = initial?.model === term.model ? initial : undefined;
   const open = selectedTerm.value === index;
-  const follows = (term.roughness_map ?? false) !== false;
+  const follows = term.roughness_map != null;
   const storedQuality = useServerQuery(open ? btfOf(term) : null, getStoredQuality);
   const changeModel = (name: string) => {
     editValue("Change model", path, withModel(term, name, models.value));
@@ -161,16 +161,16 @@ export function TermCard({ material, term, index, onRemove }: Props) {
             value={term.texture ?? null}
             onChange={(value) => editValue("Texture", jsonPointer("materials", material, "terms"), withTexture(selectedTerms.value, index, value))}
           />
-          {model?.width != null && (
+          {model?.width_parameter != null && (
             <RoughnessImage
               material={material}
               index={index}
-              value={term.roughness_map ?? false}
+              value={term.roughness_map ?? null}
               hasOwn={hasRoughnessMap(material)}
               onChange={(value) => editValue("Roughness map", jsonPointer("materials", material, "terms"), withMap(selectedTerms.value, index, value))}
             />
           )}
-          {model?.width != null && follows && <MapWidthRow term={term} model={model} />}
+          {model?.width_parameter != null && follows && <MapWidthRow term={term} model={model} />}
           {model?.parameters.map((declared) => limitToStored(declared, storedQuality)).map((info) => (
             <ParamRow
               key={info.name}

@@ -7,10 +7,10 @@ import { isBtfTerm } from "../../state/look";
 import { isClientRendering } from "../../session/clientRendering";
 import { useServerQuery } from "./useServerQuery";
 
-function fitMessage({ functions, missed, needed, is_mirror }: ZernikeFitBody): string {
-  const percent = missed < 0.01 ? "less than 1 %" : `${Math.round(100 * missed)} %`;
+function fitMessage({ functions, residual, required_functions, is_mirror }: ZernikeFitBody): string {
+  const percent = residual < 0.01 ? "less than 1 %" : `${Math.round(100 * residual)} %`;
   if (is_mirror) return `While the eye moves: a blurred mirror. ${functions} terms would miss ${percent} of this highlight.`;
-  const enough = needed === null || needed === functions ? "" : needed === 1 ? "; one misses less than 5 %" : `; ${needed} miss less than 5 %`;
+  const enough = required_functions === null || required_functions === functions ? "" : required_functions === 1 ? "; one misses less than 5 %" : `; ${required_functions} miss less than 5 %`;
   return `While the eye moves: ${functions} terms, which miss ${percent}${enough}.`;
 }
 

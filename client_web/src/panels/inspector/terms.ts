@@ -19,12 +19,12 @@ export function hasRoughnessMap(material: string): boolean {
 
 /** Whether a term is so smooth that it is a mirror rather than a highlight, by `relume/brdf/specular.py`. */
 export function isMirror(term: Term): boolean {
-  const { mirrors_below: below, width, curves } = modelOf(term) ?? {};
-  if (below == null || width == null || (term.roughness_map ?? false) !== false) return false;
+  const { specular_below: below, width_parameter, curves } = modelOf(term) ?? {};
+  if (below == null || width_parameter == null || term.roughness_map != null) return false;
   if (term.texture === "diffuse" || isImageReference(term.texture)) return false;
   const facets = curves?.find(({ angle }) => angle === "theta_h");
   if (facets !== undefined && term.curves?.[facets.name] !== undefined) return false;
-  return [term.params?.[width] ?? below].flat().some((value) => value < below);
+  return [term.params?.[width_parameter] ?? below].flat().some((value) => value < below);
 }
 
 /** Whether what a term mirrors is shown blurred, since its material mirrored nothing when the scene was baked. */
@@ -58,6 +58,6 @@ export function withModel(term: Term, name: string, models: readonly ModelBody[]
   );
   const { data, roughness_map: follows, ...remainingFields } = term;
   const measured = model.data_prefix !== null && data?.startsWith(model.data_prefix) === true ? { data } : {};
-  const mapped = follows === undefined || model.width === null ? {} : { roughness_map: follows };
+  const mapped = follows === undefined || model.width_parameter === null ? {} : { roughness_map: follows };
   return { ...remainingFields, ...measured, ...mapped, model: name, params, curves: {} };
 }

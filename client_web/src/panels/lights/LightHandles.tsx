@@ -130,7 +130,7 @@ function LightHandle({ projection, name, light, position, label, change }: Handl
       onKeyDown={key}
     >
       <svg viewBox="-9 -9 18 18" aria-hidden="true">
-        <path d={SHAPES[label === "Move" ? light.kind : "aim"]} style={light.on ? { fill: toHex(emittedColor, 0) } : undefined} />
+        <path d={SHAPES[label === "Move" ? light.kind : "aim"]} style={light.enabled ? { fill: toHex(emittedColor, 0) } : undefined} />
       </svg>
     </button>
   );

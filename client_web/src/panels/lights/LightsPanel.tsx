@@ -27,13 +27,13 @@ function LightRow({ name, light }: { name: string; light: Light }) {
   return (
     <li
       ref={row}
-      class={`light ${selected ? "selected" : ""} ${light.on ? "" : "off"}`}
+      class={`light ${selected ? "selected" : ""} ${light.enabled ? "" : "off"}`}
     >
       <IconButton
         icon="lamp"
-        label={`${name}: ${light.on ? "switch off" : "switch on"}`}
-        pressed={light.on}
-        onClick={() => editLight(light.on ? "Off" : "On", name, "on", !light.on)}
+        label={`${name}: ${light.enabled ? "switch off" : "switch on"}`}
+        pressed={light.enabled}
+        onClick={() => editLight(light.enabled ? "Off" : "On", name, "enabled", !light.enabled)}
       />
       <button
         class="name"
@@ -58,13 +58,13 @@ function LightRow({ name, light }: { name: string; light: Light }) {
       />
       <Slider
         label={`${name}: intensity`}
-        value={light.scale}
-        initial={defaultLook.value?.lights[name]?.scale ?? 1}
+        value={light.intensity}
+        initial={defaultLook.value?.lights[name]?.intensity ?? 1}
         minimum={0.01}
         maximum={100}
         scale="log"
         unit="×"
-        onChange={(value) => editLight("Intensity", name, "scale", value)}
+        onChange={(value) => editLight("Intensity", name, "intensity", value)}
         onHold={() => beginDrag(lightPath(name))}
       />
     </li>

@@ -45,7 +45,7 @@ function emittingExtent(light: Light): number {
 
 /** Watts of a light as it is now: with its intensity and tint, whether it is on or not. */
 export function wattsOf(light: Light): number {
-  const emittedRadiance = light.emission.map((value, channel) => value * light.scale * (light.color[channel] as number)) as Rgb;
+  const emittedRadiance = light.emission.map((value, channel) => value * light.intensity * (light.color[channel] as number)) as Rgb;
   return luminance(emittedRadiance) * emittingExtent(light);
 }
 

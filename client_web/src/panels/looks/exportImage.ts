@@ -70,18 +70,21 @@ export function exportExr(layers: boolean | "light_groups"): Promise<void> {
     layers,
     color_space: availableExrSpace.value,
     name: fileStem(KINDS.get(layers), availableExrSpace.value ?? ""),
-    path: pose === null ? null : { eyes: [pose] },
+    path: pose === null ? null : { cameras: [pose] },
   });
 }
 
 export const TURNTABLE_FRAMES = 72;
 
-/** What goes around in a turntable. */
-export type TurntableRotation = NonNullable<Turntable["turns"]>;
-export const turntableRotation = signal<TurntableRotation>("eye");
+/** Exact, or as while the camera moves. */
+export type RenderQuality = NonNullable<RenderRequest["quality"]>;
 
-/** Once around, from where the camera is: numbered frames in a ZIP, or a video. `exact`: as where the camera stops. */
-export function exportTurntable(format: "png" | "mp4", exact: boolean): Promise<void> {
-  const path = { turntable: TURNTABLE_FRAMES, turns: turntableRotation.value, start: currentPose() };
-  return startExport("turntable", format === "mp4" ? "video.mp4" : "archive.zip", { format, path, exact });
+/** What goes around in a turntable. */
+export type TurntableRotation = NonNullable<Turntable["rotate"]>;
+export const turntableRotation = signal<TurntableRotation>("camera");
+
+/** Once around, from where the camera is: numbered frames in a ZIP, or a video. `quality`: exact, or as while the camera moves. */
+export function exportTurntable(format: "png" | "mp4", quality: RenderQuality): Promise<void> {
+  const path = { turntable: TURNTABLE_FRAMES, rotate: turntableRotation.value, start_camera: currentPose() };
+  return startExport("turntable", format === "mp4" ? "video.mp4" : "archive.zip", { format, path, quality });
 }

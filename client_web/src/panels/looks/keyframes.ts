@@ -11,7 +11,7 @@ export const [MIN_SECONDS, MAX_SECONDS] = [0.5, 20];
 export const keyframes = signal<readonly Keyframe[]>([]);
 export const seconds = signal(4);
 /** How materials go from one look to the next. */
-export const interpolation = signal<NonNullable<LooksRequest["between"]>>("parameters");
+export const interpolation = signal<NonNullable<LooksRequest["interpolation"]>>("parameters");
 export const isLooping = signal(true);
 /** What moves during playback: nothing; the camera, once around from the first look's pose, or from key to key; or, before a
  * camera that stays, the object or the environment, once around. */

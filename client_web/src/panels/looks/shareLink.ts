@@ -31,7 +31,7 @@ export async function createShareLink(): Promise<ShareEntry> {
     solo: soloMaterial.value,
     solo_light: soloLight.value,
     paths: pathOverride.value,
-    eyes: poses,
+    cameras: poses,
     sizes,
   });
 }
@@ -65,7 +65,7 @@ function applySharedState(shared: ShareBody): void {
 }
 
 /** See the views from where they were shared, once they are there: the look is, before. */
-function applySharedCameras({ eyes: poses, sizes }: ShareBody): void {
+function applySharedCameras({ cameras: poses, sizes }: ShareBody): void {
   let waits = true;
   const stop = effect(() => {
     if (!waits || bake.value === null || !views.value.some(({ name }) => name in poses)) return;
@@ -81,7 +81,7 @@ function applySharedCameras({ eyes: poses, sizes }: ShareBody): void {
 export async function openShare(id: string, { room, watch }: Pick<UrlState, "room" | "watch">): Promise<void> {
   await reportErrors(async () => {
     const shared = await getShare(id);
-    if (shared.lacking.length > 0) throw new Error(shared.lacking.join(" "));
+    if (shared.missing.length > 0) throw new Error(shared.missing.join(" "));
     const hasNoRoom = room === null && watch === null;
     joinTarget.value = mayEdit.value ? null : { scene: shared.scene, share: id };
     const isFromServer = () => {

@@ -17,7 +17,7 @@ function EnvironmentActions({ scale }: { scale: number }) {
   const isOn = scale > 0;
   const toggle = () => {
     if (isOn) previousScale.current = scale;
-    editValue(isOn ? "Environment off" : "Environment on", "/environment/scale", isOn ? 0 : previousScale.current);
+    editValue(isOn ? "Environment off" : "Environment on", "/environment/intensity", isOn ? 0 : previousScale.current);
   };
   return (
     <>
@@ -50,18 +50,18 @@ export function EnvironmentPanel() {
   const initial = defaultLook.value?.environment;
   if (environment === undefined || initial === undefined) return null;
   return (
-    <Section title="Environment" actions={<EnvironmentActions scale={environment.scale} />}>
+    <Section title="Environment" actions={<EnvironmentActions scale={environment.intensity} />}>
       <EnvironmentGallery />
       <LabeledSlider
         shortLabel="Brightness"
         label="Environment brightness"
-        value={environment.scale}
-        initial={initial.scale}
+        value={environment.intensity}
+        initial={initial.intensity}
         minimum={0.01}
         maximum={100}
         scale="log"
         unit="×"
-        onChange={(value) => editValue("Environment brightness", "/environment/scale", value)}
+        onChange={(value) => editValue("Environment brightness", "/environment/intensity", value)}
       />
       <LabeledSlider
         shortLabel="Rotation"

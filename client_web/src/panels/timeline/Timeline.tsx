@@ -204,7 +204,7 @@ function RenderSelect() {
       onChange={(event) => {
         const [format, how] = event.currentTarget.value.split(" ");
         event.currentTarget.value = "";
-        void exportAnimation(format as "png" | "mp4", how === "exact");
+        void exportAnimation(format as "png" | "mp4", how === "exact" ? "exact" : "interactive");
       }}
     >
       <option value="">Render…</option>

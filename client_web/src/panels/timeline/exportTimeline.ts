@@ -1,16 +1,16 @@
 /** The timeline as numbered frames in a ZIP, or as a video. */
 import { completeLook } from "../looks/abCompare";
-import { currentPose, startExport } from "../looks/exportImage";
+import { currentPose, startExport, type RenderQuality } from "../looks/exportImage";
 import { interpolation, keyframes, currentPath } from "../looks/keyframes";
 import type { RenderRequest } from "../../protocol";
 import { FPS, numFrames, renderPath } from "./playback";
 
-/** `exact`: as where the camera stops, where it moves. */
-export function exportAnimation(format: "png" | "mp4", exact: boolean): Promise<void> {
+/** `quality`: of a camera that moves. */
+export function exportAnimation(format: "png" | "mp4", quality: RenderQuality): Promise<void> {
   const looks = keyframes.value.map(({ look }) => completeLook(look)) as unknown as RenderRequest["looks"];
   const frames = Math.max(numFrames.value, looks.length);
   const camera = currentPose();
-  const path = renderPath(currentPath.value, frames) ?? (camera === null ? null : { eyes: [camera] });
+  const path = renderPath(currentPath.value, frames) ?? (camera === null ? null : { cameras: [camera] });
   const fetchFrom = format === "mp4" ? "video.mp4" : "archive.zip";
-  return startExport("animation", fetchFrom, { format, looks, between: interpolation.value, fps: FPS, exact, path, frames });
+  return startExport("animation", fetchFrom, { format, looks, interpolation: interpolation.value, fps: FPS, quality, path, frames });
 }

@@ -28,11 +28,11 @@ const previewLabel = (fraction: number) => `The time line at ${(fraction * secon
 /** What goes where while `num` frames are shown; null where nothing does. */
 export function renderPath(motion: CameraPathMode, num: number): NonNullable<RenderRequest["path"]> | null {
   const freeCamera = freeCameraOf(activeViewName.peek());
-  if (motion === "environment") return { turntable: num, turns: motion, start: freeCamera?.pose ?? null };
+  if (motion === "environment") return { turntable: num, rotate: motion, start_camera: freeCamera?.pose ?? null };
   if (freeCamera === null || motion === "still") return null;
   const cameras = keyframes.peek().map((key): CameraPose => key.camera ?? freeCamera.first);
-  if (motion === "along") return { eyes: cameras };
-  return { turntable: num, turns: motion === "object" ? motion : "eye", start: cameras[0] ?? freeCamera.first };
+  if (motion === "along") return { cameras: cameras };
+  return { turntable: num, rotate: motion === "object" ? motion : "camera", start_camera: cameras[0] ?? freeCamera.first };
 }
 
 function showPlayhead(): void {

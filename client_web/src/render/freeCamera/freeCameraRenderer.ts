@@ -10,7 +10,7 @@ import { backgroundShader, cornerShader, surfaceShader, encodeShader, type Image
 import { ImageTargets, LAYERS, ValueTarget } from "./renderTargets";
 import { BYTES_PER_TEXEL, DataTextures, type TexelType } from "./dataTextures";
 
-type Tables = NonNullable<FrameHeader["tables"]>;
+type Tables = NonNullable<FrameHeader["scene_update"]>;
 
 /** Where a camera is, as the protocol says it. */
 export interface RenderCamera {
@@ -190,7 +190,7 @@ export class FreeCameraRenderer {
     this.probeValues.begin(layers);
     gl.enable(gl.SCISSOR_TEST);
     this.materials.forEach(({ points, tables, lobe }, k) => {
-      const [first, end] = [surface.first_points[k] as number, surface.first_points[k + 1] as number];
+      const [first, end] = [surface.first_probes[k] as number, surface.first_probes[k + 1] as number];
       if (first === end) return;
       const compiled = this.program({ points, layers }, () => new Program(gl, FULLSCREEN_VERTEX, probeShader(surface, points, layers)));
       const program = this.use(compiled, PROBE_ARRAYS);
@@ -202,7 +202,7 @@ export class FreeCameraRenderer {
       gl.uniform2iv(program.uniform("uTables"), tables.plain);
       gl.uniform4iv(program.uniform("uHighlights"), tables.highlights);
       gl.uniform1i(program.uniform("uLobe"), lobe);
-      gl.uniform1i(program.uniform("uSeenTexels"), this.texels.count("seen_lights") / Math.max(1, surface.first_points[surface.first_points.length - 1] as number));
+      gl.uniform1i(program.uniform("uSeenTexels"), this.texels.count("seen_lights") / Math.max(1, surface.first_probes[surface.first_probes.length - 1] as number));
       gl.uniform3fv(program.uniform("uEye"), positionOf(camera));
       this.setEnvironmentUniforms(program, numbers);
       for (const rectangle of rectanglesOf(first, end)) {
@@ -315,11 +315,11 @@ export class FreeCameraRenderer {
 
   private setEnvironmentUniforms(program: Program, numbers: Tables): void {
     const { gl } = this;
-    gl.uniform3fv(program.uniform("uSkyGain"), numbers.sky_gain);
-    gl.uniform3iv(program.uniform("uSkyLevels"), numbers.sky_levels.slice(0, ENVIRONMENT_LEVELS).flat());
-    gl.uniform1i(program.uniform("uNumSkyLevels"), Math.min(ENVIRONMENT_LEVELS, numbers.sky_levels.length));
-    gl.uniform1f(program.uniform("uTurn"), numbers.sky_turn);
-    const brightLights = numbers.lamps.slice(0, MAX_SKY_LAMPS);
+    gl.uniform3fv(program.uniform("uSkyGain"), numbers.environment_gain);
+    gl.uniform3iv(program.uniform("uSkyLevels"), numbers.environment_mips.slice(0, ENVIRONMENT_LEVELS).flat());
+    gl.uniform1i(program.uniform("uNumSkyLevels"), Math.min(ENVIRONMENT_LEVELS, numbers.environment_mips.length));
+    gl.uniform1f(program.uniform("uTurn"), numbers.environment_rotation);
+    const brightLights = numbers.bright_lights.slice(0, MAX_SKY_LAMPS);
     gl.uniform1i(program.uniform("uNumLamps"), brightLights.length);
     if (brightLights.length === 0) return;
     gl.uniform4fv(program.uniform("uLampDirections"), brightLights.flatMap(([x, y, z, , , , spread]) => [x, y, z, spread]));
@@ -330,8 +330,8 @@ export class FreeCameraRenderer {
     const { gl } = this;
     gl.uniform3fv(program.uniform("uBackgroundGain"), numbers.background_gain);
     gl.uniform3fv(program.uniform("uBackgroundColor"), numbers.background === "color" ? numbers.background_color : [0, 0, 0]);
-    gl.uniform1f(program.uniform("uTurn"), numbers.sky_turn);
-    gl.uniform1f(program.uniform("uFree"), numbers.is_direct ? 1 : 0);
+    gl.uniform1f(program.uniform("uTurn"), numbers.environment_rotation);
+    gl.uniform1f(program.uniform("uFree"), numbers.shows_direct ? 1 : 0);
   }
 }
 

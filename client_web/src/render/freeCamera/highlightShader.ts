@@ -2,9 +2,9 @@
 import type { FreeCameraBody } from "../../protocol";
 
 /** Of unit albedo, without the environment's gain; also the confidence in the lobes, and in all of it on curved normals. Needs the lobe visibility (`glance`). */
-export const highlightGlsl = ({ shapes: { rings, spokes, widths, least_bits } }: FreeCameraBody) => `
+export const highlightGlsl = ({ shapes: { elevation_rings, azimuths, widths, min_bits } }: FreeCameraBody) => `
 uniform sampler2D uSkyLights, uShapes;
-const int SHAPE = ${1 + widths * rings * 2};
+const int SHAPE = ${1 + widths * elevation_rings * 2};
 vec4 shapeTexel(int row, int texel, float share) {
   return mix(texelFetch(uShapes, at(row * SHAPE + texel), 0), texelFetch(uShapes, at((row + 1) * SHAPE + texel), 0), share);
 }
@@ -29,11 +29,11 @@ vec3 byLights(int p, int row, float share, vec3 n, vec3 wo, float facing, out fl
       here >>= 4u;
       if ((light & 15) == 0) continue;
       vec4 towards = texelFetch(uSkyLights, at(2 * light), 0);
-      float off = clamp(2.0 - 2.0 * dot(mirror, towards.xyz), intBitsToFloat(${least_bits}), 4.0);
+      float off = clamp(2.0 - 2.0 * dot(mirror, towards.xyz), intBitsToFloat(${min_bits}), 4.0);
       float turn = arcCosine(clamp(dot(across, towards.xyz) * inversesqrt(max(off * (1.0 - 0.25 * off), 1e-12)), -1.0, 1.0));
-      float ring = min(float(floatBitsToInt(off) - ${least_bits}) * ${(2 ** -22).toExponential()}, ${(rings - 1.001).toFixed(3)});
-      float spoke = clamp(turn * ${spokes.toFixed(1)} / PI - 0.5, 0.0, ${(spokes - 1.001).toFixed(3)});
-      int r = int(ring), s = int(spoke), first = int(towards.w) * ${rings} + r;
+      float ring = min(float(floatBitsToInt(off) - ${min_bits}) * ${(2 ** -22).toExponential()}, ${(elevation_rings - 1.001).toFixed(3)});
+      float spoke = clamp(turn * ${azimuths.toFixed(1)} / PI - 0.5, 0.0, ${(azimuths - 1.001).toFixed(3)});
+      int r = int(ring), s = int(spoke), first = int(towards.w) * ${elevation_rings} + r;
       float value = mix(onRing(row, share, first, s, spoke - float(s)), onRing(row, share, first + 1, s, spoke - float(s)), ring - float(r));
       vec3 both = towards.xyz + wo;
       float below = max(2.0 - 2.0 * (dot(n, towards.xyz) + facing) * inversesqrt(max(dot(both, both), 1e-6)), 0.0) + head.y;

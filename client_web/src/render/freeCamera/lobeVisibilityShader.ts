@@ -2,7 +2,7 @@
 import type { FreeCameraBody } from "../../protocol";
 
 /** The visible fraction of the environment's light in a lobe, and of two bright lights. */
-export const lobeVisibilityGlsl = ({ lobe_lists: { side, listed, lights_a_lamp: lightsPerBrightLight, narrowest, widths } }: FreeCameraBody) => `
+export const lobeVisibilityGlsl = ({ lobe_lists: { bins_per_side, max_listed, lights_per_bright_light: lightsPerBrightLight, min_width, widths } }: FreeCameraBody) => `
 uniform usampler2D uSeenLights;
 uniform isampler2D uLobeLists, uLobeFirsts;
 uniform sampler2D uLobeLights, uLightsOfLamps;
@@ -17,8 +17,8 @@ int squareOf(vec3 d) {
   d /= abs(d.x) + abs(d.y) + abs(d.z);
   vec2 place = d.xz;
   if (d.y < 0.0) place = (1.0 - abs(d.zx)) * vec2(d.x < 0.0 ? -1.0 : 1.0, d.z < 0.0 ? -1.0 : 1.0);
-  ivec2 square = clamp(ivec2((place + 1.0) * ${(side / 2).toFixed(1)}), 0, ${side - 1});
-  return square.y * ${side} + square.x;
+  ivec2 square = clamp(ivec2((place + 1.0) * ${(bins_per_side / 2).toFixed(1)}), 0, ${bins_per_side - 1});
+  return square.y * ${bins_per_side} + square.x;
 }
 float lampSeen(int lamp, int p) {
   float seen = 0.0;
@@ -34,11 +34,11 @@ vec3 glanceAlong(Lobes lobes, int p) {
   float size = length(middle), own = mix(lobes.sigma2 * lobes.sigma2, lobes.sigma * lobes.sigma, lobes.first);
   float variance = own + max(1.0 - size, 0.0);
   middle /= size;
-  int width = clamp(int(floor(2.0 * log2(max(sqrt(variance), 1e-6) / ${narrowest}) + 0.5)), 0, ${widths - 1});
+  int width = clamp(int(floor(2.0 * log2(max(sqrt(variance), 1e-6) / ${min_width}) + 0.5)), 0, ${widths - 1});
   int list = texelFetch(uLobeFirsts, at(width), 0).x + squareOf(middle);
   float seen = 0.0, total = 1e-30;
-  for (int q = 0; q < ${listed / 4}; q++) {
-    ivec4 four = texelFetch(uLobeLists, at(list * ${listed / 4} + q), 0);
+  for (int q = 0; q < ${max_listed / 4}; q++) {
+    ivec4 four = texelFetch(uLobeLists, at(list * ${max_listed / 4} + q), 0);
     for (int k = 0; k < 4; k++) {
       int light = k == 0 ? four.x : k == 1 ? four.y : k == 2 ? four.z : four.w;
       if (light < 0) break;

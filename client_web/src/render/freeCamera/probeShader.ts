@@ -49,7 +49,7 @@ function rotationGlsl(orders: number): string {
 }
 
 /** Rows of the recurrence table whose functions a material's incident radiance coefficients have. */
-const basisGlsl = ({ ladder: recurrence }: FreeCameraBody, { functions, otherFunctions }: ProbeFeatures) =>
+const basisGlsl = ({ recurrence }: FreeCameraBody, { functions, otherFunctions }: ProbeFeatures) =>
   indexRange(recurrence.order.length).filter((row) => (recurrence.cosine[row] as number) < Math.max(functions, otherFunctions));
 
 /** One incident radiance coefficient, stored channel by channel. That of the environment is the difference of all and other light. */
@@ -61,7 +61,7 @@ function loadLightGlsl(features: ProbeFeatures, quantity: TableKind, channel: nu
 
 /** Incident radiance coefficients rotated to the camera's φ, row by row; or their derivative by φ. */
 function rotatedGlsl(surface: FreeCameraBody, features: ProbeFeatures, quantity: TableKind, isChange = false): string {
-  const { ladder: recurrence } = surface;
+  const { recurrence } = surface;
   const lines = CHANNELS.flatMap((channel) =>
     basisGlsl(surface, features).map((row) => {
       const m = recurrence.order[row] as number;
@@ -76,8 +76,8 @@ function rotatedGlsl(surface: FreeCameraBody, features: ProbeFeatures, quantity:
 }
 
 /** Σ of the light, of its luminance, with an expansion. */
-function expansionGlsl({ expansions }: FreeCameraBody, features: ProbeFeatures): string {
-  const sums = expansions.map((row) => {
+function expansionGlsl({ gradient_basis }: FreeCameraBody, features: ProbeFeatures): string {
+  const sums = gradient_basis.map((row) => {
     const summands = row.flatMap((value, k) =>
       Math.abs(value) < 1e-7
         ? []
@@ -90,7 +90,7 @@ function expansionGlsl({ expansions }: FreeCameraBody, features: ProbeFeatures):
 
 /** Radiance by a table over θo alone; or how it changes from a row to the next. */
 function isotropicGlsl(surface: FreeCameraBody, features: ProbeFeatures, isStep = false): string {
-  const rows = surface.ladder.order.length / 4;
+  const rows = surface.recurrence.order.length / 4;
   const used = new Set(basisGlsl(surface, features));
   // texels of rows that hold only functions of high degree are omitted
   const lines = indexRange(rows).flatMap((q) => {
@@ -105,7 +105,7 @@ function isotropicGlsl(surface: FreeCameraBody, features: ProbeFeatures, isStep 
     return `sum += vec3(${sums.join(",\n    ")});`;
   });
   return `vec3 ${isStep ? "evenStep(int table, int row)" : "even(int table, int row, float share)"} {
-  int near = (table * ${surface.rows} + row) * ${3 * rows}, far = near + ${3 * rows};
+  int near = (table * ${surface.table_rows} + row) * ${3 * rows}, far = near + ${3 * rows};
   vec3 sum = vec3(0.0);
   ${lines.join("\n  ")}
   return sum;
@@ -113,8 +113,8 @@ function isotropicGlsl(surface: FreeCameraBody, features: ProbeFeatures, isStep 
 }
 
 /** Radiance by a table over θo and φo. */
-function anisotropicGlsl({ rows, columns, functions }: FreeCameraBody, features: ProbeFeatures, quantity: TableKind): string {
-  const texels = functions / 4;
+function anisotropicGlsl({ table_rows, table_columns, num_basis }: FreeCameraBody, features: ProbeFeatures, quantity: TableKind): string {
+  const texels = num_basis / 4;
   const texel = (row: string, column: string, k: number) => `texelFetch(uUneven, at((${row} + ${column}) * ${3 * texels} + ${k}), 0)`;
   const sums = CHANNELS.map((channel) =>
     indexRange(Math.ceil(Math.max(features.functions, features.otherFunctions) / 4))
@@ -126,10 +126,10 @@ function anisotropicGlsl({ rows, columns, functions }: FreeCameraBody, features:
       .join(" +\n    "),
   );
   return `vec3 ${quantity}Uneven(int table, int row, float share, float cp, float sp) {
-  float place = fract(atan(sp, cp) / 6.28318530718) * ${columns.toFixed(1)};
-  int column = min(int(place), ${columns - 1}), beside = (column + 1) % ${columns};
+  float place = fract(atan(sp, cp) / 6.28318530718) * ${table_columns.toFixed(1)};
+  int column = min(int(place), ${table_columns - 1}), beside = (column + 1) % ${table_columns};
   float part = place - float(column);
-  int near = (table * ${rows} + row) * ${columns}, far = near + ${columns};
+  int near = (table * ${table_rows} + row) * ${table_columns}, far = near + ${table_columns};
   return vec3(${sums.join(",\n    ")});
 }`;
 }
@@ -188,23 +188,23 @@ function functionsGlsl(surface: FreeCameraBody, features: ProbeFeatures): string
   const numbers = (texels: string, count: number) => (count > 0 ? namedTexels(texels, Math.ceil((3 * count) / 4)) : "");
   return `${numbers("t", features.functions)}
 ${numbers("o", features.otherFunctions)}
-${isEven ? `${namedTexels("turned", 3 * (surface.ladder.order.length / 4))}\n${isotropicGlsl(surface, features)}` : ""}
+${isEven ? `${namedTexels("turned", 3 * (surface.recurrence.order.length / 4))}\n${isotropicGlsl(surface, features)}` : ""}
 ${hasGradients(features) ? isotropicGlsl(surface, features, true) : ""}
 ${kinds.filter((kind) => features[kind].anisotropic.includes(true)).map((kind) => anisotropicGlsl(surface, features, kind)).join("\n")}`;
 }
 
 export function probeShader(surface: FreeCameraBody, features: ProbeFeatures, layers: readonly number[]): string {
   const { functions, otherFunctions, lobe, map, otherLight } = features;
-  const orders = basisGlsl(surface, features).map((row) => surface.ladder.order[row] as number);
+  const orders = basisGlsl(surface, features).map((row) => surface.recurrence.order[row] as number);
   const otherLightGlsl = `${sumGlsl(surface, features, "otherLight", "beside")}
   ${indexRange(NUM_GROUPS).map((group) => `sent${group} += max(beside${group}, 0.0);`).join(" ")}
   ${hasGradients(features) ? lobeGradientGlsl(surface, otherLight, rotatedGlsl(surface, features, "otherLight", true)) : ""}`;
-  const lobesGlsl = `int of = (uLobe * ${surface.rows} + row) * ${NUM_GROUPS + 1} + ${NUM_GROUPS};
+  const lobesGlsl = `int of = (uLobe * ${surface.table_rows} + row) * ${NUM_GROUPS + 1} + ${NUM_GROUPS};
   Lobes lobes = alongBoth(of, share, n, -wo);
   glance.xyz = glanceAlong(lobes, p);
   ${environmentHighlightGlsl(surface, features)}`;
   const values = ["vec4(sent0, sent1.r)", "vec4(sent1.gb, sent2.rg)", "vec4(sent2.b, towards)", "glance", "turn"];
-  return `${SHADER_HEADER}${elevationRowGlsl(surface.rows)}${lobe ? `${EQUIRECTANGULAR_GLSL}${ENVIRONMENT_GLSL}${LOBES_GLSL}${lobeVisibilityGlsl(surface)}${hasTables(features.environment) ? "" : highlightGlsl(surface)}` : ""}${UNIFORMS}
+  return `${SHADER_HEADER}${elevationRowGlsl(surface.table_rows)}${lobe ? `${EQUIRECTANGULAR_GLSL}${ENVIRONMENT_GLSL}${LOBES_GLSL}${lobeVisibilityGlsl(surface)}${hasTables(features.environment) ? "" : highlightGlsl(surface)}` : ""}${UNIFORMS}
 ${outputGlsl(layers)}
 ${functionsGlsl(surface, features)}
 void main() {

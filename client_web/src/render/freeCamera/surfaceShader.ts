@@ -223,10 +223,10 @@ const SLOTS = `vec2 bary = clamp(vBary, 0.0, 1.0);
   vec3 weights = isFirst ? vec3(1.0 - f.x - f.y, f) : vec3(f.x + f.y - 1.0, 1.0 - f.y, 1.0 - f.x);
   if (rows == 0) weights = vec3(0.0);`;
 
-export function surfaceShader({ rows }: FreeCameraBody, features: SurfaceFeatures): string {
+export function surfaceShader({ table_rows }: FreeCameraBody, features: SurfaceFeatures): string {
   const { groups, textures, lobes, catchesShadows } = features;
   const sections = [
-    lobes && `${elevationRowGlsl(rows)}${ENVIRONMENT_GLSL}${LOBES_GLSL}${mirrorGlsl(rows)}`,
+    lobes && `${elevationRowGlsl(table_rows)}${ENVIRONMENT_GLSL}${LOBES_GLSL}${mirrorGlsl(table_rows)}`,
     textures && `${TEXTURES}${NORMAL_MAP_GLSL}uniform float uPixelAngle;`,
     catchesShadows && `${backgroundGlsl(features.map)}${UNOCCLUDED_GLSL}`,
     needsWholeSurface(features) && "uniform sampler2D uNormals;\nuniform isampler2D uMaterials;\ncentroid in vec3 vAway;",
@@ -251,9 +251,9 @@ void main() {
   ${groups ? fetchGlsl("v1", 1) : ""}
   ${groups || textures ? fetchGlsl("v2", 2) : ""}
   ${needsWholeSurface(features) ? completeBody : ""}
-  ${groupGlsl(0, "v0.rgb", features, rows)}
-  ${groups ? groupGlsl(1, "vec3(v0.a, v1.rg)", features, rows) : ""}
-  ${groups ? groupGlsl(2, "vec3(v1.ba, v2.r)", features, rows) : ""}
+  ${groupGlsl(0, "v0.rgb", features, table_rows)}
+  ${groups ? groupGlsl(1, "vec3(v0.a, v1.rg)", features, table_rows) : ""}
+  ${groups ? groupGlsl(2, "vec3(v1.ba, v2.r)", features, table_rows) : ""}
   color *= uGain;
   float hides = 1.0;
   ${catchesShadows ? SHADOW_CATCHER_GLSL : ""}

@@ -108,19 +108,19 @@ export async function getJson<T>(path: string): Promise<T> {
 
 export const listScenes = () => getJson<SceneBody[]>("/api/scenes");
 export const getScene = (id: string) => getJson<SceneBody>(`/api/scenes/${encodeURIComponent(id)}`);
-export const listBuiltIns = () => getJson<ExampleSceneBody[]>("/api/built-ins");
+export const listBuiltIns = () => getJson<ExampleSceneBody[]>("/api/example-scenes");
 /** Make a built-in scene; a second time it is the same one. */
 export async function createBuiltInScene(name: string): Promise<SceneBody> {
-  return (await (await request(`/api/built-ins/${encodeURIComponent(name)}`, { method: "POST" })).json()) as SceneBody;
+  return (await (await request(`/api/example-scenes/${encodeURIComponent(name)}`, { method: "POST" })).json()) as SceneBody;
 }
 export const listModels = () => getJson<ModelBody[]>("/api/models");
 export const listMaterials = () => getJson<MaterialBody[]>("/api/materials");
 export const listBtfs = () => getJson<BtfBody[]>("/api/materials/btf");
 export const getBtf = (id: string) => getJson<BtfBody>(`/api/materials/btf/${encodeURIComponent(id)}`);
-const btfJobPath = (id: string) => `/api/materials/btf-works/${encodeURIComponent(id)}`;
-export const listBtfJobs = () => getJson<BtfJobBody[]>("/api/materials/btf-works");
+const btfJobPath = (id: string) => `/api/materials/btf/jobs/${encodeURIComponent(id)}`;
+export const listBtfJobs = () => getJson<BtfJobBody[]>("/api/materials/btf/jobs");
 export async function startBtfJob(body: SyntheticBtfRequest): Promise<BtfJobBody> {
-  return (await (await request("/api/materials/btf-works/synthetic", json("POST", body))).json()) as BtfJobBody;
+  return (await (await request("/api/materials/btf/jobs/synthetic", json("POST", body))).json()) as BtfJobBody;
 }
 /** The results so far are kept. */
 export async function stopBtfJob(id: string): Promise<void> {
@@ -130,7 +130,7 @@ export async function resumeBtfJob(id: string): Promise<void> {
   await request(`${btfJobPath(id)}/resume`, { method: "POST" });
 }
 export async function deleteBtfJob(id: string): Promise<void> {
-  await request(`${btfJobPath(id)}?forget=true`, { method: "DELETE" });
+  await request(`${btfJobPath(id)}?delete_files=true`, { method: "DELETE" });
 }
 export const listMeasured = () => getJson<MeasuredBody[]>("/api/materials/measured");
 export const getMaterialMap = () => getJson<MaterialMapBody>("/api/materials/map");
@@ -204,7 +204,7 @@ export async function getAlbedo(terms: Term[]): Promise<AlbedoBody> {
 
 /** How terms are sent in views with a free camera. */
 export async function getInOut(terms: Term[]): Promise<ZernikeFitBody[]> {
-  return (await (await request("/api/models/in-out", json("POST", { terms }))).json()) as ZernikeFitBody[];
+  return (await (await request("/api/models/zernike-fit", json("POST", { terms }))).json()) as ZernikeFitBody[];
 }
 
 export async function startRender(body: RenderRequest): Promise<RenderBody> {
@@ -240,15 +240,15 @@ export async function deleteComment(scene: string, id: string): Promise<void> {
   await request(commentPath(scene, id), { method: "DELETE" });
 }
 
-const comparisonPath = (id: string) => `/api/truths/${encodeURIComponent(id)}`;
+const comparisonPath = (id: string) => `/api/comparisons/${encodeURIComponent(id)}`;
 
 export async function startComparison(body: ComparisonRequest): Promise<ComparisonBody> {
-  return (await (await request("/api/truths", json("POST", body))).json()) as ComparisonBody;
+  return (await (await request("/api/comparisons", json("POST", body))).json()) as ComparisonBody;
 }
 export const getComparison = (id: string) => getJson<ComparisonBody>(comparisonPath(id));
 /** How long a comparison would take; nothing is begun. */
 export async function planComparison(body: ComparisonRequest): Promise<ComparisonPlanBody> {
-  return (await (await request("/api/truths", json("POST", { ...body, dry_run: true }))).json()) as ComparisonPlanBody;
+  return (await (await request("/api/comparisons", json("POST", { ...body, dry_run: true }))).json()) as ComparisonPlanBody;
 }
 /** Its passes so far are stored. */
 export async function stopComparison(id: string): Promise<void> {
@@ -258,7 +258,7 @@ export async function resumeComparison(id: string): Promise<ComparisonBody> {
   return (await (await request(`${comparisonPath(id)}/resume`, { method: "POST" })).json()) as ComparisonBody;
 }
 export async function deleteComparison(id: string): Promise<void> {
-  await request(`${comparisonPath(id)}?forget=true`, { method: "DELETE" });
+  await request(`${comparisonPath(id)}?delete_files=true`, { method: "DELETE" });
 }
 /** The address of a comparison's image as it is after so many passes. */
 export const comparisonImageUrl = (id: string, name: ComparisonImage, passes: number) =>

@@ -35,7 +35,7 @@ function validateTiles(tiles: unknown, width: number, height: number): asserts t
   }
 }
 
-function validateArrays(tables: FrameHeader["tables"] | undefined, size: number): void {
+function validateArrays(tables: FrameHeader["scene_update"] | undefined, size: number): void {
   if (typeof tables !== "object" || tables === null || !Array.isArray(tables.arrays)) {
     throw new FrameError("a frame came without its list of arrays");
   }
@@ -77,8 +77,8 @@ export function parseFrame(buffer: ArrayBuffer): Frame {
   }
   const header = parseHeader(new TextDecoder().decode(new Uint8Array(buffer, 4, headerBytes)));
   const body = new Uint8Array(buffer, 4 + headerBytes);
-  if (header.kind === "tables") {
-    validateArrays(header.tables, body.byteLength);
+  if (header.kind === "scene_update") {
+    validateArrays(header.scene_update, body.byteLength);
     return { header, payload: body, alpha: null };
   }
   if (header.format === "jpeg") return { header, payload: body, alpha: null };

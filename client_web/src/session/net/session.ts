@@ -34,14 +34,14 @@ export interface SessionHandlers {
   frame(frame: Frame): Promise<void>;
   status(message: StatusMessage): void;
   problem(message: ProblemMessage, lastGood: Look | null): void;
-  probe(message: InspectAnswer): void;
+  inspect(message: InspectAnswer): void;
   curve(message: CurveMessage): void;
   bake(message: BakeMessage): void;
   room(message: RoomMessage): void;
   /** Somebody has commented on the scene. */
   comments(): void;
   /** Others have edited the look; it has become this one, where there is one yet. */
-  shared(message: RoomUpdate, look: Look | null): void;
+  roomUpdate(message: RoomUpdate, look: Look | null): void;
   onEditSent(revision: number, inputTime: number): void;
   /** The look cannot be changed: the server lets this one only look. */
   readOnly(): void;
@@ -78,13 +78,13 @@ export class Session {
       hello: (message) => this.onHello(message),
       status: (message) => handlers.status(message),
       problem: (message) => handlers.problem(message, this.onProblem(message)),
-      probe: (message) => handlers.probe(message),
+      inspect: (message) => handlers.inspect(message),
       curve: (message) => handlers.curve(message),
       bake: (message) => handlers.bake(message),
       room: (message) => handlers.room(message),
       comments: () => handlers.comments(),
-      shared: (message) => this.onShared(message),
-      leaving: () => this.socket.abandonConnection(),
+      room_update: (message) => this.onRoomUpdate(message),
+      server_draining: () => this.socket.abandonConnection(),
       pong: () => undefined, // that it came is all it says
     };
   }
@@ -146,7 +146,7 @@ export class Session {
     const look = message.look as unknown as Look;
     this.readOnlyLook = message.role === "view" ? look : null;
     this.sharedRevision = 0;
-    if (message.room === null || message.room.created) {
+    if (message.room === null || message.room.is_new) {
       this.queue.reset(look, message.revision, message.solo, message.room !== null);
     } else this.queue.joinRoom(look, message.revision, message.solo);
     this.shownRevision = this.queue.revision;
@@ -155,11 +155,11 @@ export class Session {
     this.flush();
   }
 
-  private onShared(message: RoomUpdate): void {
+  private onRoomUpdate(message: RoomUpdate): void {
     const look = this.queue.applyRemote(message.patch as PatchOp[], message.revision);
     if (this.readOnlyLook !== null) this.readOnlyLook = look;
-    if (message.patch.length > 0) this.sharedRevision = message.shared;
-    if (message.patch.length > 0) this.handlers.shared(message, look);
+    if (message.patch.length > 0) this.sharedRevision = message.room_revision;
+    if (message.patch.length > 0) this.handlers.roomUpdate(message, look);
   }
 
   /** The look that is wanted, with what others made of it. */
@@ -205,7 +205,7 @@ export class Session {
 
   private sendEdits(): void {
     for (const { revision, patch, activeControl, solo, inputTime } of this.queue.takeEdits()) {
-      this.send({ type: "edit", revision, patch: [...patch], hand: activeControl, solo: solo && [...solo] });
+      this.send({ type: "edit", revision, patch: [...patch], active_control: activeControl, solo: solo && [...solo] });
       this.handlers.onEditSent(revision, inputTime);
     }
     this.hasSentThisFrame = true;
@@ -220,7 +220,7 @@ export class Session {
 
   /** Whether the message went. */
   send(message: ClientMessage): boolean {
-    const isHold = message.type === "touch" && message.curve == null;
+    const isHold = message.type === "prepare" && message.curve == null;
     if (this.readOnlyLook !== null && isHold) return false; // nothing of it is edited
     return this.socket.send(message);
   }

@@ -56,7 +56,7 @@ export class SessionSocket {
     url.protocol = url.protocol.replace("http", "ws");
     // all else is in a message: addresses are written into logs
     const opening: OpenMessage = { type: "open", ...this.openParameters(), resume: this.resume };
-    const room = opening.room ?? opening.watch;
+    const room = opening.room ?? opening.view_token;
     if (room != null) url.searchParams.set("room_prefix", room.slice(0, ROOM_PREFIX));
     this.socket?.close(1000); // one that hangs while it connects
     const socket = new WebSocket(url, SUBPROTOCOL);

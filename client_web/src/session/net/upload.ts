@@ -80,12 +80,12 @@ export function uploadGeometry(
   const form = new FormData();
   form.append("geometry", file);
   if (period !== null) form.append("period", String(period));
-  return postForm("/api/materials/btf-works/geometry", form, progress) as Promise<BtfJobBody>;
+  return postForm("/api/materials/btf/jobs/geometry", form, progress) as Promise<BtfJobBody>;
 }
 
 /** A zip of images of a texture from all sides, or a .btf container; the server compresses them from then on. */
 export function uploadBtf(file: File, progress: (fraction: number) => void): Promise<BtfJobBody> {
   const form = new FormData();
   form.append("images", file);
-  return postForm("/api/materials/btf-works", form, progress) as Promise<BtfJobBody>;
+  return postForm("/api/materials/btf/jobs", form, progress) as Promise<BtfJobBody>;
 }

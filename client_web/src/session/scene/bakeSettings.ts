@@ -1,6 +1,6 @@
 /** Which bakes of a scene there are, and what may be asked of a new one. */
 import { listBakes } from "../net/api";
-import { MAX_VIEWS_SHOWN, type BakeBody, type SceneBody } from "../../protocol";
+import { MAX_VISIBLE_VIEWS, type BakeBody, type SceneBody } from "../../protocol";
 import type { BakeMethod } from "./bakeMethods";
 import type { BakeSize } from "./recipe";
 
@@ -22,7 +22,7 @@ export interface BakeSettings {
 
 /** The views that are baked where nobody chooses: as many as can be shown at once. */
 export function viewsToBake(scene: SceneBody): string[] {
-  return scene.views.slice(0, MAX_VIEWS_SHOWN).map((view) => view.name);
+  return scene.views.slice(0, MAX_VISIBLE_VIEWS).map((view) => view.name);
 }
 
 /** How fine a bake is: pixels times lights. */

@@ -25,7 +25,7 @@ export function hasProgress(bake: BakeStatus): boolean {
 /** What it is at, without numbers that run. */
 export function phaseText(bake: BakeStatus): string {
   if (bake.state === "queued") {
-    const ahead = bake.ahead ?? 0;
+    const ahead = bake.queue_position ?? 0;
     return ahead === 0 ? "waits for its turn" : `waits for ${ahead} ${ahead === 1 ? "bake" : "bakes"} before it`;
   }
   if (bake.state !== "running") return `bake ${bake.state}`;

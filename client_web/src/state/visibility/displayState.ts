@@ -4,9 +4,9 @@ import { withVisiblePaths } from "./lightPaths";
 import { ENVIRONMENT_SOURCE, hasLightSource, soloLight } from "./soloSources";
 
 function withSingleLight(look: Look, source: string): Look {
-  const off = ([name, light]: [string, Light]) => [name, { ...light, on: name === source }];
+  const off = ([name, light]: [string, Light]) => [name, { ...light, enabled: name === source }];
   const lights = Object.fromEntries(Object.entries(look.lights).map(off)) as Look["lights"];
-  const environment = source === ENVIRONMENT_SOURCE ? look.environment : { ...look.environment, scale: 0 };
+  const environment = source === ENVIRONMENT_SOURCE ? look.environment : { ...look.environment, intensity: 0 };
   return { ...look, environment, lights };
 }
 

@@ -14,7 +14,7 @@ export const LIGHT_PATHS: readonly PathLabels[] = [
   { value: "all", label: "All", title: "All light", only: null },
   { value: "direct", label: "Direct", title: "Light straight from its sources", only: "direct light" },
   {
-    value: "reflected",
+    value: "indirect",
     label: "Reflected",
     title: "Light that surfaces have passed on",
     only: "reflected light",

@@ -12,7 +12,7 @@ import { orbitKeyStep } from "./useCameraControl";
 
 const BROWSER_TITLE = "This browser draws while the eye moves: nothing goes over the network for it. Bright rims a pixel thin are smoothed where the server draws";
 const SERVER_TITLE = "The server draws while the eye moves, and sends each picture";
-const CHOICES: Record<RendererMode, string> = { auto: "automatic", browser: "this browser", server: "the server" };
+const CHOICES: Record<RendererMode, string> = { auto: "automatic", client: "this browser", server: "the server" };
 
 /** Who draws while the camera moves. */
 function RendererSelect() {
@@ -38,7 +38,7 @@ export const cameraMessage = computed(() => (sideBySide.value ? `Eye of ${active
 export function CameraBar() {
   const [open, setOpen] = useState(true);
   const name = activeViewName.value;
-  const moves = views.value.find((view) => view.name === name)?.eye === "free";
+  const moves = views.value.find((view) => view.name === name)?.camera_mode === "free";
   const freeCamera = moves ? freeCameraOf(name) : null;
   const sceneId = scene.value?.id ?? null;
   if (freeCamera === null) return null;

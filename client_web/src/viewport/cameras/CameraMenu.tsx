@@ -1,7 +1,7 @@
 /** Menu of a free camera: field of view, image size, and the cameras saved with the scene:
  * to look from, to rename, to delete. */
 import { useEffect, useRef, useState } from "preact/hooks";
-import { MAX_EYE_PIXELS, type CameraEntry } from "../../protocol";
+import { MAX_CAMERA_PIXELS, type CameraEntry } from "../../protocol";
 import { activeView } from "../../state/views";
 import { IconButton } from "../../ui/IconButton";
 import { EditableName } from "../../ui/EditableName";
@@ -21,7 +21,7 @@ const UPRIGHT = 1e-3; // radians
 /** Width and height; what would be too many pixels takes from the other side. */
 function ImageSizeFields({ freeCamera }: { freeCamera: FreeCamera }) {
   const [width, height] = freeCamera.size;
-  const maxSide = (otherSide: number) => Math.floor(MAX_EYE_PIXELS / otherSide);
+  const maxSide = (otherSide: number) => Math.floor(MAX_CAMERA_PIXELS / otherSide);
   const field = (label: string, value: number, onChange: (value: number) => void) => (
     <NumberField label={label} value={value} minimum={MIN_SIDE} maximum={MAX_SIDE} step={10} isInteger onChange={onChange} />
   );

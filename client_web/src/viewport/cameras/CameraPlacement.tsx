@@ -36,11 +36,11 @@ interface PlacementStart {
 /** The scene's bounds, and the initial orbit, else of its first camera: it turns about what the middle of the image
  * shows. */
 async function startPlacement(scene: string, from: CameraPose | null): Promise<PlacementStart> {
-  const [{ lowest, highest, framing }, cameras] = await Promise.all([getPlacementView(scene), listCameras(scene)]);
-  const bounds: Bounds = { lowest: lowest as Triple, highest: highest as Triple };
-  const frame = from ?? cameras[0] ?? framing;
+  const [{ bounds_min, bounds_max, default_camera }, cameras] = await Promise.all([getPlacementView(scene), listCameras(scene)]);
+  const bounds: Bounds = { lowest: bounds_min as Triple, highest: bounds_max as Triple };
+  const frame = from ?? cameras[0] ?? default_camera;
   const target = await pickTarget(scene, frame, IDLE_SIZE, IDLE_SIZE[0] / 2, IDLE_SIZE[1] / 2);
-  return { bounds, first: orbitOf(frame, bounds, target), overview: orbitOf(framing, bounds) };
+  return { bounds, first: orbitOf(frame, bounds, target), overview: orbitOf(default_camera, bounds) };
 }
 
 export function CameraPlacement({ scene, from, name, onSave, onClose }: Props) {

@@ -10,7 +10,7 @@ const cameraUrl = (scene: string) => `/api/scenes/${encodeURIComponent(scene)}`;
 const namedCameraUrl = (scene: string, name: string) => `${cameraUrl(scene)}/cameras/${encodeURIComponent(name)}`;
 
 export const listCameras = (scene: string) => getJson<CameraEntry[]>(`${cameraUrl(scene)}/cameras`);
-export const getPlacementView = (scene: string) => getJson<ViewportBody>(`${cameraUrl(scene)}/finder`);
+export const getPlacementView = (scene: string) => getJson<ViewportBody>(`${cameraUrl(scene)}/viewport`);
 
 export async function saveCamera(scene: string, name: string, { to_world, yfov }: CameraPose): Promise<void> {
   await request(namedCameraUrl(scene, name), json("PUT", { to_world, yfov }));
@@ -21,7 +21,7 @@ export async function deleteCamera(scene: string, name: string): Promise<void> {
 }
 
 export async function renderPlacement(scene: string, { to_world, yfov }: CameraPose, size: BakeSize): Promise<Blob> {
-  return (await request(`${cameraUrl(scene)}/finder`, json("POST", { to_world, yfov, size }))).blob();
+  return (await request(`${cameraUrl(scene)}/viewport`, json("POST", { to_world, yfov, size }))).blob();
 }
 
 /** The surface point that a pixel shows; null for the background. */
@@ -32,7 +32,7 @@ export async function pickTarget(
   x: number,
   y: number,
 ): Promise<Triple | null> {
-  const answer = await request(`${cameraUrl(scene)}/finder/place`, json("POST", { to_world, yfov, size, x, y }));
+  const answer = await request(`${cameraUrl(scene)}/viewport/pick`, json("POST", { to_world, yfov, size, x, y }));
   return ((await answer.json()) as PickBody).position as Triple | null;
 }
 

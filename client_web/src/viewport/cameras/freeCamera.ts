@@ -143,20 +143,20 @@ export class FreeCamera {
     storeCamera(name, hasOwnPose ? { camera, size: limitRenderSize(width, height) } : null);
     const isRenderedHere = !isLast && renderIfPossible(name);
     if (!isRenderedHere) this.sendPose(camera, "exact");
-    else if (!isMoving(name)) this.sendPose(camera, "stay"); // nothing is to be traced of where it is passing
+    else if (!isMoving(name)) this.sendPose(camera, "none"); // nothing is to be traced of where it is passing
     setMoving(name, isRenderedHere);
     if (isLast) renderIfPossible(name);
   }
 
-  private sendPose(camera: View["camera"], rest: "exact" | "stay"): void {
+  private sendPose(camera: View["camera"], refine: "exact" | "none"): void {
     const { name } = this.view;
     this.number = Math.max(this.number + 1, Date.now());
     setCameraSeq(name, this.number);
-    sendToShown({ type: "eye", view: name, eye: this.number, ...camera, size: limitRenderSize(...this.size), hand: null, rest });
+    sendToShown({ type: "camera", view: name, seq: this.number, ...camera, size: limitRenderSize(...this.size), active_control: null, refine });
   }
 
   private get key(): string {
-    return `relume.eye.${scene.peek()?.id}.${this.view.name}`; // other bakes of the scene use it, too
+    return `relume.camera.${scene.peek()?.id}.${this.view.name}`; // other bakes of the scene use it, too
   }
 
   private save(): void {
@@ -190,7 +190,7 @@ const freeCameras = new Map<string, FreeCamera>();
 export function freeCameraOf(name: string): FreeCamera | null {
   const currentBakeId = bake.peek();
   const view = views.peek().find((candidate) => candidate.name === name);
-  if (currentBakeId === null || view?.eye !== "free") return null;
+  if (currentBakeId === null || view?.camera_mode !== "free") return null;
   const existing = freeCameras.get(name);
   if (existing?.bake === currentBakeId) return existing;
   existing?.end();
@@ -202,7 +202,7 @@ export function freeCameraOf(name: string): FreeCamera | null {
 /** Current pose of a view; null with a fixed camera. */
 export function cameraOf(name: string): CameraPose | null {
   const view = views.peek().find((candidate) => candidate.name === name);
-  return view?.eye === "free" ? { to_world: view.camera.to_world, yfov: view.camera.yfov * DEGREES } : null;
+  return view?.camera_mode === "free" ? { to_world: view.camera.to_world, yfov: view.camera.yfov * DEGREES } : null;
 }
 
 /** See a view from there, if its camera is free, in an image of a size; null: as large as was baked, undefined: as it is. */

@@ -1,17 +1,17 @@
 /** The roughness map of a term: the scene's own, an image, or none. */
 import { useEffect } from "preact/hooks";
 import { isImageReference } from "../../../state/document/imageReference";
-import type { Term } from "../../../protocol";
 import { MapImageField } from "./MapImageField";
+import { ROUGHNESS_MAP } from "./roughness";
 import { loadImages, assignRoughness, removeRoughnessMap } from "./imageStore";
 
 interface Props {
   material: string;
   index: number;
-  value: NonNullable<Term["roughness_map"]>;
+  value: string | null;
   /** Whether the scene has a map of its own. */
   hasOwn: boolean;
-  onChange(value: boolean): void;
+  onChange(value: string | null): void;
 }
 
 export function RoughnessImage({ material, index, value, hasOwn, onChange }: Props) {
@@ -24,16 +24,16 @@ export function RoughnessImage({ material, index, value, hasOwn, onChange }: Pro
       file="File of a map of roughness"
       material={material}
       displayedImage={displayedImage}
-      fallbackLabel={value === true ? "map" : ""}
+      fallbackLabel={value === ROUGHNESS_MAP ? "map" : ""}
       assign={(target, image) => assignRoughness(target, image, index)}
       unassign={removeRoughnessMap}
       onOther={(name) => {
         if (displayedImage !== null && (name === "" || name === "map")) removeRoughnessMap(material);
-        else onChange(name === "map");
+        else onChange(name === "map" ? ROUGHNESS_MAP : null);
       }}
     >
       <option value="">None</option>
-      {(hasOwn || value === true) && <option value="map">{hasOwn ? "As in the scene" : "By finer bumps"}</option>}
+      {(hasOwn || value === ROUGHNESS_MAP) && <option value="map">{hasOwn ? "As in the scene" : "By finer bumps"}</option>}
     </MapImageField>
   );
 }

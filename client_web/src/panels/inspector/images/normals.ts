@@ -1,18 +1,19 @@
 /** A material with an image as its normal map, and without it. */
 import type { MaterialLook, Term } from "../../../protocol";
 import { modelOf, models } from "../../../state/scene";
+import { ROUGHNESS_MAP } from "./roughness";
 
 /** Whether bumps that are finer than a pixel make a term rougher, as of files that have a normal map: no mirror. */
 function isWidened(term: Term): boolean {
-  const roughness = modelOf(term)?.width === "roughness" ? term.params?.roughness : undefined;
-  const mirrorsBelow = Math.max(0, ...models.value.map(({ mirrors_below }) => mirrors_below ?? 0));
+  const roughness = modelOf(term)?.width_parameter === "roughness" ? term.params?.roughness : undefined;
+  const mirrorsBelow = Math.max(0, ...models.value.map(({ specular_below }) => specular_below ?? 0));
   return roughness !== undefined && Math.min(...[roughness].flat()) >= mirrorsBelow;
 }
 
 /** The material with the image, as strong as it was, or as it is. */
 export function withNormals(material: MaterialLook, image: string): MaterialLook {
   const terms = material.terms.map((term) =>
-    term.roughness_map === undefined && isWidened(term) ? { ...term, roughness_map: true } : term,
+    term.roughness_map === undefined && isWidened(term) ? { ...term, roughness_map: ROUGHNESS_MAP } : term,
   );
   return { ...material, terms, normal_map: { image, scale: material.normal_map?.scale ?? 1 } };
 }
@@ -21,7 +22,7 @@ export function withNormals(material: MaterialLook, image: string): MaterialLook
 export function withoutNormals(material: MaterialLook, original: MaterialLook | undefined): MaterialLook {
   const { normal_map: _image, ...bare } = material;
   const terms = material.terms.map((term, k) => {
-    if (term.roughness_map !== true || original?.terms[k]?.roughness_map !== undefined) return term;
+    if (term.roughness_map !== ROUGHNESS_MAP || original?.terms[k]?.roughness_map !== undefined) return term;
     const { roughness_map: _followed, ...rest } = term;
     return rest;
   });

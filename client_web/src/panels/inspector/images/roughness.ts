@@ -3,9 +3,10 @@ import { isImageReference } from "../../../state/document/imageReference";
 import type { ImageBody, ModelBody, ParamValue, Term } from "../../../protocol";
 import { modelOf } from "../../../state/scene";
 
-type RoughnessFollow = NonNullable<Term["roughness_map"]>;
+/** A term's `roughness_map` that is the material's own. */
+export const ROUGHNESS_MAP = "roughness";
 
-const followsMap = (term: Term): boolean => term.roughness_map !== undefined && term.roughness_map !== false;
+const followsMap = (term: Term): boolean => term.roughness_map != null;
 
 /** The image used as the material's roughness map; all terms that follow one follow the same. */
 export function roughnessImage(terms: readonly Term[]): string | null {
@@ -14,24 +15,24 @@ export function roughnessImage(terms: readonly Term[]): string | null {
 
 /** The terms that an image dropped on the object is for: those that follow a map or may, else all that have a width. */
 export function roughTermIndices(terms: readonly Term[]): number[] {
-  const indicesWhere = (predicate: (term: Term) => boolean) => terms.flatMap((term, k) => (modelOf(term)?.width != null && predicate(term) ? [k] : []));
+  const indicesWhere = (predicate: (term: Term) => boolean) => terms.flatMap((term, k) => (modelOf(term)?.width_parameter != null && predicate(term) ? [k] : []));
   const following = indicesWhere((term) => term.roughness_map !== undefined);
   return following.length > 0 ? following : indicesWhere(() => true);
 }
 
 /** The width of a term whose material is so rough; null where the model measures it otherwise. */
 function lobeWidth(model: ModelBody, roughness: number): ParamValue | null {
-  const info = model.parameters.find(({ name }) => name === model.width);
+  const info = model.parameters.find(({ name }) => name === model.width_parameter);
   if (info === undefined || !((model.width_power ?? 0) > 0)) return null;
   const value = Math.min(Math.max(roughness ** (model.width_power as number), info.minimum), info.maximum);
   return Math.round(value * 1e4) / 1e4;
 }
 
 /** Let a term follow a map, an image, or none; others that follow one follow the same. */
-export function withMap(terms: readonly Term[], index: number, follows: RoughnessFollow): Term[] {
+export function withMap(terms: readonly Term[], index: number, follows: string | null): Term[] {
   const image = isImageReference(follows) || roughnessImage(terms) !== null;
   return terms.map((term, k) => {
-    const changes = k === index || (image && follows !== false && followsMap(term));
+    const changes = k === index || (image && follows !== null && followsMap(term));
     return changes ? { ...term, roughness_map: follows } : term;
   });
 }
@@ -41,9 +42,9 @@ export function withRoughnessImage(terms: readonly Term[], indices: readonly num
   const following = indices.reduce<Term[]>((result, index) => withMap(result, index, image.texture), [...terms]);
   return following.map((term) => {
     const model = modelOf(term);
-    if (model?.width == null || term.roughness_map !== image.texture) return term;
+    if (model?.width_parameter == null || term.roughness_map !== image.texture) return term;
     const width = lobeWidth(model, image.roughness);
-    return width === null ? term : { ...term, params: { ...term.params, [model.width]: width } };
+    return width === null ? term : { ...term, params: { ...term.params, [model.width_parameter]: width } };
   });
 }
 
@@ -52,7 +53,7 @@ export function withoutRoughnessImage(terms: readonly Term[], originals: readonl
   return terms.map((term, k) => {
     if (!isImageReference(term.roughness_map)) return term;
     const original = originals[k]?.model === term.model ? originals[k] : undefined;
-    const width = modelOf(term)?.width;
+    const width = modelOf(term)?.width_parameter;
     const value = width == null ? undefined : original?.params?.[width];
     const params = width == null || value === undefined ? term.params : { ...term.params, [width]: value };
     const { roughness_map: _image, ...bare } = term;
