@@ -29,7 +29,7 @@ export interface AckMessage {
   frame: number;
 }
 
-/** What to bake. A preset gives size and lights; what is named beside it wins. `aspect`: width ÷ height of the preset's picture, of as many pixels; beside a `size` it says nothing. `views`: names of the scene's cameras, or cameras, which become part of the recipe; all that came with the scene where none are named. `points`: that light is kept at where the eye moves (method `surface`); fixed views have none, and a number of them is refused. `gather_samples`: pieces of surfaces that reflected light is kept for; `gather_rays`: of a view sample, or point, that look for them; as many as fit the picture where they are not named (methods `gather` and `surface`). `relightable`: divide the light so that turning or exchanging the environment errs little. */
+/** What to bake. A preset gives size and lights; what is named beside it wins. `aspect`: width ÷ height of the preset's picture, of as many pixels; beside a `size` it says nothing. `views`: names of the scene's cameras, or cameras, which become part of the recipe; all that came with the scene where none are named. `probes`: surface probes of a free camera (method `probes`); refused for fixed views, which have none. `patches`: surface patches that indirect light is stored for; `gather_rays`: of a view sample or probe; by default as many as fit the picture (methods `gather` and `probes`). `relightable`: divide the light so that turning or exchanging the environment errs little. */
 export interface BakeRequest {
   scene: string;
   method?: string;
@@ -38,8 +38,8 @@ export interface BakeRequest {
   aspect?: number | null;
   size?: [number, number] | null;
   lights?: number | null;
-  points?: number | null;
-  gather_samples?: number | null;
+  probes?: number | null;
+  patches?: number | null;
   gather_rays?: number | null;
   relightable?: boolean;
   dry_run?: boolean;
@@ -753,14 +753,14 @@ export interface ProblemMessage {
   problem: Problem;
 }
 
-/** What was asked for, complete; `cameras` are those of the `views` that somebody placed. `points`: null where the eye does not move. `gather_samples`, `gather_rays`: null where the method chooses. */
+/** What was asked for, complete; `cameras` are those of the `views` that somebody placed. `probes`: null for fixed cameras. `patches`, `gather_rays`: null where the method chooses. */
 export interface RecipeBody {
   method: string;
   views: string[];
   size: [number, number];
   lights: number;
-  points: number | null;
-  gather_samples: number | null;
+  probes: number | null;
+  patches: number | null;
   gather_rays: number | null;
   relightable: boolean;
   cameras: CameraBody[];

@@ -76,7 +76,7 @@ test("recipes are whole numbers within bounds", () => {
     expect(validateRecipe({ size, lights: 9 })).toMatch("whole pixels");
   expect(validateRecipe({ size: [640, 480], lights: 0 })).toMatch("light triangles");
   const good = { size: [640, 480] as [number, number], lights: 9 };
-  expect(validateRecipe({ ...good, gather_samples: 64, gather_rays: 4096 })).toBeNull();
-  expect(validateRecipe({ ...good, gather_samples: 63 })).toMatch("64 to 65,535 gather samples");
+  expect(validateRecipe({ ...good, patches: 64, gather_rays: 4096 })).toBeNull();
+  expect(validateRecipe({ ...good, patches: 63 })).toMatch("64 to 65,535 patches");
   for (const gather_rays of [15, 4097, 20.5, Number.NaN]) expect(validateRecipe({ ...good, gather_rays })).toMatch("rays a sample");
 });

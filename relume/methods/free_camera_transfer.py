@@ -1,4 +1,4 @@
-"""An opened bake of the method `surface`: what a moving eye sees, and what arrives there under any light."""
+"""An opened bake of the method `probes`: surfaces visible to a free camera, and their incident light."""
 
 from __future__ import annotations
 

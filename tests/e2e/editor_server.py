@@ -81,7 +81,7 @@ class Server:
         ledger = Ledger(open_database(f"sqlite:///{self.data / 'relume.db'}"))
         register_scene(self.data, ledger, scene)
         ledger.close()
-        self.bake({"scene": scene.id, "method": "probes", "size": (120, 120), "lights": 100, "points": 400})
+        self.bake({"scene": scene.id, "method": "probes", "size": (120, 120), "lights": 100, "probes": 400})
         return scene.id
 
     def bake(self, recipe: dict[str, Any]) -> None:

@@ -38,7 +38,7 @@ def scene(client: TestClient) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def bake(client: TestClient, scene: dict[str, Any]) -> str:
-    request = {"scene": scene["id"], "method": "probes", "size": SIZE, "lights": 100, "points": 2000}
+    request = {"scene": scene["id"], "method": "probes", "size": SIZE, "lights": 100, "probes": 2000}
     done = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
     assert done["state"] == "ready", done["problem"]
     assert done["recipe"]["points"] == 2000
@@ -48,17 +48,16 @@ def bake(client: TestClient, scene: dict[str, Any]) -> str:
 @pytest.mark.parametrize("method", ["gather", "probes"])
 def test_gather_samples_and_rays_may_be_asked_for(client: TestClient, scene: dict[str, Any], method: str) -> None:
     request = {"scene": scene["id"], "method": method, "size": SIZE, "lights": 100, "dry_run": True}
-    request |= {"points": 500} if method == "probes" else {}
+    request |= {"probes": 500} if method == "probes" else {}
     usual, asked = (
-        client.post("/api/bakes", json=request | more).json()
-        for more in ({}, {"gather_samples": 4000, "gather_rays": 1000})
+        client.post("/api/bakes", json=request | more).json() for more in ({}, {"patches": 4000, "gather_rays": 1000})
     )
-    assert (usual["recipe"]["gather_samples"], usual["recipe"]["gather_rays"]) == (None, None)
-    assert (asked["recipe"]["gather_samples"], asked["recipe"]["gather_rays"]) == (4000, 1000)
+    assert (usual["recipe"]["patches"], usual["recipe"]["gather_rays"]) == (None, None)
+    assert (asked["recipe"]["patches"], asked["recipe"]["gather_rays"]) == (4000, 1000)
     for count in ("rays", "store_bytes", "peak_bytes"):
         assert asked["plan"][count] > usual["plan"][count]
     for bad in (
-        {"gather_samples": 10**6},
+        {"patches": 10**6},
         {"gather_rays": 5000},
         {"gather_rays": 0},
         {"method": "direct", "gather_rays": 9},
@@ -71,9 +70,9 @@ def test_gather_samples_and_rays_may_be_asked_for(client: TestClient, scene: dic
 def test_points_are_refused_where_no_eye_moves(client: TestClient, scene: dict[str, Any], method: str) -> None:
     request = {"scene": scene["id"], "method": method, "size": SIZE, "lights": 100, "dry_run": True}
     recipe = client.post("/api/bakes", json=request).json()["recipe"]
-    assert recipe["points"] is None
-    assert client.post("/api/bakes", json=request | {"points": recipe["points"]}).json()["recipe"] == recipe
-    refused = client.post("/api/bakes", json=request | {"points": 777})
+    assert recipe["probes"] is None
+    assert client.post("/api/bakes", json=request | {"probes": recipe["probes"]}).json()["recipe"] == recipe
+    refused = client.post("/api/bakes", json=request | {"probes": 777})
     assert (refused.status_code, refused.json()["type"]) == (422, "urn:relume:problem:plan")
     assert f"777 probes were asked for; method {method} has none" in refused.json()["detail"]
 
@@ -262,7 +261,7 @@ def test_fixed_views_have_no_eye_that_moves_and_moving_ones_no_mask(
 def test_a_scene_deleted_under_a_moving_view_leaves_what_moves(client: TestClient) -> None:
     file = trimesh.Scene(trimesh.creation.icosphere(subdivisions=2)).export(file_type="glb")
     scene = client.post("/api/scenes", files={"scene": ("gone.glb", file)}).json()["id"]
-    request = {"scene": scene, "method": "probes", "size": SIZE, "lights": 50, "points": 500}
+    request = {"scene": scene, "method": "probes", "size": SIZE, "lights": 50, "probes": 500}
     made = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
     with open_session(client, made["id"]) as session:
         (view,) = hello(session)["views"]
@@ -364,7 +363,7 @@ def test_there_are_no_other_arrays_and_none_of_fixed_views(
     assert (missing.status_code, "there are corners" in missing.json()["detail"]) == (404, True)
     request = {"scene": scene["id"], "size": SIZE, "lights": 100}
     fixed = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
-    for path in ("surface", "surface/corners"):
+    for path in ("probes", "probes/corners"):
         refused = client.get(f"/api/bakes/{fixed['id']}/{path}")
         assert (refused.status_code, "are fixed" in refused.json()["detail"]) == (404, True)
 

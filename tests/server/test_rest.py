@@ -83,8 +83,8 @@ def test_scene_is_imported_listed_baked_and_deleted(client: TestClient, glb: byt
     plan = client.post("/api/bakes", json=request | {"dry_run": True})
     assert plan.status_code == 200
     assert plan.json()["recipe"] == {
-        "method": "direct", "views": ["front"], "size": [320, 240], "lights": 300, "points": None,
-        "gather_samples": None, "gather_rays": None, "relightable": False, "cameras": [],
+        "method": "direct", "views": ["front"], "size": [320, 240], "lights": 300, "probes": None,
+        "patches": None, "gather_rays": None, "relightable": False, "cameras": [],
     }  # fmt: skip
     assert client.get("/api/bakes").json() == []
     queued = client.post("/api/bakes", json=request)

@@ -2,13 +2,13 @@
 import { useEffect, useState } from "preact/hooks";
 import { planBake } from "../session/net/api";
 import type { BakeRequest } from "../protocol";
-import { GATHER_RAYS_RANGE, GATHER_SAMPLES_RANGE, LIGHTS_RANGE, validateRecipe, SIDE_RANGE, type CustomBakeRecipe as Recipe } from "../session/scene/recipe";
+import { GATHER_RAYS_RANGE, PATCHES_RANGE, LIGHTS_RANGE, validateRecipe, SIDE_RANGE, type CustomBakeRecipe as Recipe } from "../session/scene/recipe";
 import { PlanText, type BakePlan } from "./PlanText";
 
 const TYPING_DELAY_MS = 300;
 /** What methods that gather light have besides. */
 const GATHER_FIELDS = [
-  { name: "gather_samples", label: "Gather samples", range: GATHER_SAMPLES_RANGE },
+  { name: "patches", label: "Patches", range: PATCHES_RANGE },
   { name: "gather_rays", label: "Rays a sample", range: GATHER_RAYS_RANGE },
 ] as const;
 
@@ -73,9 +73,9 @@ interface CustomRecipeProps {
 
 export function CustomRecipe({ request, initial, action, onChoose }: CustomRecipeProps) {
   const [typed, setRecipe] = useState(initial);
-  const gathers = request.method === "gather" || request.method === "surface";
+  const gathers = request.method === "gather" || request.method === "probes";
   const recipe: Recipe = gathers ? typed : { size: typed.size, lights: typed.lights };
-  const setNumber = (name: "gather_samples" | "gather_rays", value: number) => {
+  const setNumber = (name: "patches" | "gather_rays", value: number) => {
     const { [name]: _, ...remaining } = recipe;
     setRecipe(Number.isNaN(value) ? remaining : { ...remaining, [name]: value });
   };

@@ -193,9 +193,9 @@ def _recipe(request: BakeRequest, services: Services) -> Recipe:
     views, cameras = resolve_views(ledger, get_scene(ledger, request.scene), requested_views)
     preset = PRESETS[request.preset or "good"]
     num_lights = request.lights or preset.num_lights
-    num_probes = resolve_num_probes(request.method, request.points)
+    num_probes = resolve_num_probes(request.method, request.probes)
     size = request.size or (preset.size if request.aspect is None else preset.fit_aspect(request.aspect))
-    gathering = (request.gather_samples, request.gather_rays)
+    gathering = (request.patches, request.gather_rays)
     return Recipe(request.method, views, size, num_lights, request.relightable, cameras, num_probes, *gathering)
 
 
@@ -213,8 +213,8 @@ def _recipe_body(recipe: Recipe) -> RecipeBody:
         views=list(recipe.views),
         size=recipe.size,
         lights=recipe.num_lights,
-        points=recipe.num_probes if recipe.method in FREE_CAMERA_METHODS else None,
-        gather_samples=recipe.num_patches,
+        probes=recipe.num_probes if recipe.method in FREE_CAMERA_METHODS else None,
+        patches=recipe.num_patches,
         gather_rays=recipe.gather_rays,
         relightable=recipe.relightable,
         cameras=[CameraBody(**camera.document()) for camera in recipe.cameras],

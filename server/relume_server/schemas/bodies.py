@@ -179,10 +179,10 @@ class BakeRequest(Body):
     preset's picture, of as many pixels; beside a `size` it says nothing.
 
     `views`: names of the scene's cameras, or cameras, which become part of the recipe; all that came with the scene
-    where none are named. `points`: that light is kept at where the eye moves (method `surface`); fixed views have
-    none, and a number of them is refused.
-    `gather_samples`: pieces of surfaces that reflected light is kept for; `gather_rays`: of a view sample, or point,
-    that look for them; as many as fit the picture where they are not named (methods `gather` and `surface`).
+    where none are named. `probes`: surface probes of a free camera (method `probes`); refused for fixed views, which
+    have none.
+    `patches`: surface patches that indirect light is stored for; `gather_rays`: of a view sample or probe; by default
+    as many as fit the picture (methods `gather` and `probes`).
     `relightable`: divide the light so that turning or exchanging the environment errs little.
     """
 
@@ -193,8 +193,8 @@ class BakeRequest(Body):
     aspect: Annotated[float, Field(ge=0.125, le=8)] | None = None
     size: tuple[Side, Side] | None = None
     lights: Annotated[int, Field(ge=1, le=100_000)] | None = None
-    points: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
-    gather_samples: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
+    probes: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
+    patches: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
     gather_rays: Annotated[int, Field(ge=1, le=100_000)] | None = None
     relightable: bool = False
     dry_run: bool = False
@@ -212,15 +212,15 @@ class PlanBody(Body):
 
 
 class RecipeBody(Body):
-    """What was asked for, complete; `cameras` are those of the `views` that somebody placed. `points`: null where the
-    eye does not move. `gather_samples`, `gather_rays`: null where the method chooses."""
+    """What was asked for, complete; `cameras` are those of the `views` that somebody placed. `probes`: null for fixed
+    cameras. `patches`, `gather_rays`: null where the method chooses."""
 
     method: str
     views: list[str]
     size: tuple[int, int]
     lights: int
-    points: int | None
-    gather_samples: int | None
+    probes: int | None
+    patches: int | None
     gather_rays: int | None
     relightable: bool
     cameras: list[CameraBody]

@@ -55,7 +55,7 @@ setBakeReadyListener((id) => {
 
 /** Bake what is soon there to be shown, and wait for it; gives its id. */
 export async function bakePreview(scene: SceneBody, choice: BakeSettings): Promise<string> {
-  const { size, lights: _, gather_samples: __, gather_rays: ___, ...settings } = choice;
+  const { size, lights: _, patches: __, gather_rays: ___, ...settings } = choice;
   const sizeOverride = size === undefined ? {} : { size: previewSize(size) };
   const preview = await api.startBake({ scene: scene.id, ...settings, ...sizeOverride, preset: "preview" });
   pendingBake.value = preview;

@@ -1,5 +1,5 @@
 /** Labels of the bake methods. */
-export type BakeMethod = "direct" | "gather" | "surface";
+export type BakeMethod = "direct" | "gather" | "probes";
 
 /** What is baked where nobody chooses: without indirect light metal and glass mirror no objects. */
 export const DEFAULT_BAKE_METHOD: BakeMethod = "gather";
@@ -26,7 +26,7 @@ export const BAKE_METHODS: readonly MethodLabels[] = [
     help: "Surfaces light each other too, and take on each other’s colours. Takes longer and more memory.",
   },
   {
-    name: "surface",
+    name: "probes",
     label: "Moving view",
     short: "moving",
     help: "Look from anywhere while you edit, with reflected light. Fine shadows and sharp highlights are approximate.",

@@ -14,7 +14,7 @@ export interface BakeSettings {
   aspect?: number;
   size?: BakeSize;
   lights?: number;
-  gather_samples?: number;
+  patches?: number;
   gather_rays?: number;
   /** Divided for light that will be turned or exchanged. */
   relightable?: boolean;

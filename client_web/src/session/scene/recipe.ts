@@ -4,15 +4,15 @@ export type BakeSize = [width: number, height: number];
 /** The server takes no others. */
 export const SIDE_RANGE = { minimum: 16, maximum: 16384 };
 export const LIGHTS_RANGE = { minimum: 1, maximum: 100_000 };
-export const GATHER_SAMPLES_RANGE = { minimum: 64, maximum: 65_535 };
+export const PATCHES_RANGE = { minimum: 64, maximum: 65_535 };
 export const GATHER_RAYS_RANGE = { minimum: 16, maximum: 4096 };
 export const PREVIEW_PIXELS = 320 * 240;
 
 export interface CustomBakeRecipe {
   size: BakeSize;
   lights: number;
-  /** Pieces of surfaces that light each other, and rays that look for them; without a number the method chooses. */
-  gather_samples?: number;
+  /** Surface patches for indirect light, and gather rays; without a number the method chooses. */
+  patches?: number;
   gather_rays?: number;
 }
 
@@ -61,10 +61,10 @@ const isUnsetOrInRange = (value: number | undefined, range: { minimum: number; m
 const rangeText = ({ minimum, maximum }: { minimum: number; maximum: number }) => `${minimum} to ${maximum.toLocaleString("en")}`;
 
 /** The error message of a recipe; null if it is valid. */
-export function validateRecipe({ size, lights, gather_samples, gather_rays }: CustomBakeRecipe): string | null {
+export function validateRecipe({ size, lights, patches, gather_rays }: CustomBakeRecipe): string | null {
   if (!size.every((side) => isIntegerInRange(side, SIDE_RANGE))) return `Give width and height in whole pixels, ${rangeText(SIDE_RANGE)}.`;
   if (!isIntegerInRange(lights, LIGHTS_RANGE)) return `Give ${rangeText(LIGHTS_RANGE)} light triangles.`;
-  if (!isUnsetOrInRange(gather_samples, GATHER_SAMPLES_RANGE)) return `Give ${rangeText(GATHER_SAMPLES_RANGE)} gather samples, or none: as many as fit.`;
+  if (!isUnsetOrInRange(patches, PATCHES_RANGE)) return `Give ${rangeText(PATCHES_RANGE)} patches, or none: as many as fit.`;
   if (!isUnsetOrInRange(gather_rays, GATHER_RAYS_RANGE)) return `Give ${rangeText(GATHER_RAYS_RANGE)} rays a sample, or none: as many as fit.`;
   return null;
 }

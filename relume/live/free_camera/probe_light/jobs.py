@@ -70,7 +70,7 @@ class IncrementalProbeLightJob:
     on_done: Callable[[Any], None]
 
     label = "light between surfaces"
-    state: ClassVar[Literal["following"]] = "following"
+    state: ClassVar[Literal["updating"]] = "updating"
     is_refinement = False
     is_resumable = False
 

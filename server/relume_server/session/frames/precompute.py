@@ -88,7 +88,7 @@ class Precomputer:
             return None
         if error is not None:
             raise error
-        if running.job.state != "following":
+        if running.job.state != "updating":
             self._metrics.freeze.observe(time.perf_counter() - running.start_s)
         if self._traces is not None:
             attributes = {"view": running.viewport.name, "label": running.job.label, "state": running.job.state}
@@ -97,7 +97,7 @@ class Precomputer:
 
     async def send_ready(self, viewport: Viewport, job: Job) -> None:
         """Tell the client that this is not waited for any more: it has been handed over, or given up."""
-        if job.state != "following":
+        if job.state != "updating":
             await self._socket.send(StatusMessage(state="ready", view=viewport.name, label=job.label, progress=1.0))
 
     async def end(self) -> None:
@@ -112,7 +112,7 @@ class Precomputer:
 
     async def _send_progress(self, future: asyncio.Future[Any], view: str, job: Job, progress: list[float]) -> None:
         """Say how far it is, each per cent once; what follows a hand is not worth a word."""
-        if job.state == "following":
+        if job.state == "updating":
             await asyncio.wait({future})
             return
         last_fraction = -1.0
