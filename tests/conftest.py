@@ -7,6 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import shape_checks  # noqa: F401 - before relume: it checks what is imported from then on
+
+# isort: split
 import pytest
 from hypothesis import HealthCheck, settings
 from postgres import Cluster

@@ -1,0 +1,93 @@
+"""Checks the array shapes that annotations of `relume` state, `Shaped[F32, "n 3"]`, in every call that a test makes.
+
+Import it before `relume`: it checks what is imported from then on. Nothing else reads the shapes, so an annotation
+that is not true fails the first test that calls the function.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib.abc
+import importlib.machinery
+import inspect
+import sys
+import types
+import typing
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from jaxtyping import AbstractArray, jaxtyped
+
+
+class ShapeError(TypeError):
+    """An array has another shape than its annotation states, or than other arrays of the call imply."""
+
+
+def _matches(value: object, hint: Any) -> bool:
+    """Whether a value has the shapes of a hint; what is no array has none."""
+    if isinstance(hint, type) and issubclass(hint, AbstractArray):
+        return isinstance(value, hint)
+    alternatives = typing.get_args(hint)
+    if isinstance(hint, types.UnionType) or typing.get_origin(hint) is typing.Union:
+        return value is None or any(_matches(value, alternative) for alternative in alternatives)
+    if typing.get_origin(hint) is tuple and isinstance(value, tuple) and len(value) == len(alternatives):
+        return all(_matches(item, alternative) for item, alternative in zip(value, alternatives, strict=True))
+    return True
+
+
+def with_checks(function: types.FunctionType) -> Callable[..., Any]:
+    """The function, its shapes checked at each call; itself if its annotations state none."""
+    stated = {name: text for name, text in function.__annotations__.items() if "Shaped[" in str(text)}
+    if not stated:
+        return function
+    signature = inspect.signature(function)
+
+    @functools.cache
+    def hint(name: str) -> Any:
+        return eval(stated[name], function.__globals__)
+
+    def check(name: str, value: object) -> None:
+        if name in stated and not _matches(value, hint(name)):
+            shape = getattr(value, "shape", type(value).__name__)
+            raise ShapeError(f"{function.__module__}.{function.__qualname__}: {name} is {shape}, not {stated[name]}")
+
+    @functools.wraps(function)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        result = function(*args, **kwargs)  # not inside: a context is of one thread, and calls nest
+        with jaxtyped("context"):  # the name of a dimension stands for one size in all arrays of a call
+            for name, value in signature.bind(*args, **kwargs).arguments.items():
+                check(name, value)
+            check("return", result)
+        return result
+
+    return call
+
+
+def _check_module(module: types.ModuleType) -> None:
+    classes = [
+        value for value in vars(module).values() if inspect.isclass(value) and value.__module__ == module.__name__
+    ]
+    for owner in (module, *classes):
+        for name, value in list(vars(owner).items()):
+            if isinstance(value, types.FunctionType) and value.__module__ == module.__name__:
+                setattr(owner, name, with_checks(value))
+
+
+class _Finder(importlib.abc.MetaPathFinder):
+    def find_spec(
+        self, name: str, path: Sequence[str] | None, target: types.ModuleType | None = None
+    ) -> importlib.machinery.ModuleSpec | None:
+        spec = importlib.machinery.PathFinder.find_spec(name, path, target) if name.startswith("relume.") else None
+        if spec is None or not isinstance(spec.loader, importlib.machinery.SourceFileLoader):
+            return None
+        spec.loader = _Loader(spec.loader.name, spec.loader.path)
+        return spec
+
+
+class _Loader(importlib.machinery.SourceFileLoader):
+    def exec_module(self, module: types.ModuleType) -> None:
+        super().exec_module(module)
+        _check_module(module)
+
+
+sys.meta_path.insert(0, _Finder())
