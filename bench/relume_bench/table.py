@@ -1,7 +1,7 @@
 """Merge figures into docs/performance.json and docs/accuracy.json, and write the tables of both pages from them.
 
-`relume bench --json | python -m bench.table`. A file holds the list that `relume bench --json` prints, with the context
-of each figure; figures that a run did not measure keep their entries. A table stands between two marks.
+`relume bench --json | python -m relume_bench.table`. A file holds the list that `relume bench --json` prints, with the
+context of each figure; figures that a run did not measure keep their entries. A table stands between two marks.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
-BEGIN, END = "<!-- figures: relume bench --json | python -m bench.table -->", "<!-- end of figures -->"
+DOCS = next(folder for folder in Path(__file__).resolve().parents if (folder / "docs").is_dir()) / "docs"
+BEGIN, END = "<!-- figures, written by relume_bench.table -->", "<!-- end of figures -->"
 HEAD = ["| figure | value | target | limit or peer | date |", "|---|---|---|---|---|"]
 PAGES = ("performance", "accuracy")
 
@@ -237,7 +237,7 @@ def filled(text: str, figures: list[dict[str, Any]]) -> str:
     before, _, suffix = text.partition(BEGIN)
     _, mark, after = suffix.partition(END)
     if not mark:
-        raise ValueError("the page has no table of figures; put the two marks of bench/table.py into it")
+        raise ValueError("the page has no table of figures; put the two marks of relume_bench.table into it")
     return "\n".join([before + BEGIN, *HEAD, *map(row, figures), END]) + after
 
 
