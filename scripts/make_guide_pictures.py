@@ -118,6 +118,7 @@ def new_page(browser: Browser) -> Iterator[Page]:
 
 def save_picture(setup: Setup, page: Page, task: str) -> None:
     """Take the picture of a page of the guide, without messages."""
+    time.sleep(1.5)  # for thumbnails
     page.evaluate(WAIT_FOR_FRAMES)
     page.screenshot(path=setup.output / f"{task}.png", style=".toasts { visibility: hidden !important }")
 
@@ -158,6 +159,14 @@ def drag_slider(page: Page, slider: Locator, start: float, stop: float) -> None:
     page.mouse.move(box["x"] + stop * box["width"], y, steps=12)
     page.mouse.up()
     time.sleep(1.0)
+
+
+def set_color(page: Page, color: str) -> None:
+    """Set the color of the expanded layer, without the browser's color picker."""
+    script = "(field, color) => { field.value = color; field.dispatchEvent(new Event('input', { bubbles: true })); }"
+    page.locator(".inspector input[type=color]").first.evaluate(script, color)
+    time.sleep(1.0)
+    wait_until_exact(page)
 
 
 def show_control(page: Page, name: str) -> Locator:
@@ -232,11 +241,9 @@ def compare_looks(setup: Setup) -> None:
     with open_editor(setup, material=MATERIAL, term="0") as page:
         page.mouse.move(*canvas_point(page, 0.5, 0.5))
         page.keyboard.press("a")
-        color = page.locator(".inspector input[type=color]").first
-        color.fill("#1c5f8a")
-        wait_until_exact(page)
+        set_color(page, "#1c5f8a")
         page.keyboard.press("w")
-        page.locator(".wipe-handle").wait_for()
+        page.locator(".wipe[role=slider]").wait_for()
         save_picture(setup, page, "compare")
 
 
@@ -244,12 +251,10 @@ def save_looks(setup: Setup) -> None:
     """Two saved looks and some steps of the history."""
     with open_editor(setup, material=MATERIAL, term="0") as page:
         for color in ("#1c5f8a", "#3f7d3a"):
-            page.locator(".inspector input[type=color]").first.fill(color)
-            wait_until_exact(page)
+            set_color(page, color)
             page.keyboard.press("Control+s")
-            page.locator(".tiles.saved .tile").first.wait_for()
-            page.keyboard.press("Enter")
-            time.sleep(2.0)
+            page.locator(".tiles.saved input").press("Enter")
+            time.sleep(1.0)
         save_picture(setup, page, "save-and-share")
 
 
@@ -275,7 +280,7 @@ def work_together(setup: Setup) -> None:
         link = menu.locator("input[readonly]").input_value()
         second.goto(link)
         wait_until_exact(second)
-        second.get_by_role("option").nth(1).click()
+        second.locator("nav [role=option]").nth(1).click()
         page.locator(".together .chip").first.wait_for()
         if menu.count() == 0:
             page.locator(".together > button").click()
