@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pg8000
 import pytest
+from sqlalchemy.exc import OperationalError
 
 MISSING = "PostgreSQL is not installed (Debian: apt-get install --no-install-recommends postgresql)"
 USER = "relume"
@@ -91,3 +92,8 @@ def _find_unprivileged_user() -> pwd.struct_passwd:
         except KeyError:
             continue
     pytest.skip("PostgreSQL does not run as root, and there is no user postgres or nobody")
+
+
+def make_unavailable_error(line: str) -> OperationalError:
+    """What a call on a server that does not answer raises. line: what the driver says."""
+    return OperationalError(None, None, pg8000.InterfaceError(line))

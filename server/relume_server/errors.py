@@ -22,7 +22,7 @@ from relume.core import errors as relume_errors
 from relume.core.errors import ProtocolError, RelumeError, is_disk_full
 from relume_server.schemas.protocol import Problem
 from relume_server.validation_errors import list_field_errors
-from relume_worker.database.failures import database_outage, describe_error, is_unavailable
+from relume_worker.database.failures import describe_error, is_unavailable
 
 log = logging.getLogger(__name__)
 MEDIA_TYPE = "application/problem+json"
@@ -289,9 +289,8 @@ def install(app: FastAPI, methods_at: Callable[[str], Sequence[str]]) -> None:
     """
 
     async def on_mapped_error(_: Request, error: Exception) -> Response:
-        if is_unavailable(error):
-            database_outage.report_failure(error)
-        elif find_mapping(error).status >= 500 and not isinstance(error, NOT_LOGGED):
+        is_said = is_unavailable(error) or isinstance(error, NOT_LOGGED)
+        if find_mapping(error).status >= 500 and not is_said:
             log.error("%s: %s", type(error).__name__, describe_error(error))
         return problem_response(make_problem(error), make_problem_headers(error))
 

@@ -21,7 +21,7 @@ from relume_server.auth.roles import KEY as CALLER
 from relume_server.auth.rules import is_change
 from relume_server.errors import InProgressError, KeyReusedError, make_problem, make_problem_headers, problem_response
 from relume_server.persistence.idempotency import Answer, EarlierCall, IdempotencyStore
-from relume_worker.database.failures import DATABASE_ERRORS, database_outage, describe_error
+from relume_worker.database.failures import DATABASE_ERRORS, describe_error, is_unavailable
 
 log = logging.getLogger(__name__)
 HEADER, REPLAYED = "Idempotency-Key", "Idempotency-Replayed"
@@ -100,7 +100,8 @@ class _Call:
         try:
             before = await run_sync(self._store.claim, *self._client_and_key, self._digest.hex())
         except DATABASE_ERRORS as error:
-            database_outage.report_failure(error)
+            if not is_unavailable(error):
+                log.error("a key cannot be claimed (%s)", describe_error(error))
             response = problem_response(make_problem(error))
         else:
             if before is None:

@@ -1,7 +1,6 @@
 """What a new bake shows first is made before anybody opens it, by one server, and never against somebody's hand."""
 
 import fcntl
-import logging
 import os
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -13,7 +12,6 @@ import numpy as np
 import pg8000
 import pytest
 from server_fakes import InThreadBatches
-from sqlalchemy.exc import OperationalError
 from tiny_scenes import still_life
 
 from relume.core.cache import Cache
@@ -26,7 +24,6 @@ from relume_server.batch.step import IsNeeded, ProgressCallback, Step
 from relume_server.batch.thumbnails import Thumbnails
 from relume_server.runtime.library import open_library
 from relume_server.settings import Settings
-from relume_worker.database.failures import DatabaseError, database_outage
 from relume_worker.paths import bake_path
 from relume_worker.scenes import register_scene
 from relume_worker.service import BakeService
@@ -140,38 +137,6 @@ def test_who_opens_a_bake_or_closes_the_server_stops_it(bakes: BakeService) -> N
     assert asked.wait(60)
     ahead.close()
     assert kept(bakes, identity) == {}
-
-
-def test_who_has_not_the_turn_says_nothing_of_the_database(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.setattr(module, "POLL_INTERVAL_S", 0.02)
-    bakes = BakeService(tmp_path)  # not started: it would ask the database itself
-    lock, rounds = bakes.data_dir / module._LOCK, threading.Semaphore(0)
-    ahead = looking(bakes, Steps(bakes.data_dir))
-    turn = ahead._try_lock
-
-    @contextmanager
-    def counted() -> Iterator[bool]:
-        rounds.release()
-        with turn() as is_ours:
-            yield is_ours
-
-    ahead._try_lock = counted  # type: ignore[method-assign]
-    with caplog.at_level(logging.WARNING, "relume_worker.database.failures"):
-        DatabaseError(logging.getLogger("loop"), "it cannot be read").report_failure(
-            OperationalError("SELECT 1", {}, AWAY)
-        )
-        with closing_lock(lock):
-            ahead.start()
-            for _ in range(3):
-                assert rounds.acquire(timeout=60)
-            ahead.close()
-        said = [record.getMessage() for record in caplog.records]
-        assert [line.split(" (")[0] for line in said] == ["the database does not answer"]
-        database_outage.report_recovered()
-        assert "that is over" in caplog.text
-    bakes.close()
 
 
 @contextmanager

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
 import base64
 import io
-import logging
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 import pytest
-from alone import run_in_thread
 from fastapi.testclient import TestClient
 from PIL import Image
 from problems import parse_problem
@@ -19,9 +15,7 @@ from server_fakes import SIZE
 from session_client import ROOM_FIELDS, Baked, open_session
 
 from relume_server.collaboration.comment_sync import CommentSync
-from relume_server.collaboration.rooms import Rooms
 from relume_server.persistence import comment_store
-from relume_worker.database.failures import MissingDatabase, make_unavailable_error
 
 
 def image(size: tuple[int, int] = (640, 384), form: str = "JPEG") -> str:
@@ -122,23 +116,6 @@ def test_those_who_work_together_are_told(client: TestClient, baked: Baked, path
         assert ann.text("comments") == {"type": "comments"}
         client.delete(f"{path}/{made['id']}")
         ann.text("comments")
-
-
-def test_where_nothing_is_asked_nothing_is_said_of_the_database(
-    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("relume_server.collaboration.comment_sync.POLL_INTERVAL_S", 0.001)
-    away = MissingDatabase(logging.getLogger("away"), "the database")
-    monkeypatch.setattr("relume_worker.database.failures.database_outage", away)
-    away.report_failure(make_unavailable_error("connection refused"))
-    caplog.clear()
-
-    async def look_for_a_while() -> None:
-        with pytest.raises(TimeoutError):
-            await asyncio.wait_for(CommentSync(Rooms(1, 1, 1.0), lambda _: {}, ThreadPoolExecutor(1)).run(), 0.1)
-
-    run_in_thread(look_for_a_while())
-    assert caplog.records == []
 
 
 def test_rooms_are_told_of_what_another_server_took(

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import pytest
 from fastapi.testclient import TestClient
+from postgres import make_unavailable_error
 from server_fakes import write_tiny_scene
 
 from relume.core.errors import DiskFullError, MaterialError, RelumeError, SceneError
@@ -15,7 +16,6 @@ from relume_server.errors import make_problem
 from relume_server.io import import_request
 from relume_server.io.import_request import ImportRequest, run_import
 from relume_server.settings import Settings
-from relume_worker.database.failures import make_unavailable_error
 
 
 class Usage(NamedTuple):

@@ -1,6 +1,7 @@
 """Databases that fail say so in words, and loops that go on say it once."""
 
 import logging
+import time
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from sqlalchemy.exc import OperationalError
 
 from relume.core.errors import DatabaseDamagedError, DiskFullError
 from relume_worker.database import open_database
-from relume_worker.database.failures import DatabaseError, database_outage
+from relume_worker.database.failures import DatabaseError, Outage
 from relume_worker.ledger import Ledger
 from relume_worker.scenes import register_scene
 
@@ -51,14 +52,22 @@ def test_a_database_without_room_says_so_and_goes_on_when_there_is_some(tmp_path
     register_scene(tmp_path, ledger, scene)
 
 
-def test_a_loop_that_asks_no_database_says_nothing_of_it(caplog: pytest.LogCaptureFixture) -> None:
-    database_outage.report_failure(OperationalError("SELECT 1", {}, Exception("away")))
-    caplog.clear()
-    with caplog.at_level(logging.WARNING):
-        DatabaseError(log := logging.getLogger("loop"), "it cannot be stored", asks_database=False).report_recovered()
-        assert caplog.records == []
-        DatabaseError(log, "it cannot be read").report_recovered()
-    assert [record.getMessage() for record in caplog.records] == ["the database does not answer: that is over"]
+def test_calls_that_overlap_a_change_say_nothing_new(caplog: pytest.LogCaptureFixture) -> None:
+    outage, away = Outage(logging.getLogger("outage"), "it"), Exception("away")
+    with caplog.at_level(logging.WARNING, "outage"):
+        slow = time.monotonic()
+        outage.report_failure(away, time.monotonic())
+        outage.report_failure(away, time.monotonic())
+        outage.report_recovered(slow)  # it was answered before the server went away
+        late = time.monotonic()
+        outage.report_recovered(time.monotonic())
+        outage.report_failure(away, late)  # it was refused before the server came back
+        outage.report_failure(away, time.monotonic())
+    assert [record.getMessage() for record in caplog.records] == [
+        "it does not answer (away); trying again",
+        "it does not answer: that is over",
+        "it does not answer (away); trying again",
+    ]
 
 
 def test_a_loop_says_each_fault_once_and_that_it_is_over(caplog: pytest.LogCaptureFixture) -> None:

@@ -30,7 +30,7 @@ from relume_server.errors import (
 from relume_server.schemas.protocol import SUBPROTOCOL
 from relume_server.telemetry.logs.context import USER
 from relume_server.telemetry.logs.requests import quoted
-from relume_worker.database.failures import DATABASE_ERRORS, database_outage, describe_error, is_unavailable
+from relume_worker.database.failures import DATABASE_ERRORS, describe_error, is_unavailable
 
 if TYPE_CHECKING:
     from relume_server.settings import Settings
@@ -74,9 +74,7 @@ class AuthMiddleware:
             await self._refuse(error, scope, receive, send)
             return
         except DATABASE_ERRORS as error:
-            if is_unavailable(error):
-                database_outage.report_failure(error)
-            else:
+            if not is_unavailable(error):
                 log.error("who calls cannot be told (%s)", describe_error(error))
             await self._refuse(error, scope, receive, send)
             return

@@ -64,7 +64,7 @@ class Prewarmer:
                 with self._try_lock() as has_lock:
                     if has_lock:
                         self._run_once(processed)
-                        self._outage.report_recovered()  # where another server has the turn nothing was asked
+                        self._outage.report_recovered()
             except Exception as error:  # the database may be away for a while; the thread must outlive that
                 self._outage.report_failure(error)
 

@@ -35,8 +35,7 @@ class CommentSync:
             await asyncio.sleep(POLL_INTERVAL_S)
             try:
                 await self.refresh()
-                if self._last_marks:  # else nothing was asked
-                    self._outage.report_recovered()
+                self._outage.report_recovered()
             except Exception as error:  # the database may be away for a while; the next look must come
                 self._outage.report_failure(error)
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Sequence
 
 from opentelemetry.sdk.trace import ReadableSpan
 from opentelemetry.sdk.trace.export import SpanExporter, SpanExportResult
 
 from relume.core.errors import RelumeError
-from relume_worker.database.failures import MissingDatabase
+from relume_worker.database.failures import Outage
 
 EXPORTER = "opentelemetry.exporter.otlp.proto.http.trace_exporter"
 log = logging.getLogger(__name__)
@@ -27,7 +28,7 @@ class TraceExporter(SpanExporter):
             exporter: sends.
         """
         self._exporter, self._messages = exporter, list[str]()
-        self._outage = MissingDatabase(log, "the collector of traces")
+        self._outage = Outage(log, "the collector of traces")
         logging.getLogger(EXPORTER).addFilter(self._collect_message)
 
     def _collect_message(self, record: logging.LogRecord) -> bool:
@@ -37,11 +38,13 @@ class TraceExporter(SpanExporter):
     def export(self, spans: Sequence[ReadableSpan]) -> SpanExportResult:
         """Send some; those that cannot be sent are lost."""
         self._messages.clear()
+        began_s = time.monotonic()
         result = self._exporter.export(spans)
         if result is SpanExportResult.SUCCESS:
-            self._outage.report_recovered()
+            self._outage.report_recovered(began_s)
         else:
-            self._outage.report_failure(RelumeError(self._messages[0] if self._messages else "it takes none"))
+            message = self._messages[0] if self._messages else "it takes none"
+            self._outage.report_failure(RelumeError(message), began_s)
         return result
 
     def shutdown(self) -> None:

@@ -12,7 +12,7 @@ from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError
 
 from relume.core.errors import ParameterError
-from relume_worker.database.failures import translate_error
+from relume_worker.database.failures import translate_error, watch
 from relume_worker.database.postgresql import TLS_MODES, connect_postgresql
 from relume_worker.database.upgrading import upgrade
 
@@ -44,6 +44,7 @@ def connect(url: str) -> Engine:
     if database_url.get_backend_name() == "postgresql":
         waits = {"pool_timeout": POOL_TIMEOUT_S, "max_overflow": MAX_OVERFLOW}
         engine = create_engine(database_url, pool_pre_ping=True, **waits)
+        watch(engine)
         event.listen(engine, "do_connect", connect_postgresql)
     else:
         if database_url.database:

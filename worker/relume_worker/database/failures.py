@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import logging
+import math
 import sqlite3
 import threading
+import time
 
 import pg8000
+from sqlalchemy import Engine, event
 from sqlalchemy.engine import ExceptionContext
 from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError, SQLAlchemyError
 
@@ -49,12 +52,7 @@ def is_unavailable(error: Exception) -> bool:
     return isinstance(error, DBAPIError) and _is_unanswered(error.orig)
 
 
-def make_unavailable_error(line: str) -> OperationalError:
-    """What another process met, as it would have been met here. line: as `told` puts it."""
-    return OperationalError(None, None, pg8000.InterfaceError(line))
-
-
-def describe_error(error: Exception) -> str:
+def describe_error(error: BaseException) -> str:
     """A failure in one line."""
     cause = error.orig if isinstance(error, DBAPIError) and error.orig is not None else error
     return " ".join(_reply(cause).get("M", str(cause)).split()) or type(cause).__name__
@@ -79,22 +77,20 @@ def _is_unanswered(cause: BaseException | None) -> bool:
 class DatabaseError:
     """Says what a loop meets in one line, and not again until it has gone or another has come; from any thread.
 
-    A database server that is away is said once for the whole process, however many loops meet that.
+    A database server that is away is said by `database_outage`, once for the whole process.
 
     Args:
         log: where. label: cannot be done, as a sentence begins.
-        asks_database: whether the loop does, so that all is well with that where all is well here.
     """
 
-    def __init__(self, log: logging.Logger, label: str, asks_database: bool = True) -> None:
-        self._log, self._label, self._asks_database = log, label, asks_database
+    def __init__(self, log: logging.Logger, label: str) -> None:
+        self._log, self._label = log, label
         self._lock = threading.Lock()
         self._reported = ""
 
     def report_failure(self, error: Exception) -> None:
         """Something failed; what nobody foresaw is told with its trace."""
         if is_unavailable(error):
-            database_outage.report_failure(error)
             return
         line, is_expected = describe_error(error), isinstance(error, (*DATABASE_ERRORS, RelumeError, OSError))
         with self._lock:
@@ -105,16 +101,16 @@ class DatabaseError:
 
     def report_recovered(self) -> None:
         """It works."""
-        if self._asks_database:
-            database_outage.report_recovered()
         with self._lock:
             was_reported, self._reported = self._reported, ""
         if was_reported:
             self._log.warning("%s: that is over", self._label)
 
 
-class MissingDatabase:
+class Outage:
     """Says that a server does not answer, and that it does again: whatever the reasons are meanwhile.
+
+    Calls overlap: a slow one that began before the last change may end after it, and says nothing new.
 
     Args:
         log: where. label: does not answer.
@@ -122,23 +118,54 @@ class MissingDatabase:
 
     def __init__(self, log: logging.Logger, label: str) -> None:
         self._log, self._label = log, label
-        self._is_reported, self._lock = False, threading.Lock()
+        self._is_reported, self._changed_s, self._lock = False, -math.inf, threading.Lock()
 
-    def report_failure(self, error: Exception) -> None:
-        """It did not."""
-        with self._lock:
-            was_reported, self._is_reported = self._is_reported, True
-        if not was_reported:
+    def report_failure(self, error: BaseException, began_s: float) -> None:
+        """A call that began at `began_s` (`time.monotonic`) got no answer."""
+        if self._changes(True, began_s):
             self._log.error(
                 "%s does not answer (%s); trying again", self._label, describe_error(error)[:MAX_MESSAGE_LENGTH]
             )
 
-    def report_recovered(self) -> None:
-        """It did."""
-        with self._lock:
-            was_reported, self._is_reported = self._is_reported, False
-        if was_reported:
+    def report_recovered(self, began_s: float) -> None:
+        """A call that began at `began_s` (`time.monotonic`) was answered."""
+        if self._changes(False, began_s):
             self._log.warning("%s does not answer: that is over", self._label)
 
+    def _changes(self, is_away: bool, began_s: float) -> bool:
+        with self._lock:
+            if self._is_reported == is_away or began_s < self._changed_s:
+                return False
+            self._is_reported, self._changed_s = is_away, time.monotonic()
+            return True
 
-database_outage = MissingDatabase(log, "the database")
+
+database_outage = Outage(log, "the database")
+
+
+class _CallStart(threading.local):
+    """When the last call on a database began in this thread."""
+
+    time_s = -math.inf
+
+
+_call_start = _CallStart()
+
+
+def watch(engine: Engine) -> None:
+    """Report to `database_outage` which statements and connections of an engine are answered."""
+
+    def begin(*_: object) -> None:
+        _call_start.time_s = time.monotonic()
+
+    def report_answer(*_: object) -> None:
+        database_outage.report_recovered(_call_start.time_s)
+
+    def report_error(context: ExceptionContext) -> None:
+        if _is_unanswered(context.original_exception):
+            database_outage.report_failure(context.original_exception, _call_start.time_s)
+
+    event.listen(engine, "do_connect", begin)
+    event.listen(engine, "before_cursor_execute", begin)
+    event.listen(engine, "after_cursor_execute", report_answer)
+    event.listen(engine, "handle_error", report_error)

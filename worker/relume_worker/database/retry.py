@@ -8,7 +8,7 @@ from typing import ParamSpec, TypeVar
 
 from sqlalchemy.exc import DBAPIError
 
-from relume_worker.database.failures import database_outage, is_unavailable
+from relume_worker.database.failures import is_unavailable
 
 RETRY_S = 1.0
 
@@ -27,12 +27,8 @@ def with_retry(
     """
     while True:
         try:
-            result = call(*args, **kwargs)
+            return call(*args, **kwargs)
         except DBAPIError as error:
             if not is_unavailable(error) or gives_up():
                 raise
-            database_outage.report_failure(error)
             time.sleep(RETRY_S)
-        else:
-            database_outage.report_recovered()
-            return result

@@ -34,7 +34,7 @@ class PartialUploads:
     def __init__(self, staging: Path, bake_id: str, run: str, tasks: Collection[TaskName]) -> None:
         self._staging, self._storage, self._name = staging, get_storage(), _name(bake_id, run)
         self._tasks, self._stored_files = set(tasks), dict[str, tuple[int, int]]()
-        self._storage_error = DatabaseError(log, f"parts of bake {bake_id} cannot be stored", asks_database=False)
+        self._storage_error = DatabaseError(log, f"parts of bake {bake_id} cannot be stored")
 
     def store(self, task: TaskName) -> None:
         """Store what has appeared since the last time, that of a finished task among it."""

@@ -12,6 +12,7 @@ import hashlib
 import json
 import logging
 import os
+import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -26,7 +27,7 @@ from obstore.store import from_url
 
 from relume.core.errors import ParameterError, StorageError
 from relume.core.filesystem import atomic_write
-from relume_worker.database.failures import MissingDatabase
+from relume_worker.database.failures import Outage
 
 SCHEMES = ("s3://", "file://")
 NUM_THREADS = 4
@@ -35,7 +36,7 @@ PIECE_BYTES = 8 << 20
 MAX_INDEX_BYTES = 64 << 20
 
 log = logging.getLogger(__name__)
-storage_outage = MissingDatabase(log, "the object storage")
+storage_outage = Outage(log, "the object storage")
 
 
 class ObjectStorage:
@@ -208,12 +209,14 @@ def _index(name: str) -> str:
 @contextmanager
 def _translate_errors() -> Iterator[None]:
     """Say what fails in words for everybody, and once in the log in those of the storage, which name addresses."""
+    began_s = time.monotonic()
     try:
         yield
     except (BaseError, FileNotFoundError) as error:  # what is on the list, and is not there
-        storage_outage.report_failure(StorageError(str(error).split("\n")[0]))  # what follows is for those who debug it
+        first_line = str(error).split("\n")[0]  # what follows is for those who debug it
+        storage_outage.report_failure(StorageError(first_line), began_s)
         raise StorageError("the object storage cannot be used now; try again in a while") from error
-    storage_outage.report_recovered()
+    storage_outage.report_recovered(began_s)
 
 
 @lru_cache(maxsize=4)
