@@ -85,7 +85,7 @@ def test_pages_and_decisions_that_the_code_names_are_there() -> None:
 
 PATH = re.compile(r"\b((?:relume|worker|server|cli|bench|tests|client_web|docker|docs)/[\w./-]*\w/?)")
 MODULE = re.compile(r"`((?:relume|relume_worker|relume_server|relume_cli|relume_bench)(?:\.[a-z_]\w*)+)")
-NOT_MODULES = {"relume.v1", "relume.v2", "relume.db"}
+NOT_MODULES = {"relume.v2", "relume.db"}
 EXAMPLES = {"relume/brdf/terms/your_term.py", "bench/.venv-peers", "bench/.venv-cycles", "client_web/dist"}
 
 
