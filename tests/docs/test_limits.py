@@ -67,20 +67,15 @@ ROWS = {
     "text of a comment; side of its image, uploaded; stored": (
         f"{wire_comments.MAX_COMMENT:,} characters; {comment_images.MAX_SIDE:,}; {comment_images.STORED_SIDE} pixels"
     ),
-    "participant name; room name": (
-        f"{rooms.MAX_PERSON_NAME}; {rooms.MIN_ROOM} to {rooms.MAX_ROOM} characters"
-    ),
-    "visible views; unacknowledged frames": (
-        f"{protocol.MAX_VIEWS_SHOWN}; {protocol.MAX_FRAMES_IN_FLIGHT}"
-    ),
+    "participant name; room name": (f"{rooms.MAX_PERSON_NAME}; {rooms.MIN_ROOM} to {rooms.MAX_ROOM} characters"),
+    "visible views; unacknowledged frames": (f"{protocol.MAX_VIEWS_SHOWN}; {protocol.MAX_FRAMES_IN_FLIGHT}"),
     "custom cameras of a scene": f"{cameras.MAX_CAMERAS}",
     "saved look; number of looks": f"{look_store.MAX_LOOK_BYTES // KIB} KiB; {look_store.MAX_LOOKS:,}",
     "shared look; number of shared looks; total": (
         f"{share_store.MAX_SHARE_BYTES // KIB} KiB; {share_store.MAX_SHARES:,}; {share_store.MAX_BYTES // MIB} MiB"
     ),
     "looks and cameras of a batch render; its frames": f"{renders.MAX_LOOKS:,}; {renders.MAX_FRAMES:,}",
-    "frames with listed looks; total": f"{renders.MAX_LISTED_FRAMES}; "
-    f"{renders.MAX_LISTED_BYTES // MIB} MiB",
+    "frames with listed looks; total": f"{renders.MAX_LISTED_FRAMES}; {renders.MAX_LISTED_BYTES // MIB} MiB",
     "passes of a comparison; queued jobs of each kind": f"{most('passes'):,}; {Settings().max_queued}",
     "pixels of a free-camera view": f"{protocol.MAX_EYE_PIXELS:,}",
 }
