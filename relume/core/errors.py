@@ -27,10 +27,6 @@ class SceneError(RelumeError, ValueError):
     """A scene or environment file cannot be used as it is."""
 
 
-class MissingNormalsError(SceneError):
-    """A mesh has no normals and none can be made from its triangles."""
-
-
 class MaterialError(RelumeError, ValueError):
     """A measured material cannot be used as it is."""
 
@@ -94,14 +90,6 @@ class SchemaVersionError(StoreError):
 
     def __init__(self, stored: int, current: int) -> None:
         super().__init__(f"the store has schema version {stored}, this relume reads {current}; bake the scene again")
-        self.stored, self.current = stored, current
-
-
-class StaleStoreError(StoreError):
-    """A store belongs to another scene or recipe than the one asked for."""
-
-    def __init__(self, stored: str, current: str) -> None:
-        super().__init__(f"the store was baked for {stored}, not for {current}; bake again")
         self.stored, self.current = stored, current
 
 

@@ -82,21 +82,6 @@ def visible_fraction(visible, group, fraction, start, stop, visible_fractions): 
                 visible_fractions[cluster, p] += np.float32((bits[p] >> shift) & np.uint8(1)) * part_fraction
 
 
-def visible_fraction_numpy(visible: NDArray[np.uint8], subset: TriangleSubset, num_clusters: int) -> F64:
-    """Do as `visible_fraction` for all points, in plain NumPy: its oracle.
-
-    Args:
-        visible: bits of all parts. (n, bytes) uint8
-        subset: which merged triangle each is of, and its share. num_clusters: of merged triangles, C.
-    Returns:
-        (n, C)
-    """
-    bits = np.unpackbits(visible, axis=1, count=len(subset.group), bitorder="little")
-    fractions = np.zeros((len(subset.group), num_clusters))
-    fractions[np.arange(len(subset.group)), subset.group] = subset.fraction
-    return np.asarray(bits @ fractions)
-
-
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def weight_by_visibility(first, light, visible_fractions, shading):  # type: ignore[no-untyped-def]
     """Weigh what listed merged lights bring by the share that is seen of them.

@@ -79,17 +79,3 @@ def compute_moments(
     return sums[:, :2], np.stack(
         [xx - x * x + texel_variance, xy - x * y, xy - x * y, yy - y * y + texel_variance], axis=1
     ).reshape(-1, 2, 2)
-
-
-def compute_moments_numpy(texels: LightTexels, mean: F64, frame: F64, tile: int) -> tuple[F64, F64]:
-    """Do as `compute_moments` for one tile, in plain NumPy: its oracle.
-
-    Args:
-        texels: of all tiles. mean: n of this one. (3,) frame: its t. (2, 3) tile: its number.
-    """
-    _, luminous, directions, solid_angles = (each[texels.tile == tile] for each in texels)
-    weight = luminous / luminous.sum()
-    position = directions @ frame.T / (directions @ mean)[:, None]
-    center = weight @ position
-    offset = position - center
-    return center, np.einsum("n,ni,nj->ij", weight, offset, offset) + np.eye(2) * (weight @ solid_angles) / 12

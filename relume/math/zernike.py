@@ -168,29 +168,6 @@ def evaluate_basis(table, num, wi, scratch, out):  # type: ignore[no-untyped-def
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
-def evaluate_basis_along(table, x, y, out):  # type: ignore[no-untyped-def]
-    """Evaluate all functions in one direction; rows of one ray would be written and read at every rung.
-
-    Args:
-        table: the `recurrence`. x, y: of the direction, local, unit. out: written. (K,) float32
-    """
-    argument = np.float32(2) * (x * x + y * y) - np.float32(1)
-    re, im = np.float32(1), np.float32(0)
-    before, last = np.float32(0), np.float32(1)
-    for row in range(table.order.shape[0]):
-        a = table.a[row]
-        if a == 0:
-            if table.order[row] > 0:
-                re, im = re * x - im * y, re * y + im * x
-            before, last = np.float32(0), np.float32(1)
-        else:
-            before, last = last, (a * argument + table.b[row]) * last - table.c[row] * before
-        value = table.norm[row] * last
-        out[table.sine[row]] = value * im
-        out[table.cosine[row]] = value * re
-
-
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _start_recurrence(num, wi, x):  # type: ignore[no-untyped-def]
     for n in range(num):
         x[n] = np.float32(2) * (wi[0, n] * wi[0, n] + wi[1, n] * wi[1, n]) - np.float32(1)

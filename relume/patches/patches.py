@@ -56,11 +56,6 @@ class Patches:
         """Their number C."""
         return len(self.material)
 
-    @property
-    def sample_points(self) -> SurfacePoints:
-        """The points that stand for all cells, those of a cell one after another."""
-        return patch_sample_points(self.position, self.normal)
-
 
 def patch_sample_points(position: F32, normal: F32, first_patch: int = 0) -> SurfacePoints:
     """Make the points that stand for cells, where direct light arrives at them; any tangent does.

@@ -11,7 +11,7 @@ from pathlib import Path
 import zarr
 from zarr.storage import LocalStore
 
-from relume.core.errors import ChunkDamagedError, StoreError
+from relume.core.errors import StoreError
 from relume.core.filesystem import UNFINISHED, atomic_write, remove_folder
 from relume.store.reader import Reader, open_staging, rows_per_shard
 from relume.store.schema import MANIFEST_NAME, SCHEMA_VERSION
@@ -87,11 +87,3 @@ def manifest_digests(path: Path) -> dict[str, str]:
         return {str(entry["path"]): str(entry["sha256"]) for entry in read_json(path / MANIFEST_NAME)["files"]}
     except (KeyError, TypeError) as error:
         raise StoreError(f"the manifest of {path.name} is unreadable; bake the scene again") from error
-
-
-def verify_manifest(path: Path) -> None:
-    """Compare every file of a published store with its SHA-256. Raises ChunkDamagedError."""
-    for name, sha256 in manifest_digests(path).items():
-        with (path / name).open("rb") as stream:
-            if hashlib.file_digest(stream, "sha256").hexdigest() != sha256:
-                raise ChunkDamagedError(name, "its SHA-256 differs from the manifest")

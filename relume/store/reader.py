@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from zarr.storage import LocalStore
 
 from relume.core.errors import ChunkDamagedError, StoreDeletedError, StoreError, StoreNotFoundError
-from relume.core.folder_size import folder_bytes
 from relume.store.bake_protocol import ArraySpec
 from relume.store.room import scratch_file
 from relume.store.schema import (
@@ -181,11 +180,6 @@ def _check_array(path: Path, document: str, num_present: Mapping[str, int]) -> N
     present = num_present.get(array_path, 0)
     if present != num_shards(spec):
         raise ChunkDamagedError(array_path, f"{present} shards of {num_shards(spec)}")
-
-
-def stored_bytes(reader: Reader) -> int:
-    """Size of a store's files on disk, in bytes."""
-    return folder_bytes(reader.path)
 
 
 def rows_per_shard(spec: ArraySpec) -> int:

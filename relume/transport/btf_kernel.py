@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.assets.btf.direction_rings import interpolation_weights
-from relume.assets.btf.outgoing_radiance import outgoing_radiance_numpy, sample_btf_numpy
 from relume.assets.btf.parallax import compute_shear, compute_shears, parallax_intersection
 from relume.brdf.terms.btf import BtfRef
 from relume.core.numba_options import UNCOUNTED
@@ -273,26 +272,3 @@ def outgoing_rows(btf_ref: BtfRef, tables: F32, incident: F32, receivers: Shadin
     )
     _shade_texels(*args)
     return out
-
-
-def texel_numpy(
-    btf_ref: BtfRef, directions: F64, irradiance: F64, wo: F64, texel_position: F64, footprint: float = 0.0
-) -> F64:
-    """Do as `texel_rows` for one point under given lights, in plain NumPy: its oracle.
-
-    Args:
-        btf_ref: how it is covered. directions: to lights, in the texture's frame, unit. (m, 3)
-        irradiance: of each light, across its direction. (m, 3)
-        wo: to the eye, in the texture's frame. (3,)
-        texel_position: column and row, in texels of the finest level, from the middle of the first.
-        footprint: side of the square of its area, in texels; no wider than two of them, seen from a slant.
-    Returns:
-        (3,) float64
-    """
-    length = footprint / np.sqrt(wo[2])
-    num = 1 if length**2 <= 3 else int(np.clip(np.ceil(length / _MAX_SPACING), 2, _MAX_FOOTPRINT_SAMPLES))
-    spacing = np.sqrt((length**2 - 3) / (num**2 - 1)) if num > 1 else 0.0
-    offset = spacing * (np.arange(num) - (num - 1) / 2)
-    positions = texel_position + offset[:, None] * wo[:2] / np.hypot(wo[0], wo[1]) * [1, -1]
-    outgoing = outgoing_radiance_numpy(btf_ref.btf, sample_btf_numpy(btf_ref.btf, positions, wo), directions)
-    return np.asarray((outgoing * irradiance).sum(axis=0).clip(0))

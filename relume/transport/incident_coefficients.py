@@ -25,7 +25,6 @@ from relume.math.zernike import (
     WI,
     accumulate,
     num_functions,
-    project,
     recurrence,
 )
 from relume.raytrace.surface_points import SurfacePoints
@@ -132,22 +131,6 @@ def _list_and_add(rays: RayList, receivers: ShadingPoints, degree: int, start: i
     """Add rays of points [start, stop)."""
     ray_list = build_ray_lists(rays, receivers, start, stop)
     _from_listed(recurrence(degree), stop - start, ray_list.first, ray_list.wi, ray_list.irradiance, out[start:stop])
-
-
-def incident_coefficients_numpy(points: SurfacePoints, visible: NDArray[np.uint8], lights: TriangleLights) -> F64:
-    """Do as `incident_coefficients` for light triangles alone, in plain NumPy: its oracle.
-
-    Args:
-        points, visible, lights: as there.
-    Returns:
-        (n, 3, K) float64
-    """
-    n, t = points.normal.astype(np.float64), points.tangent.astype(np.float64)
-    frame = np.stack([t, np.cross(n, t), n], axis=1)
-    wi = np.einsum("nij,mj->nmi", frame, lights.direction.astype(np.float64))
-    is_visible = np.unpackbits(visible, axis=1, count=lights.num_lights, bitorder="little").astype(np.float64)
-    weight = is_visible * np.maximum(wi[..., 2], 0)
-    return np.asarray(np.einsum("nm,mc,nmk->nck", weight, lights.irradiance.astype(np.float64), project(wi)))
 
 
 def add_scaled(

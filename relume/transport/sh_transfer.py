@@ -20,7 +20,7 @@ from relume.core.numba_options import UNCOUNTED
 from relume.core.thread_pools import for_ranges, parallel_for_chunks
 from relume.math.local_pca import cluster, distances
 from relume.math.spherical_harmonics import NUM_HARMONICS, harmonics
-from relume.math.zernike import evaluate_basis, num_functions, project, recurrence
+from relume.math.zernike import evaluate_basis, num_functions, recurrence
 from relume.raytrace.surface_points import SurfacePoints
 
 F16 = NDArray[np.float16]
@@ -85,23 +85,6 @@ def _transfer(recurrence_table, normal, tangent, visible, direction, values, sta
                 total += product
                 num_pending = 0
         out[p] = total[:, :NUM_HARMONICS]
-
-
-def transfer_matrices_numpy(
-    points: SurfacePoints, visible: NDArray[np.uint8], directions: F32, solid_angles: F64
-) -> F64:
-    """Do as `transfer_matrices`, of the whole in-basis, in plain NumPy: its oracle.
-
-    Args:
-        points, visible, directions, solid_angles: as there.
-    Returns:
-        (n, K, NUM_HARMONICS) float64
-    """
-    n, t = points.normal.astype(np.float64), points.tangent.astype(np.float64)
-    wi = np.einsum("nij,mj->nmi", np.stack([t, np.cross(n, t), n], axis=1), directions.astype(np.float64))
-    is_visible = np.unpackbits(visible, axis=1, count=len(directions), bitorder="little")
-    weight = is_visible * np.maximum(wi[..., 2], 0) * solid_angles
-    return np.asarray(np.einsum("nm,nmk,mj->nkj", weight, project(wi), harmonics(directions.astype(np.float64))))
 
 
 class ClusteredTransfer(NamedTuple):

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from btf_reference import parallax_intersection_numpy
 
 from relume.assets.btf.direction_rings import directions, ubo_grid
-from relume.assets.btf.parallax import compute_shear, compute_shears, parallax_intersection, parallax_intersection_numpy
+from relume.assets.btf.parallax import compute_shear, compute_shears, parallax_intersection
 from relume.synthetic_btf.render import TileGeometry
 from relume.synthetic_btf.weave import weave
 

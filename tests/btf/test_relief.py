@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from test_texels import CAMERA, GREY, SIZE, covered, floor, opened
 
 from relume.assets.btf.btf_store import load_btf
 from relume.assets.btf.direction_rings import directions, interpolation_weights_numpy, ubo_grid
 from relume.live.free_camera import frame
 from relume.live.free_camera.primary_visibility import trace_primary
+from relume.live.free_camera.probes.lattice_nodes import LatticeNodes
 from relume.live.free_camera.texel_brdf import texel_tables
 from relume.live.free_camera.texel_brdf.coefficient_packing import COEFFICIENT_AXIS, COEFFICIENT_LANE, FUNCTIONS
 from relume.live.free_camera.texel_brdf.shade_texels import IncidentTexelLight, TextureFootprint, shade_texels
@@ -19,14 +21,41 @@ from relume.live.free_camera.texel_brdf.texel_tables import (
     find_btf_materials,
     pack_lanes,
 )
-from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight, node_light_numpy
+from relume.live.free_camera.texel_brdf.texture_frame_light import F32, TexelLight
 from relume.look import validate
-from relume.math.zernike import project
+from relume.math.zernike import project, recurrence
 from relume.output.render_image import render_image
 
 SCALE, ROTATION, MEAN = 2.0, 40.0, np.float32(0.02)
 TO_LIGHT = np.array([0.5, 0.8, 0.2]) / np.linalg.norm([0.5, 0.8, 0.2])
 CONSTANT = int(np.flatnonzero(FUNCTIONS == 0)[0])
+
+
+def node_light_numpy(
+    lattice_nodes: LatticeNodes, tangents: F32, vectors: F32, lattice_node: int
+) -> tuple[NDArray[np.float64], F32]:
+    """Do as `TexelLight.about` for one vertex, in plain NumPy: its oracle.
+
+    Args:
+        lattice_nodes: all. tangents, vectors: of points, (points, 3), (points, 3, K). lattice_node: number of it.
+    Returns:
+        Its light vector by functions, (3, K), its tangent (3,).
+    """
+    recurrence_table, weights, probes = (
+        recurrence(),
+        lattice_nodes.weight[lattice_node],
+        lattice_nodes.point[lattice_node],
+    )
+    n, t = lattice_nodes.normal[lattice_node], tangents[probes[weights.argmax()]]
+    out = np.zeros(vectors.shape[1:])
+    for weight, probe in zip(weights, probes, strict=True):
+        angle = np.arctan2(tangents[probe] @ np.cross(n, t), tangents[probe] @ t)
+        for m, cosine, sine in zip(recurrence_table.order, recurrence_table.cosine, recurrence_table.sine, strict=True):
+            phase = vectors[probe, :, cosine] + 1j * (vectors[probe, :, sine] if m else 0)
+            phase = weight * phase * np.exp(1j * m * angle)
+            out[:, sine] += phase.imag
+            out[:, cosine] += phase.real
+    return out, t
 
 
 @pytest.fixture(scope="module")

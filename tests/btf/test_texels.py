@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from btf_reference import outgoing_radiance_numpy, sample_btf_numpy
 from sessions import run_until_exact
 from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, studio
 
 from relume.assets.btf.direction_rings import interpolation_weights_numpy
 from relume.brdf.evaluate import eval_brdf
 from relume.brdf.registry import TERMS
+from relume.brdf.terms.btf import BtfRef
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import illumination_from_look
 from relume.live.fixed_camera.picture import Picture
@@ -23,11 +25,34 @@ from relume.reference.roughness_classes import RoughnessClasses
 from relume.scene.model import Material
 from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
-from relume.transport.btf_kernel import texel_numpy, texel_rows
+from relume.transport.btf_kernel import _MAX_FOOTPRINT_SAMPLES, _MAX_SPACING, F64, texel_rows
 
 CAMERA = make_camera("front", [0.3, 1.6, 1.9], [0, 0, 0], 0.5)
 GREY = {"model": "lambert", "color": [0.5, 0.5, 0.5]}
 SIZE = (48, 36)
+
+
+def texel_numpy(
+    btf_ref: BtfRef, directions: F64, irradiance: F64, wo: F64, texel_position: F64, footprint: float = 0.0
+) -> F64:
+    """Do as `texel_rows` for one point under given lights, in plain NumPy: its oracle.
+
+    Args:
+        btf_ref: how it is covered. directions: to lights, in the texture's frame, unit. (m, 3)
+        irradiance: of each light, across its direction. (m, 3)
+        wo: to the eye, in the texture's frame. (3,)
+        texel_position: column and row, in texels of the finest level, from the middle of the first.
+        footprint: side of the square of its area, in texels; no wider than two of them, seen from a slant.
+    Returns:
+        (3,) float64
+    """
+    length = footprint / np.sqrt(wo[2])
+    num = 1 if length**2 <= 3 else int(np.clip(np.ceil(length / _MAX_SPACING), 2, _MAX_FOOTPRINT_SAMPLES))
+    spacing = np.sqrt((length**2 - 3) / (num**2 - 1)) if num > 1 else 0.0
+    offset = spacing * (np.arange(num) - (num - 1) / 2)
+    positions = texel_position + offset[:, None] * wo[:2] / np.hypot(wo[0], wo[1]) * [1, -1]
+    outgoing = outgoing_radiance_numpy(btf_ref.btf, sample_btf_numpy(btf_ref.btf, positions, wo), directions)
+    return np.asarray((outgoing * irradiance).sum(axis=0).clip(0))
 
 
 def floor():

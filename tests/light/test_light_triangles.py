@@ -9,9 +9,23 @@ from tiny_scenes import studio
 from relume.assets.environments.equirect import halve_to_width, texel_directions, texel_solid_angles
 from relume.core.color import luminance
 from relume.core.errors import PlanError
-from relume.lights.light_moments import LightTexels, compute_moments, compute_moments_numpy
+from relume.lights.light_moments import F64, LightTexels, compute_moments
 from relume.lights.sphere_tiles import MAX_DEPTH, MAX_LIGHTS, Tiles, choose_tiles
 from relume.lights.spherical_triangles import RotatedEnvironment, integrate_environment, tessellate_environment
+
+
+def compute_moments_numpy(texels: LightTexels, mean: F64, frame: F64, tile: int) -> tuple[F64, F64]:
+    """Do as `compute_moments` for one tile, in plain NumPy: its oracle.
+
+    Args:
+        texels: of all tiles. mean: n of this one. (3,) frame: its t. (2, 3) tile: its number.
+    """
+    _, luminous, directions, solid_angles = (each[texels.tile == tile] for each in texels)
+    weight = luminous / luminous.sum()
+    position = directions @ frame.T / (directions @ mean)[:, None]
+    center = weight @ position
+    offset = position - center
+    return center, np.einsum("n,ni,nj->ij", weight, offset, offset) + np.eye(2) * (weight @ solid_angles) / 12
 
 
 def solid_angles(corners):

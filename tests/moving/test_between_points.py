@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from tiny_scenes import make_camera, make_tiny_scene, mesh, quad, sphere, studio
 
 from relume.assets.environments.equirect import lookup, rotate_about_y, texel_directions
@@ -18,12 +19,15 @@ from relume.live.free_camera.environment_lookup import build_environment_lookup,
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
 from relume.live.free_camera.highlights.interpolated_highlights import add_environment_highlights
 from relume.live.free_camera.highlights.lobe_light_lists import (
+    _DIRECTION_BINS,
+    _SHARPNESS,
     NUM_LISTED,
     NUM_WIDTHS,
     SIDE,
+    LobeLightLists,
     build_light_lists,
-    lists_numpy,
     lobe_widths,
+    sigma_at_width,
 )
 from relume.live.free_camera.highlights.lobe_visibility import trace_lobe_visibility
 from relume.live.free_camera.probes.density import density_from_distance
@@ -44,6 +48,21 @@ TOLD = {"model": "ward_anisotropic", "color": [0.9, 0.6, 0.3], "params": {"alpha
 SKIRTED = {"model": "ggx", "color": [0.9, 0.6, 0.3], "params": {"roughness": 0.6, "f0": 0.9}}
 NARROW = {"model": "blinn_phong", "color": [0.9, 0.6, 0.3], "params": {"exponent": 3000.0}}
 CAMERA = make_camera("front", [0, 0.5, 3], [0, 0, 0], 0.75)
+
+
+def lists_numpy(lobe_lights: LobeLightLists, width: int, bin_index: int) -> NDArray[np.intp]:
+    """Find the lights of a list in plain NumPy: the oracle, in no order.
+
+    Args:
+        lobe_lights: whose lights. width, bin_index: of the list.
+    """
+    centers, farthest = _DIRECTION_BINS
+    lights = lobe_lights.lights.astype(np.float64)
+    angle = np.maximum(np.arccos(np.clip(lights[:, :3] @ centers[bin_index], -1, 1)) - farthest[bin_index], 0)
+    variance = sigma_at_width(width) ** 2 + lights[:, 3]
+    weight = lights[:, 4] / variance * np.maximum(1 - (1 - np.cos(angle)) / (_SHARPNESS * variance), 0) ** _SHARPNESS
+    heaviest = np.argsort(-weight)[:NUM_LISTED]
+    return np.asarray(heaviest[weight[heaviest] > 0])
 
 
 def ball(terms):

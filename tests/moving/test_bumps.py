@@ -5,7 +5,9 @@ import pytest
 from tiny_scenes import make_camera, make_tiny_scene, quad, studio
 
 from relume.core.cache import Cache
-from relume.live.free_camera.normal_mapping import basis_gradients, light_gradient, light_gradient_numpy
+from relume.core.color import LUMINANCE
+from relume.live.free_camera.normal_mapping import F32, F64, basis_gradients, light_gradient
+from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.look import complete, validate
 from relume.math.zernike import NUM_FUNCTIONS, project
 from relume.methods.registry import METHODS, open_bake
@@ -19,6 +21,20 @@ LAMBERT = ({"model": "lambert", "color": [0.8, 0.7, 0.6]},)
 METAL = ({"model": "ggx", "color": [0.9, 0.9, 0.9], "params": {"roughness": 0.25}},)
 CAMERA = make_camera("front", [0.4, 1.6, 1.8], [0, 0, 0], 0.35)  # sees nothing but floor
 SIZE = (64, 48)
+
+
+def light_gradient_numpy(stored_scene: StoredScene, vectors: F32, probe: int) -> F64:
+    """Do as `light_gradient` for one point, in plain NumPy: its oracle.
+
+    Args:
+        stored_scene, vectors: as there. probe: number of the point.
+    Returns:
+        (3,) float64
+    """
+    n, t = (getattr(stored_scene.probes, name)[probe].astype(np.float64) for name in ("normal", "tangent"))
+    luminance = np.asarray(LUMINANCE) @ vectors[probe].astype(np.float64)
+    assert luminance.shape == (NUM_FUNCTIONS,)
+    return np.asarray((basis_gradients().astype(np.float64) @ luminance) @ np.stack([t, np.cross(n, t), n]))
 
 
 def waves(size=128, slope=0.35, wrap=("repeat", "repeat")):

@@ -2,14 +2,30 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from tiny_scenes import make_camera, make_tiny_scene, sphere, studio
 
 from relume.brdf.evaluate import eval_brdf
 from relume.core.cache import Cache
 from relume.lights.sphere_tiles import Tiles
-from relume.live.free_camera.basis.highlight_lobes import build_lobes
-from relume.live.free_camera.basis.outgoing_coefficients import cosines
-from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLights, sum_lights, sum_lights_numpy
+from relume.live.free_camera.basis.highlight_lobes import Lobes, build_lobes
+from relume.live.free_camera.basis.lobe_shapes import (
+    NUM_AZIMUTHS,
+    NUM_GRID_DIRECTIONS,
+    NUM_RINGS,
+    WIDTHS,
+    ring_distances,
+)
+from relume.live.free_camera.basis.outgoing_coefficients import NUM_ROWS, cosines
+from relume.live.free_camera.basis.table_index import MIN_COSINE
+from relume.live.free_camera.highlights.light_sum_kernel import (
+    F32,
+    F64,
+    LIGHTS_PER_GROUP,
+    EnvironmentLights,
+    sum_lights,
+)
+from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.methods.registry import METHODS, open_bake
 from relume.scene.model import Material
 from relume.store import bake_in_process
@@ -17,6 +33,51 @@ from relume.store.bake_protocol import Recipe
 
 CAMERA = make_camera("front", [0, 0.5, 3], [0, 0, 0], 0.75)
 EYE = np.array([0.4, 1.5, 3.0], np.float32)
+
+
+def sum_lights_numpy(
+    stored_scene: StoredScene,
+    visibility_bits: NDArray[np.uint8],
+    lights: EnvironmentLights,
+    lobes: Lobes,
+    camera_position: F32,
+    probe: int,
+) -> F64:
+    """Do as `sum_lights` for one point with a lobe, in plain NumPy: its oracle.
+
+    Args:
+        stored_scene, visibility_bits, lights, lobes, camera_position: as there. probe: number of the point.
+    Returns:
+        (3,) float64
+    """
+    n, lobe = stored_scene.probes.normal[probe].astype(np.float64), lobes.lobe_index[stored_scene.material[probe]]
+    wo = camera_position.astype(np.float64) - stored_scene.probes.position[probe]
+    wo /= np.linalg.norm(wo)
+    facing = float(np.clip(n @ wo, MIN_COSINE, 1))
+    row_coordinate = np.sqrt(1 - facing) * (NUM_ROWS - 1)
+    row = min(int(row_coordinate), NUM_ROWS - 2)
+    table = (1 - (row_coordinate - row)) * lobes.shape[lobe, row] + (row_coordinate - row) * lobes.shape[lobe, row + 1]
+    table = table.astype(np.float64).reshape(len(WIDTHS), NUM_RINGS, NUM_AZIMUTHS)
+    mirror = 2 * facing * n - wo
+    across = n - facing * mirror
+    across /= max(float(np.linalg.norm(across)), 1e-6)
+    bits = np.unpackbits(visibility_bits[probe], bitorder="little")[: len(lights.table) // 4]
+    nibbles = np.pad(bits, (0, -len(bits) % LIGHTS_PER_GROUP)).reshape(-1, LIGHTS_PER_GROUP) @ (
+        1 << np.arange(LIGHTS_PER_GROUP)
+    )
+    light_indices = (16 * np.arange(len(nibbles)) + nibbles)[nibbles > 0]
+    wi, irradiance = np.split(lights.lights[light_indices].astype(np.float64), 2, axis=1)
+    x = np.clip(2 - 2 * wi @ mirror, ring_distances()[0], 4)
+    psi = np.arccos(np.clip(wi @ across / np.sqrt(np.maximum(x * (1 - x / 4), 1e-12)), -1, 1))
+    half = (wi @ n + facing) / np.linalg.norm(wi + wo, axis=1)
+    ring = np.interp(x, ring_distances(), np.arange(NUM_RINGS))
+    spoke = np.clip(psi / np.pi * NUM_AZIMUTHS - 0.5, 0, NUM_AZIMUTHS - 1)
+    r, s = np.minimum(ring.astype(int), NUM_RINGS - 2), np.minimum(spoke.astype(int), NUM_AZIMUTHS - 2)
+    fr, fs, width = ring - r, spoke - s, lights.table[light_indices] // NUM_GRID_DIRECTIONS
+    lower = (1 - fs) * table[width, r, s] + fs * table[width, r, s + 1]
+    upper = (1 - fs) * table[width, r + 1, s] + fs * table[width, r + 1, s + 1]
+    values = ((1 - fr) * lower + fr * upper) / (np.maximum(2 - 2 * half, 0) + lobes.flatness[lobe]) ** 2
+    return np.asarray(values @ irradiance)
 
 
 def document(model, **params):

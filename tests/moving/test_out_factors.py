@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from analytic_terms import ANALYTIC
+from probe_shading import rotate_coefficients
 from test_zernike import hemisphere
 
 from relume.brdf.evaluate import eval_brdf
@@ -10,14 +11,43 @@ from relume.live.free_camera.basis import highlight_lobes as lobes_module
 from relume.live.free_camera.basis.highlight_lobes import build_lobes, is_narrow
 from relume.live.free_camera.basis.material_tables import build_tables
 from relume.live.free_camera.basis.outgoing_coefficients import (
+    F64,
     NUM_ROWS,
     cosines,
     outgoing_coefficients,
-    rotate_coefficients,
     white_coefficients,
 )
-from relume.live.free_camera.basis.two_lobes import fit_two_lobes, fit_two_lobes_numpy
+from relume.live.free_camera.basis.two_lobes import _INITIAL_OFFSET, _NUM_ITERATIONS, fit_two_lobes
 from relume.math.zernike import NUM_FUNCTIONS, project
+
+
+def fit_two_lobes_numpy(x: F64, z: F64, area: F64, brdf_cosine: F64) -> F64:
+    """Do as `fit_two_lobes` for one row, in plain NumPy: its oracle.
+
+    Args:
+        x, z, area, brdf_cosine: as there. (n,)
+    Returns:
+        (5,)
+    """
+    weight, squared_weight = brdf_cosine * area / (brdf_cosine @ area), brdf_cosine**2 * area / (brdf_cosine**2 @ area)
+    middle = np.array([squared_weight @ x, squared_weight @ z])
+    variance = 2 - 2 * np.linalg.norm(middle)
+    angle, off = np.arctan2(*middle), _INITIAL_OFFSET * np.sqrt(variance)
+    towards = np.array([[np.sin(angle + side), np.cos(angle + side)] for side in (off, -off)])
+    first, width = 0.5, variance / np.array([1.5, 0.75])
+    for _ in range(_NUM_ITERATIONS):
+        log_density = np.log(np.array([[first], [1 - first]]) / width[:, None] / (1 - np.exp(-2 / width[:, None])))
+        log_density = log_density - (1 - towards @ np.array([x, z])) / width[:, None]
+        responsibility = weight / (1 + np.exp(np.minimum(log_density[1] - log_density[0], 700)))
+        mean = np.array(
+            [[responsibility @ x, responsibility @ z], [(weight - responsibility) @ x, (weight - responsibility) @ z]]
+        )
+        first = float(responsibility.sum())
+        length = np.linalg.norm(mean, axis=1)
+        towards, r = mean / length[:, None], length / [first, 1 - first]
+        width = (1 - r**2) / (r * (3 - r**2))
+    cosines = np.where(towards[:, 0] > 0, np.clip(towards[:, 1], 0, 1), 1)
+    return np.array([*cosines, first, *np.sqrt(width)])
 
 
 def document(model, **fields):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from probe_shading import shade_probes_numpy
 from tiny_scenes import make_camera, make_tiny_scene, mesh, sphere, still_life
 
 from relume.assets.environments.equirect import lookup, rotate_about_y
@@ -19,7 +20,7 @@ from relume.live.free_camera.probes.mesh_lattice import make_corner_grid, place_
 from relume.live.free_camera.probes.triangle_grids import ProbeDensity, node_index, num_nodes
 from relume.live.free_camera.probes.visible_sides import visible_sides
 from relume.live.free_camera.shade_pixels import InterpolatedProbes, MirrorData, shade_pixels
-from relume.live.free_camera.shade_probes import shade_probes, shade_probes_numpy
+from relume.live.free_camera.shade_probes import shade_probes
 from relume.look import EnvironmentKey
 from relume.methods.registry import METHODS, open_bake
 from relume.raytrace.scene_buffers import build_scene_buffers

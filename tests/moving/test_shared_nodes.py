@@ -1,16 +1,42 @@
 """Nodes of a lattice that lie together are one point, however many there are."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from relume.live.free_camera.probes.lattice_nodes import (
+    _POSITION_BITS,
+    _U64,
     NodeTable,
     _keys,
     bounding_cube,
-    keys_numpy,
     num_representatives,
     representative_nodes,
 )
 from relume.raytrace.surface_points import SurfacePoints
+
+
+def keys_numpy(
+    grid_nodes: NodeTable, merge_distance: float, normal_steps: int
+) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
+    """Find the keys in plain NumPy: the oracle.
+
+    Args:
+        grid_nodes: of all grids. merge_distance: of the spacing, within which they are one.
+        normal_steps: steps of a unit normal's components, within which they look the same way.
+    Returns:
+        Two numbers that nodes have alike which lie together. (n,) uint64 each
+    """
+    surface_points, corner, extent = grid_nodes.surface_points, grid_nodes.corner, grid_nodes.extent
+    level = np.rint(np.log2(grid_nodes.spacing / grid_nodes.spacing.min())).astype(np.uint64)
+    size = np.maximum(merge_distance * grid_nodes.spacing, extent / ((1 << _POSITION_BITS) - 1))
+    box = np.floor((surface_points.position - corner) / size[:, None]).astype(np.uint64)
+    normal_code = np.rint(surface_points.normal * np.float32(normal_steps)).astype(np.int64) + normal_steps
+    base = 2 * normal_steps + 1
+    kind = (((normal_code[:, 0] * base + normal_code[:, 1]) * base + normal_code[:, 2]) * 2 + grid_nodes.side).astype(
+        np.uint64
+    )
+    position_key = (box[:, 0] << _U64(2 * _POSITION_BITS)) | (box[:, 1] << _U64(_POSITION_BITS)) | box[:, 2]
+    return position_key, (kind << _U64(24)) | (level << _U64(16)) | grid_nodes.material.astype(np.uint64)
 
 
 def nodes(num, seed=3):

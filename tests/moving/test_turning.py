@@ -4,15 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from probe_shading import shade_probes_numpy
 from tiny_scenes import make_camera, make_tiny_scene, sphere, studio
 
 from relume.core.cache import Cache
-from relume.live.free_camera.basis.highlight_lobes import build_lobes
-from relume.live.free_camera.basis.material_tables import build_tables, window
+from relume.core.color import LUMINANCE
+from relume.live.free_camera.basis.highlight_lobes import Lobes, build_lobes
+from relume.live.free_camera.basis.material_tables import Tables, build_tables, window
+from relume.live.free_camera.basis.outgoing_coefficients import NUM_ROWS
+from relume.live.free_camera.basis.table_index import MIN_COSINE
 from relume.live.free_camera.environment_lookup import rotation_of
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
-from relume.live.free_camera.highlights.lobe_gradients import gradients_along_lobe, gradients_along_lobe_numpy
+from relume.live.free_camera.highlights.lobe_gradients import F32, F64, gradients_along_lobe
 from relume.live.free_camera.primary_visibility import interpolate_to_nodes, trace_primary
+from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.shade_pixels import InterpolatedProbes, MirrorData, shade_pixels
 from relume.live.free_camera.shade_probes import shade_probes
 from relume.math.zernike import DEGREES, WINDOW_DECAY, project
@@ -27,6 +32,50 @@ EYE = CAMERA.to_world[:3, 3].astype(np.float32)
 WHITE = {"model": "ggx", "color": [1.0] * 3, "texture": None, "curves": {}}
 COAT = {**WHITE, "params": {"roughness": 0.3, "f0": 0.05}}
 METAL = {**WHITE, "color": [0.9, 0.6, 0.3], "params": {"roughness": 0.4, "f0": 0.9}}
+
+
+_DIFFERENCE_STEP = 1e-5  # radians
+
+
+def gradients_along_lobe_numpy(
+    stored_scene: StoredScene, non_environment: F32, tables: Tables, lobes: Lobes, camera_position: F32, probe: int
+) -> F64:
+    """Oracle of `gradients_along_lobe` for one point: differences of `shade_probes_numpy` beside the camera.
+
+    Args:
+        stored_scene, non_environment, tables, lobes, camera_position: as there. probe: number of the point, which has a
+        lobe.
+    Returns:
+        (4,) float64
+    """
+    n, position = (
+        array[probe].astype(np.float64) for array in (stored_scene.probes.normal, stored_scene.probes.position)
+    )
+    to_camera, lobe = camera_position - position, lobes.lobe_index[stored_scene.material[probe]]
+    distance, tangents = float(np.linalg.norm(to_camera)), np.linalg.svd(to_camera[None])[2][1:]
+
+    def outgoing_luminance(direction: F64) -> float:
+        outgoing, _ = shade_probes_numpy(
+            stored_scene,
+            np.zeros_like(non_environment),
+            non_environment,
+            tables,
+            position + distance * direction,
+            probe,
+        )
+        rows = np.sqrt(1 - np.clip(direction @ n, MIN_COSINE, 1)) * (NUM_ROWS - 1)
+        row_albedo = lobes.albedo[lobe].sum(axis=1).astype(np.float64)
+        albedo = [np.interp(rows, np.arange(NUM_ROWS), row_albedo[:, channel]) for channel in range(3)]
+        return float(outgoing.sum(axis=0) / np.maximum(albedo, 1e-30) @ LUMINANCE)
+
+    wo, gradient = to_camera / distance, np.zeros(3)
+    for across in tangents:
+        forward, backward = (wo + sign * _DIFFERENCE_STEP * across for sign in (1, -1))
+        change = outgoing_luminance(forward / np.linalg.norm(forward)) - outgoing_luminance(
+            backward / np.linalg.norm(backward)
+        )
+        gradient += change / (2 * _DIFFERENCE_STEP) * (2 * (n @ across) * n - across)
+    return np.append(gradient, gradient @ (2 * (n @ wo) * n - wo))
 
 
 @pytest.fixture(scope="module")

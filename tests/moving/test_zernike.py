@@ -3,12 +3,52 @@
 import numba as nb
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from relume.lights.spherical_triangles import TriangleLights
-from relume.math.zernike import DEGREE, NUM_FUNCTIONS, evaluate_basis_along, num_functions, project, recurrence
+from relume.math.zernike import DEGREE, NUM_FUNCTIONS, num_functions, project, recurrence
 from relume.raytrace.surface_points import SurfacePoints
 from relume.raytrace.tangents import any_tangent
-from relume.transport.incident_coefficients import incident_coefficients, incident_coefficients_numpy
+from relume.transport.incident_coefficients import F64, incident_coefficients
+
+
+def incident_coefficients_numpy(points: SurfacePoints, visible: NDArray[np.uint8], lights: TriangleLights) -> F64:
+    """Do as `incident_coefficients` for light triangles alone, in plain NumPy: its oracle.
+
+    Args:
+        points, visible, lights: as there.
+    Returns:
+        (n, 3, K) float64
+    """
+    n, t = points.normal.astype(np.float64), points.tangent.astype(np.float64)
+    frame = np.stack([t, np.cross(n, t), n], axis=1)
+    wi = np.einsum("nij,mj->nmi", frame, lights.direction.astype(np.float64))
+    is_visible = np.unpackbits(visible, axis=1, count=lights.num_lights, bitorder="little").astype(np.float64)
+    weight = is_visible * np.maximum(wi[..., 2], 0)
+    return np.asarray(np.einsum("nm,mc,nmk->nck", weight, lights.irradiance.astype(np.float64), project(wi)))
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def evaluate_basis_along(table, x, y, out):  # type: ignore[no-untyped-def]
+    """Evaluate all functions in one direction; rows of one ray would be written and read at every rung.
+
+    Args:
+        table: the `recurrence`. x, y: of the direction, local, unit. out: written. (K,) float32
+    """
+    argument = np.float32(2) * (x * x + y * y) - np.float32(1)
+    re, im = np.float32(1), np.float32(0)
+    before, last = np.float32(0), np.float32(1)
+    for row in range(table.order.shape[0]):
+        a = table.a[row]
+        if a == 0:
+            if table.order[row] > 0:
+                re, im = re * x - im * y, re * y + im * x
+            before, last = np.float32(0), np.float32(1)
+        else:
+            before, last = last, (a * argument + table.b[row]) * last - table.c[row] * before
+        value = table.norm[row] * last
+        out[table.sine[row]] = value * im
+        out[table.cosine[row]] = value * re
 
 
 def hemisphere(radii=24, turns=48):

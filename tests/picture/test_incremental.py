@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 
+import identity_basis
 import numpy as np
 import pytest
 import twins
@@ -19,7 +20,6 @@ from relume.live.fixed_camera.jobs import Resum
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.strategies.operator import advance
 from relume.look import BAKED_ENVIRONMENT, LightPaths, validate
-from relume.math import identity
 from relume.math.daubechies import analysis, synthesis
 from relume.operators.edit_basis import CurveBasis
 from relume.operators.linear_operator import LinearOperator, precompute
@@ -128,7 +128,7 @@ def start(frozen):
 
 def test_what_moves_the_picture_most_goes_first(monkeypatch):
     """A small change of a coefficient that much light falls on before a large one that lights nothing."""
-    monkeypatch.setattr("relume.operators.edit_basis.analysis", identity.analysis)
+    monkeypatch.setattr("relume.operators.edit_basis.analysis", identity_basis.analysis)
     frozen = one_pixel([0.01, 100, 2])
     shown, target, seen = start(frozen), target_of(50, 1, 10), []
     while shown.changed_curves(target):
@@ -139,7 +139,7 @@ def test_what_moves_the_picture_most_goes_first(monkeypatch):
 
 def test_didactic_example_of_table_2(monkeypatch):
     """One pixel, T = (3, 5, 2), one multiplication a frame; bands themselves as the basis, as in the paper."""
-    monkeypatch.setattr("relume.operators.edit_basis.analysis", identity.analysis)
+    monkeypatch.setattr("relume.operators.edit_basis.analysis", identity_basis.analysis)
     frozen = one_pixel([3, 5, 2])
 
     shown = start(frozen)

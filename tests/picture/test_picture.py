@@ -7,9 +7,9 @@ import pytest
 import twins
 from oracle import exact_image, render_uncached
 from pictures import BALL, WALL, find_pure_ball_pixels, open_exact_picture, set_sigma, set_single_term_ball
+from rgb9e5 import rgb9e5_pack
 from sessions import make_look, relative_rmse, run_until_exact
 
-from relume.core.color import rgb9e5_pack
 from relume.look import validate
 
 

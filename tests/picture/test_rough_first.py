@@ -9,16 +9,33 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import twins
+from numpy.typing import NDArray
 from pictures import open_exact_picture
 from sessions import make_look, relative_rmse, run_next_job, run_until_exact
 
 from relume.core.cache import Cache
 from relume.core.color import luminance
-from relume.lights.light_clusters import cluster_lights, visible_fraction, visible_fraction_numpy
+from relume.lights.light_clusters import F64, cluster_lights, visible_fraction
+from relume.lights.spherical_triangles import TriangleSubset
 from relume.live.fixed_camera import operator_budget
 from relume.operators.linear_operator import LinearOperator, MergedLightOperator
 
 FLOOR = "/materials/Floor/terms/1/"
+
+
+def visible_fraction_numpy(visible: NDArray[np.uint8], subset: TriangleSubset, num_clusters: int) -> F64:
+    """Do as `visible_fraction` for all points, in plain NumPy: its oracle.
+
+    Args:
+        visible: bits of all parts. (n, bytes) uint8
+        subset: which merged triangle each is of, and its share. num_clusters: of merged triangles, C.
+    Returns:
+        (n, C)
+    """
+    bits = np.unpackbits(visible, axis=1, count=len(subset.group), bitorder="little")
+    fractions = np.zeros((len(subset.group), num_clusters))
+    fractions[np.arange(len(subset.group)), subset.group] = subset.fraction
+    return np.asarray(bits @ fractions)
 
 
 def roughened(roughness):

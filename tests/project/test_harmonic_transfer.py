@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from sessions import relative_rmse
 
 from relume.assets.environments.equirect import texel_directions, texel_solid_angles
@@ -12,7 +13,7 @@ from relume.lights.sphere_tiles import choose_tiles
 from relume.lights.spherical_triangles import RotatedEnvironment, integrate_environment
 from relume.math.local_pca import leading_components
 from relume.math.spherical_harmonics import NUM_HARMONICS, harmonics
-from relume.math.zernike import num_functions
+from relume.math.zernike import num_functions, project
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.gather_rays import make_pattern
 from relume.raytrace.surface_points import SurfacePoints
@@ -22,7 +23,7 @@ from relume.transport.clustered_rays import shared_direction_coefficients, weigh
 from relume.transport.direction_bins import outgoing_bins
 from relume.transport.incident_coefficients import incident_coefficients, ray_incident_coefficients
 from relume.transport.outgoing_patch_light import NUM_OUTGOING, isotropic, radiance_from_patch
-from relume.transport.sh_transfer import ClusteredTransfer, transfer_matrices, transfer_matrices_numpy
+from relume.transport.sh_transfer import F32, F64, ClusteredTransfer, transfer_matrices
 from relume.transport.shading_points import GatherRays
 
 DEGREE = 4
@@ -30,6 +31,23 @@ SKY = np.ones((128, 256, 3), np.float32)
 TILES = choose_tiles(SKY, 300, True)
 NUM_LIGHTS = len(TILES.codes)
 BROUGHT = harmonics(TILES.centroids) * TILES.solid_angles[:, None]
+
+
+def transfer_matrices_numpy(
+    points: SurfacePoints, visible: NDArray[np.uint8], directions: F32, solid_angles: F64
+) -> F64:
+    """Do as `transfer_matrices`, of the whole in-basis, in plain NumPy: its oracle.
+
+    Args:
+        points, visible, directions, solid_angles: as there.
+    Returns:
+        (n, K, NUM_HARMONICS) float64
+    """
+    n, t = points.normal.astype(np.float64), points.tangent.astype(np.float64)
+    wi = np.einsum("nij,mj->nmi", np.stack([t, np.cross(n, t), n], axis=1), directions.astype(np.float64))
+    is_visible = np.unpackbits(visible, axis=1, count=len(directions), bitorder="little")
+    weight = is_visible * np.maximum(wi[..., 2], 0) * solid_angles
+    return np.asarray(np.einsum("nm,nmk,mj->nkj", weight, project(wi), harmonics(directions.astype(np.float64))))
 
 
 def lights_of(radiance):

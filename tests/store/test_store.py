@@ -12,10 +12,18 @@ import pytest
 from relume.core.errors import ChunkDamagedError, SchemaVersionError, StoreDeletedError, StoreError, StoreNotFoundError
 from relume.store import StoreWriter, create_store, open_store, publish, schema
 from relume.store.bake_protocol import ArraySpec
-from relume.store.publish import verify_manifest
+from relume.store.publish import manifest_digests
 
 ROWS = 100
 SPEC = ArraySpec("views/front/visibility", (ROWS, 7), "uint8", (8, 7), (32, 7))
+
+
+def verify_manifest(path: Path) -> None:
+    """Compare every file of a published store with its SHA-256. Raises ChunkDamagedError."""
+    for name, sha256 in manifest_digests(path).items():
+        with (path / name).open("rb") as stream:
+            if hashlib.file_digest(stream, "sha256").hexdigest() != sha256:
+                raise ChunkDamagedError(name, "its SHA-256 differs from the manifest")
 
 
 def bits() -> np.ndarray:

@@ -10,7 +10,7 @@ from tiny_scenes import corner, make_camera, make_surface_points, make_tiny_scen
 
 from relume.patches.gather_hits import trace_gather_rays
 from relume.patches.patch_kdtree import NO_PATCH, grow_tree, locate
-from relume.patches.patches import POINTS_PER_PATCH, choose_patches
+from relume.patches.patches import POINTS_PER_PATCH, choose_patches, patch_sample_points
 from relume.patches.photon_density import lobe_directions
 from relume.raytrace.camera_rays import trace_rays
 from relume.raytrace.gather_rays import lattice_offsets, local_ray, make_pattern
@@ -30,7 +30,11 @@ def box():
 
 
 def points_of(cells, count, first=0):
-    some = cells.sample_points.rows(slice(None, None, POINTS_PER_PATCH * cells.num_patches // count)).rows(slice(count))
+    some = (
+        patch_sample_points(cells.position, cells.normal)
+        .rows(slice(None, None, POINTS_PER_PATCH * cells.num_patches // count))
+        .rows(slice(count))
+    )
     return make_surface_points(some.position, some.normal, first)
 
 
@@ -246,7 +250,7 @@ def test_cells_know_how_textures_lie_on_them():
     tangents = np.broadcast_to(np.float32([1, 0, 0, 1]), scene.meshes[0].tangents.shape)
     scene = replace(scene, meshes=(replace(scene.meshes[0], tangents=tangents), *scene.meshes[1:]))
     cells = choose_patches(scene, build_scene_buffers(scene), ("front",), (40, 30), 100)
-    points, place = cells.sample_points, cells.uv.reshape(-1, 5)
+    points, place = patch_sample_points(cells.position, cells.normal), cells.uv.reshape(-1, 5)
     of_floor = np.repeat(cells.material == 0, POINTS_PER_PATCH) & (points.position[:, 1] < 1e-3)
     chosen = np.flatnonzero(of_floor)
     assert len(chosen) > 20

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rgb9e5 import RGB9E5_MAX, rgb9e5_pack, rgb9e5_unpack
 
-from relume.core.color import RGB9E5_MAX, luminance, rgb9e5_pack, rgb9e5_unpack, srgb_decode, srgb_encode
+from relume.core.color import luminance, srgb_decode, srgb_encode
 
 
 def test_luminance_of_white_is_one_and_keeps_the_type():

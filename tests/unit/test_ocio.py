@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import PyOpenColorIO as ocio  # noqa: N813
 import pytest
+from numpy.typing import NDArray
 from tiny_scenes import still_life
 
 from relume.assets.environments.read_environment import read_environment
 from relume.core.errors import ParameterError
 from relume.image_io.ocio.active_config import get_config, using_config
 from relume.image_io.ocio.config import Config
-from relume.image_io.ocio.lut import sample_lut
+from relume.image_io.ocio.lut import GAIN, SIZE
 from relume.image_io.ocio.view import OcioView
 from relume.image_io.primaries import INTEROP_SPACES, to_rec_709
 from relume.image_io.tone_mapping import tone_map
@@ -35,6 +36,35 @@ colorspaces:
   - !<ColorSpace> {name: film, from_reference: !<ExponentTransform> {value: [0.5, 0.5, 0.5, 1]}}
   - !<ColorSpace> {name: broken, from_reference: !<FileTransform> {src: gone.cube}}
 """
+
+
+_CHANNELS = np.arange(3)
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+U16 = NDArray[np.uint16]
+
+
+def sample_lut(table: U16, light: F32) -> F64:
+    """Display values by a table: the twin of the editor's shader.
+
+    Args:
+        table: as `bake` makes it. (N, N, N, 3)
+        light: linear, after exposure. (n, 3)
+    """
+    roots = np.sqrt(np.maximum(light.astype(np.float64), 0))
+    position = np.minimum(np.log1p(GAIN * roots) / (2 * np.log1p(GAIN)), 1) * (SIZE - 1)
+    node = np.minimum(position.astype(int), SIZE - 2)
+    fraction = position - node
+    # from the corner at 0 along the longest part first, to that at 1
+    order = np.argsort(-fraction, axis=1, kind="stable")
+    steps = np.take_along_axis(fraction, order, axis=1)
+    weights = -np.diff(steps, axis=1, prepend=1, append=0)  # of the four corners
+    display = np.zeros(light.shape)
+    for k in range(4):
+        display += weights[:, k, None] * table[tuple(node.T)]
+        if k < 3:
+            node += order[:, k, None] == _CHANNELS
+    return display / 65535
 
 
 def lights(num: int, stops: tuple[float, float] = (-10, 8)) -> np.ndarray:

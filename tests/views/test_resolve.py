@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import twins
+from rgb9e5 import rgb9e5_pack, rgb9e5_unpack
 
-from relume.core.color import rgb9e5_pack, rgb9e5_unpack
 from relume.core.errors import ParameterError
 from relume.scene.model import Camera
 from relume.views.resolve import encode, pack_rgb9e5, resolve

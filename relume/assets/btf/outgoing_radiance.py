@@ -1,4 +1,4 @@
-"""What places of a BTF send: by kernels, for brute force; and place by place in NumPy, the oracle of all kernels."""
+"""Outgoing radiance of BTF-textured points, for brute force. The tests have a reference in plain NumPy."""
 
 from __future__ import annotations
 
@@ -8,51 +8,12 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.assets.btf.direction_rings import interpolation_weights, interpolation_weights_numpy
+from relume.assets.btf.direction_rings import interpolation_weights
 from relume.assets.btf.local_pca_btf import F32, LocalPcaBtf
-from relume.assets.btf.parallax import compute_shear, compute_shears, parallax_intersection, parallax_intersection_numpy
+from relume.assets.btf.parallax import compute_shear, compute_shears, parallax_intersection
 from relume.core.numba_options import UNCOUNTED
 
 F64 = NDArray[np.float64]
-
-_CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
-
-
-def sample_btf_numpy(btf: LocalPcaBtf, texel_positions: F64, wo: F64) -> F64:
-    """The mean over places of what they send to an eye of light from each side in which the BTF is known.
-
-    Args:
-        btf: the BTF. wo: to the eye, in the texture's frame, unit. (3,)
-        texel_positions: column and row, in texels of the finest level, from the middle of the first. (n, 2)
-    Returns:
-        (L, 3) float64, the cosine of the light in it
-    """
-    size, shears = np.array(btf.size[::-1]), compute_shears(btf.grid)
-    shear = wo[:2] / max(wo[2], np.hypot(wo[0], wo[1]) / np.tan(btf.grid.theta[-1]))
-    height = np.array(
-        [parallax_intersection_numpy(btf.height, (position + 0.5) / size, shear) for position in texel_positions]
-    )
-    view, view_weight, _ = interpolation_weights_numpy(btf.grid, wo[None])
-    values_by_light = np.zeros((btf.grid.num_directions, 3))
-    for side, side_weight in zip(view[0], view_weight[0], strict=True):
-        shifted_positions = texel_positions + height[:, None] * (shear - shears[side]) * [1, -1] * size
-        first = np.floor(shifted_positions).astype(int)
-        corner_weight = np.abs(1 - _CORNERS - (shifted_positions - first)[:, None]).prod(axis=2) / len(texel_positions)
-        column, row = np.moveaxis((first[:, None] + _CORNERS) % size, 2, 0)
-        values_by_light += side_weight * btf.evaluate(side, (row * size[0] + column).ravel(), corner_weight.ravel())
-    return values_by_light
-
-
-def outgoing_radiance_numpy(btf: LocalPcaBtf, values_by_light: F64, wi: F64) -> F64:
-    """What is sent of light from some directions, one unit of irradiance across each.
-
-    Args:
-        btf: the BTF. values_by_light: from `sample_btf_numpy`. wi: in the texture's frame, unit. (m, 3)
-    Returns:
-        (m, 3) float64
-    """
-    light, light_weight, cosine_ratio = interpolation_weights_numpy(btf.grid, wi)
-    return np.asarray(np.einsum("mk,m,mkc->mc", light_weight, cosine_ratio, values_by_light[light]))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
@@ -134,13 +95,14 @@ def _sample_btf_kernel(grid, shears, height, size, cluster, weight, tables, texe
 
 
 def sample_btf(btf: LocalPcaBtf, tables: F32, texel_positions: F64, wo: F64) -> F32:
-    """Do as `sample_btf_numpy` of many points at once.
+    """Reflected radiance toward `wo` for each measured light direction, averaged over the texels of each point.
 
     Args:
-        btf: the BTF. tables: of it, see `LocalPcaBtf.tables`.
-        wo: to the eye, above the horizon. (n, 3). texel_positions: of each point. (n, places, 2)
+        btf: the BTF. tables: from `LocalPcaBtf.tables`.
+        texel_positions: column and row, in texels of the finest level, from the center of the first. (n, texels, 2)
+        wo: view directions in the frame of the texture, above the horizon, unit. (n, 3)
     Returns:
-        (n, L, 3) float32
+        Radiance for one unit of irradiance across the light direction; the cosine is in it. (n, L, 3) float32
     """
     out = np.empty((len(wo), btf.grid.num_directions, 3), np.float32)
     _sample_btf_kernel(
@@ -152,7 +114,7 @@ def sample_btf(btf: LocalPcaBtf, tables: F32, texel_positions: F64, wo: F64) -> 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _outgoing_radiance_kernel(grid, values_by_light, axes, point_index, wi, out):  # type: ignore[no-untyped-def]
-    """Do as `sent` of its arrays."""
+    """Kernel of `outgoing_radiance`."""
     index, weight = np.empty(4, np.int32), np.empty(4, np.float32)
     for m in range(len(wi)):
         p, x, y, z = point_index[m], np.float32(wi[m, 0]), np.float32(wi[m, 1]), np.float32(wi[m, 2])
@@ -168,14 +130,14 @@ def _outgoing_radiance_kernel(grid, values_by_light, axes, point_index, wi, out)
 def outgoing_radiance(
     btf: LocalPcaBtf, values_by_light: F32, axes: F64, point_index: NDArray[np.int64], wi: F64
 ) -> F64:
-    """Do as `outgoing_radiance_numpy` of many points at once.
+    """Reflected radiance of light from any direction, interpolated between the measured light directions.
 
     Args:
-        btf: the BTF. values_by_light: from `values_by_light`. (n, L, 3)
+        btf: the BTF. values_by_light: from `sample_btf`. (n, L, 3)
         axes: of the texture, in the frames of the points. (n, 2, 2)
         point_index: point of each direction. (m,). wi: in the frames of their points, unit. (m, 3)
     Returns:
-        (m, 3) float64
+        Radiance for one unit of irradiance across `wi`; the cosine is in it. (m, 3) float64
     """
     out = np.empty((len(wi), 3))
     _outgoing_radiance_kernel(btf.grid, values_by_light, axes, point_index, np.ascontiguousarray(wi, np.float64), out)

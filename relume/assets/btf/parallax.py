@@ -82,28 +82,3 @@ def parallax_intersection(height, lowest, highest, u, v, shear):  # type: ignore
             return previous_z + step * clearance / max(clearance - next_clearance, np.float32(1e-9))
         clearance, previous_z = next_clearance, z
     return lowest
-
-
-def parallax_intersection_numpy(height: F32, uv: F64, shear: F64) -> float:
-    """Do as `parallax_intersection`, in plain NumPy: its oracle.
-
-    Args:
-        height: of the relief. (height, width). uv: u and v, in repeats. (2,). shear: s of the ray. (2,)
-    """
-    size = np.array(height.shape[::-1])
-    low, high = float(height.min()), float(height.max())
-    steps = int(np.clip(np.ceil(2 * np.max(np.abs(shear) * size) * (high - low)), 1, _MAX_STEPS))
-    z = np.linspace(high, low, steps + 1)
-    texel_positions = (uv + z[:, None] * shear * [1, -1]) * size - 0.5
-    first = np.floor(texel_positions).astype(int)
-    fraction = texel_positions - first
-    surface_height = np.zeros(len(z))
-    for right, down in ((0, 0), (1, 0), (0, 1), (1, 1)):
-        weight = np.abs(1 - right - fraction[:, 0]) * np.abs(1 - down - fraction[:, 1])
-        surface_height += weight * height[(first[:, 1] + down) % size[1], (first[:, 0] + right) % size[0]]
-    clearance = z - surface_height
-    hits = np.flatnonzero(clearance[1:] <= 0)
-    if not len(hits):
-        return low
-    k = hits[0]
-    return float(z[k] + (z[k + 1] - z[k]) * clearance[k] / max(clearance[k] - clearance[k + 1], 1e-9))

@@ -26,8 +26,6 @@ GAIN = 9.0
 LAYOUT = f"roots {SIZE} {GAIN}"
 """Names the scale: browsers keep tables, those of another scale are others."""
 
-_CHANNELS = np.arange(3)
-
 
 def build_lut(apply_view: Callable[[F32], None]) -> U16:
     """The table of a view.
@@ -41,26 +39,3 @@ def build_lut(apply_view: Callable[[F32], None]) -> U16:
     nodes = np.stack(np.meshgrid(light, light, light, indexing="ij"), axis=-1).astype(np.float32)
     apply_view(nodes.reshape(-1, 3))
     return np.asarray(np.clip(np.nan_to_num(nodes), 0, 1) * 65535 + 0.5, np.uint16)
-
-
-def sample_lut(table: U16, light: F32) -> F64:
-    """Display values by a table: the twin of the editor's shader.
-
-    Args:
-        table: as `bake` makes it. (N, N, N, 3)
-        light: linear, after exposure. (n, 3)
-    """
-    roots = np.sqrt(np.maximum(light.astype(np.float64), 0))
-    position = np.minimum(np.log1p(GAIN * roots) / (2 * np.log1p(GAIN)), 1) * (SIZE - 1)
-    node = np.minimum(position.astype(int), SIZE - 2)
-    fraction = position - node
-    # from the corner at 0 along the longest part first, to that at 1
-    order = np.argsort(-fraction, axis=1, kind="stable")
-    steps = np.take_along_axis(fraction, order, axis=1)
-    weights = -np.diff(steps, axis=1, prepend=1, append=0)  # of the four corners
-    display = np.zeros(light.shape)
-    for k in range(4):
-        display += weights[:, k, None] * table[tuple(node.T)]
-        if k < 3:
-            node += order[:, k, None] == _CHANNELS
-    return display / 65535

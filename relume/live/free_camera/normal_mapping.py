@@ -24,7 +24,7 @@ from relume.core.numba_options import UNCOUNTED
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.probes.texture_kernels import sample_texture
-from relume.math.zernike import NUM_FUNCTIONS, project
+from relume.math.zernike import project
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -78,20 +78,6 @@ def light_gradient(stored_scene: StoredScene, vectors: F32, is_needed: NDArray[n
     args = (basis_gradients(), np.array(LUMINANCE, np.float32), probes.normal, probes.tangent, vectors, is_needed)
     parallel_for_chunks(lambda start, stop: _light_gradient(*args, start, stop, out), len(vectors))
     return out
-
-
-def light_gradient_numpy(stored_scene: StoredScene, vectors: F32, probe: int) -> F64:
-    """Do as `light_gradient` for one point, in plain NumPy: its oracle.
-
-    Args:
-        stored_scene, vectors: as there. probe: number of the point.
-    Returns:
-        (3,) float64
-    """
-    n, t = (getattr(stored_scene.probes, name)[probe].astype(np.float64) for name in ("normal", "tangent"))
-    luminance = np.asarray(LUMINANCE) @ vectors[probe].astype(np.float64)
-    assert luminance.shape == (NUM_FUNCTIONS,)
-    return np.asarray((basis_gradients().astype(np.float64) @ luminance) @ np.stack([t, np.cross(n, t), n]))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)

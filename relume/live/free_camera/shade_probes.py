@@ -19,10 +19,10 @@ from relume.core.numba_options import UNCOUNTED
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS
 from relume.live.free_camera.basis.material_tables import Tables
-from relume.live.free_camera.basis.outgoing_coefficients import NUM_COLUMNS, NUM_ROWS, rotate_coefficients
-from relume.live.free_camera.basis.table_index import MIN_COSINE, view_direction_local
+from relume.live.free_camera.basis.outgoing_coefficients import NUM_COLUMNS
+from relume.live.free_camera.basis.table_index import view_direction_local
 from relume.live.free_camera.probes.stored_scene import StoredScene
-from relume.math.zernike import NUM_FUNCTIONS, recurrence
+from relume.math.zernike import recurrence
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -189,53 +189,3 @@ def shade_probes(
     )
     parallel_for_chunks(lambda start, stop: _shade_probes(*args, start, stop, *outgoing), len(rows))
     return outgoing
-
-
-def shade_probes_numpy(
-    stored_scene: StoredScene, vectors: F32, non_environment: F32, tables: Tables, camera_position: F32, probe: int
-) -> tuple[F64, F64]:
-    """Do as `send` for one point, in plain NumPy: its oracle.
-
-    Args:
-        stored_scene, vectors, non_environment, tables, camera_position: as there. probe: number of the point.
-    Returns:
-        Radiance and sky, as there. (groups, 3) float64 each
-    """
-    lights = vectors[probe], vectors[probe] - non_environment[probe], non_environment[probe]
-    plain, environment, highlights = (
-        _sum_numpy(stored_scene, t, tables, camera_position, probe, 2 * kind) for kind, t in enumerate(lights)
-    )
-    return plain + np.maximum(highlights, 0), environment
-
-
-def _sum_numpy(
-    stored_scene: StoredScene, light: F32, tables: Tables, camera_position: F32, probe: int, first: int
-) -> F64:
-    """Sum the light (3, K) of a point with the tables of a kind, which begin at column `first`. (groups, 3)"""
-    probes, recurrence_table = stored_scene.probes, recurrence()
-    n, t = probes.normal[probe].astype(np.float64), probes.tangent[probe].astype(np.float64)
-    wo = camera_position.astype(np.float64) - probes.position[probe]
-    x, y, z = np.array([t, np.cross(n, t), n]) @ wo / np.linalg.norm(wo)
-    row_coordinate = np.sqrt(1 - np.clip(z, MIN_COSINE, 1)) * (NUM_ROWS - 1)
-    row, phi = min(int(row_coordinate), NUM_ROWS - 2), np.arctan2(y, x)
-    row_fraction, column_coordinate = row_coordinate - row, phi / (2 * np.pi) % 1 * NUM_COLUMNS
-    column_index = int(column_coordinate) % NUM_COLUMNS
-    out = np.zeros((NUM_GROUPS, 3))
-    for group, (isotropic, anisotropic) in enumerate(
-        tables.table_index[stored_scene.material[probe], :, first : first + 2]
-    ):
-        factors = np.zeros((3, NUM_FUNCTIONS))
-        if isotropic >= 0:
-            unrotated = np.zeros((3, NUM_FUNCTIONS))
-            unrotated[:, recurrence_table.cosine] = (1 - row_fraction) * tables.isotropic[
-                isotropic, row
-            ] + row_fraction * tables.isotropic[isotropic, row + 1]
-            factors += rotate_coefficients(unrotated, phi)
-        if anisotropic >= 0:
-            row_pair = tables.anisotropic[anisotropic, row : row + 2]
-            interpolated = row_pair[:, column_index] + (column_coordinate - int(column_coordinate)) * (
-                row_pair[:, (column_index + 1) % NUM_COLUMNS] - row_pair[:, column_index]
-            )
-            factors += (1 - row_fraction) * interpolated[0] + row_fraction * interpolated[1]
-        out[group] = np.einsum("ck,ck->c", factors, light.astype(np.float64))
-    return out

@@ -162,17 +162,3 @@ def _project_anisotropic(document: Mapping[str, Any], phi: F64) -> tuple[F64, F6
         table[row] = value @ weighted_functions
         energy[row] = (value**2 @ weight).sum(axis=-1)
     return table, energy
-
-
-def rotate_coefficients(row: F64, phi: float) -> F64:
-    """Turn the factors of an isotropic term for φo = 0, (..., K), to another φo: what kernels do, in NumPy."""
-    recurrence_table, out = recurrence(), np.array(row, np.float64)
-    for basis_index, m in enumerate(recurrence_table.order):
-        if m > 0:
-            out[..., recurrence_table.sine[basis_index]] = row[..., recurrence_table.cosine[basis_index]] * np.sin(
-                m * phi
-            )
-            out[..., recurrence_table.cosine[basis_index]] = row[..., recurrence_table.cosine[basis_index]] * np.cos(
-                m * phi
-            )
-    return out

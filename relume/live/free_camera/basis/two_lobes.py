@@ -123,32 +123,3 @@ def fit_two_lobes(x: F32, z: F32, area: F32, brdf_cosine: F32) -> F32:
     out = np.empty((len(x), NUM_PARAMETERS), np.float32)
     parallel_for_chunks(lambda start, stop: _fit(x, z, area, brdf_cosine, start, stop, out), len(x))
     return out
-
-
-def fit_two_lobes_numpy(x: F64, z: F64, area: F64, brdf_cosine: F64) -> F64:
-    """Do as `fit_two_lobes` for one row, in plain NumPy: its oracle.
-
-    Args:
-        x, z, area, brdf_cosine: as there. (n,)
-    Returns:
-        (5,)
-    """
-    weight, squared_weight = brdf_cosine * area / (brdf_cosine @ area), brdf_cosine**2 * area / (brdf_cosine**2 @ area)
-    middle = np.array([squared_weight @ x, squared_weight @ z])
-    variance = 2 - 2 * np.linalg.norm(middle)
-    angle, off = np.arctan2(*middle), _INITIAL_OFFSET * np.sqrt(variance)
-    towards = np.array([[np.sin(angle + side), np.cos(angle + side)] for side in (off, -off)])
-    first, width = 0.5, variance / np.array([1.5, 0.75])
-    for _ in range(_NUM_ITERATIONS):
-        log_density = np.log(np.array([[first], [1 - first]]) / width[:, None] / (1 - np.exp(-2 / width[:, None])))
-        log_density = log_density - (1 - towards @ np.array([x, z])) / width[:, None]
-        responsibility = weight / (1 + np.exp(np.minimum(log_density[1] - log_density[0], 700)))
-        mean = np.array(
-            [[responsibility @ x, responsibility @ z], [(weight - responsibility) @ x, (weight - responsibility) @ z]]
-        )
-        first = float(responsibility.sum())
-        length = np.linalg.norm(mean, axis=1)
-        towards, r = mean / length[:, None], length / [first, 1 - first]
-        width = (1 - r**2) / (r * (3 - r**2))
-    cosines = np.where(towards[:, 0] > 0, np.clip(towards[:, 1], 0, 1), 1)
-    return np.array([*cosines, first, *np.sqrt(width)])

@@ -25,9 +25,7 @@ from relume.live.free_camera.basis.lobe_shapes import (
     NUM_GRID_DIRECTIONS,
     NUM_RINGS,
     WIDTHS,
-    ring_distances,
 )
-from relume.live.free_camera.basis.outgoing_coefficients import NUM_ROWS
 from relume.live.free_camera.basis.table_index import MIN_COSINE, table_row
 from relume.live.free_camera.probes.stored_scene import StoredScene
 
@@ -195,48 +193,3 @@ def sum_lights(
     )
     parallel_for_chunks(lambda start, stop: _sum_lights(*args, start, stop, sums), len(rows))
     return sums
-
-
-def sum_lights_numpy(
-    stored_scene: StoredScene,
-    visibility_bits: NDArray[np.uint8],
-    lights: EnvironmentLights,
-    lobes: Lobes,
-    camera_position: F32,
-    probe: int,
-) -> F64:
-    """Do as `sum_lights` for one point with a lobe, in plain NumPy: its oracle.
-
-    Args:
-        stored_scene, visibility_bits, lights, lobes, camera_position: as there. probe: number of the point.
-    Returns:
-        (3,) float64
-    """
-    n, lobe = stored_scene.probes.normal[probe].astype(np.float64), lobes.lobe_index[stored_scene.material[probe]]
-    wo = camera_position.astype(np.float64) - stored_scene.probes.position[probe]
-    wo /= np.linalg.norm(wo)
-    facing = float(np.clip(n @ wo, MIN_COSINE, 1))
-    row_coordinate = np.sqrt(1 - facing) * (NUM_ROWS - 1)
-    row = min(int(row_coordinate), NUM_ROWS - 2)
-    table = (1 - (row_coordinate - row)) * lobes.shape[lobe, row] + (row_coordinate - row) * lobes.shape[lobe, row + 1]
-    table = table.astype(np.float64).reshape(len(WIDTHS), NUM_RINGS, NUM_AZIMUTHS)
-    mirror = 2 * facing * n - wo
-    across = n - facing * mirror
-    across /= max(float(np.linalg.norm(across)), 1e-6)
-    bits = np.unpackbits(visibility_bits[probe], bitorder="little")[: len(lights.table) // 4]
-    nibbles = np.pad(bits, (0, -len(bits) % LIGHTS_PER_GROUP)).reshape(-1, LIGHTS_PER_GROUP) @ (
-        1 << np.arange(LIGHTS_PER_GROUP)
-    )
-    light_indices = (16 * np.arange(len(nibbles)) + nibbles)[nibbles > 0]
-    wi, irradiance = np.split(lights.lights[light_indices].astype(np.float64), 2, axis=1)
-    x = np.clip(2 - 2 * wi @ mirror, ring_distances()[0], 4)
-    psi = np.arccos(np.clip(wi @ across / np.sqrt(np.maximum(x * (1 - x / 4), 1e-12)), -1, 1))
-    half = (wi @ n + facing) / np.linalg.norm(wi + wo, axis=1)
-    ring = np.interp(x, ring_distances(), np.arange(NUM_RINGS))
-    spoke = np.clip(psi / np.pi * NUM_AZIMUTHS - 0.5, 0, NUM_AZIMUTHS - 1)
-    r, s = np.minimum(ring.astype(int), NUM_RINGS - 2), np.minimum(spoke.astype(int), NUM_AZIMUTHS - 2)
-    fr, fs, width = ring - r, spoke - s, lights.table[light_indices] // NUM_GRID_DIRECTIONS
-    lower = (1 - fs) * table[width, r, s] + fs * table[width, r, s + 1]
-    upper = (1 - fs) * table[width, r + 1, s] + fs * table[width, r + 1, s + 1]
-    values = ((1 - fr) * lower + fr * upper) / (np.maximum(2 - 2 * half, 0) + lobes.flatness[lobe]) ** 2
-    return np.asarray(values @ irradiance)

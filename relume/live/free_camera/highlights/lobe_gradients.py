@@ -28,7 +28,6 @@ from relume.live.free_camera.basis.material_tables import Tables
 from relume.live.free_camera.basis.outgoing_coefficients import NUM_ROWS
 from relume.live.free_camera.basis.table_index import MIN_COSINE, view_direction_local
 from relume.live.free_camera.probes.stored_scene import StoredScene
-from relume.live.free_camera.shade_probes import shade_probes_numpy
 from relume.math.zernike import recurrence
 
 F32 = NDArray[np.float32]
@@ -37,7 +36,6 @@ F64 = NDArray[np.float64]
 _LUMINANCE = np.array(LUMINANCE, np.float32)
 _NON_ENVIRONMENT_COLUMN = 4  # the column of `Tables.table_index` for other light in highlights
 _MIN_SINE = np.float32(1e-3)
-_DIFFERENCE_STEP = 1e-5  # radians
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
@@ -230,44 +228,3 @@ def gradients_along_lobe(
     args = *probe_args, tables, lobes, np.ascontiguousarray(camera_position, np.float32), rows
     parallel_for_chunks(lambda start, stop: _gradient_kernel(*args, start, stop, gradients), len(rows))
     return gradients
-
-
-def gradients_along_lobe_numpy(
-    stored_scene: StoredScene, non_environment: F32, tables: Tables, lobes: Lobes, camera_position: F32, probe: int
-) -> F64:
-    """Oracle of `gradients_along_lobe` for one point: differences of `shade_probes_numpy` beside the camera.
-
-    Args:
-        stored_scene, non_environment, tables, lobes, camera_position: as there. probe: number of the point, which has a
-        lobe.
-    Returns:
-        (4,) float64
-    """
-    n, position = (
-        array[probe].astype(np.float64) for array in (stored_scene.probes.normal, stored_scene.probes.position)
-    )
-    to_camera, lobe = camera_position - position, lobes.lobe_index[stored_scene.material[probe]]
-    distance, tangents = float(np.linalg.norm(to_camera)), np.linalg.svd(to_camera[None])[2][1:]
-
-    def outgoing_luminance(direction: F64) -> float:
-        outgoing, _ = shade_probes_numpy(
-            stored_scene,
-            np.zeros_like(non_environment),
-            non_environment,
-            tables,
-            position + distance * direction,
-            probe,
-        )
-        rows = np.sqrt(1 - np.clip(direction @ n, MIN_COSINE, 1)) * (NUM_ROWS - 1)
-        row_albedo = lobes.albedo[lobe].sum(axis=1).astype(np.float64)
-        albedo = [np.interp(rows, np.arange(NUM_ROWS), row_albedo[:, channel]) for channel in range(3)]
-        return float(outgoing.sum(axis=0) / np.maximum(albedo, 1e-30) @ LUMINANCE)
-
-    wo, gradient = to_camera / distance, np.zeros(3)
-    for across in tangents:
-        forward, backward = (wo + sign * _DIFFERENCE_STEP * across for sign in (1, -1))
-        change = outgoing_luminance(forward / np.linalg.norm(forward)) - outgoing_luminance(
-            backward / np.linalg.norm(backward)
-        )
-        gradient += change / (2 * _DIFFERENCE_STEP) * (2 * (n @ across) * n - across)
-    return np.append(gradient, gradient @ (2 * (n @ wo) * n - wo))

@@ -217,21 +217,6 @@ def _list_lights_into(args: tuple[Any, ...], lists: NDArray[np.int32], start: in
     _list_lights(*args, start, stop, lists)  # type: ignore[call-arg]
 
 
-def lists_numpy(lobe_lights: LobeLightLists, width: int, bin_index: int) -> NDArray[np.intp]:
-    """Find the lights of a list in plain NumPy: the oracle, in no order.
-
-    Args:
-        lobe_lights: whose lights. width, bin_index: of the list.
-    """
-    centers, farthest = _DIRECTION_BINS
-    lights = lobe_lights.lights.astype(np.float64)
-    angle = np.maximum(np.arccos(np.clip(lights[:, :3] @ centers[bin_index], -1, 1)) - farthest[bin_index], 0)
-    variance = sigma_at_width(width) ** 2 + lights[:, 3]
-    weight = lights[:, 4] / variance * np.maximum(1 - (1 - np.cos(angle)) / (_SHARPNESS * variance), 0) ** _SHARPNESS
-    heaviest = np.argsort(-weight)[:NUM_LISTED]
-    return np.asarray(heaviest[weight[heaviest] > 0])
-
-
 def sigma_at_width(width: int) -> float:
     """Find the σ that lists of a width are made for, radians."""
     return float(MIN_SIGMA * 2 ** (width / 2))

@@ -17,11 +17,9 @@ from numpy.typing import NDArray
 from relume.core.numba_options import UNCOUNTED
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.primary_visibility import mark_needed_probes
-from relume.live.free_camera.probes.lattice_nodes import LatticeNodes
 from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.texel_brdf.coefficient_packing import EMPTY_LANE, FUNCTIONS, HALF, HAS_ORDER, PAIRS, WIDTH
 from relume.live.free_camera.texel_brdf.texture_coordinates import cross, dot, face_placements, vector_row
-from relume.math.zernike import recurrence
 
 F32 = NDArray[np.float32]
 U8 = NDArray[np.uint8]
@@ -171,30 +169,3 @@ class TexelLight:
             parallel_for_chunks(lambda start, stop: _sum_at_nodes(*args, start, stop, *self._node_light), len(rows))
             self._is_current[rows] = 1
         return self._node_light
-
-
-def node_light_numpy(
-    lattice_nodes: LatticeNodes, tangents: F32, vectors: F32, lattice_node: int
-) -> tuple[NDArray[np.float64], F32]:
-    """Do as `TexelLight.about` for one vertex, in plain NumPy: its oracle.
-
-    Args:
-        lattice_nodes: all. tangents, vectors: of points, (points, 3), (points, 3, K). lattice_node: number of it.
-    Returns:
-        Its light vector by functions, (3, K), its tangent (3,).
-    """
-    recurrence_table, weights, probes = (
-        recurrence(),
-        lattice_nodes.weight[lattice_node],
-        lattice_nodes.point[lattice_node],
-    )
-    n, t = lattice_nodes.normal[lattice_node], tangents[probes[weights.argmax()]]
-    out = np.zeros(vectors.shape[1:])
-    for weight, probe in zip(weights, probes, strict=True):
-        angle = np.arctan2(tangents[probe] @ np.cross(n, t), tangents[probe] @ t)
-        for m, cosine, sine in zip(recurrence_table.order, recurrence_table.cosine, recurrence_table.sine, strict=True):
-            phase = vectors[probe, :, cosine] + 1j * (vectors[probe, :, sine] if m else 0)
-            phase = weight * phase * np.exp(1j * m * angle)
-            out[:, sine] += phase.imag
-            out[:, cosine] += phase.real
-    return out, t

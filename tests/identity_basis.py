@@ -1,4 +1,4 @@
-"""The bands themselves as a basis, with the interface of `relume.math.daubechies`; oracle in tests."""
+"""The angle bands themselves as a basis, with the interface of `relume.math.daubechies`."""
 
 from __future__ import annotations
 
