@@ -1,4 +1,4 @@
-"""Pictures of docs/gather.md: reflected light by us and by Mitsuba, and how far they are apart.
+"""Pictures of docs/indirect-light.md: reflected light by us and by Mitsuba, and how far they are apart.
 
 python -m relume_bench.error_map SCENE FILE.jpg     SCENE is one of relume_bench.gather_scenes
 """

@@ -2,7 +2,7 @@
 
 The pictures of bench/relume_bench/gather_scenes.py, every surface on the way with its whole BSDF on Mitsuba's side:
 highlights light other surfaces there by their own shape,
-with us by few functions (docs/adr/0047-cells-send-by-direction.md).
+with us by few functions (docs/indirect-light.md#bounces).
 """
 
 from __future__ import annotations

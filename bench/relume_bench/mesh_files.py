@@ -1,7 +1,7 @@
 """import.obj, import.ply: seconds to read a grid of a million triangles, and how long other libraries take.
 
 The text has positions, texture coordinates and normals; the .ply is binary. Where tinyobjloader and plyfile are
-installed, which relume does not need, they read the same bytes in turn. docs/adr/0014-own-obj-and-ply-readers.md.
+installed, which relume does not need, they read the same bytes in turn. docs/adr/0010-scene-file-readers.md.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
-"""Writes figures into docs/performance.md and docs/accuracy.md: `relume bench --json | python -m relume_bench.table`.
+"""Merge figures into docs/performance.json and docs/accuracy.json, and write the tables of both pages from them.
 
-A table stands between two marks; its rows are kept by name, so that a run of a few figures leaves the others.
+`relume bench --json | python -m relume_bench.table`. A file holds the list that `relume bench --json` prints, with the
+context of each figure; figures that a run did not measure keep their entries. A table stands between two marks.
 """
 
 from __future__ import annotations
@@ -10,9 +11,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
-BEGIN, END = "<!-- figures: relume bench --json | python -m relume_bench.table -->", "<!-- end of figures -->"
-HEAD = ["| figure | value | target | how it came about |", "|---|---|---|---|"]
+DOCS = next(folder for folder in Path(__file__).resolve().parents if (folder / "docs").is_dir()) / "docs"
+BEGIN, END = "<!-- figures, written by relume_bench.table -->", "<!-- end of figures -->"
+HEAD = ["| figure | value | target | limit or peer | date |", "|---|---|---|---|---|"]
+PAGES = ("performance", "accuracy")
 
 TARGETS = {
     "frame.bandwidth_ratio": "≥ 0.8",
@@ -112,11 +114,74 @@ TARGETS = {
     "demo.first_picture_s": "≤ 10 s",
 }
 
+PEERS = {
+    "accuracy.": "reference, every texel",
+    "assets.rmse": "Mitsuba 3, its own reader",
+    "bake.ray_saving": "1, every ray traced",
+    "bake.rays_vs_embreex": "`embreex`, same rays",
+    "bake.teatray_s": "Ben-Artzi 2006, size of Teatray",
+    "bake.two_workers_speedup": "2, cores",
+    "bake.wall_vs_rays": "1, tracing kernels alone",
+    "btf.compression_error": "uncompressed BTF",
+    "btf.five_vs_two": "1, edit with two BTFs",
+    "btf.geometry_rmse": "path tracing of the geometry",
+    "btf.light_bytes": "640 kB HDR, 11 MB tables",
+    "btf.several_ratio": "1, edit without BTFs",
+    "btf.sphere_rmse": "path tracing of the geometry",
+    "btf.table_rmse": "uncompressed BTF",
+    "estimators.": "path tracing",
+    "factorization.phong_terms_per_exponent": "2.5, Mahajan 2008",
+    "flood.latency_ratio": "1, quiet server",
+    "frame.bandwidth_ratio": "1, summing the same bytes",
+    "frame.incremental_rmse": "T · c in float64",
+    "freeze.curve_switch_s": "2.1 s, Ben-Artzi 2006",
+    "gather.full_": "Mitsuba 3, whole materials",
+    "gather.incremental_error": "the same look, shaded",
+    "gather.rmse_": "Mitsuba 3",
+    "glass.rmse": "Mitsuba 3 `volpath`",
+    "large.bytes_ratio": "1, float32",
+    "large.frame_ratio": "1, float32",
+    "lights.rmse_": "Mitsuba 3",
+    "load.aggregate_ratio": "1, best session count",
+    "load.drag_with_renders_ratio": "1, no renders",
+    "memory.": "323 MB, server at start",
+    "mirror.": "Mitsuba 3",
+    "opening.larger_ratio": "1, ratio of pixels",
+    "paper.fig5_incremental": "4.8e-8, Ben-Artzi 2006",
+    "paper.fig5_non_linear": "0.12, Ben-Artzi 2006",
+    "pca.blinn_phong_6": "1e-5, Nguyen 2010 (norm not stated)",
+    "peer.cycles_time_ratio": "Cycles 5",
+    "peer.mitsuba_": "Mitsuba 3",
+    "plan.disk_ratio": "1, bytes used",
+    "preview.": "shading all samples",
+    "probes.against_fixed_": "fixed view of the same bake",
+    "probes.all_vs_sun": "1, Sun 2007",
+    "probes.brdf_vs_sun": "1, Sun 2007",
+    "probes.canvas_fps": "11.1 frames/s, the server",
+    "probes.incremental_error": "the change at rest",
+    "probes.probe_rmse": "path tracing",
+    "probes.rmse_": "Mitsuba 3",
+    "reference.mitsuba": "Mitsuba 3",
+    "roughness.rmse": "Mitsuba 3",
+    "shade.pairs_per_s_vs_limit": "1, angles alone",
+    "shade.vs_operator_sums": "1, sums of the operator",
+    "slider.drag_error": "the same look, shaded",
+    "slider.freeze_ratio": "1, operator along θh",
+    "slider.sharp_": "the same look, shaded",
+    "slow_readers.mb": "14.3 MB × 60 readers",
+}
+"""What a figure is compared with, by its name or the beginning of it: a limit of the machine, a paper, a renderer."""
+
+
+def find_peer(name: str) -> str:
+    """Limit or peer of a figure; empty for none."""
+    return next((peer for start, peer in PEERS.items() if name.startswith(start)), "")
+
 
 def find_document(name: str) -> str:
-    """Which document a figure belongs to."""
+    """Page and file of a figure, by name without suffix."""
     return (
-        "accuracy.md"
+        "accuracy"
         if name.startswith(
             (
                 "accuracy.",
@@ -138,21 +203,21 @@ def find_document(name: str) -> str:
             )
         )
         or name == "frame.incremental_rmse"
-        else "performance.md"
+        else "performance"
     )
 
 
 def row(figure: dict[str, Any]) -> str:
     """One line of a table."""
-    context = figure["context"]
     if figure["value"] is None:
         value = "not measured"
     elif figure["unit"] == "relative RMSE" and figure["value"] > 1e-3:
         value = f"{100 * figure['value']:.2f}{_spread(figure, 100)} %"
     else:
         value = f"{figure['value']:.3g}{_spread(figure)} {figure['unit'].replace('ratio', '×')}"
-    context_text = "; ".join(f"{key} {_short(item)}" for key, item in context.items() if key not in ("their_steps",))
-    return f"| `{figure['name']}` | {value} | {TARGETS.get(figure['name'], '')} | {context_text.replace('|', '/')} |"
+    date = str(figure["context"].get("measured_on", "")).partition(",")[0]
+    name = figure["name"]
+    return f"| `{name}` | {value} | {TARGETS.get(name, '')} | {find_peer(name)} | {date} |"
 
 
 def _spread(figure: dict[str, Any], scale: float = 1.0) -> str:
@@ -161,34 +226,31 @@ def _spread(figure: dict[str, Any], scale: float = 1.0) -> str:
     return "" if error is None else f" ± {scale * error:.2g}"
 
 
-def _short(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.3g}" if abs(value) < 1e5 else f"{value:.2e}"
-    if isinstance(value, dict):
-        return "(" + ", ".join(f"{key} {_short(item)}" for key, item in value.items()) + ")"
-    return "×".join(map(_short, value)) if isinstance(value, list) else str(value)
+def merge(stored: list[dict[str, Any]], measured: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Stored figures, replaced by measured ones of the same name, in the order of names."""
+    figures = {figure["name"]: figure for figure in [*stored, *measured]}
+    return [figures[name] for name in sorted(figures)]
 
 
 def filled(text: str, figures: list[dict[str, Any]]) -> str:
-    """A document with new rows in its table. Raises ValueError where it has no marks."""
+    """A page with these figures in its table. Raises ValueError if the page has no marks."""
     before, _, suffix = text.partition(BEGIN)
-    table, mark, after = suffix.partition(END)
+    _, mark, after = suffix.partition(END)
     if not mark:
-        raise ValueError(
-            "the document has no table of figures; put the two marks of bench/relume_bench/table.py into it"
-        )
-    rows = {line.split("`")[1]: line for line in table.splitlines() if line.startswith("| `")}
-    rows |= {figure["name"]: row(figure) for figure in figures}
-    return "\n".join([before + BEGIN, *HEAD, *(rows[name] for name in sorted(rows)), END]) + after
+        raise ValueError("the page has no table of figures; put the two marks of relume_bench.table into it")
+    return "\n".join([before + BEGIN, *HEAD, *map(row, figures), END]) + after
 
 
 def main() -> int:
-    """Read the JSON list from standard input and write both documents."""
-    figures = json.load(sys.stdin)
-    for name in ("performance.md", "accuracy.md"):
-        path = DOCS / name
-        document_figures = [figure for figure in figures if find_document(figure["name"]) == name]
-        path.write_text(filled(path.read_text(), document_figures))
+    """Read the JSON list from standard input and write both files and pages."""
+    measured = json.load(sys.stdin)
+    for name in PAGES:
+        file, page = DOCS / f"{name}.json", DOCS / f"{name}.md"
+        mine = [figure for figure in measured if find_document(figure["name"]) == name]
+        figures = merge(json.loads(file.read_text()), mine)
+        lines = ",".join("\n" + json.dumps(figure, ensure_ascii=False) for figure in figures)
+        file.write_text(f"[{lines}\n]\n")
+        page.write_text(filled(page.read_text(), figures))
     return 0
 
 

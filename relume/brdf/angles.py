@@ -1,6 +1,6 @@
 """The angles that curves are functions of, as Numba kernels over local-frame directions (z = normal, x = tangent).
 
-Each is γ(wi, wo) in radians, clamped to [0, π/2]; see docs/method.md. The NumPy twin that tests compare
+Each is γ(wi, wo) in radians, clamped to [0, π/2]; see docs/direct-light.md#angles. The NumPy twin that tests compare
 with is `relume.brdf.evaluate.angles_numpy`.
 """
 

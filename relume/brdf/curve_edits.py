@@ -3,7 +3,8 @@
     edited = factor · before + offset
 
 `factors` and `offsets` give them band by band. `handles`, [degrees, was, becomes], pull the result: between two of them
-the pulls of both are blended, so that one handle moves the curve as far as its neighbours and no farther (ADR 29).
+the pulls of both are blended, so that one handle moves the curve as far as its neighbours and no farther
+(docs/direct-light.md#curves-as-bands).
 """
 
 from __future__ import annotations

@@ -8,8 +8,8 @@ share T_g, the mean of what the sides of glass let pass on the way. So the visib
 
 in each channel, and each P is that of a sample whose share of the pixel is multiplied by what stands beside it. A lobe
 that sees one light sees its tint, and nothing that sums light knows of it
-(docs/adr/0094-samples-of-a-channel.md). Brute force does without means: its samples are of one channel each, and their
-rays pass by the tint of that.
+(docs/direct-light.md#glass-mirrors-shadow-catchers). Brute force does without means: its samples are of one channel
+each, and their rays pass by the tint of that.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """View samples: the points of a view whose radiance makes its pixels.
 
-One sample a pixel, more where material, normal or depth change across it (docs/method.md, "View samples"): eight
+One sample a pixel, more where material, normal or depth change across it (docs/direct-light.md#algorithm): eight
 positions are traced in such a pixel and those that see the same thing, turned alike, are merged into the most central
 of them: a silhouette has eight levels of coverage for a few samples, and thin chrome several reflections.
 
 A picture is looked at twice, window by window: for edges, then for samples, which go to files as they are found and are
-read from there in their order (docs/adr/0105-samples-window-by-window.md).
+read from there in their order (docs/adr/0013-plans-and-tiled-sampling.md).
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Where a texel is metal it scatters nothing, and highlights have its base colour (`relume.scene_io.gltf.blend`). So the
 image is no texture of a term itself: two are made of it and of the base colour, texel by texel, and kept on the same
-shelf (docs/adr/0103-images-of-metalness.md). Blue says how much a texel is metal, as in files of glTF: the number
+shelf (docs/adr/0007-texture-slots-and-images.md). Blue says how much a texel is metal, as in files of glTF: the number
 itself, no display value.
 """
 

@@ -2,7 +2,7 @@
 
 Tiles are leaves of a hierarchy; merged are those under an inner node that a coarser division would not have split.
 What a point sees of a merged triangle is the share of its light that comes from the parts it sees
-(docs/adr/0089-operators-of-merged-lights.md).
+(docs/direct-light.md#algorithm).
 """
 
 from __future__ import annotations

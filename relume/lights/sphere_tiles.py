@@ -27,10 +27,12 @@ MIN_LIGHTS, MAX_LIGHTS = 8, 65_536
 MAX_DEPTH = 28  # of the hierarchy: what a code of 64 bits holds
 
 # Agarwal 2003 use ΔΩ^(1/4) against the error of shadows; highlights show the map itself, so that size counts more
-# here, and a little of plain solid angle is added, weighted by the mean radiance (docs/adr/0010-light-metric.md).
+# here, and a little of plain solid angle is added, weighted by the mean radiance
+# (docs/direct-light.md#environment-triangles).
 SOLID_ANGLE_EXPONENT = 0.4
 UNIFORM_FRACTION = 1e-2
-# Light that may come to any azimuth has more dim places where a lamp may arrive (docs/adr/0013-relightable-bakes.md).
+# Light that may come to any azimuth has more dim places where a lamp may arrive
+# (docs/direct-light.md#environment-triangles).
 _RELIGHTABLE_UNIFORM_FRACTION = 0.1
 
 _OCTAHEDRON = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], dtype=np.float64)

@@ -44,7 +44,7 @@ class TriangleLights:
     The sphere is tiled by a hierarchy of triangles. What is kept of a tile is the triangle with the same light, whose
     mean direction and spread (first and second moments) are those of the light in the tile: the same tile where the
     light is uniform, a smaller one around a lamp. Highlights then err in the third order of the tile's size instead
-    of the first (docs/adr/0011-moment-matched-lights.md).
+    of the first (docs/direct-light.md#environment-triangles).
 
     Attributes:
         nodes: unit directions of the corners a, b, c and of the midpoints of ab, bc, ca. (3 axes, 6, M) float32

@@ -6,7 +6,7 @@ the disc keeps most of a BRDF by its cosine-weighted error:
     h_nm(ω) = N_nm · (Re | Im)(x + iy)^m · P_s^(0,m)(2 (x² + y²) − 1),   s = (n − m) / 2,   N² = (n + 1) (1 or 2) / π
 
 with Jacobi's polynomials P. They are nested: those of degree n ≤ N are the first (N + 1)(N + 2) / 2
-(docs/adr/0042-zernike-in-basis.md).
+(docs/free-camera.md#the-zernike-basis).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ DEGREES = np.repeat(np.arange(DEGREE + 1), np.arange(DEGREE + 1) + 1)
 """Degree of each function. (K,)"""
 WINDOW_DECAY = 1 / (2 * 8.0**2)
 """1 / 2d², d = 8, of windows e^(−n (n + 2) / 2d²). Functions cut off at a degree ring beside what is bright; a window
-takes a part of that away for a little blur (docs/adr/0063-highlights.md, docs/adr/0047-cells-send-by-direction.md)."""
+takes a part of that away for a little blur (docs/free-camera.md#highlights, docs/indirect-light.md#bounces)."""
 BATCH_RAYS = 128  # rays that `add_light` takes; all columns of them stay in the first cache
 WI, LIGHT, _X, _RE, _IM, _BEFORE, _LAST, NUM_COLUMNS = 0, *(BATCH_RAYS * k for k in (2, 5, 6, 7, 8, 9)), 10
 """Where the columns of `add_light` begin, and how many there are."""

@@ -7,7 +7,7 @@ values of the parameter that span it,
     R(p) = Σ_s c_s(p) R(p_s),
 
 with as many as hold every band of the product to `MAX_ERROR`, and so every pixel
-(docs/adr/0032-nodes-that-hold-every-pixel.md).
+(docs/direct-light.md#algorithm).
 """
 
 from __future__ import annotations

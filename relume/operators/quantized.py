@@ -3,7 +3,7 @@
     T_ij ≈ s_bj n_ij,   n an integer of 16 bits, s_bj the largest |T_ij| of block b over 32,767
 
 A rest of at most s/2 stays in every number: images of all columns are within 10⁻⁴ of those in float32, for which
-float16 needs as much memory and has three times the error (docs/adr/0083-operators-of-some-samples.md). An operator in
+float16 needs as much memory and has three times the error (docs/direct-light.md#algorithm). An operator in
 use adds changes to an exact image, so that the rest is one of the change alone.
 """
 

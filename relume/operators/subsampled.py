@@ -3,7 +3,7 @@
     R' = R + W T Δc
 
 T are the columns at the chosen samples, W says how all others change with them. An image keeps what it has of shadows,
-edges and bumps, which only its change knows coarsely (docs/adr/0083-operators-of-some-samples.md).
+edges and bumps, which only its change knows coarsely (docs/direct-light.md#algorithm).
 """
 
 from __future__ import annotations

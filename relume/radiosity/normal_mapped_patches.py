@@ -1,7 +1,7 @@
 """Gather cells whose material leans as an image of normals says: what a bake finds whose scene has it as its map.
 
 Each point of a cell takes the normal of its texels, as blurred as its textures are. What then comes up over its horizon
-is traced, and its gather rays leave about the normal as it is now; docs/adr/0110-cells-under-images-of-normals.md.
+is traced, and its gather rays leave about the normal as it is now; docs/indirect-light.md#algorithm.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 After Ben-Artzi et al. 2006b, "Efficient shadows from sampled environment maps": few samples are traced, the others are
 predicted, rays go where neighbours disagree, and a prediction found wrong floods its neighbours. Neighbours are samples
-that follow each other, and lights beside each other on the sphere (docs/adr/0016-coherent-shadows.md). Nothing is
+that follow each other, and lights beside each other on the sphere (docs/direct-light.md#algorithm). Nothing is
 random, and blocks know nothing of each other: the same samples give the same bits whatever the threads.
 """
 

@@ -1,6 +1,6 @@
 """Local lights of the reference: points of each drawn at random, their shadows found by what a ray hits first.
 
-It shares no kernel with pictures: float64, formulas as docs/lights.md states them.
+It shares no kernel with pictures: float64, formulas as docs/direct-light.md#local-lights states them.
 """
 
 from __future__ import annotations

@@ -7,8 +7,8 @@ evenly over the hemisphere, others at each place of a texel; values are on the w
 
     B(v, ·) → argmin Σ_j ( Σ_l hat_l(ω_j) B(v, l) − f(ω_j, v) cos θ_j V(ω_j) )² ,
 
-with hat_l of `relume.assets.btf.direction_rings` (ADR 87). Eyes are points, as far lenses are: between them relief is
-found by its height (`relume.assets.btf.parallax`),
+with hat_l of `relume.assets.btf.direction_rings` (docs/btf.md#against-the-geometry). Eyes are points, as far lenses
+are: between them relief is found by its height (`relume.assets.btf.parallax`),
 which a blur would only hide. E_l is the irradiance by light that other faces
 have sent on, which do so as matt surfaces of the same reflectance ρ: found once for the middles of all faces,
 by rays to other

@@ -6,7 +6,7 @@ band counts to it: angles are clamped to its end.
 
 Half of the projector's time goes into the inner sums over bands, a handful for each triangle: too few for the compiler
 to vectorise by itself, and scattered where it cannot know that they do not alias. Written as vectors of eight floats,
-by Numba intrinsics, they take half the time (docs/adr/0017-eight-bands-at-once.md). LLVM lowers them to whatever
+by Numba intrinsics, they take half the time (docs/adr/0009-numba-and-embree.md). LLVM lowers them to whatever
 registers the machine has.
 """
 

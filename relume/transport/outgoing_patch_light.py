@@ -9,7 +9,7 @@ together hardly knows the difference.
 
 What few functions make of a small bright light has rings about it, in part below nothing. Who gathers widely sees none
 of them; a narrow lobe sees one alone. For those there is a second table, of L_j times a factor of its degree, which
-takes a part of them away (docs/adr/0047-cells-send-by-direction.md).
+takes a part of them away (docs/indirect-light.md#bounces).
 """
 
 from __future__ import annotations

@@ -115,7 +115,8 @@ def _append(  # type: ignore[no-untyped-def]
 ):
     """Append the triangles between three nodes of the listed ones to the leaves; returns the new number of leaves.
 
-    Corners move by `bent` times as much as angles bend, which is nearly always one way (docs/method.md, "Overlap").
+    Corners move by `bent` times as much as angles bend, which is nearly always one way
+    (docs/direct-light.md#algorithm).
     """
     for k in range(gamma.shape[0]):
         curve_bend_sum = bend_sum[k]

@@ -6,7 +6,7 @@ to the truth than the sample alone. The weights depend on places and normals onl
 and materials, and one for images and for operators.
 
 What a highlight shows turns by twice as much as the normal: its neighbours are those that are turned alike
-(docs/adr/0072-gather-rays-of-stills.md).
+(docs/indirect-light.md#measured).
 """
 
 from __future__ import annotations

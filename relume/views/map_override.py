@@ -1,9 +1,10 @@
 """Views whose materials wear other maps of roughness or of normals than they were baked with.
 
-Levels of roughness are coefficients of one operator (docs/adr/0052-roughness-in-levels.md), and bakes say where samples
-lie in textures. So an image in the place of a map of roughness is another level for each sample, nothing else; as
-samples of a level lie together, they come in another order (docs/adr/0102-images-of-roughness.md). An image of normals
-is another normal for each, and another level where bumps below a pixel widen it (docs/adr/0107-images-of-normals.md).
+Levels of roughness are coefficients of one operator (docs/direct-light.md#textures-and-maps), and bakes say where
+samples lie in textures. So an image in the place of a map of roughness is another level for each sample, nothing else;
+as samples of a level lie together, they come in another order (docs/direct-light.md#textures-and-maps). An image of
+normals is another normal for each, and another level where bumps below a pixel widen it
+(docs/direct-light.md#textures-and-maps).
 """
 
 from __future__ import annotations

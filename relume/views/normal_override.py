@@ -1,7 +1,7 @@
 """Normals of a bake where an image says how they lean: what a bake finds whose scene has the image as its map.
 
 Bakes say where points lie in textures and how these are turned there. So the image is looked up, as wide as a pixel,
-and leans the surface's own normal in the frame of its texture; docs/adr/0107-images-of-normals.md.
+and leans the surface's own normal in the frame of its texture; docs/direct-light.md#textures-and-maps.
 """
 
 from __future__ import annotations

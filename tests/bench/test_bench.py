@@ -127,44 +127,45 @@ def test_failure_is_a_figure_and_the_others_go_on(
     assert second["value"] > 0
 
 
-def test_table_keeps_rows_that_were_not_measured() -> None:
+def test_merge_keeps_figures_that_were_not_measured() -> None:
     text = f"before\n{table.BEGIN}\n{table.END}\nafter\n"
-    one = {"name": "bake.nothing_s", "value": 12.345, "unit": "s", "context": {"size": [640, 480]}}
+    details = {"size": [640, 480], "measured_on": "2026-11-28, schema 8"}
+    one = {"name": "bake.nothing_s", "value": 12.345, "unit": "s", "context": details}
     two = {"name": "accuracy.lambert", "value": 0.00412, "unit": "relative RMSE", "context": {}}
-    once = table.filled(text, [one])
-    assert "| `bake.nothing_s` | 12.3 s |  | size 640×480 |" in once.splitlines()
-    both = table.filled(once, [two])
-    assert "| `accuracy.lambert` | 0.41 % | ≤ 0.5 % |  |" in both.splitlines()
-    assert "12.3 s" in both
-    assert table.filled(both, [two]) == both
-    assert both.startswith("before\n")
-    assert both.endswith("\nafter\n")
+    both = table.merge([one], [two])
+    assert both == [two, one]
+    assert table.merge(both, [two]) == both
+    page = table.filled(text, both)
+    assert "| `bake.nothing_s` | 12.3 s |  |  | 2026-11-28 |" in page.splitlines()
+    assert "| `accuracy.lambert` | 0.41 % | ≤ 0.5 % | reference, every texel |  |" in page.splitlines()
+    assert table.filled(page, both) == page
+    assert page.startswith("before\n")
+    assert page.endswith("\nafter\n")
 
 
-@pytest.mark.parametrize("name", ["performance.md", "accuracy.md"])
-def test_documents_have_their_table(name: str) -> None:
-    text = (table.DOCS / name).read_text()
-    assert table.filled(text, []).count("| figure | value | target |") == 1
-    mine = [figure for figure in registry.names() if table.find_document(figure) == name]
-    for figure in mine:
+@pytest.mark.parametrize("name", table.PAGES)
+def test_pages_describe_every_figure(name: str) -> None:
+    text = (table.DOCS / f"{name}.md").read_text()
+    for figure in (figure for figure in registry.names() if table.find_document(figure) == name):
         assert figure.removesuffix(".p50").removesuffix(".p95") in text
 
 
 def test_estimate_is_shown_with_its_standard_error() -> None:
     share = {"name": "gather.rmse_x", "value": 0.0112, "unit": "relative RMSE", "context": {}, "standard_error": 0.0034}
-    assert table.row(share) == "| `gather.rmse_x` | 1.12 ± 0.34 % |  |  |"
+    assert table.row(share) == "| `gather.rmse_x` | 1.12 ± 0.34 % |  | Mitsuba 3 |  |"
     ratio = {"name": "peer.x", "value": 1.2e6, "unit": "ratio", "context": {}, "standard_error": 9.8e4}
     assert "| 1.2e+06 ± 9.8e+04 × |" in table.row(ratio)
 
 
-@pytest.mark.parametrize("name", ["performance.md", "accuracy.md"])
-def test_rows_are_those_that_the_benchmarks_wrote(name: str) -> None:
-    text = (table.DOCS / name).read_text()
-    rows = text.partition(table.BEGIN)[2].partition(table.END)[0].splitlines()[3:]
-    told = {line.split("`")[1]: line for line in rows if line}
-    assert set(told) <= set(registry.names())
-    for figure, line in told.items():
-        assert "not measured" in line or re.search(r"; measured_on \d{4}-\d\d-\d\d, schema \d+ \|$", line), figure
+@pytest.mark.parametrize("name", table.PAGES)
+def test_tables_show_the_stored_figures(name: str) -> None:
+    figures = json.loads((table.DOCS / f"{name}.json").read_text())
+    text = (table.DOCS / f"{name}.md").read_text()
+    assert table.filled(text, figures) == text
+    assert {figure["name"] for figure in figures} <= set(registry.names())
+    for figure in figures:
+        measured_on = figure["context"].get("measured_on", "")
+        assert figure["value"] is None or re.fullmatch(r"\d{4}-\d\d-\d\d, schema \d+", measured_on), figure["name"]
 
 
 def test_figure_without_a_value_says_why() -> None:

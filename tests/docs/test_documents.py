@@ -22,6 +22,23 @@ SYMBOLS = {
     "lobe": r"\gamma_C",
 }
 IGNORED_FOLDERS = {"build", "dist", "data", "test-results"}
+SOURCES = sorted(
+    path
+    for folder in (
+        "relume",
+        "worker",
+        "server",
+        "cli",
+        "bench",
+        "tests",
+        "scripts",
+        "client_web/src",
+        "client_web/tests",
+    )
+    for suffix in ("py", "ts", "tsx")
+    for path in ROOT.glob(f"{folder}/**/*.{suffix}")
+    if "node_modules" not in path.parts and not {".venv-peers", ".venv-cycles"} & set(path.parts)
+)
 
 
 def _read(name: str) -> str:
@@ -33,18 +50,37 @@ def _anchor(heading: str) -> str:
     return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
 
 
+def _anchors(page: Path) -> set[str]:
+    """Anchors of all headings of a page."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    return {_anchor(heading) for heading in re.findall(r"^#+ (.*)$", text, flags=re.MULTILINE)}
+
+
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
-def test_links_lead_somewhere(document: Path) -> None:
+def test_links_and_images_lead_somewhere(document: Path) -> None:
     text = re.sub(r"```.*?```", "", document.read_text(encoding="utf-8"), flags=re.DOTALL)
-    for target in re.findall(r"(?<!!)\[[^\]]*\]\(([^)\s]+)\)", text):
+    for target in re.findall(r"\[[^\]]*\]\(([^)\s]+)\)", text):
         if target.startswith(("http://", "https://")):
             continue
         path, _, anchor = target.partition("#")
         file = (document.parent / path).resolve() if path else document
         assert file.exists(), f"{target} is not there"
-        if anchor:
-            headings = re.findall(r"^#+ (.*)$", file.read_text(encoding="utf-8"), flags=re.MULTILINE)
-            assert anchor in {_anchor(heading) for heading in headings}, f"{target} has no such heading"
+        assert not anchor or anchor in _anchors(file), f"{target} has no such heading"
+
+
+def test_pages_and_decisions_that_the_code_names_are_there() -> None:
+    decisions = {int(page.name[:4]) for page in ROOT.glob("docs/adr/0*.md")}
+    references = 0
+    for source in SOURCES:
+        text = source.read_text(encoding="utf-8")
+        for path, anchor in re.findall(r"\b(docs/[\w/-]+\.md)(?:#([\w-]+))?", text):
+            references += 1
+            assert (ROOT / path).exists(), f"{source} names {path}"
+            assert not anchor or anchor in _anchors(ROOT / path), f"{source} names {path}#{anchor}"
+        for number in re.findall(r"\bADRs? (\d+)", text):
+            references += 1
+            assert int(number) in decisions, f"{source} names ADR {number}"
+    assert references > 40
 
 
 PATH = re.compile(r"\b((?:relume|worker|server|cli|bench|tests|client_web|docker|docs)/[\w./-]*\w/?)")
@@ -92,12 +128,12 @@ def test_folder_map_of_the_readme_matches_ls() -> None:
 
 
 def test_method_lists_every_term_and_its_curves() -> None:
-    rows = dict(re.findall(r"^\| `(\w+)`[^|]*\|(.*)$", _read("docs/method.md"), flags=re.MULTILINE))
+    rows = dict(re.findall(r"^\| `(\w+)`[^|]*\|(.*)$", _read("docs/direct-light.md"), flags=re.MULTILINE))
     for model, term in TERMS.items():
-        assert model in rows, f"docs/method.md has no row for {model}"
+        assert model in rows, f"docs/direct-light.md has no row for {model}"
         for curve in (curve for curve in term.curves if curve is not VIEW):
             symbol = SYMBOLS.get(curve.name, "\\" + curve.name)
-            assert symbol in rows[model], f"docs/method.md leaves out {curve.name} of {model}"
+            assert symbol in rows[model], f"docs/direct-light.md leaves out {curve.name} of {model}"
 
 
 def test_operations_lists_every_setting_and_no_other() -> None:

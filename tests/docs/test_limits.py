@@ -40,49 +40,44 @@ ROWS = {
     "triangles of a scene": f"{validate.MAX_TRIANGLES // MILLION} million",
     "materials of a scene; terms of a material": f"{validate.MAX_MATERIALS:,}; {document.MAX_TERMS}",
     "local lights of a scene": f"{validate.MAX_LIGHTS}",
-    "scene file; companions of it together; files of a `.zip`": (
+    "scene file; its referenced files together; files in a `.zip`": (
         f"{import_scene.MAX_FILE_BYTES // MIB} MiB; {referenced_files.MAX_BYTES // MIB} MiB; {zip_scene.MAX_ENTRIES:,}"
     ),
-    "side of an image in a scene; texels of all; of what materials make of them": (
+    "side of a scene's image; texels of all images; of all texture channels": (
         f"{images.MAX_SIDE:,} pixels; {images.MAX_TEXELS // MILLION} million; {MAX_TEXTURE_TEXELS // MILLION} million"
     ),
-    "environment; its file; kept with a scene at most": (
+    "environment; its file; stored with a scene": (
         f"{environment.MAX_WIDTH:,} × {environment.MAX_HEIGHT:,}; {environment.MAX_FILE_BYTES // MILLION} MB; "
         f"{environment.SCENE_MAX_WIDTH:,} wide"
     ),
-    "imported environments; kept at most": f"{environments.STORE.max_entries}; {environments.MAX_WIDTH:,} wide",
-    "images that looks may name; each; its file": (
+    "imported environments; stored width": f"{environments.STORE.max_entries}; {environments.MAX_WIDTH:,} wide",
+    "uploaded images; size; file": (
         f"{IMAGES.max_entries:,}; {read_image.MAX_SIDE:,} × {read_image.MAX_SIDE:,}; "
         f"{read_image.MAX_FILE_BYTES // MILLION} MB"
     ),
     "imported measured materials": f"{materials.STORE.max_entries}",
-    "pixels of a baked view; light triangles of a bake": f"{direct.MAX_PIXELS:,}; {sphere_tiles.MAX_LIGHTS:,}",
-    "points of a drawn curve": f"{terms.MAX_POINTS:,}",
+    "pixels of a baked view; environment triangles of a bake": f"{direct.MAX_PIXELS:,}; {sphere_tiles.MAX_LIGHTS:,}",
+    "points of a curve": f"{terms.MAX_POINTS:,}",
     "operations of a patch; text message of a session": (
         f"{patch.MAX_OPERATIONS}; {protocol.MAX_MESSAGE_BYTES // KIB} KiB"
     ),
-    "comments on a scene; in all; their pictures and words together": (
+    "comments on a scene; in all; their images and texts together": (
         f"{comment_store.MAX_PER_SCENE}; {comment_store.MAX_COMMENTS:,}; {comment_store.MAX_BYTES // MIB} MiB"
     ),
-    "words of a comment; side of its picture as it is sent; as it is kept": (
+    "text of a comment; side of its image, uploaded; stored": (
         f"{wire_comments.MAX_COMMENT:,} characters; {comment_images.MAX_SIDE:,}; {comment_images.STORED_SIDE} pixels"
     ),
-    "name of somebody in a room; name of a room": (
-        f"{rooms.MAX_PERSON_NAME}; {rooms.MIN_ROOM} to {rooms.MAX_ROOM} characters"
-    ),
-    "views shown at once; frames that are not acknowledged": (
-        f"{protocol.MAX_VISIBLE_VIEWS}; {protocol.MAX_FRAMES_IN_FLIGHT}"
-    ),
-    "cameras placed in a scene": f"{cameras.MAX_CAMERAS}",
-    "saved look; number of them": f"{look_store.MAX_LOOK_BYTES // KIB} KiB; {look_store.MAX_LOOKS:,}",
-    "shared look; number of them; all together": (
+    "participant name; room name": (f"{rooms.MAX_PERSON_NAME}; {rooms.MIN_ROOM} to {rooms.MAX_ROOM} characters"),
+    "visible views; unacknowledged frames": (f"{protocol.MAX_VISIBLE_VIEWS}; {protocol.MAX_FRAMES_IN_FLIGHT}"),
+    "custom cameras of a scene": f"{cameras.MAX_CAMERAS}",
+    "saved look; number of looks": f"{look_store.MAX_LOOK_BYTES // KIB} KiB; {look_store.MAX_LOOKS:,}",
+    "shared look; number of shared looks; total": (
         f"{share_store.MAX_SHARE_BYTES // KIB} KiB; {share_store.MAX_SHARES:,}; {share_store.MAX_BYTES // MIB} MiB"
     ),
-    "looks and cameras of one batch render; its frames": f"{renders.MAX_LOOKS:,}; {renders.MAX_FRAMES:,}",
-    "frames whose looks are told at once; all together": f"{renders.MAX_LISTED_FRAMES}; "
-    f"{renders.MAX_LISTED_BYTES // MIB} MiB",
-    "passes of a comparison; of each kind of long work waiting": f"{most('passes'):,}; {Settings().max_queued}",
-    "pixels of a view whose eye moves": f"{protocol.MAX_CAMERA_PIXELS:,}",
+    "looks and cameras of a batch render; its frames": f"{renders.MAX_LOOKS:,}; {renders.MAX_FRAMES:,}",
+    "frames with listed looks; total": f"{renders.MAX_LISTED_FRAMES}; {renders.MAX_LISTED_BYTES // MIB} MiB",
+    "passes of a comparison; queued jobs of each kind": f"{most('passes'):,}; {Settings().max_queued}",
+    "pixels of a free-camera view": f"{protocol.MAX_CAMERA_PIXELS:,}",
 }
 
 
@@ -90,7 +85,7 @@ def test_the_table_of_limits_says_what_the_code_checks() -> None:
     section = OPERATIONS.read_text(encoding="utf-8").split("## Limits")[1].split("\n## ")[0]
     told = dict(re.findall(r"^\| (?!what)(.+?) \| (.+?) \|$", section, re.MULTILINE))
     assert {what: at_most for what, at_most in told.items() if what in ROWS} == ROWS
-    assert set(told) - set(ROWS) == {"images of edited looks kept beside a bake"}
+    assert set(told) - set(ROWS) == {"cached images of edited looks beside a bake"}
 
 
 def test_what_is_said_of_plans_is_what_plans_count() -> None:

@@ -21,7 +21,7 @@ from relume.transport.term_contraction import contract
 NUM_POINTS = 40
 # every curve that enters the transport, and every pair of a term's
 CURVES = [(model, c.name) for model, term in ANALYTIC.items() for c in term.curves if not c.depends_on_view]
-# what an angle may be off and still count as linear, in bands: docs/method.md, "Overlap of triangle and band"
+# what an angle may be off and still count as linear, in bands: docs/direct-light.md#algorithm
 TOLERANCE_BANDS, TOLERANCE_SHARE = 0.12, 0.015
 
 

@@ -1,4 +1,4 @@
-"""Kernels that count no references must not return arrays: docs/adr/0111-kernels-count-no-references.md."""
+"""Kernels that count no references must not return arrays: docs/adr/0009-numba-and-embree.md."""
 
 from __future__ import annotations
 

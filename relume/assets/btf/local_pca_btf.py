@@ -2,9 +2,10 @@
 
     B_x(v, l) ≈ M_vk(l) + Σ_j α_vj(x) E_vkj(l),   k = k_v(x)
 
-Müller 2004, section 3: eigenvectors are over the light, for each view direction apart. Relief moves across texels from
-one side to the next; clusters of each view follow it. Values are radiance towards v for light of one unit of irradiance
-across its direction l: the cosine is in them.
+Local PCA for each view direction, with eigenvectors over the light. Müller 2004, section 3, clusters whole BRDFs
+instead: one cluster and one weight vector per texel for all views. Relief moves across texels from one view to the
+next, and clusters per view follow it (docs/btf.md#equations). Values are radiance toward v for light of unit irradiance
+across its direction l, with the cosine.
 """
 
 from __future__ import annotations

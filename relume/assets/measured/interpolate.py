@@ -1,7 +1,7 @@
 """A measured BRDF at any pair of directions: linear between the nodes of the MERL grid, in its own mapping.
 
-Also what is left of it when a product of curves is divided out: the quotients of the measured terms (docs/method.md).
-All arithmetic is float64; directions and results keep their type.
+Also what is left of it when a product of curves is divided out: the quotients of the measured terms
+(docs/direct-light.md#measured-brdfs). All arithmetic is float64; directions and results keep their type.
 """
 
 from __future__ import annotations

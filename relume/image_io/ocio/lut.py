@@ -3,7 +3,7 @@
 The table has N³ nodes over s(x) = log(1 + G √x) / (2 log(1 + G)) of each channel, linear Rec. 709 after exposure: even
 in roots near black, where displays have powers, and in stops above, with a node on 1, where many views bend. Light
 above s⁻¹(1) = 121, seven stops over 1, is as bright as that. Between nodes goes tetrahedral interpolation: greys come
-from greys alone (docs/adr/0095-views-as-tables.md).
+from greys alone (docs/adr/0026-ocio-and-exr.md).
 """
 
 from __future__ import annotations

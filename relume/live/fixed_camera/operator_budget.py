@@ -1,12 +1,12 @@
 """What a term's operator is made of: all of its samples in float32 where the memory has room for that, else less.
 
 Where an operator would take a hand's patience, a rough one is there first, by which the picture goes on
-(docs/adr/0089-operators-of-merged-lights.md).
+(docs/direct-light.md#algorithm).
 
 What a hand is on is followed whatever the picture's size. An operator along a curve of 256 bands takes 3 kB a sample,
 6.4 GB where a material fills 1920×1080 pixels. In 16 bits it is half of that, to 10⁻⁴; where that is too much, one
 sample of each square of pixels says how the picture changes. At rest every sample is shaded
-(docs/adr/0083-operators-of-some-samples.md).
+(docs/direct-light.md#algorithm).
 """
 
 from __future__ import annotations

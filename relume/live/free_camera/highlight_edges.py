@@ -1,7 +1,7 @@
 """Rims of highlights a pixel thin: where brightness jumps from pixel to pixel, many rays find what a pixel sees of it.
 
 Rays through the middles of pixels meet a thin rim or miss it, and it is hundreds of times as bright as what lies beside
-it. Of all pixels a few make most of the error (docs/adr/0063-highlights.md). They take more time than a moving eye
+it. Of all pixels a few make most of the error (docs/free-camera.md#highlights). They take more time than a moving eye
 has: fine frames alone have them.
 """
 

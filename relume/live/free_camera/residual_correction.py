@@ -6,7 +6,7 @@ M is the moving picture, a control variate that is known at every pixel; E is ex
 eighth row, and of both the light that comes straight alone. w are weights of the four samples about a pixel, of those
 on the same material, turned alike, near its plane (after Kopf, Cohen, Lischinski and Uyttendaele 2007, *Joint Bilateral
 Upsampling*). D̂ is what the samples about a sample say of it, itself left out. Where that explains little, as of narrow
-highlights, the moving picture of that material stands as it is (docs/adr/0061-few-exact-samples.md).
+highlights, the moving picture of that material stands as it is (docs/free-camera.md#when-the-camera-stops).
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 What has a highlight sends the sky apart from other light
 (`relume.live.free_camera.highlights.interpolated_highlights`). Of other light it sends Σ_k w_k p_k t_k: functions cut
-off at a degree ring, black beside what is bright, which w takes away for a little blur (docs/adr/0063-highlights.md).
+off at a degree ring, black beside what is bright, which w takes away for a little blur
+(docs/free-camera.md#highlights).
 """
 
 from __future__ import annotations

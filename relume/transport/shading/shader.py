@@ -3,7 +3,7 @@
     R(x) = Σ_m V(x, m) L_m Ω_m cos θi · q(x, ω_m) · Π_f mean_m(f)
 
 The sums of `relume.transport.projector`, by a quadrature that need not be right for whatever a curve may become: the
-pictures are the same to a thousandth or two (docs/adr/0055-boxes-for-pictures.md).
+pictures are the same to a thousandth or two (docs/direct-light.md#algorithm).
 """
 
 from __future__ import annotations

@@ -21,7 +21,8 @@ from relume.methods.registry import open_transfer
 
 HALF_ANGLE = "half angle θh"
 NUDGE = 1e-3
-ROUNDING = 1e-6  # of the brightest value: what float32 sums are off by where a highlight was before (docs/adr/0033)
+# of the brightest value: what float32 sums are off by where a highlight was before (docs/direct-light.md#algorithm)
+ROUNDING = 1e-6
 # everything that the page says to the server from now on
 LISTEN = """() => {
   window.said = [];

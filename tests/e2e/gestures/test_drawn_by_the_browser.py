@@ -239,7 +239,8 @@ def ball_on_a_floor(server: Server) -> Iterator[str]:
 def test_reflections_turn_between_points_as_the_server_has_them(
     server: Server, browser: Browser, ball_on_a_floor: str
 ) -> None:
-    """Of a floor in a metal ball: a tenth of all pixels would be other ones without gradients (ADR 112)."""
+    """Of a floor in a metal ball: a tenth of all pixels would be other ones without gradients
+    (docs/free-camera.md#highlights)."""
     with opened_page(browser) as page:
         never_at_rest(page, [])
         page.goto(f"{server.url}/?scene={ball_on_a_floor}")

@@ -1,4 +1,4 @@
-"""Brings a database to the newest revision of its schema, by Alembic; see docs/adr/0068-one-ledger-for-a-team.md.
+"""Brings a database to the newest revision of its schema, by Alembic; see docs/adr/0029-database-revisions.md.
 
 Revisions that only add are made when a database is opened: relumes from before them work on beside. Others wait until
 somebody says `relume db upgrade`.

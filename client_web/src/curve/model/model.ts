@@ -1,5 +1,5 @@
 /** The open curve as the editor shows it, channel by channel, and how to change it. What is not changed stays as it is:
- * points that are moved bend the curve, they do not replace it (docs/adr/0029). */
+ * points that are moved bend the curve, they do not replace it (docs/direct-light.md#curves-as-bands). */
 import { editValue } from "../../edit/edit";
 import type { CurveBody, CurveEdits, CurveMessage, Handle, Point } from "../../protocol";
 import { niceTop, type CurveAxes } from "./axes";

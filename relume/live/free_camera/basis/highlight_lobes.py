@@ -5,14 +5,14 @@
 L̄ is the sky about a direction, blurred by a width; it is found for each pixel, where Σ_k p_k t_k is found for points.
 Points find more: most highlights have a core and a wide skirt, and seen from aslant they are longer in the plane of the
 eye and the normal than across it, and lean. Two round lobes stand for one there
-(`relume.live.free_camera.basis.two_lobes`, docs/adr/0098-core-and-skirt.md),
+(`relume.live.free_camera.basis.two_lobes`, docs/free-camera.md#highlights),
 
     L_2(ωo) = a(θo) · Σ_n s_n L̄(ω_n, σ_n),   s_1 + s_2 = 1 ,
 
 and for each pixel, too, where both are not alike. What the in-basis cannot tell is summed over lights, by the shape of
 the terms (`relume.live.free_camera.basis.lobe_shapes`), and where these are narrower than lights it is L_2. L is what
 changes fastest from point to point, and what is sent less L is interpolated: B(pixel) = L(pixel) + Σ_points w (B − L)
-(docs/adr/0048-highlights-between-points.md). All stand in tables over θo, as out-factors do; of terms that depend on
+(docs/free-camera.md#highlights). All stand in tables over θo, as out-factors do; of terms that depend on
 φo as well, the mean over it, and one lobe.
 """
 

@@ -8,7 +8,7 @@ between which it is linear in x, and six to half a turn of ψ, about ωr from th
 Lights are as wide as they are. Of each width that they have there is a table, blurred by it; and where a highlight is
 narrower than most lights, the two round lobes that stand for it (`relume.live.free_camera.basis.highlight_lobes`) show
 the sky more sharply than lights do: what these are believed, 1 − β, is taken out of the table, blurred by as much
-(docs/adr/0100-highlights-by-the-brdf.md).
+(docs/free-camera.md#highlights).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The out-factors of a look: those of terms that the same texture multiplies summed, highlights apart.
 
 Functions cut off at a degree ring: beside what is bright they say less than black. Of what highlights send of other
-light than the sky, in Σ_k w_k p_k t_k, w takes that away for a little blur (docs/adr/0063-highlights.md).
+light than the sky, in Σ_k w_k p_k t_k, w takes that away for a little blur (docs/free-camera.md#highlights).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a shader sums highlights from: lights of a sky, shapes of terms (docs/adr/0100-highlights-by-the-brdf.md)."""
+"""What a shader sums highlights from: lights of a sky, shapes of terms (docs/free-camera.md#highlights)."""
 
 from __future__ import annotations
 

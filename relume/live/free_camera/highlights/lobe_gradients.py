@@ -5,7 +5,7 @@
 Y is the luminance of Σ_k w_k p_k t_k (`relume.live.free_camera.shade_probes`) for an albedo of one, ωr the mirror
 direction of what is seen. Where weights w give ωr back from those of points, ω_p,
 this is exact for what is square in ωr: the second
-order that the whole gradient adds too much of is what is missing without it (docs/adr/0112-half-gradients.md). ωr turns
+order that the whole gradient adds too much of is what is missing without it (docs/free-camera.md#highlights). ωr turns
 twice as fast as normals do, and reflections with it.
 
 What pixels add is linear in their own ωr: points tell G, and G · ω_p.

@@ -2,7 +2,8 @@
 
 What is between points is interpolated: off by as much as what they get differs over their distance s. With g what
 differs for each metre, Σ A g² s² over areas A is least where s ∝ 1 / √g. But g is known from points that may be farther
-apart than a shadow's edge is wide, and is then too small: a somewhat greater power leaves less (docs/adr/0106).
+apart than a shadow's edge is wide, and is then too small: a somewhat greater power leaves less
+(docs/free-camera.md#surface-probes).
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 class ClientRenderState:
     """Of one view. Light that changes brings vectors of all points anew, megabytes where surfaces are glossy: a link
-    that is too slow for them gets pictures while a hand moves, and tables when it rests (ADR 91).
+    that is too slow for them gets pictures while a hand moves, and tables when it rests (ADR 24).
 
     Attributes:
         client_keys: keys of the parts that the client's shader has.
