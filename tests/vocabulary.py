@@ -14,72 +14,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-RETIRED = frozenset(
-    [
-        "arrived",
-        "arrives",
-        "arriving",
-        "backdrop",
-        "beams",
-        "caretaker",
-        "caught",
-        "complaint",
-        "complaints",
-        "dormant",
-        "dressed",
-        "eye",
-        "eyes",
-        "finder",
-        "glance",
-        "glances",
-        "glimpse",
-        "glimpses",
-        "guest",
-        "guests",
-        "keeper",
-        "lacking",
-        "ladder",
-        "lamp",
-        "lamps",
-        "leaning",
-        "leant",
-        "mend",
-        "mended",
-        "mends",
-        "oracle",
-        "oracles",
-        "panes",
-        "parted",
-        "patience",
-        "remark",
-        "remarks",
-        "rims",
-        "rung",
-        "rungs",
-        "seat",
-        "seats",
-        "seen",
-        "shelf",
-        "shelves",
-        "skies",
-        "sky",
-        "spokes",
-        "stills",
-        "suns",
-        "tents",
-        "thrown",
-        "told",
-        "truth",
-        "truths",
-        "uncounted",
-        "unhidden",
-        "untold",
-        "untraced",
-        "wears",
-        "workshop",
-        "worn",
-    ]
-)
+_RETIRED = """
+arrived arrives arriving backdrop beams caretaker caught complaint complaints dormant dressed eye eyes finder
+glance glances glimpse glimpses guest guests keeper lacking ladder lamp lamps leaning leant mend mended mends oracle
+oracles panes parted patience remark remarks rims rung rungs seat seats seen shelf shelves skies sky spokes stills
+suns tents thrown told truth truths uncounted unhidden untold untraced wears workshop worn
+"""
+RETIRED = frozenset(_RETIRED.split())
 """Words of identifiers and of file names that have a standard one."""
 
 RETIRED_PHRASES = re.compile(
@@ -98,25 +39,8 @@ BRITISH = re.compile(
     re.IGNORECASE,
 )
 
-VAGUE_NAMES = frozenset(
-    [
-        "found",
-        "told",
-        "kept",
-        "seen",
-        "place",
-        "what",
-        "part",
-        "one",
-        "of",
-        "most",
-        "known",
-        "chosen",
-        "both",
-        "there",
-        "about",
-    ]
-)
+_VAGUE = "found told kept seen place what part one of most known chosen both there about"
+VAGUE_NAMES = frozenset(_VAGUE.split())
 """Names of locals and parameters that want their neighbors to be understood."""
 
 FIRST_WORDS = re.compile(r"(What|Whether|How|Which|Where|Of|The same)\b")
@@ -127,7 +51,7 @@ class Finding(NamedTuple):
     """One place that the glossary would word otherwise. kind: identifier, vague, prose, spelling or docstring."""
 
     kind: str
-    place: str
+    location: str
     text: str
 
 
@@ -150,11 +74,13 @@ def _names(tree: ast.AST) -> Iterator[tuple[str, int, bool]]:
             yield node.attr, node.lineno, False
 
 
-def _prose(text: str, place: str) -> Iterator[Finding]:
+def _prose(text: str, location: str) -> Iterator[Finding]:
     for offset, line in enumerate(text.splitlines()):
         for pattern, kind in ((RETIRED_PHRASES, "prose"), (BRITISH, "spelling")):
             if match := pattern.search(line):
-                yield Finding(kind, place if not offset else f"{place}+{offset}", f"{match[0]}: {line.strip()[:110]}")
+                yield Finding(
+                    kind, location if not offset else f"{location}+{offset}", f"{match[0]}: {line.strip()[:110]}"
+                )
 
 
 def read_python(path: Path) -> Iterator[Finding]:
@@ -216,4 +142,4 @@ def read(paths: list[Path]) -> Iterator[Finding]:
 
 if __name__ == "__main__":
     for finding in read([Path(argument) for argument in sys.argv[1:]]):
-        sys.stdout.write(f"{finding.kind:10} {finding.place}  {finding.text}\n")
+        sys.stdout.write(f"{finding.kind:10} {finding.location}  {finding.text}\n")
