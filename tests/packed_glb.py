@@ -14,7 +14,7 @@ from glb_builder import Glb
 
 # Packed by the encoder of meshoptimizer 1.3, unpacked by its reference decoder.
 VECTORS: dict[str, dict[str, Any]] = {
-    each["name"]: each for each in json.loads((Path(__file__).parent / "scene" / "meshopt_vectors.json").read_text())
+    each["name"]: each for each in json.loads((Path(__file__).parent / "scene_io" / "meshopt_vectors.json").read_text())
 }
 SIDE = 7  # points along the grid's sides
 GRID_FACES = 2 * (SIDE - 1) ** 2

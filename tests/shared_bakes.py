@@ -6,7 +6,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from sessions import bake_corner_scene
+from session_edits import bake_corner_scene
 from tiny_scenes import make_camera, make_tiny_scene, quad, still_life
 
 from relume.core.cache import Cache

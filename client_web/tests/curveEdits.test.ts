@@ -39,7 +39,7 @@ function modelOf(generated: number[], edits?: CurveEdits) {
 }
 
 test("bends curves as the server does", () => {
-  // the same numbers stand in tests/brdf/test_edited_curves.py
+  // the same numbers stand in tests/brdf/test_curve_edits.py
   const drawn: DrawnChannels = {
     factors: [1, 1, 2, 0, 1, 1, 1, 1],
     offsets: [0, 0, 0, 3, 0, 0, 0, 0],

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from alone import run_in_thread
+from coroutines import run_in_thread
 from fastapi.testclient import TestClient
 from postgres import make_unavailable_error
 

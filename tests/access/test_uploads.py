@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from alone import run_in_thread
+from coroutines import run_in_thread
 from fastapi.testclient import TestClient
 from server_fakes import tiny_scene
 from starlette.types import Message, Receive, Scope, Send

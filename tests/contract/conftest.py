@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from furnace_method import FurnaceMethod
-from leaves import by_leaves
+from subdivided_shading import shade_with_projector
 from watched_bakes import Bake, Done
 
 from relume.core.cache import Cache
@@ -19,7 +19,7 @@ from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
 from relume_worker.status import FREE_CAMERA_METHODS
 
-__all__ = ["by_leaves"]  # a fixture
+__all__ = ["shade_with_projector"]  # a fixture
 
 SIZE, NUM_LIGHTS, NUM_POINTS = (48, 36), 100, 6000
 

@@ -1,7 +1,7 @@
 """Pictures whose eyes move, made as tests of them want them."""
 
 from looks_of_pictures import add_lights
-from sessions import make_look
+from session_edits import make_look
 
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.refine_job import RefineHighlights

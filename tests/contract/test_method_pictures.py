@@ -6,6 +6,7 @@ what is refused or undone leaves no trace.
 
 import numpy as np
 import pytest
+from exact_pictures import exact_image
 from looks_of_pictures import (
     EDITS,
     EXPONENT,
@@ -21,8 +22,7 @@ from looks_of_pictures import (
     set_exponent,
     set_floor_color,
 )
-from oracle import exact_image
-from sessions import BUDGET, has_bounces, has_pending_job, make_look, relative_rmse, run_until_exact
+from session_edits import BUDGET, has_bounces, has_pending_job, make_look, relative_rmse, run_until_exact
 
 from relume.brdf.registry import TERMS
 from relume.core.cache import Cache

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oracle import DERIVED_FOLDERS
+from exact_pictures import DERIVED_FOLDERS
 from watched_bakes import Bake
 
 from relume.core.errors import PlanError

@@ -16,7 +16,7 @@ from looks_of_pictures import (
     set_floor_color,
 )
 from moving_pictures import finish_refinement, make_picture, make_watched_picture, run_job
-from sessions import make_look, relative_rmse
+from session_edits import make_look, relative_rmse
 
 from relume.core.errors import NotFoundError, ParameterError
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture

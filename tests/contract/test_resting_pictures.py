@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from looks_of_pictures import EDITS, LOBE, add_lights, draw_curve, edit_light, edit_transport, set_floor_color
-from sessions import make_look, relative_rmse, run_next_job
+from session_edits import make_look, relative_rmse, run_next_job
 
 from relume.core.cache import Cache
 from relume.core.errors import CancelledError, ResultUnavailableError

@@ -1,9 +1,9 @@
 """The product's own shading, by boxes: what a picture shows before a curve is touched, and after."""
 
 import pytest
+from exact_pictures import open_copy, render_uncached
 from looks_of_pictures import EDITS, MARKED_EDITS, add_lights
-from oracle import open_copy, render_uncached
-from sessions import BUDGET, make_look, relative_rmse, run_until_exact
+from session_edits import BUDGET, make_look, relative_rmse, run_until_exact
 
 import relume.operators.shade
 from relume.core.cache import Cache
@@ -15,7 +15,7 @@ A_THOUSANDTH = 1e-3
 
 
 @pytest.fixture
-def by_boxes(by_leaves, monkeypatch):
+def by_boxes(shade_with_projector, monkeypatch):
     monkeypatch.setattr(relume.operators.shade, "Shader", Shader)
 
 

@@ -1,6 +1,6 @@
 """Small bakes by any method, and what a look shows of them."""
 
-from sessions import run_until_exact
+from session_edits import run_until_exact
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture

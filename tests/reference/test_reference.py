@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from analytic_terms import ANALYTIC
-from sessions import relative_rmse
+from session_edits import relative_rmse
 from tiny_scenes import make_camera, make_tiny_scene, quad, sphere, still_life, studio
 
 from relume.assets.environments.environment import Environment

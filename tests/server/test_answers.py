@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from alone import run_in_thread
+from coroutines import run_in_thread
 from fastapi.testclient import TestClient
 from session_client import Baked
 

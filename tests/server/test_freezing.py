@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from alone import run_in_thread
+from coroutines import run_in_thread
 from server_fakes import Control, FakeJob
 
 from relume.core.errors import ProtocolError, StoreError

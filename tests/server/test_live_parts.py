@@ -7,7 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from alone import run_in_thread
+from coroutines import run_in_thread
 
 from relume.core.errors import ParameterError, ProtocolError, StoreError
 from relume_server.client_state.flow_control import FrameWindow

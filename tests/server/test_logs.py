@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from alone import run_in_thread
+from coroutines import run_in_thread
 from fastapi.testclient import TestClient
 from running_server import running_server
 from server_fakes import Control

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from alone import run_in_thread
+from coroutines import run_in_thread
 from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families
 from session_client import open_session

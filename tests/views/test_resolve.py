@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy_reference as ref
 import pytest
-import twins
 from rgb9e5 import rgb9e5_pack, rgb9e5_unpack
 
 from relume.core.errors import ParameterError
@@ -47,13 +47,13 @@ def test_whole_picture_is_the_weighted_sum(view, radiance, gain):
     pixels = resolve(view, radiance, [(0, 0, view.width, view.height)], gain, view.throughput).reshape(
         view.height, view.width, 3
     )
-    np.testing.assert_allclose(pixels, np.array(gain) * twins.resolve(view, radiance.T.astype(float)), rtol=2e-6)
+    np.testing.assert_allclose(pixels, np.array(gain) * ref.resolve(view, radiance.T.astype(float)), rtol=2e-6)
 
 
 @pytest.mark.parametrize("count", [1, 3, 4])
 def test_tiles_come_one_after_another_row_major_and_clipped(view, radiance, count):
     tiles = view.all_tiles[::-1][:count]
-    whole = twins.resolve(view, radiance.T.astype(float))
+    whole = ref.resolve(view, radiance.T.astype(float))
     expected = np.concatenate([whole[y : y + h, x : x + w].reshape(-1, 3) for x, y, w, h in tiles])
     np.testing.assert_allclose(resolve(view, radiance, tiles, 1.0, view.throughput), expected, rtol=2e-6)
     payload = np.frombuffer(encode(view, radiance, tiles, "f32", 1.0, view.throughput), "<f4").reshape(-1, 3)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 import pytest
-from alone import run_in_thread
+from coroutines import run_in_thread
 
 from relume.core.errors import PlanError
 from relume_worker.dask_executor import DaskExecutor

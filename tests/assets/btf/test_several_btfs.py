@@ -1,0 +1,144 @@
+"""Several BTFs at once: their tables are made once, beside the frames, in the one budgeted memory."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from test_fixed_camera_btfs import CAMERA, GREY, SIZE
+from tiny_scenes import make_tiny_scene, quad, studio
+
+from relume.assets.btf.btf_store import load_btf, store_btf
+from relume.brdf.terms import btf as term
+from relume.core import cache as memories
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+from relume.live.free_camera.texel_brdf import texel_tables
+from relume.live.free_camera.texel_brdf.job import TablesJob
+from relume.look import validate
+from relume.methods.registry import METHODS, open_bake
+from relume.scene.model import Material
+from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
+
+NUM = 5
+NAMES = [f"Strip {k}" for k in range(NUM)]
+
+
+@pytest.fixture(scope="module")
+def records(small_btf, tmp_path_factory):
+    whole, folder = load_btf(small_btf.record.data), tmp_path_factory.mktemp("sources")
+    found = []
+    for number in range(NUM):
+        source = folder / f"{number}.txt"
+        source.write_text(str(number))
+        dimmed = replace(whole, mean=(whole.mean * (1 - 0.1 * number)).astype(np.float16))
+        found.append(store_btf(small_btf.folder, source, f"Cords {number}", None, lambda made=dimmed: made))
+    return found
+
+
+@pytest.fixture(scope="module")
+def strips():
+    """Five strips of a floor, and one beside them."""
+    edges = np.linspace(-1, 1, NUM + 2)
+    floor = [
+        quad(f"strip {k}", [[a, 0, 1], [b, 0, 1], [b, 0, -1], [a, 0, -1]], k)
+        for k, (a, b) in enumerate(pairwise(edges))
+    ]
+    materials = [Material(name, (GREY,)) for name in (*NAMES, "Other")]
+    return make_tiny_scene(*floor, camera=CAMERA, environment=studio(32, 20.0), materials=materials)
+
+
+@pytest.fixture(params=["direct", "probes"])
+def opened(request, strips, tmp_path, monkeypatch):
+    """A bake, in a memory that has nothing yet."""
+    memory = Cache(1 << 30)
+    monkeypatch.setattr(memories._AssetCache, "cache", memory)
+    recipe = Recipe(request.param, ("front",), SIZE, 100, num_probes=800)
+    return open_bake(bake_in_process(METHODS[request.param], strips, recipe, tmp_path / "s.zarr"), memory)
+
+
+def look_of(bake, records, grey=0.5):
+    """Every strip covered, and the one beside them in a shade of grey."""
+    covered = {name: {"terms": record.terms()} for name, record in zip(NAMES, records, strict=True)}
+    other = {"terms": [{"model": "lambert", "color": [grey] * 3}]}
+    return validate({"materials": {**covered, "Other": other}}, bake.default_look)
+
+
+def settle(picture):
+    for _ in range(100):
+        picture.advance(None)
+        if (job := picture.next_job()) is None:
+            return picture
+        picture.install(job, job.run(lambda share: None, lambda: False))
+    raise AssertionError("it never rests")
+
+
+def count(monkeypatch, module, name):
+    made, whole = Counter(), getattr(module, name)
+
+    def counted(self):
+        made[round(float(self.mean.sum(dtype=np.float64)), 2)] += 1
+        return whole(self)
+
+    monkeypatch.setattr(module, name, counted)
+    return made
+
+
+def test_edits_of_another_material_make_no_tables_anew(opened, records, monkeypatch):
+    is_moving = opened.camera_mode.name == "FREE"
+    made = (
+        count(monkeypatch, texel_tables, "compute_texel_tables")
+        if is_moving
+        else count(monkeypatch, term.LocalPcaBtf, "tables")
+    )
+    picture = (FreeCameraPicture if is_moving else lambda *args, **how: Picture(args[0], args[1], opened.cache, **how))(
+        opened, "front", is_watched=True
+    )
+    for number in range(4):
+        picture.set_look(look_of(opened, records, 0.2 + 0.1 * number))
+        settle(picture)
+    assert len(made) == NUM
+    assert set(made.values()) == {1}
+    assert (
+        sum(bytes_ for holder, bytes_ in opened.cache.bytes_by_owner().items() if holder.kind.startswith("BTF tables"))
+        > 0
+    )
+
+
+@pytest.mark.parametrize("opened", ["probes"], indirect=True)
+def test_frames_show_the_mean_until_the_tables_are_there(opened, records, monkeypatch):
+    picture = FreeCameraPicture(opened, "front", is_watched=True)
+    picture.set_look(look_of(opened, records))
+    with monkeypatch.context() as during:
+        during.setattr(texel_tables, "compute_texel_tables", lambda whole: pytest.fail("made by a frame"))
+        picture.advance(None)
+        mean = picture.image()
+        while not isinstance(job := picture.next_job(), TablesJob):
+            picture.install(job, job.run(lambda share: None, lambda: False))
+            picture.advance(None)
+            mean = picture.image()
+    found = settle(picture).image()
+    alone = FreeCameraPicture(opened, "front")
+    alone.set_look(look_of(opened, records))
+    alone.advance(None)
+    wanted = alone.image()
+    size = np.linalg.norm(wanted)
+    assert np.linalg.norm(found - wanted) < 0.02 * size < 0.05 * size < np.linalg.norm(mean - wanted)
+
+
+@pytest.mark.parametrize("opened", ["probes"], indirect=True)
+def test_an_edit_beside_btfs_changes_what_it_changes_and_nothing_else(opened, records):
+    picture = FreeCameraPicture(opened, "front", is_watched=True)
+    picture.set_look(look_of(opened, records, 0.2))
+    settle(picture)
+    picture.set_look(look_of(opened, records, 0.7))
+    picture.advance(None)
+    anew = FreeCameraPicture(opened, "front", is_watched=True)
+    anew.set_look(look_of(opened, records, 0.7))
+    settle(anew)
+    np.testing.assert_allclose(picture.image(), anew.image(), rtol=1e-3, atol=1e-4)

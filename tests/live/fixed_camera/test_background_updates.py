@@ -1,0 +1,240 @@
+"""One picture, one light: background and objects change over together, whatever a hand does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from environment_files import dusk, write_map
+from exact_pictures import exact_image
+from session_edits import BUDGET, make_look, relative_rmse, run_next_job, run_until_exact
+
+from relume.assets.environments.environment_store import STORE, store_environment
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
+from relume.live.fixed_camera.view_images import ViewImages
+from relume.views.view import View
+
+COLOURS = np.eye(3)
+
+
+@pytest.fixture(scope="module")
+def maps(tmp_path_factory):
+    """A red environment, a green one and a blue one: a picture of one light has one colour."""
+    folder = tmp_path_factory.mktemp("maps")
+    with STORE.with_search_folder(tmp_path_factory.mktemp("shelf")) as shelf:
+        white = dusk() / [1.0, 0.4, 0.2]
+        paths = [write_map(folder / f"{name}.exr", white * c) for name, c in zip("rgb", COLOURS, strict=True)]
+        yield [store_environment(shelf, path, path.stem).map for path in paths]
+
+
+@pytest.fixture(params=["transfer", "gathered"])
+def opened(request):
+    """A bake of light from the environment alone, with textures, and one of light between surfaces too."""
+    return request.getfixturevalue(request.param)
+
+
+@pytest.fixture(autouse=True)
+def few(monkeypatch):
+    """Glimpses are of few samples, as those of large pictures are."""
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 300)
+
+
+def lit_by(maps, number, *, lamp=None, sigma=None, **environment):
+    """A change of the look: one of the maps, a lamp of the same colour somewhere, a curve."""
+
+    def change(document):
+        document["environment"].update(map=maps[number], **environment)
+        if lamp is not None:
+            emission = (3 * COLOURS[number]).tolist()
+            document["lights"]["Lamp"] = {"kind": "point", "position": [lamp, 1.2, 0.9], "emission": emission}
+        if sigma is not None:
+            terms = [term for material in document["materials"].values() for term in material["terms"]]
+            next(term for term in terms if "sigma" in term["params"])["params"]["sigma"] = sigma
+
+    return change
+
+
+def colours_of(picture):
+    """Which channels there is any light in."""
+    return np.flatnonzero(picture.image().reshape(-1, 3).max(axis=0) > 0).tolist()
+
+
+def start(transfer, look, **options):
+    picture = Picture(transfer, "front", Cache(BUDGET), **options)
+    picture.set_look(look)
+    return picture
+
+
+def test_exchanged_environment_comes_all_at_once(opened, maps):
+    red, blue = (make_look(opened, lit_by(maps, k)) for k in (0, 2))
+    picture = run_until_exact(start(opened, red))
+    before = picture.image()
+    picture.set_look(blue)
+    still = picture.advance(None)
+    assert (still.tiles, still.exact, still.fidelity, still.complete) == ([], False, "approximate", True)
+    np.testing.assert_array_equal(picture.image(), before)
+    assert isinstance(run_next_job(picture), SparsePreview)
+    come = picture.advance(None)
+    assert (come.fidelity, come.complete) == ("preview", True)
+    assert colours_of(picture) == [2]
+    while not picture.advance(None).exact:
+        run_next_job(picture)
+        picture.advance(None)
+        assert colours_of(picture) == [2]
+    np.testing.assert_array_equal(picture.image(), exact_image(opened, blue))
+
+
+def test_where_memory_is_short_the_old_picture_is_kept_until_all_is_shaded(transfer, maps):
+    picture = Picture(transfer, "front", Cache(200_000))
+    picture.set_look(make_look(transfer, lit_by(maps, 0)))
+    before = run_until_exact(picture).image()
+    picture.set_look(make_look(transfer, lit_by(maps, 1)))
+    while not picture.advance(None).exact:
+        np.testing.assert_array_equal(picture.image(), before)
+        assert not isinstance(run_next_job(picture), SparsePreview)
+    assert colours_of(picture) == [1]
+
+
+def test_colour_of_a_material_does_not_wait_for_light(transfer, maps):
+    picture = run_until_exact(start(transfer, make_look(transfer, lit_by(maps, 0))))
+    before = picture.image()
+
+    def painted(document):
+        lit_by(maps, 1)(document)
+        document["materials"]["Ball"]["terms"][1]["color"] = [0.1, 0.1, 0.1]
+
+    picture.set_look(make_look(transfer, painted))
+    assert picture.advance(None).changed
+    assert colours_of(picture) == [0]
+    assert not np.array_equal(picture.image(), before)
+
+
+def test_environment_s_gain_comes_with_its_light(transfer, maps):
+    """Beside a lamp the gain is part of the light, without one it multiplies the picture."""
+    picture = run_until_exact(start(transfer, make_look(transfer, lit_by(maps, 0, scale=4.0))))
+    before = picture.image()
+    picture.set_look(make_look(transfer, lit_by(maps, 0, lamp=0.6, scale=4.0)))
+    picture.advance(None)
+    np.testing.assert_array_equal(picture.image(), before)
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
+def test_hand_that_never_waits_sees_one_light_at_a_time(opened, maps, seed):
+    """Maps exchanged, turned, dimmed, lamps added and moved, curves edited, all undone, in any order."""
+    rng = np.random.default_rng(seed)
+
+    def any_look():
+        number, lamp = int(rng.integers(3)), rng.uniform(-0.6, 0.6) if rng.random() < 0.6 else None
+        sigma = rng.uniform(0.1, 0.4) if rng.random() < 0.3 else None
+        turned, scale = float(rng.choice([0.0, 0.0, 40.0])), float(rng.choice([1.0, 1.0, 0.5]))
+        return make_look(opened, lit_by(maps, number, lamp=lamp, sigma=sigma, rotation=turned, scale=scale))
+
+    looks = [any_look()]
+    picture, changes = run_until_exact(start(opened, looks[0])), 0
+    shown = colours_of(picture)
+    for _ in range(60):
+        if rng.random() < 0.4:
+            looks.append(looks[rng.integers(len(looks))] if rng.random() < 0.3 else any_look())
+            picture.set_look(looks[-1])
+        if picture.next_job() is not None and rng.random() < 0.8:
+            need = picture.next_job()
+            made = need.run(lambda share: None, lambda: False)
+            if rng.random() < 0.4:  # the hand moves on meanwhile
+                looks.append(any_look())
+                picture.set_look(looks[-1])
+            picture.install(need, made)
+        advance = picture.advance(8)
+        assert advance.complete
+        assert len(colours_of(picture)) == 1, "a picture of two lights"
+        changes += colours_of(picture) != shown
+        shown = colours_of(picture)
+    assert changes > 3
+    expected = exact_image(opened, looks[-1])
+    assert relative_rmse(run_until_exact(picture).image(), expected) < 3e-3
+
+
+def test_opened_picture_is_whole_at_once_and_then_shaded(opened, maps, monkeypatch):
+    look = make_look(opened, lit_by(maps, 1, rotation=77.0))
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED_AT_ONCE", 100)
+    picture = start(opened, look, is_watched=True)
+    nothing = picture.advance(None)
+    assert (nothing.complete, nothing.fidelity) == (False, "preview")
+    assert isinstance(run_next_job(picture), SparsePreview)
+    whole = picture.advance(None)
+    assert (whole.complete, whole.fidelity, whole.exact) == (True, "preview", False)
+    while isinstance(picture.next_job(), SparsePreview):
+        run_next_job(picture)
+    expected = exact_image(opened, look)
+    picture.advance(None)
+    assert relative_rmse(picture.image(), expected) < 0.5
+    assert picture.next_job().is_refinement
+    np.testing.assert_array_equal(run_until_exact(picture).image(), expected)
+
+
+def test_what_comes_straight_is_seen_before_light_between_surfaces_is_found(gathered, maps, monkeypatch):
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED_AT_ONCE", 100)
+    lit = lit_by(maps, 1, rotation=33.0)
+
+    def straight(document):
+        lit(document)
+        document["transport"] = {**document.get("transport", {}), "show": "direct"}
+
+    looks = make_look(gathered, straight), make_look(gathered, lit)
+    direct, all_light = (exact_image(gathered, look) for look in looks)
+    read, some_rays = [], View.subset_rays
+    monkeypatch.setattr(View, "subset_rays", lambda *given: read.append(given) or some_rays(*given))
+    first, of_direct = (start(gathered, look, is_watched=True) for look in reversed(looks))
+    for picture in (first, of_direct):
+        picture.advance(None)
+        assert isinstance(run_next_job(picture), SparsePreview)
+        assert picture.advance(None).complete
+    assert not read
+    before = first.image()
+    np.testing.assert_array_equal(before, of_direct.image())
+    assert isinstance(run_next_job(first), SparsePreview)
+    first.advance(None)
+    assert read
+    assert relative_rmse(first.image() - before, all_light - direct) < 0.4
+
+
+def test_curve_that_moves_meanwhile_does_not_wait_for_the_hand_to_rest(transfer, maps, monkeypatch):
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED_AT_ONCE", 100)
+    picture = start(transfer, make_look(transfer, lit_by(maps, 1)), is_watched=True)
+    run_next_job(picture)
+    picture.prepare("/materials/Ball/terms/1/curves/theta_h")
+    picture.set_look(make_look(transfer, lit_by(maps, 1, sigma=0.3)))
+    assert not picture.next_job().is_refinement
+
+
+def test_picture_whose_images_were_kept_is_opened_without_a_preview(transfer, maps, monkeypatch):
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED_AT_ONCE", 100)
+    look = make_look(transfer, lit_by(maps, 2))
+    run_until_exact(start(transfer, look))
+    assert not isinstance(start(transfer, look, is_watched=True).next_job(), SparsePreview)
+
+
+def test_surfaces_are_told_what_they_send_out_when_light_changes_and_not_else(transfer, maps, monkeypatch):
+    picture, told = run_until_exact(start(transfer, make_look(transfer, lit_by(maps, 0)))), []
+    shine = ViewImages.set_emission
+    monkeypatch.setattr(ViewImages, "set_emission", lambda *given: told.append(given) or shine(*given))
+    for sigma, lamp in ((0.2, None), (0.3, None), (0.3, 0.4)):
+        picture.set_look(make_look(transfer, lit_by(maps, 0, sigma=sigma, lamp=lamp)))
+        run_until_exact(picture)
+        assert len(told) == (lamp is not None)
+
+
+def test_an_old_preview_s_gain_does_not_come_back(transfer):
+    """A light without lamps is the same light at another brightness: what multiplied it in a preview is forgotten."""
+
+    def look(**environment):
+        return make_look(transfer, lambda document: document["environment"].update(environment))
+
+    picture = run_until_exact(start(transfer, look(), is_watched=True))
+    picture.set_look(look(rotation=40.0))
+    run_next_job(picture)
+    run_until_exact(picture).set_look(look(rotation=40.0, scale=4.0))
+    bright = run_until_exact(picture).image()
+    picture.set_look(look(rotation=60.0, scale=4.0))
+    picture.advance(None)
+    np.testing.assert_array_equal(picture.image(), bright)

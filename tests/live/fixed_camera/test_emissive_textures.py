@@ -1,0 +1,103 @@
+"""Surfaces that shine as images say: seen so, and lighting others from where they are bright."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy_reference as ref
+import pytest
+from session_edits import BUDGET, bake_corner_scene, make_look, relative_rmse, run_until_exact
+from tiny_scenes import make_camera, make_tiny_scene, mesh, quad
+
+from relume.core.cache import Cache
+from relume.core.color import luminance
+from relume.live.fixed_camera.picture import Picture
+from relume.methods.registry import METHODS, open_bake
+from relume.output.render_image import render_image
+from relume.reference import reference_image
+from relume.scene.emission import normalize_emission
+from relume.scene.model import Light, Material, Texture, TextureEncoding
+from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
+
+SIZE = 40, 30
+
+
+def panel(cuts=16):
+    """A wall of many triangles, the unit square of an image."""
+    x, y = (g.ravel() for g in np.meshgrid(np.linspace(0, 1, cuts + 1), np.linspace(0, 1, cuts + 1)))
+    corner = (np.arange(cuts)[:, None] * (cuts + 1) + np.arange(cuts)).ravel()
+    lower = np.stack([corner, corner + 1, corner + cuts + 2], axis=1)
+    upper = np.stack([corner, corner + cuts + 2, corner + cuts + 1], axis=1)
+    positions = np.stack([2 * x - 1, y, np.full_like(x, -1)], axis=1)
+    return mesh("panel", positions, np.concatenate([lower, upper]), 1, uvs=np.stack([x, 1 - y], axis=1))
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """A floor before a dark panel, of which an orange and a blue field shine."""
+    pixels = np.zeros((16, 16, 3), np.uint8)
+    pixels[4:8, 1:5], pixels[6:14, 11:15] = [255, 120, 20], [20, 80, 200]
+    texture = Texture(pixels, encoding=TextureEncoding("srgb"))
+    floor = Material("Floor", ({"model": "lambert", "color": [0.7, 0.7, 0.7]},))
+    wall = Material("Panel", ({"model": "lambert", "color": [0.1, 0.1, 0.1]},), {"emission": texture})
+    wall, emission = normalize_emission(wall, np.array([30.0, 30.0, 30.0]), [panel()])
+    ground = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
+    camera, dark = make_camera("front", (0.2, 1.0, 2.4), (0, 0.3, -0.3), 0.8), np.full((4, 8, 3), 1e-3, np.float32)
+    made = make_tiny_scene(ground, panel(), camera=camera, environment=dark, materials=[floor, wall])
+    light = Light("Panel", {"kind": "mesh", "material": "Panel", "emission": emission.tolist()})
+    return type(made)(**{**vars(made), "lights": (light,)})
+
+
+@pytest.fixture(scope="module")
+def transfer(scene, tmp_path_factory):
+    return bake_corner_scene(scene, "direct", tmp_path_factory.mktemp("shining"))
+
+
+@pytest.fixture(scope="module")
+def pictures(scene, transfer):
+    look = make_look(transfer)
+    found = run_until_exact(Picture(transfer, "front", Cache(BUDGET))).image()
+    return found, reference_image(scene, "front", look, SIZE, 512), transfer.views["front"].material_ids()
+
+
+def test_the_image_is_seen(pictures) -> None:
+    found, truth, ids = pictures
+    wall = ids == 1
+    assert truth[wall].max() > 20 * np.median(truth[wall])
+    np.testing.assert_allclose(found[wall], truth[wall], rtol=0.05, atol=0.01 * truth.max())
+
+
+def test_others_are_lit_from_where_it_is_bright(pictures) -> None:
+    """Triangle by triangle, by brightness: the floor has the colours' mean; brute force has each texel's."""
+    found, truth, ids = pictures
+    brightness, expected = luminance(found[ids == 0]), luminance(truth[ids == 0])
+    assert relative_rmse(brightness, expected) < 0.05
+    np.testing.assert_allclose(found[ids == 0].sum(axis=0), truth[ids == 0].sum(axis=0), rtol=0.1)
+
+
+def test_brightness_and_colour_of_the_light_multiply_the_image(transfer, pictures) -> None:
+    def brighter(document):
+        red, green, _ = document["lights"]["Panel"]["emission"]
+        document["lights"]["Panel"]["emission"] = [3 * red, green, 0.0]
+
+    picture = run_until_exact(Picture(transfer, "front", Cache(BUDGET)))
+    picture.set_look(make_look(transfer, brighter))
+    found, before, wall = run_until_exact(picture).image(), pictures[0], pictures[2] == 1
+    inner = wall & np.roll(wall, 1, 0) & np.roll(wall, -1, 0) & np.roll(wall, 1, 1) & np.roll(wall, -1, 1)
+    np.testing.assert_allclose(found[inner][:, :2], before[inner][:, :2] * [3, 1], rtol=2e-2, atol=2e-2)
+    assert found[inner][:, 2].max() < 0.05 * before[inner][:, 2].max()
+
+
+def test_picture_is_what_the_twin_gives(transfer, pictures) -> None:
+    assert relative_rmse(pictures[0], ref.full_evaluation(transfer, "front", make_look(transfer))) < 1e-5
+
+
+def test_a_moving_eye_sees_the_image(scene, tmp_path, pictures) -> None:
+    recipe = Recipe("probes", ("front",), SIZE, 400, num_probes=2000)
+    moving = open_bake(bake_in_process(METHODS["probes"], scene, recipe, tmp_path / "probes.zarr"), Cache(1 << 30))
+    found, (_, truth, ids) = render_image(moving, "front", make_look(moving)), pictures
+    inner = (ids == 1) & np.roll(ids == 1, 1, 0) & np.roll(ids == 1, -1, 0) & np.roll(ids == 1, 1, 1)
+    inner &= np.roll(ids == 1, -1, 1)
+    off = np.abs(found - truth)[inner] / truth.max()
+    assert np.median(off) < 0.01  # one ray a pixel, in the middle of it: rims of fields differ
+    assert np.corrcoef(found[inner].ravel(), truth[inner].ravel())[0, 1] > 0.97

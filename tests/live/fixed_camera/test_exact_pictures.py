@@ -1,0 +1,35 @@
+"""The oracle of pictures does not believe the picture: neither its files nor its shading."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from exact_pictures import exact_image, open_copy
+from picture_edits import open_exact_picture, set_sigma
+from session_edits import make_look, relative_rmse
+
+from relume.live.fixed_camera.jobs import Shade
+from relume.operators.shade import ShadedTerm
+
+shaded = Shade._complete_image
+
+
+def too_bright(*args):
+    """Every image by a hundredth."""
+    return ShadedTerm(shaded(*args).image * np.float32(1.01))
+
+
+def test_images_that_a_session_has_kept_are_not_read(transfer, monkeypatch):
+    with open_copy(transfer) as shown:
+        look = make_look(shown, set_sigma(0.31))
+        with monkeypatch.context() as broken:
+            broken.setattr(Shade, "_complete_image", too_bright)
+            wrong = open_exact_picture(shown, look=look).image()
+        assert relative_rmse(wrong, exact_image(shown, look)) > 0.005
+        np.testing.assert_array_equal(open_exact_picture(shown, look=look).image(), wrong)  # which a session would read
+
+
+def test_shading_that_is_wrong_everywhere_is_found(transfer, monkeypatch):
+    monkeypatch.setattr(Shade, "_complete_image", too_bright)
+    with pytest.raises(AssertionError, match="Mismatched elements"):
+        exact_image(transfer, make_look(transfer))

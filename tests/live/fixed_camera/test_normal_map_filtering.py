@@ -1,0 +1,89 @@
+"""Highlights on bumps that are smaller than a pixel, against many small pixels that see every bump for itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+from session_edits import relative_rmse, run_until_exact
+from tiny_scenes import make_camera, make_tiny_scene, quad
+
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
+from relume.look import default_look, validate
+from relume.methods.registry import METHODS, open_transfer
+from relume.reference.image import reference_image
+from relume.scene.model import Material, Texture, TextureEncoding
+from relume.scene.roughness_levels import levels_of_material, rougher
+from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
+
+SIZE, FINER, BLOCK = (24, 16), 8, 4
+SLOPES = 0.12
+
+
+def bumps(side=256):
+    """Normals whose slopes are of a normal distribution, bumps of a few texels, which few more lie between."""
+    slopes = gaussian_filter(np.random.default_rng(7).normal(0, 1, (side, side, 2)), (2, 2, 0), mode="wrap")
+    slopes *= SLOPES / slopes.std()
+    normals = np.concatenate([-slopes, np.ones((side, side, 1))], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    return Texture(np.round(127.5 * (normals + 1)).astype(np.uint8), encoding=TextureEncoding("normal"))
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """A polished floor of small bumps, in the light of a lamp that it mirrors."""
+    shiny = {"model": "ggx", "texture": None, "params": {"roughness": 0.3, "f0": 0.9}, "roughness_map": "roughness"}
+    floor = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
+    sky = np.full((32, 64, 3), 0.05, np.float32)
+    sky[5:9, 14:19] = 20
+    camera = make_camera("front", (0, 1.6, 1.6), (0, 0, 0), 0.3)
+    return make_tiny_scene(floor, camera=camera, environment=sky, materials=[Material("Floor", (shiny,), {}, bumps())])
+
+
+def followed(scene, follows):
+    """The scene whose floor its bumps widen, or do not."""
+    floor = scene.materials[0]
+    return replace(scene, materials=(replace(floor, terms=({**floor.terms[0], "roughness_map": follows},)),))
+
+
+def shown(scene, folder):
+    folder.mkdir()
+    store = bake_in_process(METHODS["direct"], scene, Recipe("direct", ("front",), SIZE, 400), folder / "d.zarr")
+    picture = Picture(open_transfer(store, Cache(1 << 28)), "front", Cache(1 << 28))
+    run_until_exact(picture)
+    return picture.image()
+
+
+def of_blocks(picture):
+    """Means over so many pixels that the bumps of each are about all bumps."""
+    return picture.reshape(picture.shape[0] // BLOCK, BLOCK, picture.shape[1] // BLOCK, BLOCK, 3).mean(axis=(1, 3))
+
+
+def test_they_are_as_wide_as_all_bumps_together(scene, tmp_path):
+    fine = followed(scene, False)
+    look = validate({}, default_look(fine.materials))
+    width, height = SIZE
+    many = reference_image(fine, "front", look, (FINER * width, FINER * height), 12)
+    expected = of_blocks(many.reshape(height, FINER, width, FINER, 3).mean(axis=(1, 3)))
+    assert relative_rmse(of_blocks(shown(fine, tmp_path / "plain")), expected) > 0.4
+    assert relative_rmse(of_blocks(shown(scene, tmp_path / "wide")), expected) < 0.12
+
+
+def test_the_widening_adds_the_variance_of_slopes():
+    """Of a large sample of normals: α² + 2 σ² for σ² of their slopes, as far as slopes are small."""
+    rng = np.random.default_rng(3)
+    slopes = rng.normal(0, 0.05, (200_000, 2))
+    normals = np.concatenate([-slopes, np.ones((len(slopes), 1))], axis=1)
+    length = np.linalg.norm((normals / np.linalg.norm(normals, axis=1, keepdims=True)).mean(axis=0))
+    found = rougher(np.ones(1, np.float32), np.array([length], np.float32), 0.3)[0] * 0.3
+    assert found**4 == pytest.approx(0.3**4 + 2 * 0.05**2, rel=0.02)
+
+
+def test_levels_reach_as_far_as_bumps_widen(scene):
+    levels = levels_of_material(scene.materials[0])
+    assert levels[0] == 1
+    assert 1 < levels[-1] * 0.3 / (0.3**4 + 2 * SLOPES**2) ** 0.25 < 1.25  # some pixels cover steeper bumps than others
+    assert levels_of_material(followed(scene, False).materials[0]) == ()
+    assert levels_of_material(replace(scene.materials[0], normal_map=None)) == ()

@@ -1,0 +1,208 @@
+"""Operators that the memory has no room for in float32: in 16 bits, or of some samples; the picture exact at rest."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+import numpy_reference as ref
+import pytest
+from picture_edits import open_exact_picture
+from session_edits import make_look, relative_rmse, run_until_exact
+
+from relume.core.cache import Cache
+from relume.live.fixed_camera import operator_budget
+from relume.live.fixed_camera.jobs import PrecomputeOperator, Shade
+from relume.live.fixed_camera.picture import Picture
+from relume.math.daubechies import analysis
+from relume.operators.linear_operator import operator_bytes, quantized_bytes
+from relume.operators.subsampled import SubsampledOperator
+
+FLOOR, WALL = "/materials/Floor/terms/1/", "/materials/Wall/terms/1/"
+IMAGES = 400_000  # the still life's, and what else its pictures need
+A_THOUSANDTH = 1e-3
+
+
+def rough(roughness):
+    def change(document):
+        document["materials"]["Floor"]["terms"][1].setdefault("params", {})["roughness"] = roughness
+
+    return change
+
+
+def bent(points, material="Floor", curve="theta_h"):
+    def change(document):
+        document["materials"][material]["terms"][1]["curves"] = {curve: {"points": points}}
+
+    return change
+
+
+def num_samples(transfer, material):
+    rows = transfer.views["front"].rows(transfer.material_names.index(material))
+    return rows.stop - rows.start
+
+
+@pytest.fixture
+def half(transfer):
+    """Memory for the floor's operator in 16 bits."""
+    num = num_samples(transfer, "Floor")
+    memory = Cache(quantized_bytes(num, 256) + IMAGES)
+    assert memory.budget_bytes < operator_bytes(num, 256)
+    return memory
+
+
+@pytest.fixture
+def small(transfer):
+    """Memory for operators of some of the floor's samples, and for no other of it."""
+    return Cache(quantized_bytes(num_samples(transfer, "Floor"), 256) - IMAGES)
+
+
+def drag(picture, transfer, change, hand, max_coefficients=None):
+    picture.set_look(make_look(transfer, change), active_pointer=hand)
+    assert picture.next_job() is None or picture.next_job().is_refinement
+    return picture.advance(max_coefficients)
+
+
+def shown_exactly(transfer, change):
+    return ref.full_evaluation(transfer, "front", make_look(transfer, change))
+
+
+def test_a_curve_in_sixteen_bits_is_followed_to_a_thousandth_and_exact_at_rest(transfer, half):
+    picture = open_exact_picture(transfer, FLOOR + "curves/theta_h", cache=half)
+    before = picture.image()
+    for points in ([[0, 3.0], [20, 0.5], [90, 0]], [[0, 9.0], [5, 0.1], [90, 0.02]]):
+        advance = drag(picture, transfer, bent(points), FLOOR + "curves/theta_h")
+        assert (advance.fidelity, advance.exact) == ("near_exact", False)
+        error = relative_rmse(picture.image(), shown_exactly(transfer, bent(points)))
+        assert 1e-8 < error < A_THOUSANDTH
+    assert isinstance(picture.next_job(), Shade)
+    assert relative_rmse(run_until_exact(picture).image(), shown_exactly(transfer, bent(points))) < 1e-6
+    assert half.used_bytes <= half.budget_bytes
+    picture.set_look(make_look(transfer))
+    np.testing.assert_array_equal(run_until_exact(picture).image(), before)
+
+
+def test_a_hundred_drags_in_sixteen_bits_leave_no_trace(transfer, half):
+    rng = np.random.default_rng(3)
+    picture = open_exact_picture(transfer, FLOOR + "curves/theta_h", cache=half)
+    before = picture.image()
+    for _ in range(100):
+        drag(picture, transfer, rough(float(rng.uniform(0.1, 0.9))), FLOOR + "curves/theta_h", 20)
+    drag(picture, transfer, lambda document: None, FLOOR + "curves/theta_h")
+    assert relative_rmse(picture.image(), before) < A_THOUSANDTH
+    np.testing.assert_array_equal(run_until_exact(picture).image(), before)
+
+
+@pytest.mark.parametrize("held", ["curves/theta_h", pytest.param("params/roughness", marks=pytest.mark.slow)])
+def test_where_that_is_too_much_some_samples_say_what_changes(transfer, small, monkeypatch, held):
+    if held == "params/roughness":  # its few nodes would fit
+        small._state.budget_bytes = quantized_bytes(num_samples(transfer, "Floor"), 12)
+        monkeypatch.setattr(operator_budget, "_SUBSAMPLED_BUDGET_DIVISOR", 1)
+    picture = open_exact_picture(transfer, cache=small)
+    before = picture.image()
+    picture.prepare(FLOOR + held)
+    job = picture.next_job()
+    assert isinstance(job, PrecomputeOperator)
+    assert job.form.step > 1
+    assert isinstance(job.run(lambda share: None, lambda: False), SubsampledOperator)
+    run_until_exact(picture)
+    drags = [rough(0.35), rough(0.25)]
+    if held == "curves/theta_h":
+        drags = [bent([[0, value], [20, 0.5], [90, 0]]) for value in (3, 5)]
+    for change in drags:
+        advance = drag(picture, transfer, change, FLOOR + held)
+        assert (advance.fidelity, advance.exact) == ("incremental", False)
+        expected = shown_exactly(transfer, change)
+        assert relative_rmse(picture.image(), expected) < 0.5 * relative_rmse(before, expected)
+    assert isinstance(picture.next_job(), Shade)
+    assert relative_rmse(run_until_exact(picture).image(), expected) < 1e-6
+    assert small.used_bytes <= small.budget_bytes
+    picture.set_look(make_look(transfer))
+    np.testing.assert_array_equal(run_until_exact(picture).image(), before)
+
+
+def test_what_did_not_change_is_as_it_was(transfer, small):
+    """Shadows and edges of an image stay to the last digit where a drag comes back."""
+    picture = open_exact_picture(transfer, FLOOR + "curves/theta_h", cache=small)
+    before = picture.image()
+    drag(picture, transfer, rough(0.2), FLOOR + "curves/theta_h")
+    assert relative_rmse(picture.image(), before) > 0.005
+    drag(picture, transfer, lambda document: None, FLOOR + "curves/theta_h")
+    assert relative_rmse(picture.image(), before) < 1e-6
+
+
+def test_a_look_that_moves_on_while_its_operator_is_made_is_caught_up_with(transfer, small):
+    picture = open_exact_picture(transfer, cache=small)
+    picture.prepare(FLOOR + "curves/theta_h")
+    job = picture.next_job()
+    look = bent([[0, 3.0], [20, 0.5], [90, 0]])
+    picture.set_look(make_look(transfer, look), active_pointer=FLOOR + "curves/theta_h")
+    picture.install(job, job.run(lambda share: None, lambda: False))
+    assert picture.advance(None).fidelity == "incremental"
+    assert relative_rmse(run_until_exact(picture).image(), shown_exactly(transfer, look)) < 1e-6
+
+
+@pytest.mark.slow
+def test_two_curves_one_after_another(transfer, small):
+    """The second is of another material, and has room; then both have changed at once, as after an undo."""
+    picture = open_exact_picture(transfer, FLOOR + "curves/theta_h", cache=small)
+    before = picture.image()
+    first, second = rough(0.3), bent([[0, 5.0], [9, 0.5], [90, 0]], "Wall")
+
+    def both(document):
+        first(document)
+        second(document)
+
+    drag(picture, transfer, first, FLOOR + "curves/theta_h")
+    picture.prepare(WALL + "curves/theta_h")
+    run_until_exact(picture)
+    drag(picture, transfer, both, WALL + "curves/theta_h")
+    assert relative_rmse(run_until_exact(picture).image(), shown_exactly(transfer, both)) < 1e-6
+    picture.set_look(make_look(transfer))
+    np.testing.assert_array_equal(run_until_exact(picture).image(), before)
+    assert small.used_bytes <= small.budget_bytes
+
+
+@pytest.mark.slow
+def test_a_second_curve_of_the_same_term_waits_until_the_first_is_known(transfer, small):
+    """A hand that moves on before it rests: neither curve's operator can say what the other does."""
+    picture = open_exact_picture(transfer, FLOOR + "curves/theta_h", cache=small)
+    drag(picture, transfer, bent([[0, 3.0], [20, 0.5], [90, 0]]), FLOOR + "curves/theta_h", 3)
+
+    def both(document):
+        bent([[0, 3.0], [20, 0.5], [90, 0]])(document)
+        document["materials"]["Floor"]["terms"][1]["curves"]["theta_d"] = {"points": [[0, 0.3], [90, 1]]}
+
+    picture.set_look(make_look(transfer, both), active_pointer=FLOOR + "curves/theta_d")
+    for _ in range(3):
+        picture.advance(5)
+    assert relative_rmse(run_until_exact(picture).image(), shown_exactly(transfer, both)) < 1e-6
+
+
+def test_light_between_surfaces_is_in_it_as_well(gathered, monkeypatch):
+    monkeypatch.setattr(operator_budget, "_MIN_SAMPLES", 64)
+    memory = Cache(quantized_bytes(num_samples(gathered, "Floor"), 256) - 200_000)
+    picture = run_until_exact(Picture(gathered, "front", memory))
+    before = picture.image()
+    picture.prepare(FLOOR + "curves/theta_h")
+    job = picture.next_job()
+    assert job.form.step > 1
+    change, images = 1e-2 * np.ones((3, 256)), np.zeros((2, *job.target.live.ready.image.shape), np.float32)
+    for form, image in zip((job.form, operator_budget.EXACT), images, strict=True):
+        some = replace(job, form=form, key=form, target=job.target._replace(images=with_room(picture._images)))
+        some.run(lambda share: None, lambda: False).add(analysis(change), image)
+    assert relative_rmse(images[0], images[1]) < 0.05
+    look = bent([[0, 9.0], [25, 1.5], [90, 0]])
+    picture.install(job, job.run(lambda share: None, lambda: False))
+    picture.set_look(make_look(gathered, look), active_pointer=FLOOR + "curves/theta_h")
+    assert relative_rmse(run_until_exact(picture).image(), shown_exactly(gathered, look)) < 1e-6
+    picture.set_look(make_look(gathered))
+    np.testing.assert_array_equal(run_until_exact(picture).image(), before)
+
+
+def with_room(images):
+    """The same images with another memory."""
+    found = copy.copy(images)
+    found.cache = Cache(1 << 28)
+    return found

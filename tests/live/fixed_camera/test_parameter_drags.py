@@ -1,0 +1,179 @@
+"""Live pictures under a hand on a slider: followed along the parameter, near the look while it moves, exact at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy_reference as ref
+import pytest
+from session_edits import BUDGET, make_look, relative_rmse, run_until_exact
+
+from relume.core.cache import Cache
+from relume.core.errors import ParameterError
+from relume.live.fixed_camera.picture import Picture
+from relume.operators.edit_basis import CurveBasis
+from relume.operators.parameter_operator import MAX_ERROR, ParameterOperator
+
+TERM = "/materials/Ball/terms/1"
+ROUGHNESS, THETA_H = f"{TERM}/params/roughness", f"{TERM}/curves/theta_h"
+
+
+def shiny(roughness=0.4, curves=None, **more):
+    """The ball's highlight as glTF means it."""
+
+    def change(document):
+        term = {"model": "ggx", "color": [0.8, 0.7, 0.6], "params": {"roughness": roughness, **more}}
+        document["materials"]["Ball"]["terms"][1] = {**term, "curves": curves or {}}
+
+    return change
+
+
+@pytest.fixture
+def picture(transfer):
+    found = Picture(transfer, "front", Cache(BUDGET))
+    found.set_look(make_look(transfer, shiny()))
+    return run_until_exact(found)
+
+
+def exact(transfer, change):
+    return ref.full_evaluation(transfer, "front", make_look(transfer, change))
+
+
+def make(picture, need):
+    picture.install(need, need.run(lambda share: None, lambda: False))
+
+
+def held(picture, pointer):
+    picture.prepare(pointer)
+    make(picture, picture.next_job())
+    return picture
+
+
+def test_a_slider_of_several_curves_is_followed_at_once_and_its_picture_is_near(transfer, picture):
+    held(picture, ROUGHNESS)
+    assert picture.next_job() is None
+    for roughness in (0.41, 0.1, 0.9, 0.33):
+        picture.set_look(make_look(transfer, shiny(roughness)))
+        need = picture.next_job()
+        assert need is None
+        advance = picture.advance(8)
+        assert advance.changed
+        assert not advance.exact
+        error = relative_rmse(picture.image(), exact(transfer, shiny(roughness)))
+        assert 1e-7 < error < MAX_ERROR
+
+
+def test_at_rest_it_is_shaded_and_then_exact_and_the_slider_still_in_hand(transfer, picture):
+    held(picture, ROUGHNESS)
+    picture.set_look(make_look(transfer, shiny(0.2)))
+    picture.advance(None)
+    need = picture.next_job()
+    assert need.is_refinement
+    assert need.state == "shading"
+    assert not picture.advance(None).exact
+    make(picture, need)
+    assert picture.advance(None).exact
+    assert picture.next_job() is None
+    assert relative_rmse(picture.image(), exact(transfer, shiny(0.2))) < 1e-6
+    picture.set_look(make_look(transfer, shiny(0.7)))
+    assert picture.advance(None).changed
+    assert relative_rmse(picture.image(), exact(transfer, shiny(0.7))) < MAX_ERROR
+
+
+def test_shading_of_a_look_that_the_hand_has_left_is_not_shown(transfer, picture):
+    held(picture, ROUGHNESS)
+    picture.set_look(make_look(transfer, shiny(0.2)))
+    picture.advance(None)
+    old = picture.next_job()
+    picture.set_look(make_look(transfer, shiny(0.7)))
+    picture.advance(None)
+    make(picture, old)
+    assert not picture.advance(None).exact
+    assert relative_rmse(picture.image(), exact(transfer, shiny(0.7))) < MAX_ERROR
+
+
+@pytest.mark.parametrize("hand", [None, THETA_H, "/lights/Lamp"])
+def test_what_the_hand_is_on_is_never_guessed_from_looks(transfer, picture, hand):
+    picture.set_look(make_look(transfer, shiny(0.3)), active_pointer=hand)
+    assert isinstance(picture.next_job().basis, CurveBasis)
+
+
+def test_pointer_to_nothing_that_a_hand_may_hold_is_refused_and_the_look_stays(transfer, picture):
+    with pytest.raises(ParameterError):
+        picture.set_look(make_look(transfer, shiny(0.3)), active_pointer="/display/exposure")
+    assert picture.next_job() is None
+    assert picture.advance(None).exact
+
+
+def test_a_hand_that_took_hold_of_nothing_is_known_from_its_edits(transfer, picture):
+    picture.set_look(make_look(transfer, shiny(0.3)), active_pointer=ROUGHNESS)
+    need = picture.next_job()
+    assert isinstance(need.basis, ParameterOperator)
+    assert need.basis.parameter == "roughness"
+    make(picture, need)
+    picture.set_look(make_look(transfer, shiny(0.6)))
+    assert picture.advance(None).changed
+    assert relative_rmse(picture.image(), exact(transfer, shiny(0.6))) < MAX_ERROR
+
+
+def test_open_curve_hands_over_to_a_slider_that_moves_others_too(transfer, picture):
+    held(picture, THETA_H)
+    held(picture, ROUGHNESS)
+    picture.set_look(make_look(transfer, shiny(0.6)))
+    picture.advance(None)
+    assert relative_rmse(picture.image(), exact(transfer, shiny(0.6))) < MAX_ERROR
+
+
+def test_open_curve_is_enough_for_a_slider_that_moves_nothing_else(transfer):
+    """Its wavelets are there, and exact: nodes would only be another freeze, and less true."""
+    picture = run_until_exact(Picture(transfer, "front", Cache(BUDGET)))
+    held(picture, THETA_H)
+    picture.prepare(f"{TERM}/params/sigma")
+    assert picture.next_job() is None
+
+    def change(document):
+        document["materials"]["Ball"]["terms"][1]["params"]["sigma"] = 0.13
+
+    picture.set_look(make_look(transfer, change))
+    assert picture.next_job() is None
+    assert picture.advance(None).exact
+
+
+def test_a_drawn_curve_is_not_said_by_nodes(transfer, picture):
+    held(picture, ROUGHNESS)
+    picture.set_look(make_look(transfer, shiny(0.2)))
+    picture.advance(None)
+    drawn = shiny(0.2, {"theta_h": {"points": [[0, 3], [20, 0.2], [60, 2]]}})
+    picture.set_look(make_look(transfer, drawn))
+    need = picture.next_job()
+    assert isinstance(need.basis, CurveBasis)
+    assert need.basis.name == "theta_h"
+    make(picture, need)
+    assert picture.advance(None).exact
+    assert relative_rmse(picture.image(), exact(transfer, drawn)) < 1e-6
+
+
+def test_another_slider_of_the_term_takes_over(transfer, picture):
+    held(picture, ROUGHNESS)
+    picture.set_look(make_look(transfer, shiny(0.2)))
+    picture.advance(None)
+    held(picture, f"{TERM}/params/f0")
+    picture.set_look(make_look(transfer, shiny(0.2, f0=0.7)))
+    picture.advance(None)
+    assert relative_rmse(picture.image(), exact(transfer, shiny(0.2, f0=0.7))) < MAX_ERROR
+    assert relative_rmse(run_until_exact(picture).image(), exact(transfer, shiny(0.2, f0=0.7))) < 1e-6
+
+
+def test_pictures_at_the_same_place_share_the_operator_of_a_slider(transfer):
+    cache = Cache(BUDGET)
+    first, second = (Picture(transfer, "front", cache) for _ in range(2))
+    for picture, roughness in ((first, 0.2), (second, 0.8)):
+        picture.set_look(make_look(transfer, shiny(roughness)))
+        run_until_exact(picture)
+    held(first, ROUGHNESS)
+    used = cache.used_bytes
+    held(second, ROUGHNESS)
+    assert cache.used_bytes == used
+    second.set_look(make_look(transfer, shiny(0.5)))
+    second.advance(None)
+    assert relative_rmse(second.image(), exact(transfer, shiny(0.5))) < MAX_ERROR
+    np.testing.assert_allclose(first.image(), exact(transfer, shiny(0.2)), atol=1e-4)

@@ -1,0 +1,206 @@
+"""What a picture waits for: eviction, sharing, cancelling, and what is made for a look that is gone."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import numpy_reference as ref
+import pytest
+from picture_edits import BALL, WALL, ignore_progress, open_exact_picture, set_sigma, set_single_term_ball
+from session_edits import BUDGET, make_look, relative_rmse, run_until_exact
+
+from relume.core.cache import Cache
+from relume.core.errors import CancelledError, MemoryBudgetError
+from relume.live.fixed_camera.jobs import Resum, Shade
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
+from relume.operators.linear_operator import operator_bytes
+
+
+def test_evicted_in_mid_drag_recovers(transfer):
+    """Half of a change has been shown when another session takes the cache; the rest comes after freezing again."""
+    rows = transfer.views["front"].rows(2)
+    cache = Cache(operator_bytes(rows.stop - rows.start, 256) + 200_000)  # one operator, and the images
+    picture = open_exact_picture(transfer, BALL + "theta_h", cache=cache)
+    look = make_look(transfer, set_sigma(0.06))
+    picture.set_look(look)
+    assert not picture.advance(5).exact
+    open_exact_picture(transfer, BALL + "theta_h", cache=cache, look=make_look(transfer, set_sigma(0.3, ior=2.5)))
+    assert picture.next_job() is not None
+    assert not picture.advance(5).exact
+    run_until_exact(picture)
+    assert np.isfinite(picture.image()).all()
+    assert relative_rmse(picture.image(), ref.full_evaluation(transfer, "front", look)) < 1e-6
+
+
+def test_sessions_that_agree_share_and_those_that_do_not_are_kept_apart(transfer):
+    cache = Cache(BUDGET)
+    open_exact_picture(transfer, BALL + "theta_h", cache=cache)
+    used = cache.used_bytes
+    second = Picture(transfer, "front", cache)
+    second.set_look(make_look(transfer, set_sigma(0.5)))
+    second.prepare(BALL + "theta_h")
+    run_until_exact(second)
+    assert cache.used_bytes - used < operator_bytes(297, 256) / 2  # θh's own values are no part of its operator
+    third = open_exact_picture(
+        transfer, BALL + "theta_h", cache=cache, look=make_look(transfer, set_sigma(0.5, ior=3.0))
+    )
+    assert relative_rmse(third.image(), second.image()) > 1e-3
+    for picture, change in ((second, set_sigma(0.5)), (third, set_sigma(0.5, ior=3.0))):
+        expected = ref.full_evaluation(transfer, "front", make_look(transfer, change))
+        assert relative_rmse(picture.image(), expected) < 1e-6
+
+
+def test_cancelled_freeze_leaves_picture_and_cache_as_they_were(transfer):
+    cache = Cache(BUDGET)
+    picture = open_exact_picture(transfer, cache=cache)
+    before, used = picture.image(), cache.used_bytes
+    look = make_look(transfer, set_sigma(0.07))
+    picture.set_look(look)
+    waiting = picture.next_job().key
+    with pytest.raises(CancelledError):
+        picture.run_next_job(ignore_progress, lambda: True)
+    assert cache.used_bytes == used
+    assert picture.next_job().key == waiting
+    picture.advance(None)
+    np.testing.assert_array_equal(picture.image(), before)
+    assert relative_rmse(run_until_exact(picture).image(), ref.full_evaluation(transfer, "front", look)) < 1e-6
+
+
+def drawn(document):
+    document["materials"]["Ball"]["terms"][1]["curves"] = {"theta_h": {"points": [[0, 1], [90, 0]]}}
+
+
+def test_a_curve_whose_operator_does_not_fit_is_shaded(transfer):
+    """It can be opened and drawn; the picture stands until the hand rests, and then shows it."""
+    picture = open_exact_picture(transfer, cache=Cache(400_000))
+    before = picture.image()
+    picture.prepare(BALL + "theta_h")
+    assert picture.next_job() is None
+    look = make_look(transfer, drawn)
+    picture.set_look(look, active_pointer=BALL + "theta_h")
+    advance = picture.advance(None)
+    assert advance.fidelity == "approximate"
+    np.testing.assert_array_equal(picture.image(), before)
+    job = picture.next_job()
+    assert isinstance(job, Shade)
+    assert job.is_refinement
+    expected = ref.full_evaluation(transfer, "front", look)
+    assert relative_rmse(run_until_exact(picture).image(), expected) < 1e-6
+    picture.set_look(make_look(transfer), active_pointer=BALL + "theta_h")
+    np.testing.assert_array_equal(run_until_exact(picture).image(), before)
+
+
+def test_a_curve_whose_operator_does_not_fit_is_shaded_while_a_turned_light_is_prepared(transfer):
+    picture = open_exact_picture(transfer, cache=Cache(400_000))
+    picture.prepare("/environment/rotation")
+    job = picture.next_job()
+    assert isinstance(job, SparsePreview)
+    look = make_look(transfer, drawn)
+    picture.check(look)
+    picture.set_look(look)
+    picture.install(job, job.run(ignore_progress, lambda: False))
+    assert relative_rmse(run_until_exact(picture).image(), ref.full_evaluation(transfer, "front", look)) < 1e-6
+
+
+def many_terms(document):
+    for material in document["materials"].values():
+        material["terms"] = [{"model": "lambert", "color": [0.1, 0.1, 0.1], "texture": None}] * 16
+
+
+def test_a_look_whose_images_do_not_fit_is_refused_and_the_picture_stands(transfer):
+    picture = open_exact_picture(transfer, cache=Cache(400_000))
+    before = picture.image()
+    with pytest.raises(MemoryBudgetError):
+        picture.check(make_look(transfer, many_terms))
+    assert picture.next_job() is None
+    assert picture.advance(None).exact
+    np.testing.assert_array_equal(picture.image(), before)
+
+
+def test_picture_follows_what_is_open_while_a_freeze_of_something_else_is_made(transfer):
+    """What a need makes does not depend on what is done to its picture meanwhile."""
+    picture = open_exact_picture(transfer, BALL + "theta_h")
+    picture.prepare(WALL + "alpha")
+    need = picture.next_job()
+    assert "Wall" in need.label
+    made = []
+    thread = threading.Thread(target=lambda: made.append(need.run(ignore_progress, lambda: False)))
+    thread.start()
+    for value in (0.1, 0.4, 0.15):
+        look = make_look(transfer, set_sigma(value))
+        picture.set_look(look)
+        assert picture.advance(None).exact
+        assert picture.next_job().key == need.key
+        assert relative_rmse(picture.image(), ref.full_evaluation(transfer, "front", look)) < 1e-5
+    thread.join()
+    before = picture.image()
+    picture.install(need, made[0])
+    job = picture.next_job()
+    assert job is None or isinstance(job, Resum)  # the steps of the drag, when the hand rests
+    np.testing.assert_array_equal(picture.image(), before)
+    picture.highlight_pixels(WALL + "alpha", 0, 10)  # it is open now
+
+
+def test_operator_of_dormant_curves_that_changed_meanwhile_is_not_adopted(transfer):
+    picture = open_exact_picture(transfer, BALL + "theta_d")
+    picture.prepare(BALL + "theta_h")
+    need = picture.next_job()
+    look = make_look(transfer, set_sigma(0.2, ior=3.0))
+    picture.set_look(look)
+    assert picture.advance(None).exact  # θd, which is dormant in what is made
+    picture.install(need, need.run(ignore_progress, lambda: False))
+    assert picture.next_job().key != need.key
+    assert relative_rmse(run_until_exact(picture).image(), ref.full_evaluation(transfer, "front", look)) < 1e-6
+
+
+def test_image_of_an_older_look_is_shown_until_there_is_a_newer_one(transfer):
+    """Else a hand that does not rest would never see the material."""
+    picture = Picture(transfer, "front", Cache(BUDGET))
+    while (need := picture.next_job()).term.model != "cook_torrance":
+        picture.install(need, need.run(ignore_progress, lambda: False))
+    look = make_look(transfer, set_sigma(0.1))
+    picture.set_look(look)
+    picture.install(need, need.run(ignore_progress, lambda: False))
+    advance = picture.advance(None)
+    assert advance.changed
+    assert not advance.exact
+    assert picture.next_job().basis.affected_curves == ("theta_h",)
+    assert relative_rmse(run_until_exact(picture).image(), ref.full_evaluation(transfer, "front", look)) < 1e-6
+
+
+def test_opening_picture_shows_cheap_terms_of_all_materials_first(transfer):
+    def lambert_and_glossy(document):
+        for material in document["materials"].values():
+            material["terms"] = [{"model": "cook_torrance"}, {"model": "lambert"}]
+
+    def order(*touched):
+        picture = Picture(transfer, "front", Cache(BUDGET))
+        picture.set_look(make_look(transfer, lambert_and_glossy))
+        for pointer in touched:
+            picture.prepare(pointer)
+        made = []
+        while (need := picture.next_job()) is not None and isinstance(need, Shade):
+            made.append((need.target.name, need.term.model))
+            picture.install(need, need.run(ignore_progress, lambda: False))
+        return made, need
+
+    shaded, _ = order()
+    num_materials = len({name for name, _ in shaded})
+    assert [model for _, model in shaded] == ["lambert"] * num_materials + ["cook_torrance"] * num_materials
+    sizes = {name: np.diff(transfer.views["front"].bounds)[k] for k, name in enumerate(transfer.material_names)}
+    assert [name for name, _ in shaded[:num_materials]] == sorted(sizes, key=sizes.get)[-num_materials:]
+    shaded, need = order("/materials/Wall/terms/0/curves/theta_d")
+    assert shaded == [("Wall", "lambert")]
+    assert need.basis.affected_curves == ("theta_d",)  # its operator gives the image as well
+
+
+def test_what_is_made_for_a_term_that_is_gone_is_dropped(transfer):
+    picture = open_exact_picture(transfer)
+    picture.prepare(BALL + "theta_h")
+    need = picture.next_job()
+    look = make_look(transfer, set_single_term_ball)
+    picture.set_look(look)
+    picture.install(need, need.run(ignore_progress, lambda: False))
+    assert relative_rmse(run_until_exact(picture).image(), ref.full_evaluation(transfer, "front", look)) < 1e-6

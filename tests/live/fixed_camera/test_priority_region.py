@@ -1,0 +1,112 @@
+"""What is seen of a picture is exact first; what was made of the rest is kept, and the whole is what it ever was."""
+
+from __future__ import annotations
+
+from itertools import count
+
+import numpy as np
+import numpy_reference as ref
+import pytest
+from session_edits import BUDGET, make_look, run_next_job, run_until_exact
+
+from relume.core.cache import Cache
+from relume.core.errors import CancelledError
+from relume.live.fixed_camera.jobs import Shade
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.priority_region import ShadeRegion
+from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
+from relume.operators.shade import shade_rows
+
+REGION = (4, 6, 16, 12)
+
+
+@pytest.fixture(autouse=True)
+def large(monkeypatch):
+    """Small pictures are treated as large ones are; steps are as small as what is seen of them."""
+    for name, value in {
+        "priority_region._MIN_HIDDEN_SAMPLES": 0,
+        "strategies.sparse_preview._MAX_SHADED_AT_ONCE": 0,
+        "strategies.sparse_preview._MAX_SHADED": 40,
+    }.items():
+        monkeypatch.setattr(f"relume.live.fixed_camera.{name}", value)
+    monkeypatch.setattr("relume.operators.shade._MIN_ROWS_PER_STEP", 16)
+
+
+def seen(image):
+    x, y, width, height = REGION
+    return image[y : y + height, x : x + width]
+
+
+TURNS = count(1)
+
+
+def opened(transfer, region=REGION):
+    """A picture of a look of which no image is kept, its first preview shown."""
+    picture = Picture(transfer, "front", Cache(BUDGET), is_watched=True)
+    degrees = float(next(TURNS))
+    picture.set_look(make_look(transfer, lambda document: document["environment"].update(rotation=degrees)))
+    picture.look_at(region)
+    picture.advance(None)
+    assert isinstance(run_next_job(picture), SparsePreview)
+    return picture
+
+
+def until_seen(picture):
+    """Make what is wanted until what is seen is exact; what was made."""
+    made = []
+    while picture.advance(None).fidelity != "exact":
+        made.append(run_next_job(picture))
+    return made
+
+
+@pytest.mark.parametrize("method", ["transfer", "gathered"])
+def test_what_is_seen_is_exact_before_the_rest(request, method):
+    transfer = request.getfixturevalue(method)
+    picture = opened(transfer)
+    made = until_seen(picture)
+    assert any(isinstance(job, ShadeRegion) for job in made)
+    assert not picture.advance(None).exact
+    early = picture.image()
+    whole = run_until_exact(picture).image()
+    np.testing.assert_array_equal(seen(early), seen(whole))
+    assert np.abs(early - whole).max() > 1e-3
+    np.testing.assert_allclose(whole, ref.full_evaluation(transfer, "front", picture._look), rtol=1e-3, atol=1e-5)
+
+
+def test_somewhere_else_is_exact_when_that_is_looked_at(transfer):
+    picture = opened(transfer)
+    until_seen(picture)
+    picture.look_at((5, 7, 4, 4))
+    assert picture.advance(None).fidelity == "exact"
+    picture.look_at((20, 10, 16, 12))
+    assert picture.advance(None).fidelity != "exact"
+    picture.look_at(None)
+    assert picture.advance(None).fidelity == "preview"
+
+
+def test_what_is_stopped_goes_on_from_there(transfer, monkeypatch):
+    picture = opened(transfer, None)
+    while isinstance(job := picture.next_job(), SparsePreview) or job.target.material.num_samples < 100:
+        run_next_job(picture)
+    shaded, asked = [], []
+    monkeypatch.setattr("relume.operators.shade.shade_rows", lambda *of: shaded.append(of[4:6]) or shade_rows(*of))
+    with pytest.raises(CancelledError):
+        job.run(lambda share: None, lambda: asked.append(1) or len(asked) > 2)
+    assert isinstance(job, Shade)
+    assert shaded
+    job.run(lambda share: None, lambda: False)
+    assert sorted(shaded) == sorted(set(shaded))
+    assert sum(stop - start for start, stop in shaded) == job.target.material.num_samples
+
+
+def test_a_large_picture_is_seen_finer_and_finer(transfer, monkeypatch):
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 4)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MIN_FINER_RATIO", 1)
+    picture, images = opened(transfer, None), []
+    while not picture.advance(None).exact:
+        if isinstance(run_next_job(picture), SparsePreview):
+            picture.advance(None)
+            images.append(picture.image())
+    errors = [float(np.sqrt(np.mean((image - picture.image()) ** 2))) for image in images]
+    assert len(errors) > 1
+    assert errors == sorted(errors, reverse=True)

@@ -1,0 +1,72 @@
+"""The environment turned: weighed again from the same bake."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy_reference as ref
+import pytest
+from picture_edits import BALL, open_exact_picture, rotate_environment
+from session_edits import make_look, relative_rmse, run_until_exact
+from tiny_scenes import still_life
+
+from relume.core.cache import Cache
+from relume.methods.registry import METHODS, open_transfer
+from relume.output.render_image import render_image
+from relume.scene.scene_folder import make_scene
+from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
+
+
+@pytest.mark.parametrize("degrees", [30.0, -90.0])
+def test_turned_environment_is_weighed_again_and_back_again_is_as_before(transfer, degrees):
+    picture = open_exact_picture(transfer, BALL + "theta_h")
+    before = picture.image()
+    look = make_look(transfer, rotate_environment(degrees))
+    picture.set_look(look)
+    assert picture.next_job().state == "shading"
+    np.testing.assert_array_equal(picture.image(), before)  # stands until there is a new one
+    turned = run_until_exact(picture).image()
+    assert relative_rmse(turned, ref.full_evaluation(transfer, "front", look)) < 1e-6
+    assert relative_rmse(turned, before) > 0.1
+    picture.set_look(make_look(transfer))
+    np.testing.assert_allclose(run_until_exact(picture).image(), before, rtol=1e-5, atol=1e-6)
+
+
+def test_whole_turns_are_no_turn(transfer):
+    picture = open_exact_picture(transfer)
+    picture.set_look(make_look(transfer, rotate_environment(360.0)))
+    assert picture.next_job() is None
+    assert picture.advance(None).exact
+
+
+def test_curves_follow_under_turned_light(transfer):
+    def edit(document):
+        rotate_environment(45.0)(document)
+        document["materials"]["Ball"]["terms"][1]["params"]["sigma"] = 0.35
+
+    picture = open_exact_picture(transfer)
+    picture.set_look(make_look(transfer, rotate_environment(45.0)))
+    run_until_exact(picture).prepare(BALL + "theta_h")
+    run_until_exact(picture).set_look(make_look(transfer, edit))
+    assert picture.next_job() is None
+    assert picture.advance(None).exact
+    expected = ref.full_evaluation(transfer, "front", make_look(transfer, edit))
+    assert relative_rmse(picture.image(), expected) < 1e-5
+
+
+def test_turning_a_relightable_bake_is_near_a_fresh_bake_of_the_turned_map(tmp_path):
+    scene = still_life()
+    radiance = scene.environment.radiance
+    sky = replace(scene.environment, radiance=np.roll(radiance, -radiance.shape[1] // 4, axis=1))
+    other = make_scene("turned", scene.meshes, scene.materials, scene.cameras, sky)
+    recipe = Recipe("direct", ("front",), (48, 36), 1000)
+    relightable = bake_in_process(METHODS["direct"], scene, replace(recipe, relightable=True), tmp_path / "one.zarr")
+    one = open_transfer(relightable, Cache(1 << 30))
+    two = open_transfer(bake_in_process(METHODS["direct"], other, recipe, tmp_path / "two.zarr"), Cache(1 << 30))
+    images = [render_image(one, "front", make_look(one, rotate_environment(degrees))) for degrees in (90.0, 0.0)]
+    expected = render_image(two, "front", make_look(two))
+    # docs/direct-light.md#environment-triangles: half a per cent to some per cent, by the lobe
+    assert relative_rmse(images[0], expected) < 0.03
+    assert relative_rmse(images[1], expected) > 0.2

@@ -1,0 +1,109 @@
+"""Pictures while the environment is turned: a few samples shaded at once, all of them at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy_reference as ref
+import pytest
+from session_edits import BUDGET, make_look, relative_rmse, run_until_exact
+
+from relume.core.cache import Cache
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview, choose_samples
+
+
+def turned(degrees):
+    def change(document):
+        document["environment"]["rotation"] = degrees
+
+    return change
+
+
+@pytest.fixture
+def picture(transfer):
+    return run_until_exact(Picture(transfer, "front", Cache(BUDGET)))
+
+
+def make(picture, need):
+    picture.install(need, need.run(lambda share: None, lambda: False))
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """As few samples as a picture of 200 × 150 would have shaded."""
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 600)
+
+
+@pytest.mark.usefixtures("few")
+def test_a_turned_light_is_glimpsed_at_once_and_shaded_at_rest(transfer, picture):
+    still = picture.image()
+    picture.set_look(make_look(transfer, turned(70)))
+    need = picture.next_job()
+    assert isinstance(need, SparsePreview)
+    assert not need.is_refinement
+    make(picture, need)
+    advance = picture.advance(None)
+    assert advance.changed
+    assert not advance.exact
+    expected = ref.full_evaluation(transfer, "front", make_look(transfer, turned(70)))
+    glimpse_error = relative_rmse(picture.image(), expected)
+    assert glimpse_error < 0.5 * relative_rmse(still, expected)
+    assert glimpse_error > 1e-3
+    assert picture.next_job().is_refinement
+    assert relative_rmse(run_until_exact(picture).image(), expected) < 1e-6
+    assert picture.next_job() is None
+
+
+@pytest.mark.usefixtures("few")
+def test_a_hand_that_never_rests_sees_the_light_go(transfer, picture):
+    picture.set_look(make_look(transfer, turned(20)))
+    need = picture.next_job()
+    picture.set_look(make_look(transfer, turned(40)))
+    make(picture, need)
+    assert picture.advance(None).changed
+    assert isinstance(picture.next_job(), SparsePreview)
+    assert picture.next_job().key != need.key
+    make(picture, picture.next_job())
+    picture.advance(None)
+    assert picture.next_job().is_refinement
+
+
+@pytest.mark.usefixtures("few")
+def test_touching_the_rotation_chooses_the_samples_and_changes_nothing(transfer, picture):
+    before = picture.image()
+    picture.prepare("/environment/rotation")
+    need = picture.next_job()
+    assert isinstance(need, SparsePreview)
+    make(picture, need)
+    assert picture.next_job() is None
+    assert picture.advance(None).exact
+    np.testing.assert_array_equal(picture.image(), before)
+
+
+def test_a_picture_that_shows_nothing_yet_is_shaded_not_glimpsed(transfer):
+    picture = Picture(transfer, "front", Cache(BUDGET))
+    picture.set_look(make_look(transfer, turned(70)))
+    assert not isinstance(picture.next_job(), SparsePreview)
+    assert not picture.next_job().is_refinement
+
+
+def test_where_memory_is_short_there_is_no_glimpse(transfer):
+    picture = run_until_exact(Picture(transfer, "front", Cache(200_000)))
+    picture.set_look(make_look(transfer, turned(70)))
+    assert not isinstance(picture.next_job(), SparsePreview)
+
+
+@pytest.mark.usefixtures("few")
+def test_samples_between_are_means_of_their_neighbours(transfer):
+    view = transfer.views["front"]
+    for material in range(len(transfer.material_names)):
+        sparse, rows = choose_samples(transfer, view, material, 0, has_indirect=True), view.rows(material)
+        num_samples, num_shaded = sparse.weights.shape
+        assert num_samples == rows.stop - rows.start
+        assert 0 < num_shaded < num_samples
+        np.testing.assert_allclose(sparse.weights.sum(axis=1), 1, rtol=1e-5)
+        assert sparse.weights.data.min() > 0
+        whole = view.receivers(material)
+        spread = sparse.weights @ sparse.samples.receivers.normal
+        assert np.mean(np.einsum("nc,nc->n", spread, whole.normal)) > 0.9
+        assert sparse.num_bytes > sparse.weights.data.nbytes

@@ -1,0 +1,47 @@
+"""What people are told of the in-out factorisation of a term."""
+
+import numpy as np
+import pytest
+from hemisphere_quadrature import hemisphere
+from test_outgoing_coefficients import document
+
+from relume.brdf.evaluate import eval_brdf
+from relume.live.free_camera.basis.factorization_error import BOUND, factorization_error
+from relume.live.free_camera.basis.outgoing_coefficients import cosines, outgoing_coefficients
+from relume.math.zernike import NUM_FUNCTIONS, num_functions, project
+
+
+def test_one_function_is_enough_for_a_diffuse_surface():
+    told = factorization_error(document("lambert"))
+    assert (told.functions, told.required_functions, told.is_mirror) == (NUM_FUNCTIONS, 1, False)
+    assert told.residual < 1e-3
+
+
+def test_sharper_highlights_need_more_until_they_are_mirrors():
+    told = [factorization_error(document("phong", params={"exponent": e})) for e in (4.0, 8.0, 10.0, 300.0)]
+    needed = [one.required_functions or 1000 for one in told]
+    assert needed == sorted(needed)
+    assert len(set(needed)) > 2
+    assert [one.is_mirror for one in told] == [False, False, False, True]
+    assert told[-1].required_functions is None
+    missed = [one.residual for one in told]
+    assert missed == sorted(missed)
+
+
+@pytest.mark.parametrize("exponent", [3.0, 15.0])
+def test_what_is_missed_is_what_a_projection_onto_a_prefix_leaves(exponent):
+    term = document("blinn_phong", params={"exponent": exponent})
+    wi, weight = hemisphere(64, 128)
+    functions, cosine = project(wi), cosines()
+    missed = outgoing_coefficients(term).residual_by_degree
+    for degree in (0, 3, 7):
+        basis, left = functions[:, : num_functions(degree)], []
+        for z in cosine:
+            value = eval_brdf(term, wi, np.array([np.sqrt(1 - z * z), 0, z]))[:, 0]
+            fitted = basis @ np.linalg.lstsq(basis * np.sqrt(weight)[:, None], value * np.sqrt(weight), rcond=None)[0]
+            left.append(np.sqrt((weight * (value - fitted) ** 2).sum() / (weight * value**2).sum()))
+        assert missed[degree] == pytest.approx(np.average(left, weights=cosine), abs=0.01)
+    assert factorization_error(term).required_functions in (
+        None,
+        *(num_functions(n) for n, share in enumerate(missed) if share <= BOUND),
+    )

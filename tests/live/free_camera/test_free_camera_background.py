@@ -1,0 +1,107 @@
+"""What moving views show behind surfaces and on grounds that catch shadows, against fixed views of the same place."""
+
+import numpy as np
+import pytest
+from session_edits import bake_corner_scene, make_look
+from shadow_catcher_scenes import (
+    POINT_LIGHT,
+    SIZE,
+    background,
+    ball_scene,
+    changes,
+    environment,
+    inner,
+    plain_ground,
+    set_only_area_light,
+    set_only_emissive_ball,
+    set_only_spot_light,
+    set_paths,
+)
+from tiny_scenes import studio
+
+from relume.core.cache import Cache
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+from relume.methods.registry import METHODS, open_bake
+from relume.output.render_image import render_image
+from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
+
+WHITE, COLOUR = background(kind="color", color=[1.0, 1.0, 1.0]), background(kind="color", color=[2.0, 1.0, 0.5])
+TRANSPARENT = background(kind="transparent")
+
+
+@pytest.fixture(scope="module")
+def fixed(tmp_path_factory):
+    return bake_corner_scene(ball_scene(studio()), "gather", tmp_path_factory.mktemp("fixed"))
+
+
+@pytest.fixture(scope="module")
+def moving(tmp_path_factory):
+    recipe = Recipe("probes", ("front",), SIZE, 400, num_probes=20000)
+    store = bake_in_process(
+        METHODS["probes"], ball_scene(studio()), recipe, tmp_path_factory.mktemp("moving") / "s.zarr"
+    )
+    return open_bake(store, Cache(1 << 30))
+
+
+def rendered(transfer, *several, **kwargs):
+    return render_image(transfer, "front", make_look(transfer, changes(*several)), **kwargs)
+
+
+@pytest.mark.parametrize(
+    ("several", "at_most"),
+    [
+        ((), 0.03),
+        ((WHITE,), 0.05),
+        ((WHITE, environment(rotation=70.0)), 0.05),
+        ((background(kind="blurred", blur=12.0), environment(rotation=40.0, intensity=2.0)), 0.03),
+        ((COLOUR, set_only_area_light), 0.15),
+        ((COLOUR, set_only_spot_light, set_paths("direct")), 0.15),
+        ((COLOUR, set_only_emissive_ball), 0.01),
+        ((WHITE, set_paths("direct")), 0.05),
+        ((WHITE, plain_ground), 0.05),
+    ],
+)
+def test_grounds_are_as_dark_as_in_fixed_views(fixed, moving, several, at_most):
+    """But for edges, which are not antialiased, and shadows as sharp as points are dense."""
+    expected, found = rendered(fixed, *several), rendered(moving, *several)
+    seen = inner(fixed, "Ground") | inner(fixed, None)
+    assert np.sqrt(np.mean((found - expected)[seen] ** 2) / np.mean(expected[seen] ** 2)) < at_most
+
+
+def test_where_nothing_hides_light_nothing_is_hidden(moving, fixed):
+    """To rounding: both are sums of the same light."""
+    lit = changes(WHITE, set_paths("direct"), lambda d: d["lights"].update(Lamp=POINT_LIGHT))
+    found = rendered(moving, lit)[inner(fixed, "Ground")]
+    assert (np.abs(found - 1) < 1e-3).all(axis=1).mean() > 0.25  # points lie where it is not so
+    assert found.min() < 0.5
+
+
+def test_light_between_surfaces_alone_has_no_background(moving, fixed):
+    found = rendered(moving, COLOUR, set_paths("first_bounce"))
+    assert not found[inner(fixed, None)].any()
+    assert found[inner(fixed, "Ground")].any()
+
+
+def test_transparent_pictures_hide_what_fixed_ones_hide(fixed, moving):
+    expected, found = rendered(fixed, TRANSPARENT), rendered(moving, TRANSPARENT)
+    assert found.shape == (*SIZE[::-1], 4)
+    seen = inner(fixed, "Ground")
+    assert np.sqrt(np.mean((found - expected)[seen, 3] ** 2)) < 0.05
+    assert (found[inner(fixed, None)] == 0).all()
+    assert (found[inner(fixed, "Ball")][:, 3] == 1).all()
+    shown, shown_fixed = (rendered(t, TRANSPARENT, for_display=True) for t in (moving, fixed))
+    assert np.sqrt(np.mean((shown - shown_fixed)[seen, 3] ** 2)) < 0.05
+
+
+def test_a_live_picture_becomes_transparent_and_opaque_again(moving):
+    picture = FreeCameraPicture(moving, "front")
+    for _ in range(2):
+        picture.set_look(make_look(moving, TRANSPARENT))
+        picture.advance(None)
+        alpha = np.frombuffer(picture.encode_alpha(picture.all_tiles()), np.uint8)
+        assert len(alpha) == SIZE[0] * SIZE[1]
+        assert {0, 255} <= set(alpha)
+        picture.set_look(make_look(moving))
+        picture.advance(None)
+        assert picture.encode_alpha(picture.all_tiles()) is None

@@ -1,0 +1,233 @@
+"""Out-factors: what a term sends of each function of the in-basis, for every term of the library."""
+
+import numpy as np
+import pytest
+from analytic_terms import ANALYTIC
+from hemisphere_quadrature import hemisphere
+from probe_shading import rotate_coefficients
+
+from relume.brdf.evaluate import eval_brdf
+from relume.live.free_camera.basis import highlight_lobes as lobes_module
+from relume.live.free_camera.basis.highlight_lobes import build_lobes, is_narrow
+from relume.live.free_camera.basis.material_tables import build_tables
+from relume.live.free_camera.basis.outgoing_coefficients import (
+    F64,
+    NUM_ROWS,
+    cosines,
+    outgoing_coefficients,
+    white_coefficients,
+)
+from relume.live.free_camera.basis.two_lobes import _INITIAL_OFFSET, _NUM_ITERATIONS, fit_two_lobes
+from relume.math.zernike import NUM_FUNCTIONS, project
+
+
+def fit_two_lobes_numpy(x: F64, z: F64, area: F64, brdf_cosine: F64) -> F64:
+    """Do as `fit_two_lobes` for one row, in plain NumPy: its oracle.
+
+    Args:
+        x, z, area, brdf_cosine: as there. (n,)
+    Returns:
+        (5,)
+    """
+    weight, squared_weight = brdf_cosine * area / (brdf_cosine @ area), brdf_cosine**2 * area / (brdf_cosine**2 @ area)
+    middle = np.array([squared_weight @ x, squared_weight @ z])
+    variance = 2 - 2 * np.linalg.norm(middle)
+    angle, off = np.arctan2(*middle), _INITIAL_OFFSET * np.sqrt(variance)
+    towards = np.array([[np.sin(angle + side), np.cos(angle + side)] for side in (off, -off)])
+    first, width = 0.5, variance / np.array([1.5, 0.75])
+    for _ in range(_NUM_ITERATIONS):
+        log_density = np.log(np.array([[first], [1 - first]]) / width[:, None] / (1 - np.exp(-2 / width[:, None])))
+        log_density = log_density - (1 - towards @ np.array([x, z])) / width[:, None]
+        responsibility = weight / (1 + np.exp(np.minimum(log_density[1] - log_density[0], 700)))
+        mean = np.array(
+            [[responsibility @ x, responsibility @ z], [(weight - responsibility) @ x, (weight - responsibility) @ z]]
+        )
+        first = float(responsibility.sum())
+        length = np.linalg.norm(mean, axis=1)
+        towards, r = mean / length[:, None], length / [first, 1 - first]
+        width = (1 - r**2) / (r * (3 - r**2))
+    cosines = np.where(towards[:, 0] > 0, np.clip(towards[:, 1], 0, 1), 1)
+    return np.array([*cosines, first, *np.sqrt(width)])
+
+
+def document(model, **fields):
+    return {"model": model, "color": [1.0, 1.0, 1.0], "params": {}, "texture": None} | fields
+
+
+def test_a_diffuse_surface_is_one_number():
+    found = outgoing_coefficients(document("lambert", color=[0.2, 0.4, 0.8]))
+    assert found.table.shape == (NUM_ROWS, 1, 3, NUM_FUNCTIONS)
+    np.testing.assert_allclose(
+        found.table[:, 0, :, 0], np.tile(np.array([0.2, 0.4, 0.8]) / np.sqrt(np.pi), (32, 1)), rtol=1e-5
+    )
+    assert np.abs(found.table[..., 1:]).max() < 1e-6
+    assert found.residual_energy < 1e-3
+
+
+@pytest.mark.parametrize("around", [5, 13, 22, 30])  # in each quarter, of which one alone is integrated
+@pytest.mark.parametrize("model", ANALYTIC)
+def test_factors_are_the_integrals_of_the_term(model, around):
+    """By another quadrature, finer than the one under test; highlights that no quadrature of it resolves are blurred by
+    the same functions."""
+    term = document(model)
+    found = outgoing_coefficients(term)
+    wi, weight = hemisphere(96, 192)
+    row = 18
+    cosine = cosines()[row]
+    column = around if found.table.shape[1] > 1 else 0
+    phi = 2 * np.pi * column / found.table.shape[1]
+    sine = np.sqrt(1 - cosine**2)
+    wo = np.array([sine * np.cos(phi), sine * np.sin(phi), cosine])
+    value = eval_brdf(term, wi, wo)
+    expected = np.einsum("nc,n,nk->ck", value, weight, project(wi))
+    scale = np.sqrt((value**2 * weight[:, None]).sum(axis=0).max())
+    assert np.abs(found.table[row, column] - expected).max() < 0.05 * scale
+
+
+def test_factors_turn_with_the_eye():
+    term, wi_weights = document("blinn_phong", params={"exponent": 20.0}), hemisphere(48, 96)
+    found, (wi, weight) = outgoing_coefficients(term), wi_weights
+    row, phi = 14, 1.1
+    cosine = cosines()[row]
+    sine = np.sqrt(1 - cosine**2)
+    wo = np.array([sine * np.cos(phi), sine * np.sin(phi), cosine])
+    expected = np.einsum("nc,n,nk->ck", eval_brdf(term, wi, wo), weight, project(wi))
+    np.testing.assert_allclose(
+        rotate_coefficients(found.table[row, 0], phi), expected, atol=2e-3 * np.abs(expected).max()
+    )
+
+
+def test_what_is_missed_grows_with_the_exponent():
+    missed = [
+        outgoing_coefficients(document("blinn_phong", params={"exponent": e})).residual_energy
+        for e in (5.0, 20.0, 80.0, 300.0)
+    ]
+    assert missed == sorted(missed)
+    assert missed[0] < 0.05
+    assert missed[-1] > 0.5
+
+
+def test_terms_with_a_highlight_along_the_tangent_have_tables_over_both_angles():
+    uneven = {model for model in ANALYTIC if outgoing_coefficients(document(model)).table.shape[1] > 1}
+    assert "ward_anisotropic" in uneven
+    assert not uneven & {"lambert", "oren_nayar", "blinn_phong", "cook_torrance", "ggx"}
+
+
+def test_terms_of_one_texture_are_summed_and_others_kept_apart():
+    terms = [
+        document("lambert"),
+        document("lambert", texture="diffuse"),
+        document("lambert", texture="diffuse", color=[0, 0, 1.0]),
+        document("ward_anisotropic", params={"alpha_x": 0.9, "alpha_y": 0.5}),
+    ]
+    assert not is_narrow(white_coefficients(terms[-1]))
+    tables = build_tables([terms, []])
+    of = [[0, 0, -1, -1, -1, -1], [1, -1, -1, -1, -1, -1], [-1] * 6]
+    assert tables.table_index.tolist() == [of, [[-1] * 6] * 3]
+    np.testing.assert_allclose(tables.isotropic[1, 0, :, 0], np.array([1, 1, 2]) / np.sqrt(np.pi), rtol=1e-5)
+
+
+@pytest.mark.parametrize("roughness", [0.1, 0.2, 0.3])
+def test_a_lobe_sends_what_the_term_does_under_a_white_sky(roughness):
+    """The integral of the term, by a quadrature of its half vectors: dωi = 4 cos θd dωh."""
+    term = document("ggx", params={"roughness": roughness, "f0": 0.5}, color=[1.0, 0.5, 0.25], texture="specular")
+    lobes = build_lobes([[document("lambert")], [term]])
+    assert lobes.lobe_index.tolist() == [-1, 0]
+    nodes, weights = np.polynomial.legendre.leggauss(400)
+    alpha = roughness**2
+    u, phi = np.repeat((nodes + 1) / 2, 64), np.tile((np.arange(64) + 0.5) * (2 * np.pi / 64), 400)
+    tan2 = alpha**2 * u / (1 - u)  # of θh, as GGX's facets lie
+    cos_h = 1 / np.sqrt(1 + tan2)
+    sin_h = np.sqrt(1 - cos_h**2)
+    half = np.stack([sin_h * np.cos(phi), sin_h * np.sin(phi), cos_h], axis=-1)
+    density = alpha**2 / (np.pi * cos_h**3 * (alpha**2 + tan2) ** 2)
+    for row in (2, 12, 22):
+        cosine = cosines()[row]
+        wo = np.array([np.sqrt(1 - cosine**2), 0, cosine])
+        cos_d = half @ wo
+        wi = 2 * cos_d[:, None] * half - wo
+        measure = np.repeat(weights / 2, 64) / 64 / density * 4 * np.maximum(cos_d, 0)
+        value = eval_brdf(term, wi, wo) * (np.maximum(wi[:, 2], 0) * measure)[:, None]
+        np.testing.assert_allclose(lobes.albedo[0, row, 2], value.sum(axis=0), rtol=0.03)
+        assert not lobes.albedo[0, row, :2].any()
+
+
+def test_a_sharp_lobe_looks_where_a_mirror_does_and_a_wider_one_is_wider():
+    found = [build_lobes([[document("ggx", params={"roughness": r, "f0": 0.5})]]) for r in (0.05, 0.2, 0.35)]
+    np.testing.assert_allclose(found[0].cosine[0, :24].mean(axis=1), cosines()[:24], atol=0.02)
+    widths = [lobe.single_sigma[0, 8] for lobe in found]
+    assert widths == sorted(widths)
+    assert all((lobe.sigma[0, :24, 1] > 2 * lobe.sigma[0, :24, 0]).all() for lobe in found)  # a core and its skirt
+    assert all(lobe.is_two.all() for lobe in found)
+
+
+@pytest.mark.parametrize("row", [10, 16, 20])
+@pytest.mark.parametrize("exponent", [60.0, 200.0])
+def test_two_lobes_are_as_wide_as_the_highlight_along_it_and_across(row, exponent):
+    """Mean and variances over all directions, by another quadrature."""
+    term = document("blinn_phong", params={"exponent": exponent})
+    lobes = build_lobes([[term]])
+    assert not lobes.is_two.any()
+    cosine = cosines()[row]
+    eye = np.arccos(cosine)
+    nodes, weights = np.polynomial.legendre.leggauss(600)
+    cos_i, phi = np.repeat((nodes + 1) / 2, 360), np.tile((np.arange(360) + 0.5) * (2 * np.pi / 360), 600)
+    sin_i = np.sqrt(1 - cos_i**2)
+    wi = np.stack([sin_i * np.cos(phi), sin_i * np.sin(phi), cos_i], axis=-1)
+    weight = eval_brdf(term, wi, np.array([-np.sin(eye), 0, cosine]))[:, 0] * cos_i * np.repeat(weights, 360)
+    weight /= weight.sum()
+    mean = weight @ wi
+    angle, length = np.arctan2(mean[0], mean[2]), np.linalg.norm(mean)
+    u, v = wi @ [np.cos(angle), 0, -np.sin(angle)], wi[:, 1]
+    off = np.sin(np.arccos(lobes.cosine[0, row]) - angle)
+    share = np.array([lobes.first[0, row], 1 - lobes.first[0, row]])
+    variance = float(share @ lobes.sigma[0, row] ** 2)
+    # far aslant a highlight is longer than two round lobes of its width are: what is likeliest is wider across
+    assert (weight @ v**2) / length == pytest.approx(variance, rel=0.2)
+    assert (weight @ u**2) / length == pytest.approx(variance + share @ off**2, rel=0.1)
+    assert share @ off == pytest.approx(0, abs=0.03 * np.sqrt(variance))
+
+
+@pytest.mark.parametrize(
+    ("model", "params"),
+    [("ggx", {"roughness": 0.3, "f0": 0.9}), ("cook_torrance", {}), ("blinn_phong", {"exponent": 3000.0})],
+)
+def test_two_lobes_are_fitted_as_their_twin_does_and_better_than_one(model, params):
+    even = lobes_module._isotropic_grid()
+    value = even.quadrature.values(document(model, params=params))
+    sent = np.maximum(value.mean(axis=0) * even.z, 0).astype(np.float32)
+    found = fit_two_lobes(even.x, even.z, even.area, sent)
+    for row in (12, 24):
+        x, z, area, of_row = (np.asarray(one, np.float64) for one in (even.x[row], even.z[row], even.area, sent[row]))
+        np.testing.assert_allclose(found[row], fit_two_lobes_numpy(x, z, area, of_row), rtol=2e-3, atol=2e-4)
+        weight = of_row * area / (of_row @ area)
+        towards = np.array([weight @ x, weight @ z])
+        length = np.linalg.norm(towards)
+
+        def density(cosine, sigma, x=x, z=z):
+            off = 1 - np.sqrt(1 - cosine**2) * x - cosine * z
+            return np.exp(-off / sigma**2) / (2 * np.pi * sigma**2 * (1 - np.exp(-2 / sigma**2)))
+
+        one, other, first, narrow, wide = map(float, found[row])
+        two = first * density(one, narrow) + (1 - first) * density(other, wide)
+        alone = density(towards[1] / length, np.sqrt(1 - length))
+        assert weight @ np.log(two + 1e-30) > weight @ np.log(alone + 1e-30)
+
+
+def test_what_sends_nothing_has_lobes_that_do_no_harm():
+    nothing = np.zeros((2, 8), np.float32)
+    found = fit_two_lobes(nothing, nothing + 1, nothing[0] + 1, nothing)
+    np.testing.assert_array_equal(found, [[1, 1, 0.5, 1, 1]] * 2)
+
+
+def test_terms_along_the_tangent_have_one_lobe_of_the_mean_width():
+    term = document("ward_anisotropic", params={"alpha_x": 0.4, "alpha_y": 0.1})
+    lobes = build_lobes([[term]])
+    assert lobes.lobe_index.tolist() == [0]
+    np.testing.assert_array_equal(lobes.cosine[0, :, 0], lobes.cosine[0, :, 1])
+
+
+def test_what_the_in_basis_cannot_tell_is_not_believed_and_what_it_tells_well_is():
+    most = [build_lobes([[document("blinn_phong", params={"exponent": e})]]).max_ratio[0] for e in (20.0, 30.0, 300.0)]
+    assert most[0] > most[1] > most[2] == 1
+    assert most[0] > 5

@@ -1,0 +1,135 @@
+"""Where points lie: more where eyes begin, and where shadows end."""
+
+import numpy as np
+import pytest
+from session_edits import relative_rmse
+from tiny_scenes import make_camera, make_tiny_scene, quad, studio
+
+from relume.core.cache import Cache
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.live.free_camera.probes.density import density_from_distance, density_from_shadows
+from relume.live.free_camera.probes.interpolation_weights import make_weights_linear
+from relume.live.free_camera.probes.mesh_lattice import make_corner_grid, place_probes
+from relume.live.free_camera.probes.triangle_grids import enumerate_nodes
+from relume.live.free_camera.probes.visible_sides import visible_sides
+from relume.look import validate
+from relume.methods.registry import METHODS, open_bake
+from relume.output.render_image import render_image
+from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.scene.model import Material
+from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
+
+EYE = np.array([[0.0, 3.0, 4.0]])
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """A floor of two faces, and a card that stands on its middle."""
+    floor = quad("floor", [[-4, 0, -4], [-4, 0, 4], [4, 0, 4], [4, 0, -4]], 0)
+    card = quad("card", [[-0.3, 0, 0.1], [0.3, 0, 0.1], [0.3, 0.5, 0.1], [-0.3, 0.5, 0.1]], 1)
+    grey = [Material(name, ({"model": "lambert", "color": [0.8, 0.8, 0.8]},)) for name in ("Floor", "Card")]
+    camera = make_camera("front", EYE[0], [0, 0, 0], 0.5)
+    return make_tiny_scene(floor, card, camera=camera, environment=studio(32, 20.0), materials=grey)
+
+
+def first_placed(scene, num_points=1500):
+    geometry = build_scene_buffers(scene)
+    is_open = visible_sides(geometry, scene.cameras, 1)
+    density = density_from_distance(geometry, EYE, make_corner_grid(is_open))
+    return geometry, is_open, place_probes(geometry, is_open, density, num_points)
+
+
+def by_shadows_of(scene, geometry, placed):
+    return density_from_shadows(geometry, placed, EYE, tessellate_environment(scene.environment.radiance, 300))
+
+
+def test_far_from_the_eye_points_are_farther_apart(scene):
+    geometry, _, placed = first_placed(scene)
+    eye, steps = np.array([0.0, 0.5, 2.0]), enumerate_nodes(placed.probe_grid.num_rows)
+    power = density_from_distance(geometry, eye[None], placed.probe_grid).power
+    where = placed.probes.position[placed.lattice_nodes.probe[placed.probe_grid.node_index, 0]]
+    distance = np.linalg.norm(where - eye, axis=1)
+    is_floor = geometry.face_material[steps.grid // 2] == 0
+    assert power[is_floor][distance[is_floor].argmax()] == 3 + power[is_floor][distance[is_floor].argmin()]
+    assert set(power) <= set(range(-2, 3))
+
+
+def test_both_halves_of_narrow_strips_have_grids_alike():
+    """Their middles are unlike far from the eye; what lies between points is not."""
+    x = np.arange(8) * 0.02
+    corners = [[[w, 0, -4], [w, 0, 4], [w + 0.02, 0, 4], [w + 0.02, 0, -4]] for w in x]
+    strips = [quad(f"strip {k}", corners[k], 0) for k in range(len(x))]
+    grey = [Material("Strips", ({"model": "lambert", "color": [0.8, 0.8, 0.8]},))]
+    scene = make_tiny_scene(*strips, camera=make_camera("front", EYE[0], [0, 0, 0], 0.5), materials=grey)
+    geometry = build_scene_buffers(scene)
+    is_open = visible_sides(geometry, scene.cameras, 1)
+    density = density_from_distance(geometry, np.array([[0.0, 1.0, 3.0]]), make_corner_grid(is_open))
+    power, _ = density.face_extremes()
+    assert (power[::2] != power[1::2]).all()
+    rows = place_probes(geometry, is_open, density, 300).probe_grid.num_rows.max(axis=1)
+    assert rows.max() > 1
+    np.testing.assert_array_equal(rows[::2], rows[1::2])
+
+
+def test_they_are_dense_where_shadows_end(scene):
+    geometry, is_open, before = first_placed(scene)
+    after = place_probes(geometry, is_open, by_shadows_of(scene, geometry, before), 1500)
+    near, far = [], []
+    for placed in (before, after):
+        distance = np.linalg.norm(placed.probes.position[placed.material == 0], axis=1)
+        near.append((distance < 0.8).sum())
+        far.append((distance > 3).sum())
+    assert near[1] > 2 * near[0]
+    assert far[1] < 0.9 * far[0]
+
+
+def test_what_is_no_point_lies_on_straight_lines_between_points(scene):
+    geometry, is_open, before = first_placed(scene)
+    placed = place_probes(geometry, is_open, by_shadows_of(scene, geometry, before), 1500)
+    lattice, vertices, steps = placed.probe_grid, placed.lattice_nodes, enumerate_nodes(placed.probe_grid.num_rows)
+    is_floor = geometry.face_material[steps.grid // 2] == 0
+    a, b, c = geometry.positions[geometry.faces[steps.grid // 2]].transpose(1, 0, 2)
+    u, v = (steps.i / steps.rows)[:, None], (steps.j / steps.rows)[:, None]
+    where = ((1 - u - v) * a + u * b + v * c)[is_floor]
+    of_nodes = vertices.probe[lattice.node_index], vertices.weight[lattice.node_index]
+    found = np.einsum("npc,np->nc", placed.probes.position[of_nodes[0]], of_nodes[1])[is_floor]
+    off = np.linalg.norm((found - where)[:, [0, 2]], axis=1) / placed.spacing
+    assert len(where) > 2 * len(placed.probes.position)
+    assert np.quantile(off, 0.98) < 0.05
+    assert off.max() < 1  # beside nodes that are one with others of another face
+    np.testing.assert_allclose(vertices.weight.sum(axis=1), 1, atol=1e-5)
+
+
+def test_shadows_are_nearer_to_the_truth_so(scene, tmp_path, monkeypatch):
+    def shown(method, name):
+        recipe = Recipe(method, ("front",), (64, 48), 300, num_probes=1500)
+        bake = open_bake(bake_in_process(METHODS[method], scene, recipe, tmp_path / f"{name}.zarr"), Cache(1 << 30))
+        look = validate({"transport": {"bounces": 0}} if method == "probes" else {}, bake.default_look)
+        return render_image(bake, "front", look)[..., :3]
+
+    truth, now = shown("direct", "truth"), shown("probes", "now")
+    alike = lambda geometry, placed, eyes, lights: density_from_distance(geometry, eyes, placed.probe_grid)  # noqa: E731
+    monkeypatch.setattr("relume.methods.probes.density_from_shadows", alike)
+    assert relative_rmse(now, truth) < 0.7 * relative_rmse(shown("probes", "before"), truth)
+
+
+def test_where_nothing_is_in_the_way_distance_counts_alone():
+    ground = quad("ground", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
+    scene = make_tiny_scene(ground, camera=make_camera("front", EYE[0], [0, 0, 0], 0.8), environment=studio(32, 20.0))
+    geometry, _, placed = first_placed(scene)
+    after = by_shadows_of(scene, geometry, placed)
+    np.testing.assert_array_equal(density_from_distance(geometry, EYE, placed.probe_grid).power, after.power)
+
+
+def test_weights_meet_light_that_is_linear():
+    rng = np.random.default_rng(5)
+    towards, normal = rng.normal(size=(200, 3, 4)), np.tile([0.0, 0, 1], (200, 1))
+    weight = rng.random((200, 4))
+    weight /= weight.sum(axis=1, keepdims=True)
+    found = make_weights_linear(weight, towards, normal)
+    off = [np.linalg.norm(np.einsum("vcp,vp->vc", towards[:, :2], w), axis=1) for w in (weight, found)]
+    assert np.median(off[1] / off[0]) < 0.35
+    assert (off[1] < 1.01 * off[0]).all()
+    assert found.min() >= 0
+    np.testing.assert_allclose(found.sum(axis=1), 1)

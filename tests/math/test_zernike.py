@@ -1,0 +1,124 @@
+"""The in-basis: orthonormal over the hemisphere, nested, and the kernel that sums light in it."""
+
+import numba as nb
+import numpy as np
+import pytest
+from hemisphere_quadrature import hemisphere
+from numpy.typing import NDArray
+
+from relume.lights.spherical_triangles import TriangleLights
+from relume.math.zernike import DEGREE, NUM_FUNCTIONS, num_functions, project, recurrence
+from relume.raytrace.surface_points import SurfacePoints
+from relume.raytrace.tangents import any_tangent
+from relume.transport.incident_coefficients import F64, incident_coefficients
+
+
+def incident_coefficients_numpy(points: SurfacePoints, visible: NDArray[np.uint8], lights: TriangleLights) -> F64:
+    """Do as `incident_coefficients` for light triangles alone, in plain NumPy: its oracle.
+
+    Args:
+        points, visible, lights: as there.
+    Returns:
+        (n, 3, K) float64
+    """
+    n, t = points.normal.astype(np.float64), points.tangent.astype(np.float64)
+    frame = np.stack([t, np.cross(n, t), n], axis=1)
+    wi = np.einsum("nij,mj->nmi", frame, lights.direction.astype(np.float64))
+    is_visible = np.unpackbits(visible, axis=1, count=lights.num_lights, bitorder="little").astype(np.float64)
+    weight = is_visible * np.maximum(wi[..., 2], 0)
+    return np.asarray(np.einsum("nm,mc,nmk->nck", weight, lights.irradiance.astype(np.float64), project(wi)))
+
+
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
+def evaluate_basis_along(table, x, y, out):  # type: ignore[no-untyped-def]
+    """Evaluate all functions in one direction; rows of one ray would be written and read at every rung.
+
+    Args:
+        table: the `recurrence`. x, y: of the direction, local, unit. out: written. (K,) float32
+    """
+    argument = np.float32(2) * (x * x + y * y) - np.float32(1)
+    re, im = np.float32(1), np.float32(0)
+    before, last = np.float32(0), np.float32(1)
+    for row in range(table.order.shape[0]):
+        a = table.a[row]
+        if a == 0:
+            if table.order[row] > 0:
+                re, im = re * x - im * y, re * y + im * x
+            before, last = np.float32(0), np.float32(1)
+        else:
+            before, last = last, (a * argument + table.b[row]) * last - table.c[row] * before
+        value = table.norm[row] * last
+        out[table.sine[row]] = value * im
+        out[table.cosine[row]] = value * re
+
+
+def test_functions_are_orthonormal_under_the_cosine():
+    wi, weight = hemisphere()
+    assert weight.sum() == pytest.approx(np.pi)  # of a white sky
+    functions = project(wi)
+    np.testing.assert_allclose(np.einsum("nk,nl,n->kl", functions, functions, weight), np.eye(NUM_FUNCTIONS), atol=1e-6)
+
+
+def test_functions_of_a_degree_are_polynomials_of_it_and_come_after_all_lower_ones():
+    """So a prefix of them is the basis of a lower degree: x^a y^b lies in it where a + b is not higher."""
+    wi, weight = hemisphere()
+    functions = project(wi)
+    for degree in range(DEGREE + 1):
+        monomial = wi[:, 0] ** degree
+        share = np.einsum("n,nk,n->k", monomial, functions, weight)
+        np.testing.assert_allclose(share[num_functions(degree) :], 0, atol=1e-6)
+        assert np.abs(share[num_functions(degree - 1) :]).max() > 1e-3
+
+
+def test_nothing_arrives_from_below():
+    assert not project(np.array([[0.0, 0.6, -0.8], [0, 0, -1]])).any()
+
+
+def test_every_function_stands_on_one_rung():
+    rungs = recurrence()
+    places = [*rungs.cosine, *rungs.sine[rungs.order > 0]]
+    assert sorted(places) == list(range(NUM_FUNCTIONS))
+
+
+@pytest.fixture
+def scattered():
+    """Points that look anywhere, lights anywhere, more than are summed at once, and bits at random."""
+    rng = np.random.default_rng(5)
+    normal, direction = (rng.normal(size=(num, 3)).astype(np.float32) for num in (40, 300))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    points = SurfacePoints(normal, normal, any_tangent(normal), np.zeros(40, np.uint32))
+    lights = TriangleLights(np.zeros((3, 6, 300), np.float32), direction, rng.random((300, 3), np.float32))
+    return points, rng.integers(0, 256, (40, 38), dtype=np.uint8), lights
+
+
+def test_light_vectors_are_those_of_the_oracle(scattered):
+    points, visible, lights = scattered
+    found, expected = (
+        incident_coefficients(points, visible, lights, ()),
+        incident_coefficients_numpy(points, visible, lights),
+    )
+    assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
+
+
+def test_the_first_number_is_the_irradiance(scattered):
+    points, visible, lights = scattered
+    cosine = np.maximum(points.normal.astype(np.float64) @ lights.direction.astype(np.float64).T, 0)
+    seen = np.unpackbits(visible, axis=1, count=300, bitorder="little")
+    irradiance = (seen * cosine) @ lights.irradiance
+    np.testing.assert_allclose(
+        np.sqrt(np.pi) * incident_coefficients(points, visible, lights, ())[..., 0], irradiance, rtol=1e-4, atol=1e-4
+    )
+
+
+def test_functions_along_one_direction_are_all_functions():
+    wi, _ = hemisphere(6, 8)
+
+    @nb.njit
+    def along(rungs, x, y, out):
+        evaluate_basis_along(rungs, x, y, out)
+
+    for one, expected in zip(wi, project(wi), strict=True):
+        out = np.full(NUM_FUNCTIONS, np.nan, np.float32)
+        along(recurrence(), np.float32(one[0]), np.float32(one[1]), out)
+        np.testing.assert_allclose(out, expected, atol=1e-5)

@@ -1,0 +1,99 @@
+"""Bakes of scenes with holes: what is opened later sees through them as the bake did, and so do pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from session_edits import make_look, relative_rmse
+from shared_bakes import unmeasured
+from tiny_scenes import make_camera, make_surface_points, make_tiny_scene, quad, studio
+
+from relume.core.cache import Cache
+from relume.lights.local_lights import make_light_strata, prepare_local_lights
+from relume.live.free_camera.browser.geometry_arrays import constants
+from relume.look import LightGeometry
+from relume.methods.registry import METHODS, open_bake
+from relume.output.render_image import render_image
+from relume.raytrace.light_visibility import trace_light_visibility
+from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.reference.image import reference_image
+from relume.scene.model import Material, Opacity
+from relume.store import bake_in_process
+from relume.store.bake_protocol import Recipe
+
+__all__ = ["unmeasured"]  # a fixture
+
+LAMP = LightGeometry("point", (0.2, 1.8, 0.5))
+
+
+def bars():
+    """Opacity of eight upright bars, as wide as what is between them."""
+    return np.tile(np.repeat(np.uint8([0, 255]), 4), (4, 8))
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """A floor under a card of bars."""
+    floor = quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 0)
+    card = quad("card", [[-1, 0.8, 1], [1, 0.8, 1], [1, 0.8, -1], [-1, 0.8, -1]], 1)
+    materials = [
+        Material("Floor", ({"model": "lambert", "color": [0.7, 0.7, 0.7]},)),
+        Material("Card", ({"model": "lambert", "color": [0.2, 0.6, 0.2]},), opacity=Opacity(bars(), cutoff=0.5)),
+    ]
+    camera = make_camera("front", (0.5, 2.2, 3), (0, 0.2, 0), 0.8)
+    return make_tiny_scene(floor, card, camera=camera, environment=studio(), materials=materials)
+
+
+def opened(scene, method, folder):
+    recipe = Recipe(method, ("front",), (48, 36), 500, num_probes=2000)
+    return open_bake(bake_in_process(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Cache(1 << 30))
+
+
+@pytest.fixture(scope="module")
+def direct(scene, tmp_path_factory):
+    return opened(scene, "direct", tmp_path_factory.mktemp("direct"))
+
+
+def test_lamps_of_an_opened_bake_shine_through(scene, direct):
+    x, z = np.random.default_rng(1).uniform(-1, 1, (2, 2000))
+    points = make_surface_points(np.stack([x, np.full_like(x, 1e-3), z], axis=1), np.tile([0, 1, 0], (2000, 1)))
+    geometry = build_scene_buffers(scene)
+    lamp = prepare_local_lights(LAMP)
+    wanted = trace_light_visibility(geometry.embree, geometry.epsilon, lamp, make_light_strata(lamp, 64), points)
+    found = direct.local.shadows(LAMP, points).visible
+    np.testing.assert_array_equal(found, wanted)
+    assert 0.3 < (found & 1).mean() < 0.9
+
+
+@pytest.mark.parametrize("method", ["direct", "gather"])
+def test_pictures_agree_with_brute_force(scene, method, tmp_path):
+    found = opened(scene, method, tmp_path)
+    look = make_look(found)
+    wanted = reference_image(
+        scene, "front", look, (48, 36), 0 if method == "direct" else 1024, reflects=method == "gather"
+    )
+    picture = render_image(found, "front", look)
+    assert relative_rmse(picture, wanted) < 0.03
+    whole = [Material(material.name, material.terms) for material in scene.materials]
+    without = make_tiny_scene(*scene.meshes, camera=scene.cameras[0], environment=studio(), materials=whole)
+    assert relative_rmse(picture, reference_image(without, "front", look, (48, 36), 0)) > 0.15
+
+
+def test_a_moving_eye_sees_through_and_shaders_are_told(scene, tmp_path):
+    found = opened(scene, "probes", tmp_path)
+    holes = found.embree.alpha_test
+    assert holes is not None
+    np.testing.assert_array_equal(holes.image >= 0, found.stored_scene.face_material == 1)
+    assert constants(found)["has_alpha_test"]
+    look = make_look(found)
+    wanted = reference_image(scene, "front", look, (48, 36), 0)
+    assert relative_rmse(render_image(found, "front", look), wanted) < 0.2
+
+
+def test_bakes_of_whole_surfaces_hold_nothing_of_holes(scene, tmp_path):
+    whole = [Material(material.name, material.terms) for material in scene.materials]
+    without = make_tiny_scene(*scene.meshes, camera=scene.cameras[0], environment=studio(), materials=whole)
+    found = opened(without, "probes", tmp_path)
+    assert found.embree.alpha_test is None
+    assert not constants(found)["has_alpha_test"]
+    assert not (tmp_path / "probes.zarr" / "alpha_masks").exists()

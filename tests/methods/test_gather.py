@@ -1,0 +1,437 @@
+"""Reflected light in pictures: its kernel against plain NumPy, its pictures against path tracing and against bakes."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import numpy_reference as ref
+import pytest
+from analytic_terms import ANALYTIC
+from exact_pictures import render_uncached
+from session_edits import BUDGET, bake_corner_scene, make_look, relative_rmse, run_until_exact
+from tiny_scenes import make_camera, make_tiny_scene, quad
+
+from relume.assets.environments.equirect import texel_directions
+from relume.brdf.albedo import pack_reflectance, reflectance, unpack_reflectance
+from relume.brdf.curves import curve_bands
+from relume.brdf.evaluate import eval_brdf
+from relume.brdf.registry import TERMS
+from relume.core.cache import Cache
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.live.fixed_camera.illumination import illumination_from_look
+from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
+from relume.look import LightPaths, validate
+from relume.math.zernike import OUTGOING_DEGREE
+from relume.methods.registry import open_transfer
+from relume.output.render_image import render_image
+from relume.patches.patch_kdtree import NO_PATCH
+from relume.patches.patches import patch_sample_points
+from relume.radiosity.patch_irradiance import PatchLight
+from relume.radiosity.reflectance_operator import IncidentLight
+from relume.radiosity.solve_bounces import solve_indirect
+from relume.raytrace.gather_rays import lattice_offsets, local_ray, make_pattern, ray_weight
+from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.reference import ReferencePoints, environment_texels
+from relume.reference.path_tracing import reference_indirect
+from relume.reference.radiance import material_lobes
+from relume.scene.model import Material
+from relume.transport.outgoing_patch_light import SIDE
+from relume.transport.projector import Projector
+from relume.transport.shading_points import GatherRays, ShadingPoints
+from relume.transport.term_contraction import contract
+
+NUM_CELLS = 90
+CURVES = [(model, c.name) for model, term in ANALYTIC.items() for c in term.curves if not c.depends_on_view]
+PLAIN = {"texture": None, "params": {}, "curves": {}}
+REFLECTANCES = (
+    pack_reflectance([{**PLAIN, "model": "lambert", "color": [0.5, 0.4, 0.3]}]),
+    pack_reflectance(
+        [
+            {**PLAIN, "model": "lambert", "color": [0.6, 0.2, 0.4], "texture": "diffuse"},
+            {**PLAIN, "model": "blinn_phong", "color": [0.1, 0.1, 0.2], "params": {"exponent": 30.0}},
+        ]
+    ),
+)
+BLACK = pack_reflectance([])
+
+
+@pytest.fixture(scope="module")
+def lights():
+    return tessellate_environment(np.random.default_rng(3).random((16, 32, 3), np.float32), 40)
+
+
+@pytest.fixture(scope="module")
+def cells(lights):
+    rng = np.random.default_rng(4)
+    normal = ref.unit(rng.normal(size=(NUM_CELLS, 4, 3))).astype(np.float32)
+    visible = rng.integers(0, 256, (NUM_CELLS, 4, (lights.num_lights + 7) // 8)).astype(np.uint8)
+    links = rng.integers(0, NUM_CELLS, (NUM_CELLS, 16)).astype(np.uint16)
+    material = rng.integers(0, 2, NUM_CELLS).astype(np.uint16)
+    points = patch_sample_points(normal, normal)
+    return PatchLight(
+        points, visible, links, make_pattern(4, 0, 9), material, rng.random((2, NUM_CELLS, 3), np.float32)
+    )
+
+
+def sent_by_cells(cells, lights, first=1, last=24, reflectances=REFLECTANCES):
+    reflecting = cells.reflectance_operator(reflectances)
+    vectors = cells.incident_coefficients(reflecting.rows, lights, OUTGOING_DEGREE)
+    return solve_indirect(
+        cells, reflecting, IncidentLight(cells.irradiance(lights), vectors), first, last
+    ).outgoing_light(cells)
+
+
+def by_square(sent):
+    """All that is sent, in every direction that is told apart. (cells, squares, 3)"""
+    found = np.repeat(sent.isotropic[:NUM_CELLS, None].astype(float), SIDE * SIDE, axis=1)
+    has = sent.lobe[:NUM_CELLS] >= 0
+    found[has] += (sent.scale[:, None] * sent.table)[sent.lobe[:NUM_CELLS][has]]
+    return found
+
+
+@pytest.fixture(scope="module")
+def receivers(cells, lights):
+    """Points in the dark but for reflected light; a tenth of the rays finds nothing."""
+    rng = np.random.default_rng(5)
+    dark = ref.make_random_receivers(30, lights.num_lights, seed=6)
+    pattern = make_pattern(20, 13, 7)
+    links = rng.integers(0, NUM_CELLS, (30, 33)).astype(np.uint16)
+    for p in range(30):
+        wo = ref.frames(dark)[p] @ dark.wo[p]
+        for ray in range(33):
+            below = local_ray(pattern, ray, lattice_offsets(pattern, 50 + p), *wo.astype(np.float32))[2] <= 0
+            if below or rng.random() < 0.1:
+                links[p, ray] = NO_PATCH
+    rays = GatherRays(links, pattern, sent_by_cells(cells, lights))
+    points = dark.points._replace(seed=np.arange(50, 80, dtype=np.uint32))
+    return ShadingPoints(points, dark.wo, np.zeros_like(dark.visible), (rays,))
+
+
+def bands_of(model):
+    rng = np.random.default_rng(1)
+    bands = {}
+    for curve in TERMS[model].curves:
+        x = np.linspace(0, 1, curve.num_bands)
+        bands[curve.name] = rng.uniform(0.2, 1, (3, 1)) + 0.15 * np.sin(rng.uniform(3, 12, (3, 1)) * x)
+    return bands
+
+
+def image(model, bands, active, lights, receivers):
+    term = TERMS[model]
+    found = Projector(term, contract(term, bands, active), lights, receivers).project(0, len(receivers.normal))
+    return found[:, 0] if active is None else np.einsum("njc,cj->nc", found.astype(float), bands[active])
+
+
+def image_numpy(model, bands, receivers):
+    """Ray by ray, float64."""
+    term, (rays,) = TERMS[model], receivers.rays
+    out = np.zeros((len(receivers.normal), 3))
+    for p, frame in enumerate(ref.frames(receivers)):
+        wo = frame @ receivers.wo[p].astype(float)
+        shift = lattice_offsets(rays.pattern, receivers.points.seed[p])
+        for ray, cell in enumerate(rays.gather_hits[p]):
+            if cell == NO_PATCH:
+                continue
+            wi = np.array(local_ray(rays.pattern, ray, shift, *wo.astype(np.float32)))
+            weight = ray_weight(rays.pattern, *wi.astype(np.float32), *wo.astype(np.float32))
+            is_narrow = 2 * rays.pattern.num_cosine * weight < np.pi
+            value = weight * ref.evaluate_outgoing(rays.outgoing, cell, -(wi @ frame), is_narrow=is_narrow)
+            value = value * term.quotients(*wi.astype(float), *wo)
+            for curve in term.curves:
+                if not curve.depends_on_view:
+                    value = value * bands[curve.name][:, ref.find_bands(curve, wi.astype(float)[None], wo)[0]]
+            out[p] += value
+    return out
+
+
+def test_rays_are_summed_where_a_term_knows_no_direction(lights, receivers):
+    """Nothing is listed then; a surface that is seen from behind sends nothing."""
+    bands = {"theta_i": np.full((3, 64), [[0.5], [1.0], [0.25]])}
+    behind = replace(receivers, wo=np.where(np.arange(30)[:, None] < 3, -receivers.wo, receivers.wo))
+    expected = image_numpy("lambert", bands, behind)
+    found = image("lambert", bands, None, lights, behind)
+    np.testing.assert_allclose(found, expected, rtol=2e-5, atol=1e-6 * expected.max())
+    assert expected[3:].min() > 0
+    assert not expected[:3].any()
+
+
+@pytest.mark.parametrize("model", list(ANALYTIC))
+def test_rays_are_added_as_plain_numpy_adds_them(model, lights, receivers):
+    bands = bands_of(model)
+    expected = image_numpy(model, bands, receivers)
+    found = image(model, bands, None, lights, receivers)
+    # an angle within rounding of a band's edge may fall to either side
+    np.testing.assert_allclose(found, expected, rtol=5e-3, atol=5e-3 * np.abs(expected).max())
+    assert np.median(np.abs(found - expected)) < 1e-4 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize(("model", "curve"), CURVES)
+def test_any_curve_may_be_the_free_one(model, curve, lights, receivers):
+    bands = bands_of(model)
+    none = image(model, bands, None, lights, receivers)
+    np.testing.assert_allclose(image(model, bands, curve, lights, receivers), none, rtol=1e-4, atol=2e-6 * none.max())
+
+
+def test_several_settings_at_once_are_those_one_by_one(lights, receivers):
+    bands = bands_of("cook_torrance")
+    name = TERMS["cook_torrance"].curves[0].name
+    several = np.stack([bands[name] * k for k in (1.0, 2.0, 0.5)], axis=1)
+    term = TERMS["cook_torrance"]
+    together = Projector(term, contract(term, {**bands, name: several}, None), lights, receivers).project(0, 30)
+    for k in range(3):
+        alone = image("cook_torrance", {**bands, name: several[:, k]}, None, lights, receivers)
+        np.testing.assert_allclose(together[:, k], alone, rtol=1e-4, atol=1e-6 * alone.max())
+
+
+def test_reflected_light_adds_to_the_lights_own(lights, receivers):
+    lit = ref.only_above(ref.make_random_receivers(30, lights.num_lights, seed=6), lights)
+    both = replace(receivers, visible=lit.visible)
+    bands = bands_of("blinn_phong")
+    parts = [image("blinn_phong", bands, None, lights, r) for r in (lit, receivers)]
+    np.testing.assert_allclose(image("blinn_phong", bands, None, lights, both), sum(parts), rtol=1e-5)
+
+
+def test_black_surfaces_reflect_nothing_and_number_of_bounces_counts(cells, lights):
+    black = sent_by_cells(cells, lights, 1, 5, (BLACK, BLACK))
+    assert not by_square(black).any()
+    by_bounces = [by_square(sent_by_cells(cells, lights, 1, n)).sum() for n in (1, 2, 3, 25, 26)]
+    assert by_bounces[0] < by_bounces[1] < by_bounces[2] < by_bounces[3]
+    assert by_bounces[4] == pytest.approx(by_bounces[3], rel=1e-4)
+
+
+def test_first_and_further_reflections_are_all_of_them(cells, lights):
+    for split in (1, 2, 3):  # directions are kept for some of them
+        parts = [by_square(sent_by_cells(cells, lights, *which)) for which in ((1, split), (split + 1, 6), (1, 6))]
+        np.testing.assert_allclose(parts[0] + parts[1], parts[2], rtol=1e-3, atol=1e-4 * parts[2].max())
+        assert np.all(parts[1].sum(axis=(0, 1)) > 0)
+
+
+def test_reflectance_takes_each_texture_where_a_term_names_it(cells):
+    found = cells.reflectance_operator(REFLECTANCES)
+    known = [unpack_reflectance(of_material)[..., 0] for of_material in REFLECTANCES]
+    expected = np.where(cells.material[:, None] == 0, known[0][0], known[1][0] + known[1][1] * cells.textures[0])
+    np.testing.assert_allclose(found.reflectance, np.minimum(expected, 1), rtol=1e-5)
+    np.testing.assert_array_equal(found.rows, np.flatnonzero(cells.material == 1))
+
+
+def test_reflectance_of_diffuse_terms():
+    lambert = {"model": "lambert", "color": [0.2, 0.5, 0.9], "texture": None, "params": {}, "curves": {}}
+    np.testing.assert_allclose(reflectance(lambert), [0.2, 0.5, 0.9], rtol=1e-6)
+    rough = {**lambert, "model": "oren_nayar", "params": {"sigma": 0.5}}
+    assert 0.5 < reflectance(rough)[1] / 0.5 < 1.0
+
+
+def test_reflectance_of_highlights():
+    """Of a cosine lobe cos^s in θh it is known; a mirror of any width reflects all where its Fresnel curve does."""
+    plain = {"color": [1.0, 0.5, 0.0], "texture": None, "curves": {}}
+    for exponent in (5.0, 400.0, 20_000.0):
+        blinn = {**plain, "model": "blinn_phong", "params": {"exponent": exponent}}
+        np.testing.assert_allclose(reflectance(blinn), _by_drawing(blinn), rtol=0.02)
+    lambert = {**plain, "model": "lambert", "params": {}}
+    both = unpack_reflectance(pack_reflectance([lambert, {**blinn, "texture": "specular"}]))[..., 0]
+    np.testing.assert_allclose(both[0], [1.0, 0.5, 0.0], rtol=1e-6)
+    np.testing.assert_allclose(both[2], reflectance(blinn), atol=0.5 / 128)
+
+
+def _by_drawing(document):
+    """The same by Monte Carlo: ωi drawn by the term's own lobe."""
+    rng = np.random.default_rng(3)
+    r, phi = np.sqrt(rng.random(4000)), 2 * np.pi * rng.random(4000)
+    wo = np.stack([r * np.cos(phi), r * np.sin(phi), np.sqrt(1 - r * r)], axis=-1)
+    lobe = material_lobes([document])[1]
+    wi = lobe.draw(wo, 64, rng)
+    weight = np.where(wi[..., 2] > 0, wi[..., 2] / np.maximum(lobe.pdf(wi, wo), 1e-12), 0.0)
+    wi[wi[..., 2] <= 0] = [0.0, 0.0, 1.0]
+    return (eval_brdf(document, wi, wo[:, None]) * weight[..., None]).mean(axis=(0, 1))
+
+
+def default_look(transfer):
+    return validate(transfer.default_look, transfer.default_look)
+
+
+def against_paths(scene, transfer, index, every, spp):
+    """Light that surfaces have reflected onto samples of a material, and by path tracing with its variance. (n, 3)"""
+    view, look, name = transfer.views["front"], default_look(transfer), transfer.material_names[index]
+    reflected = transfer.outgoing_patch_light(illumination_from_look(look, transfer.material_names, has_bounces=True))
+    rows, lit = view.rows(index), view.receivers(index, reflected)
+    chosen, dark = np.arange(0, rows.stop - rows.start, every), replace(lit, visible=0 * lit.visible)
+    radiance = np.zeros((len(lit.normal), 3))
+    for document in look.materials[name].terms:
+        bands = {c.name: curve_bands(document, c) for c in TERMS[document["model"]].curves}
+        radiance += image(document["model"], bands, None, transfer.lights, dark) * document["color"]
+    position = view.store.read("views/0/position", rows.start, rows.stop)
+    ones = np.ones_like(position)
+    points = ReferencePoints(position, lit.normal, lit.tangent, lit.wo, {"diffuse": ones, "specular": ones}, ones[:, 0])
+    points = points.samples_of(chosen)
+    traced = (
+        build_scene_buffers(scene),
+        environment_texels(scene.environment),
+        look,
+        points,
+        np.full(len(chosen), index),
+    )
+    found = reference_indirect(scene, *traced, [LightPaths(False, 1, 4)], 48, spp, seed=index)
+    return radiance[chosen], found.mean[0], found.variance[0], position[chosen]
+
+
+def test_gathered_light_is_that_of_path_tracing(corner, gathered):
+    """Some hundred points: their mean by a percent, each within the noise of paths and rays."""
+    parts = [against_paths(corner, gathered, index, 12, 24)[:3] for index in range(len(gathered.material_names))]
+    found, expected, variance = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    deviation = np.sqrt(variance.sum(axis=0)) / len(found)  # of the mean
+    assert np.all(np.abs(found.mean(axis=0) - expected.mean(axis=0)) < 4 * deviation + 0.01 * expected.mean(axis=0))
+    square, noise = ((found - expected) ** 2).mean(), variance.mean()
+    assert np.sqrt(max(0.0, square - noise) / (expected**2).mean()) < 0.12
+
+
+def test_a_metal_floor_throws_light_where_it_goes(tmp_path):
+    """A sun low in the west over rough metal: the eastern wall gets almost twice what the northern one gets."""
+    sky = np.full((32, 64, 3), 0.02, np.float32)
+    sun = ref.unit(np.array([-0.75, 0.66, 0.0]))
+    sky[texel_directions(32, 64) @ sun > 0.95] = 20.0
+    white = Material("White", [{"model": "lambert", "color": [0.7, 0.7, 0.7], "texture": None}])
+    rough = {"model": "ggx", "color": [1, 1, 1], "texture": None, "params": {"roughness": 0.55, "f0": 0.9}}
+    floor = quad("floor", [(-1, 0, 1), (1, 0, 1), (1, 0, -1), (-1, 0, -1)], 1)
+    east = quad("east", [(1, 0, -1), (1, 0, 1), (1, 1.2, 1), (1, 1.2, -1)], 0, (0, 0, 1))
+    north = quad("north", [(-1, 0, -1), (1, 0, -1), (1, 1.2, -1), (-1, 1.2, -1)], 0)
+    eye = make_camera("front", (-0.9, 0.9, 2.2), (0.2, 0.5, -0.3), 0.9)
+    scene = make_tiny_scene(
+        floor, east, north, camera=eye, environment=sky, materials=[white, Material("Metal", [rough])]
+    )
+    transfer = bake_corner_scene(scene, "gather", tmp_path)
+    found, expected, variance, place = against_paths(scene, transfer, 0, 1, 64)  # its noise is that of the 48 paths
+    means = []
+    for wall in (place[:, 0] > 0.99, place[:, 2] < -0.99):
+        mean, truth = found[wall].mean(), expected[wall].mean()
+        deviation = np.sqrt(variance[wall].sum(axis=0)).mean() / wall.sum()  # channels have the same paths
+        assert abs(mean - truth) < 0.04 * truth + 3 * deviation
+        assert deviation < 0.03 * truth
+        means.append(truth)
+    assert means[0] > 1.5 * means[1]
+
+
+def test_colours_of_the_look_are_those_of_a_bake_with_them(corner, gathered, tmp_path):
+    """The wall made green in the editor: what it throws onto the floor is what a bake of a green wall gives."""
+
+    def green(document):
+        document["materials"]["Red"]["terms"][0]["color"] = [0.1, 0.7, 0.2]
+
+    edited = render_image(gathered, "front", make_look(gathered, green))
+    terms = copy.deepcopy(corner.materials[1].terms)
+    terms[0]["color"] = [0.1, 0.7, 0.2]
+    materials = [corner.materials[0], Material("Red", terms), corner.materials[2]]
+    other = make_tiny_scene(
+        *corner.meshes, camera=corner.cameras[0], environment=corner.environment.radiance, materials=materials
+    )
+    green_bake = bake_corner_scene(other, "gather", tmp_path)
+    expected = render_image(green_bake, "front", default_look(green_bake))
+    before = render_image(gathered, "front", default_look(gathered))
+    assert np.abs(edited - before).mean() > 0.05 * before.mean()
+    # other seeds, other cells: what is compared is the light, not its noise
+    assert np.abs(edited - expected).mean() < 0.02 * expected.mean()
+
+
+@pytest.fixture(scope="module")
+def direct(corner, tmp_path_factory):
+    return bake_corner_scene(corner, "direct", tmp_path_factory.mktemp("direct"))
+
+
+def test_without_reflection_a_picture_is_the_direct_one(gathered, direct):
+    """All diffuse terms black: what is left has the lights' own light only."""
+
+    def black(document):
+        for material in document["materials"].values():
+            material["terms"][0]["color"] = [0.0, 0.0, 0.0]
+
+    expected = render_image(direct, "front", make_look(direct, black))
+    np.testing.assert_allclose(render_image(gathered, "front", make_look(gathered, black)), expected, rtol=1e-5)
+    brighter = render_image(gathered, "front", default_look(gathered)) - render_image(
+        direct, "front", default_look(direct)
+    )
+    assert brighter.min() > -1e-5
+    assert brighter.mean() > 0.02
+
+
+def showing(transfer, show, bounces=24):
+    """The picture of some paths only."""
+
+    def change(document):
+        document["transport"] = {"show": show, "bounces": bounces}
+
+    return render_uncached(transfer, make_look(transfer, change))
+
+
+def test_pictures_of_some_paths_add_up_to_that_of_all(gathered):
+    whole = render_image(gathered, "front", default_look(gathered))
+    parts = [showing(gathered, show) for show in ("direct", "first_bounce", "further_bounces")]
+    np.testing.assert_allclose(sum(parts), whole, rtol=1e-4, atol=1e-6)
+    assert all(part.mean() > 0.005 * whole.mean() for part in parts)
+
+
+def test_bounces_are_counted_from_direct_light(gathered, direct):
+    unreflected = showing(gathered, "direct")
+    np.testing.assert_array_equal(showing(gathered, "all", 0), unreflected)
+    np.testing.assert_array_equal(unreflected, render_image(direct, "front", default_look(direct)))
+    one = showing(gathered, "all", 1)
+    np.testing.assert_allclose(one - unreflected, showing(gathered, "first_bounce"), atol=2e-5)
+    assert not showing(gathered, "further_bounces", 1).any()
+    assert not showing(gathered, "first_bounce", 0).any()
+    for show in ("first_bounce", "further_bounces"):
+        assert not showing(direct, show).any()
+    np.testing.assert_array_equal(showing(direct, "all", 3), unreflected)
+
+
+def test_what_is_shown_may_change_in_a_session(gathered, monkeypatch):
+    """From reflected light alone, glimpsed before there is any other, to all light."""
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 300)
+    picture = Picture(gathered, "front", Cache(BUDGET))
+    for show in ("first_bounce", "all", "direct"):
+
+        def change(document, show=show):
+            document["transport"]["show"] = show
+
+        picture.set_look(make_look(gathered, change))
+        if show == "all":
+            picture.advance(None)
+            need = picture.next_job()
+            assert isinstance(need, SparsePreview)
+            picture.install(need, need.run(lambda share: None, lambda: False))
+            picture.advance(None)
+            glimpse = picture.image()
+            exact = run_until_exact(picture).image()
+            assert relative_rmse(glimpse, exact) < 0.5 * relative_rmse(showing(gathered, "first_bounce"), exact)
+        np.testing.assert_array_equal(run_until_exact(picture).image(), showing(gathered, show))
+
+
+def test_a_thinned_bake_has_the_same_light(gathered, monkeypatch):
+    """Its samples keep the rays that were traced for them; its neighbours are others."""
+    monkeypatch.setattr("relume.views.view.make_neighbor_filter", lambda *of_samples: None)
+    transfer, step = open_transfer(Path(gathered.key), Cache(1 << 30)), 3
+    whole = Picture(transfer, "front", Cache(BUDGET))
+    few = Picture(transfer.downsampled("front", step), "front", Cache(BUDGET))
+    for picture in (whole, few):  # no look whose images are kept beside the store
+        picture.set_look(make_look(transfer, lambda document: document["transport"].update(bounces=5)))
+    np.testing.assert_allclose(
+        run_until_exact(few).image(), run_until_exact(whole).image()[::step, ::step], rtol=1e-4, atol=1e-6
+    )
+
+
+def test_light_that_is_turned_is_glimpsed_with_what_it_reflects(gathered, monkeypatch):
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 300)
+    picture = run_until_exact(Picture(gathered, "front", Cache(BUDGET)))
+
+    def turn(document):
+        document["environment"]["rotation"] = 90.0
+
+    picture.set_look(make_look(gathered, turn))
+    picture.advance(None)
+    still, need = picture.image(), picture.next_job()
+    assert isinstance(need, SparsePreview)
+    picture.install(need, need.run(lambda share: None, lambda: False))
+    assert not picture.advance(None).exact
+    glimpse, exact = picture.image(), run_until_exact(picture).image()
+    assert relative_rmse(glimpse, exact) < 0.7 * relative_rmse(still, exact)

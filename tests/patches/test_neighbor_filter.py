@@ -1,0 +1,144 @@
+"""What gather rays bring, shared among neighbours: which samples are neighbours, and what the projector makes of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy_reference as ref
+import pytest
+from analytic_terms import ANALYTIC
+from scipy.sparse import csr_array
+
+from relume.brdf.registry import TERMS
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.patches.neighbor_filter import FilterWeights, NeighborFilter
+from relume.raytrace.gather_rays import make_pattern
+from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE, SurfacePoints
+from relume.transport.outgoing_patch_light import isotropic
+from relume.transport.projector import Projector
+from relume.transport.shading_points import GatherRays
+from relume.transport.term_contraction import contract
+from relume.views.gather_filter import make_neighbor_filter
+
+WIDTH, HEIGHT = 9, 7
+
+
+def grid(keep=None):
+    """Samples of a floor, one for each pixel, in an order of their own."""
+    pixel = np.random.default_rng(1).permutation(WIDTH * HEIGHT).astype(np.uint32)
+    pixel = pixel if keep is None else pixel[keep(pixel)]
+    position = np.stack([pixel % WIDTH, 0 * pixel, pixel // WIDTH], axis=1).astype(np.float32)
+    return pixel, position, np.tile(np.array([0, 1, 0], np.float32), (len(pixel), 1))
+
+
+def shared_by(pixel, position, normal, chance=FIXED_ALPHA_SAMPLE, **options):
+    points = SurfacePoints(position, normal, np.zeros_like(normal), pixel, chance)
+    return make_neighbor_filter(pixel, WIDTH, points, **options)
+
+
+def by_hand(pixel, is_same):
+    """Every pair of samples, one after another."""
+    weights = np.zeros((len(pixel), len(pixel)))
+    for a, pa in enumerate(pixel.astype(int)):
+        for b, pb in enumerate(pixel.astype(int)):
+            dx, dy = abs(pa % WIDTH - pb % WIDTH), abs(pa // WIDTH - pb // WIDTH)
+            if a == b or (max(dx, dy) <= 1 and is_same(a, b)):
+                weights[a, b] = (2 - dx) * (2 - dy) / np.count_nonzero(pixel == pb)
+    return weights / weights.sum(axis=1, keepdims=True)
+
+
+def test_pixels_around_share_by_a_tent_and_edges_of_the_picture_by_what_is_there():
+    pixel, position, normal = grid()
+    found = shared_by(pixel, position, normal).diffuse.matrix
+    np.testing.assert_allclose(found.toarray(), by_hand(pixel, lambda a, b: True), rtol=1e-6)
+    np.testing.assert_allclose(found.sum(axis=1), 1, rtol=1e-6)
+
+
+def test_samples_of_one_pixel_count_as_one():
+    pixel, position, normal = (np.concatenate([a, a[:20]]) for a in grid())
+    found = shared_by(pixel, position, normal).diffuse.matrix
+    np.testing.assert_allclose(found.toarray(), by_hand(pixel, lambda a, b: True), rtol=1e-6)
+
+
+def test_other_pieces_of_a_surface_take_no_part():
+    """A wall that meets the floor, and a step in it."""
+    pixel, position, normal = grid()
+    x, y = pixel % WIDTH, pixel // WIDTH
+    normal[x > 4] = [1, 0, 0]
+    position[(x <= 4) & (y > 3), 1] += 0.5
+    found = shared_by(pixel, position, normal).diffuse.matrix.toarray()
+    piece = np.where(x > 4, 2, np.where(y > 3, 1, 0))
+    flat = piece != 2  # on the wall, depth as the floor has it is a rise
+    assert not found[piece[:, None] != piece[None, :]].any()
+    expected = by_hand(pixel, lambda a, b: piece[a] == piece[b])
+    np.testing.assert_allclose(found[np.ix_(flat, flat)], expected[np.ix_(flat, flat)], rtol=1e-6)
+
+
+def test_samples_of_different_channels_share_nothing():
+    pixel, position, normal = (np.concatenate([a, a]) for a in grid())
+    chance = np.repeat(np.array([-3, -4], np.float32), len(pixel) // 2)
+    found = shared_by(pixel, position, normal, chance).diffuse.matrix.toarray()
+    assert not found[chance[:, None] != chance].any()
+    np.testing.assert_allclose(found.sum(axis=1), 1, rtol=1e-6)
+
+
+def test_highlights_are_shared_by_what_is_turned_alike():
+    """Every other column of a floor is turned, first a little, then more; for what is scattered all are alike."""
+    pixel, position, normal = grid()
+    is_turned = pixel % WIDTH % 2
+
+    def both(degrees):
+        angle = np.radians(degrees) * is_turned
+        normal[:, 0], normal[:, 1] = np.sin(angle), np.cos(angle)
+        found = shared_by(pixel, position, normal)
+        return found.diffuse.matrix.toarray(), found.highlights.matrix.toarray()
+
+    all_alike = by_hand(pixel, lambda a, b: True)
+    for found in (*both(2.0), both(5.0)[0]):
+        np.testing.assert_allclose(found, all_alike, rtol=1e-6)
+    np.testing.assert_allclose(both(5.0)[1], by_hand(pixel, lambda a, b: is_turned[a] == is_turned[b]), rtol=1e-6)
+
+
+def test_tents_follow_each_other_and_highlights_have_one():
+    pixel, position, normal = grid(lambda pixel: pixel % 5 > 0)
+    found = shared_by(pixel, position, normal, num_passes=3)
+    assert (found.diffuse.num_passes, found.highlights.num_passes) == (3, 1)
+    rings, among = found.diffuse.find_dependencies(4, 11)
+    values = np.random.default_rng(9).random((len(pixel), 3))
+    once = by_hand(pixel, lambda a, b: True)
+    shared = values[among]
+    for within in reversed(rings):
+        shared = within @ shared
+    np.testing.assert_allclose(shared, (once @ once @ once @ values)[4:11], rtol=1e-5)
+
+
+@pytest.mark.parametrize("times", [1, 2])
+@pytest.mark.parametrize("model", ["lambert", "cook_torrance"])
+@pytest.mark.parametrize("is_active", [False, True])
+def test_projected_points_are_the_weighted_mean_of_points_alone(model, is_active, times):
+    """Free curves and contracted ones, in ranges of any length; light of the environment is not shared."""
+    rng, num = np.random.default_rng(2), 70
+    lights = tessellate_environment(rng.random((16, 32, 3), np.float32), 40)
+    points = ref.make_random_receivers(num, lights.num_lights, seed=3)
+    links = rng.integers(0, 50, (num, 24)).astype(np.uint16)
+    radiance = rng.random((1 << 16, 3), np.float32)
+    alone = GatherRays(links, make_pattern(16, 8, 5), isotropic(radiance))
+    weights = csr_array(rng.random((num, num)) * (rng.random((num, num)) < 0.1) + np.eye(num)).astype(np.float32)
+    term = TERMS[model]
+    curve = next(c for c in ANALYTIC[model].curves if not c.depends_on_view)
+    bands = {c.name: rng.random((3, c.num_bands)) for c in term.curves}
+    contraction = contract(term, bands, curve.name if is_active else None)
+
+    def project(rays, ranges):
+        projector = Projector(term, contraction, lights, replace(points, rays=rays))
+        return np.concatenate([projector.project(*of) for of in ranges])
+
+    dark = project((), [(0, num)])
+    separate = project((alone,), [(0, num)]) - dark
+    nobody = FilterWeights(csr_array((num, num), dtype=np.float32), 1)
+    of_term = FilterWeights(csr_array(weights / weights.sum(axis=1)[:, None]), times)
+    both = NeighborFilter(of_term, nobody) if model == "lambert" else NeighborFilter(nobody, of_term)
+    shared = project((replace(alone, sharing=both),), [(0, 50), (50, num)]) - dark
+    expected = np.einsum("pq,qjc->pjc", np.linalg.matrix_power(of_term.matrix.toarray(), times), separate)
+    np.testing.assert_allclose(shared, expected, rtol=2e-4, atol=2e-5 * np.abs(expected).max())

@@ -1,0 +1,97 @@
+"""Light between cells as a moving hand sees it, against what is exact."""
+
+import numpy as np
+import numpy_reference as ref
+import pytest
+from session_edits import relative_rmse
+
+from relume.brdf.albedo import pack_reflectance
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.math.zernike import OUTGOING_DEGREE
+from relume.patches.patch_kdtree import NO_PATCH
+from relume.patches.patches import patch_sample_points
+from relume.radiosity.coarse_irradiance import incident_fast
+from relume.radiosity.patch_irradiance import PatchLight
+from relume.radiosity.reflectance_operator import IncidentLight
+from relume.radiosity.solve_bounces import OutgoingRadiance, solve_indirect, solve_indirect_fast
+from relume.raytrace.gather_rays import cosine_ray, lattice_offsets, make_pattern
+from relume.transport.direction_bins import incoming_bins, outgoing_bins
+from relume.transport.outgoing_patch_light import NUM_OUTGOING, bin_means, bin_of
+
+NUM_CELLS = 60
+PLAIN = {"texture": None, "params": {}, "curves": {}}
+MATT = pack_reflectance([{**PLAIN, "model": "lambert", "color": [0.5, 0.4, 0.3]}])
+SHINY = pack_reflectance([{**PLAIN, "model": "blinn_phong", "color": [0.4, 0.3, 0.5], "params": {"exponent": 20.0}}])
+
+
+@pytest.fixture(scope="module")
+def cells():
+    """Flat ones, whose rays hit each other anywhere; a tenth hits nothing."""
+    rng = np.random.default_rng(4)
+    normal = np.repeat(ref.unit(rng.normal(size=(NUM_CELLS, 1, 3))), 4, axis=1).astype(np.float32)
+    visible = rng.integers(0, 256, (NUM_CELLS, 4, 5)).astype(np.uint8)
+    links = rng.integers(0, NUM_CELLS, (NUM_CELLS, 4 * 55)).astype(np.uint16)
+    links[rng.random(links.shape) < 0.1] = NO_PATCH
+    material, white = np.arange(NUM_CELLS).astype(np.uint16) % 2, np.ones((2, NUM_CELLS, 3), np.float32)
+    return PatchLight(patch_sample_points(normal, normal), visible, links, make_pattern(55, 0, 9), material, white)
+
+
+@pytest.fixture(scope="module")
+def arrived(cells):
+    lights = tessellate_environment(np.random.default_rng(3).random((16, 32, 3), np.float32), 40)
+    return IncidentLight(
+        cells.irradiance(lights), cells.incident_coefficients(np.arange(1, NUM_CELLS, 2), lights, OUTGOING_DEGREE)
+    )
+
+
+def test_squares_are_those_of_the_rays(cells):
+    points, links, pattern, frames = cells.points, cells.gather_hits.reshape(-1, 55), cells.pattern, cells.frames
+    leaving = outgoing_bins(points, links, pattern, frames)
+    coming = incoming_bins(points, 4, pattern, frames)
+    for p in (0, 7, 100):
+        shift = lattice_offsets(pattern, points.seed[p])[0]
+        n, t = points.normal[p], points.tangent[p]
+        for ray in range(55):
+            away = np.array(cosine_ray(pattern.rays[ray], shift)) @ np.array([t, np.cross(n, t), n])
+            assert coming[p, ray] == bin_of(frames, p // 4, *away.astype(np.float32))
+            cell = links[p, ray]
+            assert leaving[p, ray] == (0 if cell == NO_PATCH else bin_of(frames, cell, *-away.astype(np.float32)))
+
+
+def test_what_arrives_quickly_is_what_arrives_in_squares(cells, arrived):
+    reflecting = cells.reflectance_operator((MATT, SHINY))
+    even, vectors = reflecting.apply(arrived)
+    now = OutgoingRadiance(even, reflecting.rows, vectors, reflecting.roughening).outgoing_light(cells)
+    exact, quick = cells.incident_light(now, reflecting.rows), incident_fast(cells, now, reflecting.rows)
+    np.testing.assert_allclose(quick.irradiance, exact.irradiance, rtol=1e-4)
+    assert relative_rmse(quick.coefficients[..., :6], exact.coefficients[..., :6]) < 0.05
+    in_squares, lobe = np.zeros((30, 3, NUM_OUTGOING)), now.lobe[cells.gather_hits]
+    light = now.isotropic[cells.gather_hits].astype(float)
+    light += np.where(lobe[..., None] >= 0, now.scale[lobe] * now.table[lobe, cells.outgoing_bins], 0)
+    for row, cell in enumerate(reflecting.rows):
+        in_squares[row] = np.pi / 220 * light[cell].T @ bin_means().T[cells.incident_bins[cell]]
+    np.testing.assert_allclose(quick.coefficients, in_squares, atol=1e-5)
+
+
+@pytest.mark.parametrize(("first", "last"), [(1, 1), (1, 24), (2, 2), (3, 5)])
+@pytest.mark.parametrize("wall", [MATT, SHINY])
+def test_what_is_sent_quickly_is_about_what_is_sent(cells, arrived, wall, first, last):
+    reflecting = cells.reflectance_operator((MATT, wall))
+    known = IncidentLight(arrived.irradiance, arrived.coefficients[: len(reflecting.rows)])
+    exact, quick = (of(cells, reflecting, known, first, last) for of in (solve_indirect, solve_indirect_fast))
+    assert relative_rmse(quick.isotropic, exact.isotropic) < 0.03
+    assert np.linalg.norm(quick.coefficients - exact.coefficients) <= 0.05 * np.linalg.norm(exact.coefficients)
+
+
+def test_a_difference_knows_the_rows_of_both():
+    rng = np.random.default_rng(1)
+    even, vectors = rng.random((2, 5, 3)).astype(np.float32), rng.random((2, 2, 3, NUM_OUTGOING)).astype(np.float32)
+    falls = np.array([[0.1, 0.2], [0.3, 0.4]], np.float32)
+    one, other = (
+        OutgoingRadiance(even[k], np.array(rows), vectors[k], falls[k]) for k, rows in enumerate(([0, 3], [3, 4]))
+    )
+    found = one.subtract(other)
+    np.testing.assert_array_equal(found.isotropic, even[0] - even[1])
+    np.testing.assert_array_equal(found.rows, [0, 3, 4])
+    np.testing.assert_array_equal(found.roughening, [falls[0, 0], falls[0, 1], falls[1, 1]])
+    np.testing.assert_array_equal(found.coefficients, [vectors[0, 0], vectors[0, 1] - vectors[1, 0], -vectors[1, 1]])

@@ -1,0 +1,198 @@
+"""Light that comes straight to cells with sharp highlights, by tables, against the BRDF itself."""
+
+import json
+
+import numpy as np
+import numpy_reference as ref
+import pytest
+
+from relume.brdf.albedo import narrow_lobes, pack_reflectance, reflectance_matrix, unpack_lobes
+from relume.brdf.evaluate import eval_brdf
+from relume.brdf.highlight_tables import lobe_table
+from relume.lights.spherical_triangles import tessellate_environment
+from relume.math.direction_grid import (
+    NUM_FINE_BINS,
+    SIDE,
+    bin_index,
+    bin_solid_angles,
+    directions_at,
+    fine_bin_centers,
+    reflected_bins,
+)
+from relume.patches.patches import patch_sample_points
+from relume.radiosity.highlight_transport import DirectLobes, outgoing_in_highlights
+from relume.radiosity.outgoing_radiance import BinnedRadiance, first_bounce
+from relume.radiosity.patch_irradiance import PatchLight
+from relume.radiosity.reflectance_operator import IncidentLight
+from relume.raytrace.gather_rays import make_pattern
+
+PLAIN = {"texture": None, "curves": {}}
+NUM_CELLS = 12
+
+
+def metal(roughness, color=(1.0, 1.0, 1.0)):
+    return {**PLAIN, "model": "ggx", "color": list(color), "params": {"roughness": roughness, "f0": 0.9}}
+
+
+MATT = {**PLAIN, "model": "lambert", "color": [0.3, 0.2, 0.1], "params": {}}
+
+
+def cells_of(normal):
+    rng = np.random.default_rng(4)
+    visible = rng.integers(0, 256, (NUM_CELLS, 4, 6)).astype(np.uint8)
+    links = np.zeros((NUM_CELLS, 4 * 5), np.uint16)
+    material, white = np.zeros(NUM_CELLS, np.uint16), np.ones((2, NUM_CELLS, 3), np.float32)
+    points = patch_sample_points(normal, normal)
+    return PatchLight(points, visible, links, make_pattern(5, 0, 9), material, white)
+
+
+def flat(spread=0.0):
+    rng = np.random.default_rng(7)
+    one = np.repeat(ref.unit(rng.normal(size=(NUM_CELLS, 1, 3))), 4, axis=1)
+    return ref.unit(one + spread * rng.normal(size=one.shape)).astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def lights():
+    return tessellate_environment(np.random.default_rng(3).random((16, 32, 3), np.float32), 48)
+
+
+def mean_over_squares(document, wi):
+    """A term seen in each square by light from one direction, its mean over 64 places, by the cosine. (3, squares)"""
+    place = (np.arange(SIDE * 8) + 0.5) * (2 / (SIDE * 8)) - 1
+    x, y = np.meshgrid(place, place, indexing="ij")
+    wo = directions_at(x, y)
+    weight = np.where(x * x + y * y < 1, wo[..., 2] * (1 + wo[..., 2]) ** 2, 1e-12)
+    value = eval_brdf(document, wi, wo) * weight[..., None]
+    squares = SIDE, 8, SIDE, 8
+    return (
+        (value.reshape(*squares, 3).sum(axis=(1, 3)) / weight.reshape(squares).sum(axis=(1, 3))[..., None])
+        .reshape(SIDE * SIDE, 3)
+        .T
+    )
+
+
+@pytest.mark.parametrize("roughness", [0.3, 0.5])
+def test_tables_are_means_over_squares(roughness):
+    table, document, area = lobe_table(json.dumps(metal(roughness))), metal(roughness), bin_solid_angles()
+    for b in (0, 60, 200):
+        exact = mean_over_squares(document, fine_bin_centers()[b])
+        missed = np.sqrt(np.sum(area * (table[b] - exact) ** 2) / np.sum(area * exact**2))
+        assert missed < 0.03
+
+
+@pytest.mark.parametrize("roughness", [0.03, 0.1])
+def test_tables_of_lobes_narrower_than_squares_send_all_of_them(roughness):
+    """A mirror head-on sends what it does, 0.9 of it, wherever in a square the lobe lies."""
+    sent = lobe_table(json.dumps(metal(roughness)))[:60] @ bin_solid_angles()
+    np.testing.assert_allclose(sent, 0.9, rtol=0.02)
+
+
+def test_mirrorings_take_squares_where_they_take_directions():
+    rng = np.random.default_rng(1)
+    wo = ref.unit(rng.normal(size=(500, 3))) * [1, 1, np.sign(1)]
+    wo[:, 2] = np.abs(wo[:, 2])
+    for mirroring, squares in enumerate(reflected_bins()):
+        moved = wo * [-1 if mirroring & 1 else 1, -1 if mirroring & 2 else 1, 1]
+        moved = moved[:, [1, 0, 2]] if mirroring & 4 else moved
+        np.testing.assert_array_equal(squares[bin_index(wo)], bin_index(moved))
+
+
+def expected(cells, lights, documents, cell):
+    """What a cell sends by squares, light by light and point by point. (3, squares)"""
+    t, b = cells.frames[cell].astype(float)
+    n, out = np.cross(t, b), np.zeros((3, SIDE * SIDE))
+    for p, normal in enumerate(cells.points.normal.reshape(-1, 4, 3)[cell].astype(float)):
+        seen = np.unpackbits(cells.visible[cell, p], bitorder="little")[: lights.num_lights]
+        for m in np.flatnonzero(seen):
+            d = lights.direction[m].astype(float)
+            if (cosine := d @ normal) <= 0:
+                continue
+            away = 2 * cosine * normal - d  # mirrored as the point does, and back as the cell does
+            like = 2 * (n @ away) * n - away
+            wi = np.array([t @ like, b @ like, max(n @ like, 1e-3)])
+            values = sum(mean_over_squares(document, wi / np.linalg.norm(wi)) for document in documents)
+            out += cosine / 4 * lights.irradiance[m].astype(float)[:, None] * values
+    return out
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.1])
+def test_cells_send_lights_as_their_highlights_do(lights, spread):
+    cells, documents = cells_of(flat(spread)), [metal(0.5, (0.5, 0.8, 0.3))]
+    reflectances = (pack_reflectance([MATT, *documents]),)
+    lobes = cells.highlight_tables(reflectances, cells.reflectance_operator(reflectances))
+    found = outgoing_in_highlights(cells, lobes, DirectLobes(lights, cells.visibility_bits(lobes.rows)))
+    area = bin_solid_angles()
+    exact = expected(cells, lights, unpack_lobes(reflectances[0]), 3)
+    assert np.sqrt(np.sum(area * (found[3] - exact) ** 2) / np.sum(area * exact**2)) < 0.06
+    np.testing.assert_allclose(found[3] @ area, exact @ area, rtol=0.04)
+
+
+_LOCAL = fine_bin_centers()[60]
+
+
+class _OneRay:
+    """A light that comes to every point from one side, as one ray."""
+
+    max_rays_per_point = 1
+
+    def list_into(self, listed, receivers, start, stop):
+        num = stop - start
+        listed.first[: num + 1] = np.arange(num + 1)
+        listed.wi[:, :num], listed.irradiance[:, :num] = _LOCAL[:, None], [[1], [2], [3]]
+        return num
+
+
+def test_rays_of_lamps_are_sent_as_lights_are():
+    cells, reflectances = cells_of(flat()), (pack_reflectance([metal(0.3)]),)
+    lobes = cells.highlight_tables(reflectances, cells.reflectance_operator(reflectances))
+    found = outgoing_in_highlights(cells, lobes, DirectLobes(rays=[_OneRay()]))
+    exact = mean_over_squares(unpack_lobes(reflectances[0])[0], _LOCAL) * [[1], [2], [3]]
+    for cell in range(NUM_CELLS):
+        assert np.linalg.norm(found[cell] - exact) < 0.03 * np.linalg.norm(exact)
+
+
+def test_nothing_of_a_highlight_is_sent_twice(lights):
+    """With its table, functions and the even part say what is matt alone."""
+    cells = cells_of(flat())
+    both, matt = ((pack_reflectance(terms),) for terms in ([MATT, metal(0.3)], [MATT]))
+    reflecting, plain = cells.reflectance_operator(both), cells.reflectance_operator(matt)
+    rows = reflecting.rows
+    arrived = IncidentLight(cells.irradiance(lights), cells.incident_coefficients(rows, lights, 6))
+    lobes = cells.highlight_tables(both, reflecting)
+    found = first_bounce(reflecting, arrived, (lobes, np.zeros((NUM_CELLS, 3, SIDE * SIDE), np.float32)))
+    held = plain.reflectance * reflecting.energy_scale
+    np.testing.assert_allclose(found.isotropic, held / np.pi * arrived.irradiance, atol=1e-5)
+    assert not found.coefficients.any()
+
+
+def test_only_highlights_that_functions_miss_have_tables():
+    assert narrow_lobes([metal(0.8)]) == []
+    assert narrow_lobes([{**metal(0.2), "params": {"roughness": 0.2, "f0": 0.0}, "color": [0.1, 0.1, 0.1]}]) == []
+    assert len(narrow_lobes([metal(0.2), metal(0.8)])) == 2  # all or none of a material
+    cells = cells_of(flat())
+    reflectances = (pack_reflectance([metal(0.8)]),)
+    lobes = cells.highlight_tables(reflectances, cells.reflectance_operator(reflectances))
+    assert len(lobes.rows) == 0
+    assert outgoing_in_highlights(cells, lobes, DirectLobes()).shape == (0, 3, SIDE * SIDE)
+
+
+def test_small_steps_of_a_hand_make_no_other_light():
+    assert pack_reflectance([metal(0.3)]) == pack_reflectance([metal(0.3001)])
+    assert pack_reflectance([metal(0.3)]) != pack_reflectance([metal(0.31)])
+    one, other = unpack_lobes(pack_reflectance([metal(0.3)])), unpack_lobes(pack_reflectance([metal(0.31)]))
+    assert abs(one[0]["params"]["roughness"] - 0.3) < 0.003
+    assert abs(other[0]["params"]["roughness"] - 0.31) < 0.003
+    assert abs(reflectance_matrix(one[0])[0, 0] - reflectance_matrix(metal(0.3))[0, 0]) < 0.01
+
+
+def test_squares_of_different_cells_are_subtracted_by_cell():
+    ones = np.ones((2, 3, SIDE * SIDE), np.float32)
+    found = BinnedRadiance(np.array([1, 4]), 3 * ones).subtract(BinnedRadiance(np.array([4, 7]), ones))
+    np.testing.assert_array_equal(found.rows, [1, 4, 7])
+    np.testing.assert_array_equal(found.radiance[:, 0, 0], [3, 2, -1])
+
+
+def test_every_bin_has_one_number():
+    assert len(fine_bin_centers()) == NUM_FINE_BINS
+    assert (fine_bin_centers()[:, 0] >= fine_bin_centers()[:, 1] - 1e-12).all()

@@ -1,0 +1,178 @@
+"""Surfaces with holes: what rays of every kind find there, against plain NumPy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy_reference import opacity_at, unit
+from tiny_scenes import make_camera, make_surface_points, make_tiny_scene, quad
+
+from relume.camera.view_samples import BACKGROUND, sample_view
+from relume.core.errors import ChunkDamagedError
+from relume.lights.local_lights import make_light_strata, prepare_local_lights
+from relume.look import LightGeometry
+from relume.raytrace.alpha_filter import STOP_AT_OPAQUE, STOP_AT_PARTIAL
+from relume.raytrace.alpha_test import AlphaMasks, check_alpha_masks, collect_alpha_masks
+from relume.raytrace.camera_rays import trace_rays
+from relume.raytrace.light_visibility import trace_light_visibility
+from relume.raytrace.scene_buffers import build_scene_buffers
+from relume.raytrace.visibility import trace_visibility
+from relume.scene.model import Glass, Material, Opacity
+
+WHITE = ({"model": "lambert", "color": [1, 1, 1]},)
+MOVED = 0.2
+DOWN = np.array([0, 0, -1], np.float32)
+
+
+def card_before_wall(alpha, cutoff=None, wrap=("repeat", "repeat"), times=1.0):
+    """A wall in the plane z = −1 and, before it in z = 0, a card from (0, 0) to (1, 1) with an image of opacity."""
+    card = quad("card", [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], 1)
+    card = replace(card, uvs=card.uvs * np.float32(times) - np.float32(MOVED if times != 1 else 0))
+    wall = quad("wall", [[-2, -2, -1], [3, -2, -1], [3, 3, -1], [-2, 3, -1]], 0)
+    materials = [Material("Wall", WHITE), Material("Card", WHITE, opacity=Opacity(alpha, wrap, cutoff))]
+    return make_tiny_scene(
+        wall, card, camera=make_camera("front", (0.5, 0.5, 2), (0.5, 0.5, 0), 0.6), materials=materials
+    )
+
+
+def random_alpha(seed=3, shape=(5, 7)):
+    return np.random.default_rng(seed).integers(0, 256, shape).astype(np.uint8)
+
+
+def rays_at(x, y):
+    """Origins before the card that look straight at it."""
+    return np.stack([x, y, np.ones_like(x)], axis=1).astype(np.float32)
+
+
+def opacity_behind(opacity, times, x, y):
+    """Of the card of `card_before_wall`, as its corners' coordinates lie."""
+    return opacity_at(opacity.alpha, opacity.wrap, np.stack([x, 1 - y], axis=1) * times - (MOVED if times != 1 else 0))
+
+
+@pytest.mark.parametrize("wrap", [("repeat", "mirror"), ("clamp", "repeat"), ("mirror", "clamp")])
+def test_a_cut_surface_is_there_where_its_opacity_reaches_the_bound(wrap):
+    rng = np.random.default_rng(1)
+    x, y = rng.uniform(0.001, 0.999, (2, 20_000))
+    scene = card_before_wall(random_alpha(), 0.4, wrap, times=3.7)
+    face = trace_rays(build_scene_buffers(scene).embree, rays_at(x, y), np.tile(DOWN, (len(x), 1))).face
+    wanted = opacity_behind(scene.materials[1].opacity, 3.7, x, y)
+    clear = np.abs(wanted - 0.4) > 1e-3  # where rounding cannot decide
+    assert clear.mean() > 0.98
+    np.testing.assert_array_equal((face >= 2)[clear], (wanted >= 0.4)[clear])
+    assert 0.1 < (face >= 2).mean() < 0.9
+
+
+def test_a_blended_surface_stops_its_share_of_directions_evenly_from_everywhere():
+    rng = np.random.default_rng(2)
+    scene = card_before_wall(np.full((1, 1), 77, np.uint8))
+    embree = build_scene_buffers(scene).embree
+    directions = unit(np.concatenate([rng.uniform(-0.2, 0.2, (4000, 2)), -np.ones((4000, 1))], axis=1))
+    found = []
+    for x, y in ((0.3, 0.3), (0.7, 0.4)):
+        start = np.array([[x, y, 1]]) - 0.5 * directions / directions[:, 2:]
+        found.append(trace_rays(embree, start.astype(np.float32), directions.astype(np.float32)).face >= 2)
+    assert found[0].mean() == pytest.approx(77 / 255, abs=0.03)
+    np.testing.assert_array_equal(found[0], found[1])
+
+
+def test_chances_that_are_given_share_out_opacity():
+    scene = card_before_wall(np.full((1, 1), 77, np.uint8))
+    embree, num = build_scene_buffers(scene).embree, 800
+    origins, directions = np.tile([0.4, 0.3, 1], (num, 1)).astype(np.float32), np.tile(DOWN, (num, 1))
+    chances = ((np.arange(num) + 0.5) / num).astype(np.float32)
+    stopped = trace_rays(embree, origins, directions, chances).face >= 2
+    assert stopped.mean() == pytest.approx(77 / 255, abs=2 / num)
+    assert (trace_rays(embree, origins, directions, np.full(1, STOP_AT_PARTIAL)).face >= 2).all()
+    assert (trace_rays(embree, origins, directions, np.full(1, STOP_AT_OPAQUE)).face < 2).all()
+
+
+def test_light_comes_through_holes_to_points_and_from_lamps():
+    alpha = random_alpha(4, (6, 6))
+    scene = card_before_wall(alpha, 0.5, ("clamp", "clamp"))
+    geometry, (x, y) = build_scene_buffers(scene), np.random.default_rng(5).uniform(0.01, 0.99, (2, 3000))
+    points = np.stack([x, y, np.full_like(x, -0.99)], axis=1).astype(np.float32)
+    up = np.tile(-DOWN, (len(x), 1))
+    wanted = opacity_behind(scene.materials[1].opacity, 1.0, x, y)
+    clear = np.abs(wanted - 0.5) > 1e-3
+    seen = trace_visibility(geometry.embree, points, up, -DOWN[None]).visible[:, 0] & 1
+    np.testing.assert_array_equal(seen[clear] == 1, (wanted < 0.5)[clear])
+    lamp = prepare_local_lights(LightGeometry("directional", direction=(0.0, 0.0, -1.0)))
+    from_lamp = trace_light_visibility(
+        geometry.embree, geometry.epsilon, lamp, make_light_strata(lamp, 1), make_surface_points(points, up)
+    )
+    np.testing.assert_array_equal((from_lamp[:, 0] & 1)[clear] == 1, (wanted < 0.5)[clear])
+
+
+@pytest.mark.parametrize("share", [0.1, 0.25, 0.6, 0.95])
+def test_pixels_show_a_blended_surface_by_its_opacity(share):
+    scene = card_before_wall(np.full((1, 1), round(255 * share), np.uint8))
+    samples = sample_view(scene, build_scene_buffers(scene), "front", (64, 48))
+    of_card = np.bincount(samples.pixel, samples.weight * (samples.material == 1), minlength=64 * 48).reshape(48, 64)
+    inside = of_card[16:32, 24:40]
+    assert np.abs(inside - share).max() <= 1 / 8
+    assert inside.mean() == pytest.approx(share, abs=0.01)  # eighths are dithered
+    np.testing.assert_allclose(np.bincount(samples.pixel, samples.weight), 1, atol=1e-6)
+
+
+def test_the_rims_of_holes_are_smooth():
+    alpha = np.zeros((64, 64), np.uint8)
+    y, x = np.mgrid[:64, :64]
+    alpha[np.hypot(x - 31.5, y - 31.5) < 24] = 255
+    scene = card_before_wall(alpha, 0.5, ("clamp", "clamp"))
+    scene = replace(scene, meshes=scene.meshes[1:])
+    samples = sample_view(scene, build_scene_buffers(scene), "front", (96, 72))
+    hidden = np.bincount(samples.pixel, samples.weight * (samples.material != BACKGROUND), minlength=96 * 72)
+    between = (hidden > 0.05) & (hidden < 0.95)
+    radius = 24 / 64 / (2 * 2 * np.tan(0.3)) * 72  # pixels
+    assert 0.8 * 2 * np.pi * radius < between.sum() < 2.5 * 2 * np.pi * radius
+    assert hidden.sum() == pytest.approx(np.pi * radius**2, rel=0.02)
+
+
+def test_scenes_without_holes_pay_nothing():
+    scene = card_before_wall(np.zeros((1, 1), np.uint8))
+    whole = [Material(material.name, material.terms) for material in scene.materials]
+    assert collect_alpha_masks(whole) is None
+    assert build_scene_buffers(replace(scene, materials=tuple(whole))).embree.alpha_test is None
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"images": np.array([[0, 6, 7, 0, 0]], np.int64)},
+        {"images": np.array([[-1, 5, 7, 0, 0]], np.int64)},
+        {"images": np.array([[0, 5, 7, 0, 3]], np.int64)},
+        {"images": np.array([[0, 1 << 40, 1 << 40, 0, 0]], np.int64)},
+        {"images": np.zeros((0, 5), np.int64)},
+        {"rules": np.zeros((2, 6), np.float32)},
+        {"rules": np.zeros((1, 6), np.float64)},
+        {"material_rule": np.array([-1, 1], np.int32)},
+        {"material_rule": np.array([-2, 0], np.int32)},
+        {"material_rule": np.array([0], np.int32)},
+        {"texels": np.zeros(34, np.uint8)},
+    ],
+)
+def test_what_a_damaged_store_says_of_holes_is_refused(damage):
+    cutouts = collect_alpha_masks([Material("Wall", WHITE), Material("Card", WHITE, opacity=Opacity(random_alpha()))])
+    assert isinstance(cutouts, AlphaMasks)
+    check_alpha_masks(cutouts._asdict(), 2)
+    with pytest.raises(ChunkDamagedError):
+        check_alpha_masks({**cutouts._asdict(), **damage}, 2)
+
+
+@pytest.mark.parametrize(
+    ("opacity", "is_glass", "blends"),
+    [
+        (Opacity(random_alpha()), False, True),
+        (Opacity(random_alpha(), cutoff=0.5), False, False),
+        (Opacity(random_alpha()), True, True),
+        (None, True, False),
+    ],
+)
+def test_only_what_blends_wants_more_rays_of_every_pixel(opacity, is_glass, blends):
+    scene = card_before_wall(random_alpha())
+    card = replace(scene.materials[1], opacity=opacity, glass=Glass() if is_glass else None)
+    holes = build_scene_buffers(replace(scene, materials=(scene.materials[0], card))).embree.alpha_test
+    assert holes is not None
+    assert holes.blends == blends

@@ -1,0 +1,112 @@
+"""What cells send by direction: the numbers of materials, and the table of a cell."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy_reference as ref
+import pytest
+
+from relume.brdf.albedo import PAIRS, pack_reflectance, reflectance_matrix
+from relume.brdf.evaluate import eval_brdf
+from relume.math.zernike import OUTGOING_DEGREE, WINDOW_DECAY, project, recurrence
+from relume.patches.patch_kdtree import NO_PATCH
+from relume.radiosity.reflectance_operator import IncidentLight, ReflectanceOperator
+from relume.transport.outgoing_patch_light import NUM_OUTGOING, bin_means, decay_of, isotropic, radiance_from_patch
+
+NUM_PAIRS = 200_000
+PLAIN = {"color": [1.0, 0.5, 0.0], "texture": None, "curves": {}}
+
+
+def by_cosine(u, v):
+    """Directions by the cosine, of places in the unit square. (num, 3)"""
+    r, phi = np.sqrt(u), 2 * np.pi * v
+    return np.stack([r * np.cos(phi), r * np.sin(phi), np.sqrt(1 - r * r)], axis=-1)
+
+
+def over_hemisphere(num, seed):
+    """Directions by the cosine, drawn. (num, 3)"""
+    return by_cosine(*np.random.default_rng(seed).random((2, num)))
+
+
+@pytest.fixture(scope="module")
+def sides():
+    """Directions in and as many out, and the functions of each as rows, which are read one after another.
+
+    Pairs are Kronecker's sequence of the root of x⁵ = x + 1: each is worth many that are drawn.
+    """
+    u = (np.arange(1, NUM_PAIRS + 1)[:, None] * 1.1673039782614187 ** -np.arange(1.0, 5)) % 1
+    wi, wo = by_cosine(u[:, 0], u[:, 1]), by_cosine(u[:, 2], u[:, 3])
+    return wi, wo, *(np.ascontiguousarray(project(w)[:, :NUM_OUTGOING].T) for w in (wi, wo))
+
+
+@pytest.mark.parametrize(
+    ("model", "params"),
+    [("blinn_phong", {"exponent": 12.0}), ("ggx", {"roughness": 0.6, "f0": 0.8}), ("ward_anisotropic", {})],
+)
+def test_what_a_term_sends_on_is_its_double_integral(model, params, sides):
+    """F_jk by a mean over both directions, as near as one of a million that are drawn."""
+    document = {**PLAIN, "model": model, "params": params}
+    wi, wo, h_i, h_o = sides
+    value = np.ascontiguousarray(np.pi**2 * eval_brdf(document, wi, wo)[:, 0])
+    found, rungs = reflectance_matrix(document), recurrence(OUTGOING_DEGREE)
+    for pair, (j, k) in enumerate(PAIRS):
+        drawn = value * h_i[rungs.cosine[k]] * h_o[rungs.cosine[j]]
+        if rungs.order[j]:  # the same of cosine and sine parts; where a term is not isotropic, their mean
+            drawn = (drawn + value * h_i[rungs.sine[k]] * h_o[rungs.sine[j]]) / 2
+        deviation = drawn.std() / np.sqrt(1_000_000)
+        assert found[0, pair] == pytest.approx(drawn.mean(), abs=5 * deviation + 2e-3)
+    np.testing.assert_allclose(found[1], found[0] / 2, rtol=1e-6)
+    assert not found[2].any()
+
+
+def test_a_table_holds_what_its_functions_send():
+    """Of the directions of a cosine's rays, the sum is known without the table."""
+    rng = np.random.default_rng(5)
+    vectors = rng.normal(size=(3, 3, NUM_OUTGOING)).astype(np.float32) / np.arange(1, NUM_OUTGOING + 1)
+    even = np.zeros((NO_PATCH + 1, 3), np.float32)
+    even[:5] = 1 + rng.random((5, 3))
+    frame = np.tile(np.eye(3, dtype=np.float32)[:2], (3, 1, 1))
+    sent = radiance_from_patch(even, np.array([0, 2, 3]), frame, vectors.astype(np.float32))
+    wo = over_hemisphere(4_000, 3)
+    for row, cell in enumerate((0, 2, 3)):
+        exact = even[cell] + project(wo)[:, :NUM_OUTGOING] @ vectors[row].T
+        found = np.array([ref.evaluate_outgoing(sent, cell, w) for w in wo])
+        assert np.linalg.norm(found - exact) < 0.12 * np.linalg.norm(exact - even[cell])
+        assert np.abs(found.mean(axis=0) - exact.mean(axis=0)).max() < 0.01
+    np.testing.assert_array_equal(ref.evaluate_outgoing(sent, 1, wo[0]), even[1])
+
+
+def sent_of_one_direction(roughness):
+    """What metal sends of light from one direction, 50 of them, and how fast that falls."""
+    metal = {**PLAIN, "model": "ggx", "color": [1, 1, 1], "params": {"roughness": roughness, "f0": 0.9}}
+    plain = np.ones((2, 50, 3), np.float32)
+    made = ReflectanceOperator.from_materials((pack_reflectance([metal]),), np.zeros(50, np.uint16), plain)
+    vectors = np.repeat(project(over_hemisphere(50, 6))[:, None, :NUM_OUTGOING], 3, axis=1).astype(np.float32)
+    of_cells, leaving = made.apply(IncidentLight(plain[0], vectors))
+    even = np.zeros((NO_PATCH + 1, 3), np.float32)
+    even[:50] = of_cells
+    frame, falls = np.tile(np.eye(3, dtype=np.float32)[:2], (50, 1, 1)), decay_of(made.roughening)
+    return radiance_from_patch(even, np.arange(50), frame, leaving, falls), falls
+
+
+def test_narrow_lobes_see_fewer_rings_about_what_metals_send_and_no_sharper_ones():
+    def lowest(sent, table):
+        light = sent.isotropic[:50, None, 0] + sent.scale[:, :1] * table[..., 0]
+        return light.min(axis=1) / light.max(axis=1)
+
+    known = {roughness: sent_of_one_direction(roughness) for roughness in (0.01, 0.1, 0.3, 0.6)}
+    for sent, _ in known.values():
+        assert np.all(lowest(sent, sent.smooth) > lowest(sent, sent.table))
+    sharp, rough = known[0.01][0], known[0.3][0]
+    assert np.median(lowest(sharp, sharp.table)) < np.median(lowest(rough, rough.table)) - 0.1
+    assert np.median(lowest(sharp, sharp.smooth)) > np.median(lowest(rough, rough.smooth)) - 0.02
+    np.testing.assert_allclose(known[0.3][1], WINDOW_DECAY, rtol=0.04)  # from there on all is as the highlight has it
+    np.testing.assert_allclose(known[0.6][1], WINDOW_DECAY, rtol=1e-6)
+
+
+def test_even_light_is_sent_evenly():
+    radiance = np.zeros((NO_PATCH + 1, 3), np.float32)
+    radiance[:4] = 3
+    assert isotropic(radiance).table.shape[0] == 0
+    assert ref.evaluate_outgoing(isotropic(radiance), 2, np.array([0.0, 0, 1])) == pytest.approx(3)
+    assert bin_means()[0] == pytest.approx(1 / np.sqrt(np.pi), rel=1e-5)

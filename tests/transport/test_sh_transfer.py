@@ -1,0 +1,176 @@
+"""Smooth light: told by harmonics, brought to points by precomputed matrices, which are kept by local PCA."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from session_edits import relative_rmse
+
+from relume.assets.environments.equirect import texel_directions, texel_solid_angles
+from relume.lights.frequency_split import split_frequencies
+from relume.lights.sphere_tiles import choose_tiles
+from relume.lights.spherical_triangles import RotatedEnvironment, integrate_environment
+from relume.math.local_pca import leading_components
+from relume.math.spherical_harmonics import NUM_HARMONICS, harmonics
+from relume.math.zernike import num_functions, project
+from relume.patches.patch_kdtree import NO_PATCH
+from relume.raytrace.gather_rays import make_pattern
+from relume.raytrace.surface_points import SurfacePoints
+from relume.raytrace.tangents import any_tangent
+from relume.raytrace.visibility import select_visibility
+from relume.transport.clustered_rays import shared_direction_coefficients, weighted_basis
+from relume.transport.direction_bins import outgoing_bins
+from relume.transport.incident_coefficients import incident_coefficients, ray_incident_coefficients
+from relume.transport.outgoing_patch_light import NUM_OUTGOING, isotropic, radiance_from_patch
+from relume.transport.sh_transfer import F32, F64, ClusteredTransfer, transfer_matrices
+from relume.transport.shading_points import GatherRays
+
+DEGREE = 4
+SKY = np.ones((128, 256, 3), np.float32)
+TILES = choose_tiles(SKY, 300, True)
+NUM_LIGHTS = len(TILES.codes)
+BROUGHT = harmonics(TILES.centroids) * TILES.solid_angles[:, None]
+
+
+def transfer_matrices_numpy(
+    points: SurfacePoints, visible: NDArray[np.uint8], directions: F32, solid_angles: F64
+) -> F64:
+    """Do as `transfer_matrices`, of the whole in-basis, in plain NumPy: its oracle.
+
+    Args:
+        points, visible, directions, solid_angles: as there.
+    Returns:
+        (n, K, NUM_HARMONICS) float64
+    """
+    n, t = points.normal.astype(np.float64), points.tangent.astype(np.float64)
+    wi = np.einsum("nij,mj->nmi", np.stack([t, np.cross(n, t), n], axis=1), directions.astype(np.float64))
+    is_visible = np.unpackbits(visible, axis=1, count=len(directions), bitorder="little")
+    weight = is_visible * np.maximum(wi[..., 2], 0) * solid_angles
+    return np.asarray(np.einsum("nm,nmk,mj->nkj", weight, project(wi), harmonics(directions.astype(np.float64))))
+
+
+def lights_of(radiance):
+    """Triangles that shadows were asked for in the middles of."""
+    return replace(
+        integrate_environment(TILES, RotatedEnvironment.from_radiance(radiance)),
+        direction=TILES.centroids.astype(np.float32),
+    )
+
+
+def points_on_a_ball(num, seed=3):
+    """Points, and bits at random."""
+    rng = np.random.default_rng(seed)
+    normal = rng.normal(size=(num, 3)).astype(np.float32)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    bits = rng.integers(0, 256, (num, -(-NUM_LIGHTS // 8)), dtype=np.uint8)
+    return SurfacePoints(normal, normal, any_tangent(normal), np.zeros(num, np.uint32)), bits
+
+
+def matrices_of(points, visible):
+    return transfer_matrices(points, visible, TILES.centroids.astype(np.float32), TILES.solid_angles, DEGREE)
+
+
+def test_harmonics_are_orthonormal_over_the_sphere():
+    directions = texel_directions(256, 512).reshape(-1, 3)
+    weight = np.repeat(texel_solid_angles(256, 512), 512)
+    values = harmonics(directions)
+    np.testing.assert_allclose((values * weight[:, None]).T @ values, np.eye(NUM_HARMONICS), atol=1e-3)
+
+
+def test_matrices_are_those_of_the_oracle():
+    points, visible = points_on_a_ball(40)
+    found = matrices_of(points, visible)
+    exact = transfer_matrices_numpy(points, visible, TILES.centroids.astype(np.float32), TILES.solid_angles)
+    exact = exact[:, : num_functions(DEGREE)]
+    assert np.abs(found - exact).max() < 1e-5 * np.abs(exact).max()
+
+
+def test_light_of_few_harmonics_arrives_as_from_all_triangles():
+    points, visible = points_on_a_ball(40)
+    smooth = np.random.default_rng(2).normal(size=(NUM_HARMONICS, 3))
+    lights = replace(lights_of(SKY), irradiance=(BROUGHT @ smooth).astype(np.float32))
+    exact = incident_coefficients(points, visible, lights, (), DEGREE)
+    found = np.einsum("nkl,lc->nck", matrices_of(points, visible), smooth)
+    assert relative_rmse(found, exact) < 1e-5
+
+
+@pytest.mark.parametrize("lamp", [0.0, 300.0], ids=["overcast", "a lamp in it"])
+def test_light_that_is_divided_arrives_as_if_it_were_not(lamp):
+    sky = SKY * np.linspace(2, 0.5, 128, dtype=np.float32)[:, None, None]
+    sky[32:36, 56:60] += lamp
+    lights, (points, visible) = lights_of(sky), points_on_a_ball(200)
+    divided = split_frequencies(lights, BROUGHT)
+    assert len(divided.residual_triangles) < 0.1 * NUM_LIGHTS
+    every = np.arange(points.num_points)
+    beyond = incident_coefficients(
+        points, select_visibility(visible, every, divided.residual_triangles), divided.residual, (), DEGREE
+    )
+    found = beyond + np.einsum("nkl,lc->nck", matrices_of(points, visible), divided.low_frequency)
+    exact = incident_coefficients(points, visible, lights, (), DEGREE)
+    assert relative_rmse(found, exact) < 0.03
+    harmonics_alone = np.einsum(
+        "nkl,lc->nck", matrices_of(points, visible), harmonics(TILES.centroids).T @ lights.irradiance
+    )
+    if lamp:
+        assert relative_rmse(harmonics_alone, exact) > 0.3
+
+
+def test_no_light_is_divided_into_nothing():
+    divided = split_frequencies(lights_of(0 * SKY), BROUGHT)
+    assert not divided.low_frequency.any()
+    assert divided.residual.num_lights == len(divided.residual_triangles) == 0
+
+
+def test_clusters_keep_matrices_of_points_that_they_were_not_found_from(monkeypatch):
+    monkeypatch.setattr("relume.transport.sh_transfer._MAX_FITTED_POINTS", 1500)
+    monkeypatch.setattr("relume.transport.sh_transfer._POINTS_PER_BATCH", 700)
+    points, _ = points_on_a_ball(3000)
+    seen = TILES.centroids[:, 1] > 0.3 * points.normal[:, :1]  # shadows that change slowly from point to point
+    matrices = matrices_of(points, np.packbits(seen, axis=1, bitorder="little"))
+    kept = ClusteredTransfer.fit(len(matrices), lambda rows: matrices[rows], np.random.default_rng(1))
+    rows = np.arange(5, 3000, 7)
+    smooth = np.random.default_rng(2).normal(size=(NUM_HARMONICS, 3)).astype(np.float32)
+    exact = np.einsum("nkl,lc->nck", matrices[rows], smooth)
+    assert relative_rmse(kept.incident_coefficients(smooth, rows), exact) < 0.06
+    mean = kept._replace(weight=0 * kept.weight)
+    assert relative_rmse(mean.incident_coefficients(smooth, rows), exact) > 0.15
+
+
+def test_few_rows_reach_where_many_do():
+    rows = np.random.default_rng(4).normal(size=(6, 40)).astype(np.float32) * np.array([[9], [7], [5], [3], [2], [1]])
+    wide, tall = (
+        leading_components(rows, 3),
+        leading_components(np.concatenate([rows, np.zeros((60, 40), np.float32)]), 3),
+    )
+    np.testing.assert_allclose(np.abs(np.sum(wide * tall, axis=1)), 1, atol=1e-4)
+
+
+def test_chosen_lights_are_seen_as_among_all():
+    visible = np.random.default_rng(6).integers(0, 256, (20, 9), dtype=np.uint8)
+    rows, lights = np.array([3, 0, 19]), np.array([0, 7, 8, 22, 23, 40, 55, 56, 70])
+    bits = np.unpackbits(visible, axis=1, bitorder="little")[rows][:, lights]
+    found = np.unpackbits(select_visibility(visible, rows, lights), axis=1, count=len(lights), bitorder="little")
+    np.testing.assert_array_equal(found, bits)
+
+
+def test_rays_that_go_alike_bring_what_listed_ones_do():
+    points, _ = points_on_a_ball(50)
+    pattern, rng = make_pattern(64, 0, 11), np.random.default_rng(7)
+    links = rng.integers(0, 30, (50, 64)).astype(np.uint16)
+    links[rng.random(links.shape) < 0.1] = NO_PATCH
+    even = np.zeros((NO_PATCH + 1, 3), np.float32)
+    even[:30] = rng.random((30, 3))
+    lobed = np.array([2, 7, 8, 29])
+    frame = np.linalg.qr(rng.normal(size=(30, 3, 2)))[0].transpose(0, 2, 1).astype(np.float32)
+    some = radiance_from_patch(even, lobed, frame[lobed], rng.normal(size=(4, 3, NUM_OUTGOING)).astype(np.float32))
+    rows, squares = np.array([1, 4, 30, 49]), outgoing_bins(points, links, pattern, frame)
+    for sent in (isotropic(even), some):
+        found = shared_direction_coefficients(links, squares, rows, weighted_basis(pattern, 0, DEGREE), sent)
+        exact = ray_incident_coefficients(points, [GatherRays(links, pattern, sent)], DEGREE)[rows]
+        assert relative_rmse(found, exact) < 1e-5
+
+
+def test_glossy_rays_do_not_go_alike():
+    with pytest.raises(ValueError, match="elsewhere"):
+        weighted_basis(make_pattern(64, 8, 11), 0, DEGREE)

@@ -1,0 +1,57 @@
+"""A bake with fewer pixels shows the others as the whole bake does."""
+
+import numpy as np
+import pytest
+from session_edits import make_look
+
+from relume.core.cache import Cache
+from relume.methods.registry import open_transfer
+from relume.output.render_image import render_image, render_small
+from relume.views.downsampled import DownsampledStore
+
+
+@pytest.mark.parametrize("step", [2, 3, 7])
+@pytest.mark.parametrize("view", ["front", "left"])
+def test_every_pixel_that_is_left_is_that_of_the_whole_picture(transfer, view, step):
+    look = make_look(transfer)
+    whole = render_image(transfer, view, look)
+    small = render_image(transfer.downsampled(view, step), view, look)
+    np.testing.assert_allclose(small, whole[::step, ::step], rtol=2e-5, atol=1e-6)
+
+
+def test_a_panel_shines_on_every_pixel_that_is_left_as_on_the_whole_picture(gathered):
+    """Which places of a panel a point asks is its seed's to say, and a thinned bake keeps the seeds of gather rays."""
+    panel = {"kind": "rectangle", "position": [0.5, 1.2, 0.5], "direction": [-1, -1, -1], "size": [0.6, 0.4]}
+
+    def change(document):
+        document["environment"].update(intensity=0.0)
+        document["transport"].update(show="direct")
+        document["lights"].update(Panel={**panel, "emission": [5.0, 5.0, 5.0]})
+
+    look = make_look(gathered, change)
+    whole = render_image(gathered, "front", look)
+    small = render_image(gathered.downsampled("front", 3), "front", look)
+    assert whole.max() > 0.1
+    np.testing.assert_allclose(small, whole[::3, ::3], rtol=2e-5, atol=1e-6)
+
+
+def test_a_small_picture_is_at_least_as_wide_as_asked(transfer):
+    look = make_look(transfer)
+    widths = {width: render_small(transfer, "front", look, width).shape[1] for width in (10, 20, 32, 40, 64, 500)}
+    assert widths == {10: 11, 20: 22, 32: 32, 40: 64, 64: 64, 500: 64}
+
+
+def test_nothing_is_kept_of_it_beside_the_store(baked):
+    fresh = open_transfer(baked, Cache(1 << 30))
+    before = sorted(baked.rglob("*"))
+    small = fresh.downsampled("front", 4)
+    render_image(small, "front", make_look(small))
+    assert sorted(baked.rglob("*")) == before
+
+
+def test_arrays_of_other_views_and_of_no_view_stay(transfer):
+    store = DownsampledStore(transfer.store, 1, 4)
+    np.testing.assert_array_equal(store.read("views/0/pixel", 5, 9), transfer.store.read("views/0/pixel", 5, 9))
+    assert store.shape("lights/irradiance") == transfer.store.shape("lights/irradiance")
+    assert store.shape("views/1/visibility")[0] == len(store.read("views/1/visibility"))
+    assert store.read("views/1/pixel").max() < 16 * 12
