@@ -1,4 +1,4 @@
-"""The terms that a formula gives: those that need no measured material, so that a test can write their documents."""
+"""The analytic terms. They need no measured material, so a test can write their documents."""
 
 from relume.brdf.registry import TERMS
 

@@ -1,4 +1,4 @@
-"""A .btf container as the Bonn measurements of 2014 have them: small, and written from the layout's description."""
+"""A .btf container like those of the Bonn measurements of 2014: small, written from the description of the layout."""
 
 import struct
 from dataclasses import dataclass, field, replace
@@ -13,7 +13,7 @@ YUV_TO_RGB = np.array([[1, 0, 1.13983], [1, -0.39465, -0.5806], [1, 2.03211, 0]]
 
 @dataclass(frozen=True)
 class Written:
-    """What is written; tests change parts of it. channels: U and V of each, (pairs, C), (texels, C)"""
+    """The written contents; tests change parts. channels: U and V of each, (pairs, C), (texels, C)"""
 
     signature: bytes = b"!DFMF08FCR"
     version: int = 4
@@ -30,7 +30,7 @@ class Written:
 
 
 def random_factors(num=100, ranks=(4, 2, 3)):
-    """Positive ones, as half floats hold them, of 4, 2, 3 components."""
+    """Positive factors in half precision with 4, 2 and 3 components."""
     rng, texels = np.random.default_rng(0), SIZE[0] * SIZE[1]
     return [tuple(rng.uniform(0.05, 0.5, (rows, rank)).astype(np.float16) for rows in (num, texels)) for rank in ranks]
 
@@ -69,13 +69,13 @@ def encode_container(file):
 
 
 def container(path, **changes):
-    """Write one; returns path and what it was written from."""
+    """Write a container; return its path and contents."""
     file = replace(Written(channels=random_factors()), **changes)
     path.write_bytes(encode_container(file))
     return path, file
 
 
 def values(file, view, light):
-    """Channels of an image, of directions by their numbers in the file. (texels, 3)"""
+    """Channels of an image for directions by their indices in the file. (texels, 3)"""
     pair = view * len(file.lights) + light
     return np.stack([v.astype(float) @ u[pair].astype(float) for u, v in file.channels], axis=1)

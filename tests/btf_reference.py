@@ -15,7 +15,7 @@ _CORNERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 
 
 def parallax_intersection_numpy(height: F32, uv: F64, shear: F64) -> float:
-    """Do as `parallax_intersection`, in plain NumPy: its oracle.
+    """Reference of `parallax_intersection` in plain NumPy.
 
     Args:
         height: of the relief. (height, width). uv: u and v, in repeats. (2,). shear: s of the ray. (2,)
@@ -40,13 +40,13 @@ def parallax_intersection_numpy(height: F32, uv: F64, shear: F64) -> float:
 
 
 def sample_btf_numpy(btf: LocalPcaBtf, texel_positions: F64, wo: F64) -> F64:
-    """The mean over places of what they send to an eye of light from each side in which the BTF is known.
+    """Mean outgoing radiance over texel positions toward `wo`, for light from each measured direction.
 
     Args:
-        btf: the BTF. wo: to the eye, in the texture's frame, unit. (3,)
-        texel_positions: column and row, in texels of the finest level, from the middle of the first. (n, 2)
+        btf: the BTF. wo: view direction in the texture's frame, unit. (3,)
+        texel_positions: column and row, in texels of the finest level, from the center of the first. (n, 2)
     Returns:
-        (L, 3) float64, the cosine of the light in it
+        (L, 3) float64, including the cosine
     """
     size, shears = np.array(btf.size[::-1]), compute_shears(btf.grid)
     shear = wo[:2] / max(wo[2], np.hypot(wo[0], wo[1]) / np.tan(btf.grid.theta[-1]))
@@ -65,7 +65,7 @@ def sample_btf_numpy(btf: LocalPcaBtf, texel_positions: F64, wo: F64) -> F64:
 
 
 def outgoing_radiance_numpy(btf: LocalPcaBtf, values_by_light: F64, wi: F64) -> F64:
-    """What is sent of light from some directions, one unit of irradiance across each.
+    """Outgoing radiance for light from directions with unit irradiance perpendicular to each.
 
     Args:
         btf: the BTF. values_by_light: from `sample_btf_numpy`. wi: in the texture's frame, unit. (m, 3)

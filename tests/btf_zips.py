@@ -1,4 +1,4 @@
-"""A zip of images as the Bonn measurements have them, of ten directions."""
+"""A zip of images like those of the Bonn measurements, with ten directions."""
 
 import io
 import zipfile
@@ -12,7 +12,7 @@ DIRECTIONS = [(0, 0), *((40, phi) for phi in (0, 90, 180, 270)), *((70, phi) for
 
 
 def make_image(view, light, size=(6, 5), kind="PNG"):
-    """A picture that says who lights it and who looks."""
+    """An image that encodes its light and view direction."""
     value = 0.05 + 0.07 * DIRECTIONS.index(view) + 0.02 * DIRECTIONS.index(light)
     row, column = np.mgrid[: size[0], : size[1]]
     linear = np.clip(value * (1 + 0.3 * np.sin(row + 2 * column))[..., None] * [1, 0.8, 0.6], 0, 1).astype(np.float32)

@@ -1,4 +1,4 @@
-"""What all tests share: where real files lie, helper modules beside this file, and which tests stay in one process."""
+"""Shared by all tests: paths of real files, helper modules, and the distribution of tests to processes."""
 
 from __future__ import annotations
 
@@ -18,45 +18,45 @@ from xdist.scheduler import LoadScopeScheduling
 
 __all__ = ["baked", "corner", "gathered", "transfer"]  # fixtures
 
-os.environ.setdefault("RELUME_BATCH_NICE", "0")  # tests beside which others run would wait for ever for renders
-os.environ.setdefault("RELUME_PREWARM", "false")  # nor should each bake be followed by a process
+os.environ.setdefault("RELUME_BATCH_NICE", "0")  # tests that run in parallel would wait too long for renders
+os.environ.setdefault("RELUME_PREWARM", "false")  # no process after each bake
 
-# examples are drawn alike each time, and take as long as they take: machines differ, and others work on them
+# examples are deterministic and have no deadline: machines differ in speed and load
 settings.register_profile("relume", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("relume")
 
-# folders whose tests share what is dear: a server and a browser, a BTF, a measured material, a bake by every method
+# folders whose tests share expensive fixtures: a server and a browser, a BTF, a measured material, bakes of all methods
 TOGETHER = ("gestures", "journeys", "btf", "contract", "measured")
-FIRST = (*TOGETHER, "worker")  # files of the last are long, and wait for processes and databases
+FIRST = (*TOGETHER, "worker")  # worker tests are long: they wait for processes and databases
 
 
-class _Sharing(LoadScopeScheduling):
-    """Where tests are shared out to processes, those of a file, or of a folder in `TOGETHER`, go to the same one."""
+class _FolderScheduling(LoadScopeScheduling):
+    """Scheduler that runs the tests of a file, or of a folder in `TOGETHER`, in one process."""
 
     def _split_scope(self, nodeid: str) -> str:
         path = Path(nodeid.partition("::")[0])
         return path.parent.name if path.parent.name in TOGETHER else str(path)
 
 
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _Sharing:
-    """Called by xdist; its own groups, which are marks, are lost on the way with this pytest."""
-    return _Sharing(config, log)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> _FolderScheduling:
+    """Called by xdist, whose own groups, made by marks, do not work with this pytest."""
+    return _FolderScheduling(config, log)
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """Two processes more than there are processors: tests of servers and browsers wait as long as they compute."""
+    """Return two more processes than processors: tests of servers and browsers wait half of the time."""
     return (os.cpu_count() or 1) + 2
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What takes longest begins, so that no process is left alone with it at the end."""
+    """Start the longest tests first, so that no process is left with one of them at the end."""
     order = {folder: position for position, folder in enumerate(FIRST)}
     items.sort(key=lambda item: order.get(item.path.parent.name, len(FIRST)))
 
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """The folder of real scenes and environments; tests that need it skip where there is none."""
+    """Folder of real scenes and environments; tests that need it are skipped without it."""
     data_folder = Path(__file__).parents[2] / "shared" / "data"
     folder = Path(os.environ.get("RELUME_SHARED_DATA", data_folder))
     if not folder.is_dir():
@@ -66,7 +66,7 @@ def shared_data() -> Path:
 
 @pytest.fixture(scope="session")
 def postgresql() -> Iterator[Cluster]:
-    """A PostgreSQL for all tests of this process; skips where it is not installed."""
+    """A PostgreSQL server for all tests of this process; skipped if it is not installed."""
     cluster = Cluster()
     yield cluster
     cluster.remove()
@@ -74,7 +74,7 @@ def postgresql() -> Iterator[Cluster]:
 
 @pytest.fixture(params=["sqlite", "postgresql"])
 def ledger_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
-    """Where a ledger may be: an empty database of either kind."""
+    """URL of an empty database of either kind."""
     if request.param == "sqlite":
         return f"sqlite:///{tmp_path / 'relume.db'}"
     cluster: Cluster = request.getfixturevalue("postgresql")

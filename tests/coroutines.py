@@ -1,4 +1,4 @@
-"""Coroutines that tests run by themselves."""
+"""Run coroutines from synchronous tests."""
 
 import asyncio
 from collections.abc import Coroutine
@@ -7,6 +7,6 @@ from typing import Any
 
 
 def run_in_thread(coroutine: Coroutine[Any, Any, Any]) -> Any:
-    """In a thread of its own: the browser tests' event loop may still stand in this one."""
+    """Run a coroutine in a new thread: the event loop of browser tests may still occupy this one."""
     with ThreadPoolExecutor(1) as thread:
         return thread.submit(asyncio.run, coroutine).result()

@@ -1,4 +1,4 @@
-"""An environment file as tests need one."""
+"""Environment files for tests."""
 
 import numpy as np
 import OpenImageIO
@@ -11,7 +11,7 @@ def dusk():
 
 
 def write_map(path, pixels, chromaticities=None):
-    """An equirectangular image as the file that its name ends in; `chromaticities`: 8 numbers."""
+    """Write an equirectangular image in the format of the file name; `chromaticities`: 8 numbers."""
     height, width, channels = pixels.shape
     output = OpenImageIO.ImageOutput.create(str(path))
     spec = OpenImageIO.ImageSpec(width, height, channels, OpenImageIO.FLOAT)

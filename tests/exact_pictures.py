@@ -1,7 +1,7 @@
-"""Exact pictures that share no cache and no file with the picture that is tested, and no shading code either.
+"""Exact images that share no cache, no file and no shading code with the picture under test.
 
-A session keeps images beside its store, and in the cache it was given: a render of the same store would read them, and
-compare a picture with itself. What is rendered here comes from a copy of the store without them, opened for it alone.
+A session stores images beside its bake and in its cache: a render of the same store would read them and compare the
+picture with itself. These images are rendered from a copy of the store without them, opened separately.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from relume.live.fixed_camera.protocols import FixedViewTransfer
 from relume.methods.registry import open_transfer
 from relume.output.render_image import render_image
 
-DERIVED_FOLDERS = ("derived", "edited")  # folders of images that sessions keep in a store
+DERIVED_FOLDERS = ("derived", "edited")  # folders of images that sessions store
 
 
 @contextmanager
 def open_copy(transfer) -> Iterator[FixedViewTransfer]:
-    """The bake of a transfer, opened anew from a place where nobody has shown it; its files are links."""
+    """Open the bake of a transfer again from a fresh folder without stored images; its files are hard links."""
     store = Path(transfer.key)
     with TemporaryDirectory(dir=store.parent) as folder:
         copy = Path(folder) / store.name
@@ -35,16 +35,16 @@ def open_copy(transfer) -> Iterator[FixedViewTransfer]:
 
 
 def render_uncached(transfer, look, view="front", **options):
-    """`render_image` from a copy."""
+    """Call `render_image` on a copy."""
     with open_copy(transfer) as copy:
         return render_image(copy, view, look, **options)
 
 
 def exact_image(transfer, look, view="front"):
-    """The same, held against projector and NumPy: a shade that is wrong the same way everywhere is found here.
+    """Return the image of a copy after checking it against projector and NumPy, which finds common shading errors.
 
-    Both sum the same light in float32, in another order: a relative error of its unit, 6e-8, for each of up to 1000
-    lights and rays that come to a sample.
+    Both sum the same light in float32 in different order: a relative error of 6e-8 for each of up to 1000 lights and
+    gather rays of a sample.
     """
     with open_copy(transfer) as copy:
         image, expected = render_image(copy, view, look), ref.full_evaluation(copy, view, look)

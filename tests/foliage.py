@@ -1,4 +1,4 @@
-"""Scenes that are hard to plan: a tuft of thin blades, where nearly every pixel is an edge."""
+"""Scenes that are hard to plan: a tuft of thin blades, in which nearly every pixel is an edge."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _LENGTH, _WIDTH = 0.3, 0.004
 
 
 def tuft(num_blades: int = 60_000) -> Scene:
-    """Thin quads that fill a cube, turned every way, seen by one camera; a pixel sees several of them."""
+    """Thin quads with random orientations in a cube, seen by one camera; a pixel sees several."""
     rng = np.random.default_rng(5)
     center = rng.uniform(-1, 1, (num_blades, 3))
     along, random_direction = rng.normal(size=(2, num_blades, 3))

@@ -1,8 +1,8 @@
-"""A transfer method of the tests' own, written by following docs/adding-a-method.md: a furnace.
+"""A transfer method for tests that follows docs/adding-a-method.md: a furnace.
 
-All surfaces glow alike, with half of the mean radiance of the environment, and the environment itself is hidden: what
-arrives at a sample is the glow along those of its gather rays that hit anything. Stages: "samples", as those of
-`relume.methods.view_stages`, then "hits".
+All surfaces emit the same radiance, half of the mean radiance of the environment, and the environment itself is
+occluded: the incident light of a sample is this radiance along those of its gather rays that hit a surface. Stages:
+"samples", like those of `relume.methods.view_stages`, then "hits".
 
     views/<k>/gather_hits  0 where a gather ray of a sample hits anything, else NO_CELL
     views/<k>/seed         of a view sample: seeds its rays
@@ -39,12 +39,12 @@ _HITS, _CELLS = 1, 64
 
 
 class FurnaceViews(BakedFixedViews):
-    """What is seen in it; light and its ways are the method's own, everything else is shared."""
+    """Views of the furnace: light and its paths are the method's own, everything else is shared."""
 
     axes = frozenset((EditAxis.CURVE, EditAxis.PARAMETER, EditAxis.ENVIRONMENT))
 
     def glow(self, light: Illumination) -> OutgoingLight:
-        """What the one surface sends, the same everywhere."""
+        """Outgoing radiance of all surfaces, the same everywhere."""
         radiance = self.environment_radiance(light.environment.map).astype(np.float64)
         row_fraction = texel_solid_angles(*radiance.shape[:2]) / (4 * np.pi)
         glow = np.zeros((NO_PATCH + 1, 3), np.float32)
@@ -53,12 +53,12 @@ class FurnaceViews(BakedFixedViews):
         return isotropic(glow)
 
     def incident_light(self, view: View, material: int, light: Illumination, cache: Cache) -> LightsAndPoints:
-        """The glow along gather rays, and no light of the environment's own."""
+        """Surface radiance along gather rays, without the environment."""
         receivers = view.receivers(material, self.glow(light), is_lit=False)
         return self.lights.empty(), receivers
 
     def subset(self, view: View, material: int, sample_indices: np.ndarray, *, has_indirect: bool) -> SampledTransfer:
-        """A few samples, for previews."""
+        """Select a few samples for previews."""
         return _FurnaceSamples(self, view, material, sample_indices)
 
 
@@ -70,11 +70,11 @@ class _FurnaceSamples:
 
     @property
     def num_bytes(self) -> int:
-        """Memory they hold."""
+        """Memory of the samples."""
         return self._sample_indices.nbytes
 
     def incident_light(self, light: Illumination) -> LightsAndPoints:
-        """The same as at all samples, for these."""
+        """Incident light at these samples."""
         material_points = self._view.receivers(self._material, is_lit=False)
         rays = self._view.gather_rays(self._material, self._furnace.glow(light)).unshared(self._sample_indices)
         return self._furnace.lights.empty(), replace(material_points.without_light(self._sample_indices), rays=(rays,))
@@ -90,7 +90,7 @@ class FurnaceMethod:
         self._views = SampledViews()
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
-        """Upper bounds: the views', with rays in the place of bits."""
+        """Upper bounds: those of the views, with rays instead of bits."""
         views = self._views.plan(scene, recipe)
         samples = views.num_view_samples
         ray_bytes = samples * (2 * RAYS + 4)
@@ -98,11 +98,11 @@ class FurnaceMethod:
         return Plan(samples, num_rays, views.store_bytes + ray_bytes, views.peak_bytes + ray_bytes)
 
     def prepare(self, scene: Scene) -> None:
-        """Build the triangles' search tree."""
+        """Build the search tree of the triangles."""
         self._views.prepare(scene)
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
-        """What opening the store needs besides its arrays; gather rays of each material: cosine and glossy."""
+        """Attributes for opening the store: gather rays of each material, cosine and glossy."""
         return {
             **self._views.attributes(scene, recipe),
             "gather_rays": [[RAYS, 0]] * len(scene.materials),
@@ -110,11 +110,11 @@ class FurnaceMethod:
         }
 
     def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
-        """As the views; then whole shards of each view's surface samples, as their visibility would be."""
+        """Tasks of the views; then whole shards of the surface samples of each view, like visibility."""
         return self._views.tasks(stage, scene, recipe, store)
 
     def arrays(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[ArraySpec]:
-        """What the rays of each view's samples hit."""
+        """Hits of the gather rays of each view's samples."""
         if stage < _HITS:
             return self._views.arrays(stage, scene, recipe, store)
         return [
@@ -124,7 +124,7 @@ class FurnaceMethod:
         ]
 
     def compute(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> TaskOutput:
-        """One task; seeds are rows, so the same task gives the same bits anywhere."""
+        """Run one task; seeds are row numbers, so a task gives the same bits anywhere."""
         if task.stage < _HITS:
             return self._views.compute(scene, recipe, task, store)
         k, geometry = recipe.views.index(task.group), self._views.geometry_of(scene)
@@ -143,5 +143,5 @@ class FurnaceMethod:
         )
 
     def open(self, store: StoreReader, key: str, cache: Cache) -> FurnaceViews:
-        """Views that are lit by the glow alone."""
+        """Open the views, lit by the surfaces alone."""
         return FurnaceViews(**read_fields(store, key, cache))

@@ -1,4 +1,4 @@
-"""Small glTF files made by hand, whole or broken on purpose."""
+"""Small glTF files built by code, valid or broken on purpose."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from urllib.parse import unquote
 import numpy as np
 import PIL.Image
 
-DIELECTRIC_TRANSMISSION = 0.956463  # of light by what a dielectric of index 1.5 reflects first
+DIELECTRIC_TRANSMISSION = 0.956463  # 1 minus the mean reflectance of a dielectric of index 1.5
 FLOAT, U8, U16, U32 = 5126, 5121, 5123, 5125
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 COMPONENTS = {"f4": FLOAT, "u1": U8, "u2": U16, "u4": U32, "i1": 5120, "i2": 5122}
@@ -64,7 +64,7 @@ class Glb:
         return len(textures) - 1
 
     def quad(self, material: dict[str, Any] | None = None, **attributes: Any) -> Glb:
-        """A unit square in the plane z = 0, facing +Z, with a node that shows it."""
+        """A unit square in the plane z = 0, facing +Z, with a node that refers to it."""
         names = {"POSITION": QUAD, "NORMAL": QUAD_NORMALS, "TEXCOORD_0": QUAD_UVS, **attributes}
         primitive: dict[str, Any] = {
             "attributes": {name: self.accessor(values) for name, values in names.items() if values is not None},
@@ -94,7 +94,7 @@ def pack(document: dict[str, Any], binary: bytes) -> bytes:
 
 
 def self_contained(path: Path) -> bytes:
-    """A .gltf file with the files beside it put into it as data URIs; as it is where that cannot be done."""
+    """A .gltf file with its external files as data URIs; unchanged where that is not possible."""
     data = path.read_bytes()
     try:
         document = json.loads(data)

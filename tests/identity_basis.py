@@ -10,19 +10,19 @@ F64 = NDArray[np.float64]
 
 
 def analysis(bands: F64) -> F64:
-    """A copy: values of bands are their own coefficients. (..., J) -> (..., J)"""
+    """Return a copy: band values are their own coefficients. (..., J) -> (..., J)"""
     return np.array(bands)
 
 
 def synthesis(coefficients: F64) -> F64:
-    """A copy: values of bands are their own coefficients. (..., J) -> (..., J)"""
+    """Return a copy: band values are their own coefficients. (..., J) -> (..., J)"""
     return np.array(coefficients)
 
 
 def matrix(num_bands: int) -> F32:
-    """The unit matrix, whose rows are the basis functions. (J, J) float32"""
+    """The identity matrix, whose rows are the basis functions. (J, J) float32"""
     return np.eye(num_bands, dtype=np.float32)
 
 
 def forward(block: F32) -> None:
-    """Leaves the block as it is. (n, J)"""
+    """Leave the block unchanged. (n, J)"""

@@ -1,4 +1,4 @@
-"""The BRDFs written down a second time, straight from their papers, with no curve and no quotient in them."""
+"""The BRDFs written a second time, directly from their papers, without curves and quotients."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def phong(wi, wo, exponent):
 
 
 def lafortune(wi, wo, exponent, c_x, c_y, c_z):
-    """Lafortune 1997 with the normalisation of Nguyen 2010."""
+    """Lafortune 1997 with the normalization of Nguyen 2010."""
     c = np.array([c_x, c_y, c_z])
     cosine = dot(c * wi, wo) / np.abs(c).max()
     return (exponent + 2) / (2 * np.pi) * np.maximum(cosine, 0) ** exponent
@@ -114,7 +114,7 @@ def schlick(wi, wo, roughness, f0):
 
 
 def beard_maxwell(wi, wo, sigma, ior, extinction, tau, omega):
-    """Maxwell 1973, first surface; the slopes' normalisation by quadrature."""
+    """Maxwell 1973, first surface; the normalization of the slopes by quadrature."""
     h = half_vector(wi, wo)
     tan2 = 1 / h[..., 2] ** 2 - 1
     integral, _ = quad(lambda theta: np.sin(theta) / (sigma**2 + np.tan(theta) ** 2), 0, np.pi / 2, epsrel=1e-12)

@@ -1,4 +1,4 @@
-"""What share of even light materials send back, against sums over even directions."""
+"""Albedo of isotropic materials, against sums over uniform directions."""
 
 import numpy as np
 import pytest
@@ -19,15 +19,15 @@ from relume.brdf.evaluate import eval_brdf
 from relume.brdf.term_validation import complete_term
 from relume.brdf.texture_slots import NormalMap
 
-NUM, ERRORS = 100_000, 5  # directions, and standard errors of their sums that are allowed; quadrature's own beside
+NUM, ERRORS = 100_000, 5  # directions; allowed standard errors of their sums, besides the quadrature error
 
 
 def term_of(model, color=(1.0, 1.0, 1.0), **params):
     return complete_term(("test",), {"model": model, "color": list(color), "params": params}, None)
 
 
-def sent_towards(term, theta_o):
-    """A sum over directions, and turns about the normal, spread evenly by chance; its standard error. (3,) each"""
+def albedo_by_sampling(term, theta_o):
+    """Albedo by a sum over random uniform directions and azimuths, and its standard error. (3,) each"""
     rng = np.random.default_rng(7)
     z, phi = rng.random(NUM), 2 * np.pi * rng.random(NUM)
     wi = np.stack([np.sqrt(1 - z**2) * np.cos(phi), np.sqrt(1 - z**2) * np.sin(phi), z], axis=-1)
@@ -38,15 +38,15 @@ def sent_towards(term, theta_o):
 
 
 @pytest.mark.parametrize("model", ANALYTIC)
-def test_it_is_the_integral_over_all_directions(model):
+def test_the_albedo_is_the_integral_over_all_directions(model):
     term = term_of(model, color=(0.8, 0.3, 0.1))
     theta, albedo = directional_albedo([term])
     for k in (0, 4, 7):
-        expected, error = sent_towards(term, theta[k])
+        expected, error = albedo_by_sampling(term, theta[k])
         np.testing.assert_array_less(np.abs(albedo[k] - expected), ERRORS * error + 0.01 * expected)
 
 
-def test_terms_add_up_and_its_mean_is_the_reflectance():
+def test_albedos_of_terms_add_up_and_average_to_the_reflectance():
     terms = [term_of("oren_nayar", (0.5, 0.4, 0.2)), term_of("ggx", roughness=0.3)]
     theta, albedo = directional_albedo(terms)
     alone = [directional_albedo([term])[1] for term in terms]
@@ -61,23 +61,23 @@ def test_terms_add_up_and_its_mean_is_the_reflectance():
     np.testing.assert_allclose(mean, sum(reflectance(term) for term in terms), rtol=0.02)
 
 
-def test_a_white_furnace_takes_light_and_a_bright_lobe_makes_some():
+def test_albedo_above_one_is_detected():
     assert directional_albedo([term_of("ggx", roughness=0.5, f0=1.0)])[1].max() <= 1.001
     assert directional_albedo([term_of("blinn_phong", exponent=50.0)])[1].max() > 2
 
 
 @pytest.mark.parametrize("roughness", [0.03, 0.1, 0.6])  # a mirror, a sharp highlight, a broad one
-def test_what_leans_a_material_is_part_of_what_it_sends(roughness):
-    """And of a mirror that is not flat any more none is known; all else is as it was."""
+def test_normal_mapping_changes_the_reflectance(roughness):
+    """A normal-mapped mirror has no mirror reflectance; everything else is unchanged."""
     terms = [term_of("lambert", (0.5, 0.4, 0.2)), term_of("ggx", roughness=roughness, f0=0.9)]
     terms[0]["texture"] = "image:0123456789abcdef"
     normals = NormalMap("image:fedcba9876543210", 1.5)
-    flat, leant = pack_reflectance(terms), pack_reflectance(terms, normals)
-    assert (unpack_normal_map(flat), unpack_normal_map(leant)) == (None, normals)
-    assert leant not in (flat, pack_reflectance(terms, normals._replace(scale=1.4)))
-    assert drop_normal_map(leant) == drop_normal_map(flat) == flat
-    assert unpack_images(leant) == unpack_images(flat) == (terms[0]["texture"], None)
-    assert unpack_lobes(leant) == unpack_lobes(flat)
-    np.testing.assert_array_equal(unpack_reflectance(leant), unpack_reflectance(flat))
+    flat, normal_mapped = pack_reflectance(terms), pack_reflectance(terms, normals)
+    assert (unpack_normal_map(flat), unpack_normal_map(normal_mapped)) == (None, normals)
+    assert normal_mapped not in (flat, pack_reflectance(terms, normals._replace(scale=1.4)))
+    assert drop_normal_map(normal_mapped) == drop_normal_map(flat) == flat
+    assert unpack_images(normal_mapped) == unpack_images(flat) == (terms[0]["texture"], None)
+    assert unpack_lobes(normal_mapped) == unpack_lobes(flat)
+    np.testing.assert_array_equal(unpack_reflectance(normal_mapped), unpack_reflectance(flat))
     assert bool(unpack_mirrors(flat)) == (roughness < 0.06)
-    assert unpack_mirrors(leant) == []
+    assert unpack_mirrors(normal_mapped) == []

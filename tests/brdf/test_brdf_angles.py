@@ -1,4 +1,4 @@
-"""Angles: values known by hand, and the kernel against its NumPy twin."""
+"""Angles: values known in closed form, and the kernel against NumPy."""
 
 from __future__ import annotations
 
@@ -58,23 +58,23 @@ def test_tilts_along_and_across_make_up_the_half_angle():
 
 
 @pytest.mark.parametrize("angle", list(Angle))
-def test_kernel_equals_its_numpy_twin(angle):
+def test_kernel_equals_numpy(angle):
     rng = np.random.default_rng(8)
     wi, wo = (directions(rng, 3000, 1e-3).astype(np.float32) for _ in range(2))
     kernel = np.array([angle_at(int(angle), *i, *o) for i, o in zip(wi, wo, strict=True)])
     twin = angles_numpy(angle, wi, wo)
     assert twin.min() >= 0
     assert twin.max() <= np.pi / 2
-    # float32 cannot tell an arc cosine near one better than the root of its rounding, 3e-4
+    # near one, the error of an arc cosine in float32 is the root of its rounding, 3e-4
     np.testing.assert_allclose(kernel, twin, atol=5e-4)
     np.testing.assert_allclose(np.cos(kernel), np.cos(twin), atol=1e-6)
 
 
-def test_a_pair_by_one_power_equals_its_numpy_twin():
+def test_alpha_and_beta_equal_numpy():
     rng, wo = np.random.default_rng(11), direction(40, 70)
     wi = np.concatenate([directions(rng, 3000, 1e-3), [direction(40, 250), wo]])
-    found, scale = np.empty((2, len(wi)), np.float32), np.array([2, 3], np.float32)
-    compute_alpha_beta(scale, *np.ascontiguousarray(wi.T, np.float32), *wo.astype(np.float32), *found)
+    actual, scale = np.empty((2, len(wi)), np.float32), np.array([2, 3], np.float32)
+    compute_alpha_beta(scale, *np.ascontiguousarray(wi.T, np.float32), *wo.astype(np.float32), *actual)
     twin = np.stack([angles_numpy(angle, wi, wo) for angle in (Angle.ALPHA, Angle.BETA)])
-    np.testing.assert_allclose(found / scale[:, None], twin, atol=5e-4)
-    np.testing.assert_allclose(np.cos(found / scale[:, None]), np.cos(twin), atol=1e-6)
+    np.testing.assert_allclose(actual / scale[:, None], twin, atol=5e-4)
+    np.testing.assert_allclose(np.cos(actual / scale[:, None]), np.cos(twin), atol=1e-6)

@@ -16,7 +16,7 @@ CURVES = [(t.model, c.name) for t in ANALYTIC.values() for c in t.curves]
 
 
 def slow_averages(function, curve, panels=512):
-    """Midpoint-free oracle: 4-point rule on 512 panels in each band; about a pole weighed by the angle."""
+    """Reference: a 4-point rule on 512 panels in each band, without midpoints; weighted by the angle around a pole."""
     fine = np.linspace(0, np.pi / 2, curve.num_bands * panels + 1)
     x, w = np.polynomial.legendre.leggauss(4)
     nodes = fine[:-1, None] + 0.5 * np.diff(fine)[:, None] * (1 + x)
@@ -26,7 +26,7 @@ def slow_averages(function, curve, panels=512):
 
 
 def sweep(model):
-    """Parameter values from end to end, where widths are hardest among them."""
+    """Parameter values over the whole range, including the hardest widths."""
     parameters = TERMS[model].parameters
     for t in (0.0, 0.02, 0.1, 0.3, 0.7, 1.0):
         params = {}
@@ -52,7 +52,7 @@ def test_generated_bands_are_averages_over_the_bands(model, name):
 
 @pytest.mark.parametrize("sigma", [0.005, 0.02, 0.2])
 def test_narrow_highlights_keep_their_light(sigma):
-    # σ = 0.005: the highlight is over within the first band; by its mean over angles it would be 1.6 times as bright
+    # σ = 0.005: the highlight lies within the first band; a mean over angles would be 1.6 times as bright
     curve = TERMS["cook_torrance"].curve("theta_h")
     bands = generated_bands({"model": "cook_torrance", "params": {"sigma": sigma}}, curve)[0]
     total = (bands * np.diff(np.square(band_edges(256)) / 2)).sum()
@@ -122,13 +122,13 @@ def test_points_are_averaged_exactly_and_continue_constantly():
 def test_two_points_make_a_straight_line():
     term, curve = drawn({"points": [[0, 0], [90, 9]]})
     edges = np.linspace(0, 9, 257)
-    middles = np.diff(edges**3 / 3) / np.diff(edges**2 / 2)  # nearly those of the bands
-    np.testing.assert_allclose(curve_bands(term, curve)[2], middles, rtol=1e-9)
+    centers = np.diff(edges**3 / 3) / np.diff(edges**2 / 2)  # nearly the band centers
+    np.testing.assert_allclose(curve_bands(term, curve)[2], centers, rtol=1e-9)
     term, curve = drawn({"points": [[0, 0], [90, 9]]}, name="theta_d")
     np.testing.assert_allclose(curve_bands(term, curve)[2], 9 * (np.arange(64) + 0.5) / 64, rtol=1e-9)
 
 
-def test_channels_not_drawn_are_generated():
+def test_channels_without_drawn_values_are_generated():
     term, curve = drawn([{"points": [[0, 3], [90, 3]], "channels": "g"}, {"bands": list(range(256)), "channels": "b"}])
     bands = curve_bands(term, curve)
     np.testing.assert_array_equal(bands[0], generated_bands(term, curve)[0])

@@ -1,4 +1,4 @@
-"""Terms at levels of roughness: the width's parameter is scaled, within its range, and drawn curves stand."""
+"""Terms at roughness levels: the width parameter is scaled within its range; drawn curves do not change."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def document(model, **more):
 
 
 def half_width(model, ratio):
-    """The angle at which the highlight has half of its peak."""
+    """Angle at half of the highlight's peak."""
     curve = TERMS[model].curves[0]
     gamma = np.linspace(0, 1.2, 20_001)
     values = curve_values(scaled_roughness(document(model), ratio), curve, gamma)[0]
@@ -35,8 +35,8 @@ def half_width(model, ratio):
 
 
 @pytest.mark.parametrize("model", [term.model for term in WIDE])
-def test_highlights_are_as_wide_as_the_square_of_the_roughness(model) -> None:
-    """α is the square of what artists call roughness, whatever parameter says it."""
+def test_highlight_width_is_the_square_of_the_roughness(model) -> None:
+    """α = roughness² for every width parameter."""
     given = TERMS[model].parameter(TERMS[model].width[0])
     assert given.minimum < scaled_roughness(document(model), 0.7)["params"][given.name] < given.maximum
     assert half_width(model, 0.7) / half_width(model, 1.0) == pytest.approx(0.49, rel=0.08)
@@ -52,7 +52,7 @@ def test_parameters_stay_in_their_range() -> None:
     assert scaled_roughness(document("phong"), 0.01)["params"]["exponent"] == 1e5
 
 
-def test_curves_of_the_width_differ_and_others_do_not() -> None:
+def test_only_curves_of_the_width_differ_between_levels() -> None:
     term, curves = document("ggx"), {curve.name: curve for curve in TERMS["ggx"].curves}
     assert level_bands(term, curves["theta_h"], LEVELS).shape == (3, 3, 256)
     assert level_bands(term, curves["theta_d"], LEVELS).shape == (3, 64)
@@ -70,23 +70,23 @@ def test_a_drawn_curve_is_the_same_at_all_levels() -> None:
     np.testing.assert_array_equal(bands[0], curve_bands(term, TERMS["ggx"].curve("theta_h")))
 
 
-def test_values_are_those_of_each_sample_s_level() -> None:
+def test_each_sample_has_the_values_of_its_level() -> None:
     term, curve = document("ggx"), TERMS["ggx"].curve("theta_o")
     gamma = np.linspace(0.2, 1.5, 6)
-    found = level_values(term, curve, gamma, LEVELS)
+    actual = level_values(term, curve, gamma, LEVELS)
     for sample, level in enumerate(LEVELS.level):
         expected = curve_values(scaled_roughness(term, LEVELS.ratios[level]), curve, gamma[sample : sample + 1])
-        np.testing.assert_allclose(found[:, sample], expected[:, 0])
+        np.testing.assert_allclose(actual[:, sample], expected[:, 0])
 
 
 @pytest.mark.parametrize("model", ["lambert", "oren_nayar", "ashikhmin_shirley"])
-def test_terms_without_a_width_refuse_a_map(model) -> None:
+def test_terms_without_a_width_reject_a_roughness_map(model) -> None:
     with pytest.raises(ParameterError, match="roughness_map"):
         document(model)
 
 
 @pytest.mark.parametrize("value", [True, False, 1, "map", [], {}])
-def test_only_true_and_false_say_whether_the_map_is_followed(value) -> None:
+def test_following_a_map_accepts_only_booleans(value) -> None:
     with pytest.raises(ParameterError, match="roughness_map"):
         complete_term(("terms", 0), {"model": "ggx", "roughness_map": value}, None)
     assert not uses_roughness_map(complete_term(("terms", 0), {"model": "ggx"}, None))

@@ -1,4 +1,4 @@
-"""Every registered term against its paper's closed form, and against what physics asks of it."""
+"""Every registered term against its paper's closed form and against physical constraints."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MODELS = sorted(ANALYTIC)
 
 
 def random_params(model, rng):
-    """Parameters over their whole range, evenly as their sliders move."""
+    """Random parameters, uniform on the scale of their sliders."""
     params = {}
     for p in TERMS[model].parameters:
         scale = np.geomspace if p.scale == "log" else np.linspace
@@ -28,7 +28,7 @@ def random_params(model, rng):
 
 
 def directional_albedo(document, theta_o, num=200):
-    """∫ f cos θi dωi by Gauss-Legendre in cos θi and even steps in φ."""
+    """∫ f cos θi dωi by Gauss–Legendre in cos θi and uniform steps in φ."""
     x, w = np.polynomial.legendre.leggauss(num)
     mu = 0.5 * (x + 1)
     phi = (np.arange(2 * num) + 0.5) * np.pi / num
@@ -46,14 +46,14 @@ def test_term_equals_the_closed_form_of_its_paper(model):
         wi, wo = directions(rng, 500), directions(rng, 500)
         expected = CLOSED_FORMS[model](wi, wo, **params)
         value = eval_brdf({"model": model, "params": params, "color": [1.0, 0.5, 0.0]}, wi, wo)
-        scale = expected.max() * 1e-12 + 1e-300  # where a lobe has died away, only its absolute size counts
+        scale = expected.max() * 1e-12 + 1e-300  # in the tail of a lobe, only the absolute error counts
         np.testing.assert_allclose(value[:, 0], expected, rtol=1e-7, atol=scale)
         np.testing.assert_allclose(value[:, 1], 0.5 * expected, rtol=1e-7, atol=scale)
         assert not value[:, 2].any()
 
 
-def test_every_term_has_a_closed_form_to_be_compared_with():
-    """But for one that is made of integrals: see the furnace below."""
+def test_every_term_has_a_closed_form():
+    """Except for the term made of integrals; see the furnace test below."""
     assert {*CLOSED_FORMS, "ggx_multiple"} == set(ANALYTIC)
 
 
@@ -66,7 +66,7 @@ def test_term_is_reciprocal(model):
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_quotient_is_zero_below_the_horizon_and_above_zero_over_it(model):
+def test_quotient_is_zero_below_the_horizon_and_positive_above(model):
     quotient = TERMS[model].quotient
     rng = np.random.default_rng(5)
     for dtype in (np.float32, np.float64):
@@ -116,13 +116,13 @@ def test_lambert_passes_the_white_furnace():
     ],
     ids=lambda d: f"{d['model']}-{'-'.join(map(str, d['params'].values()))}",
 )
-def test_term_reflects_no_more_than_arrives(document, theta_o):
+def test_term_conserves_energy(document, theta_o):
     assert directional_albedo(document, theta_o) <= 1.01
 
 
 @pytest.mark.parametrize("roughness", [0.5, 0.63, 0.8, 1.0])
-def test_white_facets_lose_nothing_that_they_send_to_each_other(roughness):
-    """A furnace by another quadrature than the term's own: what ggx loses, up to two thirds, is back to 0.2 %."""
+def test_white_facets_with_multiple_scattering_conserve_energy(roughness):
+    """A furnace with a different quadrature: the loss of ggx, up to two thirds, is restored to 0.2 %."""
     params = {"roughness": roughness, "f0": 1.0}
     for theta_o in np.radians([0.0, 35.0, 60.0, 80.0]):
         at_once, later = (directional_albedo({"model": m, "params": params}, theta_o) for m in ("ggx", "ggx_multiple"))
@@ -130,8 +130,8 @@ def test_white_facets_lose_nothing_that_they_send_to_each_other(roughness):
         assert at_once + later == pytest.approx(1.0, abs=2e-3)
 
 
-def test_what_facets_send_later_loses_what_each_of_them_keeps():
-    """Dim facets send less at every bounce: below F̄² of what white ones do, and never more than arrives."""
+def test_absorbing_facets_lose_energy_at_each_bounce():
+    """Absorbing facets reflect less at every bounce: below F̄² of white ones, and never more than the incident light."""
     white, dim = (
         directional_albedo({"model": "ggx_multiple", "params": {"roughness": 0.9, "f0": f0}}, 0.5) for f0 in (1.0, 0.5)
     )
@@ -142,9 +142,9 @@ def test_what_facets_send_later_loses_what_each_of_them_keeps():
 
 
 @pytest.mark.parametrize("exponent", [3.0, 10.0, 100.0])
-def test_blinn_phong_reflects_at_most_four_times_its_colour(exponent):
-    # Nguyen's normalisation makes ∫ D cos θh dωh = 1 and leaves out the 1/(4 wo·h) that turns dωh into dωi. At normal
-    # incidence θi = 2 θh, and the integral can be done by hand.
+def test_blinn_phong_reflects_at_most_four_times_its_color(exponent):
+    # Nguyen's normalization makes ∫ D cos θh dωh = 1 and omits the 1/(4 wo·h) that converts dωh to dωi. At normal
+    # incidence θi = 2 θh, and the integral has a closed form.
     c = np.cos(np.pi / 4)
     s = exponent
     by_hand = 4 * (s + 2) * (2 * (1 - c ** (s + 4)) / (s + 4) - (1 - c ** (s + 2)) / (s + 2))
@@ -155,16 +155,16 @@ def test_blinn_phong_reflects_at_most_four_times_its_colour(exponent):
 
 
 @pytest.mark.parametrize("exponent", [1.0, 7.0, 50.0])
-def test_phong_reflects_what_its_cosine_lobe_lets_through(exponent):
+def test_phong_albedo_is_that_of_its_cosine_lobe(exponent):
     document = {"model": "phong", "params": {"exponent": exponent}}
-    # from above ∫ (s+1)/(2π) cos^(s+1) dω
+    # at normal incidence ∫ (s+1)/(2π) cos^(s+1) dω
     assert directional_albedo(document, 0.0) == pytest.approx((exponent + 1) / (exponent + 2), rel=1e-9)
     for theta_o in np.radians([20.0, 60.0, 89.0]):
         assert directional_albedo(document, theta_o) <= 1.0  # the lobe's volume is one, and cosines are at most that
 
 
 @pytest.mark.parametrize("c", [(-1.0, -1.0, 1.0), (1.0, 1.0, 1.0), (-1.0, -0.3, 0.6), (-0.2, -0.2, 1.0)])
-def test_lafortune_reflects_at_most_a_lobe(c):
+def test_lafortune_albedo_is_at_most_that_of_a_lobe(c):
     document = {"model": "lafortune", "params": dict(zip(("c_x", "c_y", "c_z"), c, strict=True)) | {"exponent": 30.0}}
     assert directional_albedo(document, 0.0) == pytest.approx(c[2] ** 30 / max(map(abs, c)) ** 30, rel=1e-9)
     for theta_o in np.radians([20.0, 60.0, 89.0]):
@@ -173,7 +173,7 @@ def test_lafortune_reflects_at_most_a_lobe(c):
 
 
 @pytest.mark.parametrize("sigma", [0.0, 0.3, 0.6, 1.0])
-def test_oren_nayar_reflects_hardly_more_than_arrives(sigma):
+def test_oren_nayar_conserves_energy_within_its_fit(sigma):
     document = {"model": "oren_nayar", "params": {"sigma": sigma, "albedo": 1.0}}
     n = np.array([0.0, 0.0, 1.0])
     variance = sigma**2
@@ -182,31 +182,31 @@ def test_oren_nayar_reflects_hardly_more_than_arrives(sigma):
     if sigma == 0:
         assert directional_albedo(document, 1.0, 50) == pytest.approx(1.0, abs=1e-9)
     for theta_o, bound in ((0.0, 1.0), (45.0, 1.0), (75.0, 1.015), (89.0, 1.05)):
-        # the paper fits its functions to numerical integrals; at the rim the fit gives a few per cent too much
+        # the paper fits its functions to numerical integrals; at grazing angles the fit is a few percent too high
         assert directional_albedo(document, np.radians(theta_o), 120) <= bound + 1e-9
 
 
 @pytest.mark.parametrize("alpha", [0.1, 0.3, 0.5])
-def test_ward_reflects_no_more_than_arrives(alpha):
+def test_ward_conserves_energy(alpha):
     n = np.array([0.0, 0.0, 1.0])
     for model in ("ward", "ward_duer"):
         peak = eval_brdf({"model": model, "params": {"alpha": alpha}}, n, n)
         np.testing.assert_allclose(peak, 1 / (4 * np.pi * alpha**2), rtol=1e-12)
     for theta_o in np.radians([0.0, 30.0, 60.0, 85.0]):
         assert directional_albedo({"model": "ward", "params": {"alpha": alpha}}, theta_o) <= 1.01
-    both = {"alpha_x": alpha, "alpha_y": 2 * alpha}
-    assert directional_albedo({"model": "ward_anisotropic", "params": both}, 0.0) <= 1.01
+    widths = {"alpha_x": alpha, "alpha_y": 2 * alpha}
+    assert directional_albedo({"model": "ward_anisotropic", "params": widths}, 0.0) <= 1.01
 
 
 def test_ward_anisotropic_with_equal_widths_is_ward():
     rng = np.random.default_rng(11)
     wi, wo = directions(rng, 300), directions(rng, 300)
     isotropic = eval_brdf({"model": "ward", "params": {"alpha": 0.3}}, wi, wo)
-    both = eval_brdf({"model": "ward_anisotropic", "params": {"alpha_x": 0.3, "alpha_y": 0.3}}, wi, wo)
-    np.testing.assert_allclose(both, isotropic, rtol=1e-9, atol=1e-300)
+    anisotropic = eval_brdf({"model": "ward_anisotropic", "params": {"alpha_x": 0.3, "alpha_y": 0.3}}, wi, wo)
+    np.testing.assert_allclose(anisotropic, isotropic, rtol=1e-9, atol=1e-300)
 
 
-# terms without masking: what each has in the place of D/4 · 1/((n·wi)(n·wo)), all facets white
+# terms without masking: the factor of each instead of D/4 · 1/((n·wi)(n·wo)), with white facets
 UNMASKED = [
     ("ward_duer", {"alpha": 0.2}, 4.0),
     ("ward_duer", {"alpha": 0.6}, 4.0),
@@ -218,19 +218,19 @@ UNMASKED = [
 
 
 @pytest.mark.parametrize(("model", "params", "scale"), UNMASKED)
-def test_facets_without_masking_reflect_no_more_than_they_project(model, params, scale):
+def test_facets_without_masking_reflect_at_most_their_projected_area(model, params, scale):
     """albedo ≤ ∫ D max(wo·h, 0) dωh / cos θo ≤ ∫ D (cos θh + tan θo sin θh max(cos φ, 0)) dωh, dωi = 4 (wo·h) dωh."""
     curve = TERMS[model].curve("theta_h")
     across = hemisphere_integral(curve, params, 0, lambda theta: np.sin(theta) / np.pi)
     for theta_o in np.radians([0.0, 35.0, 60.0, 80.0]):
         bound = scale * (hemisphere_integral(curve, params, 1) + np.tan(theta_o) * across)
         assert directional_albedo({"model": model, "params": params}, theta_o) <= bound * 1.001
-    # straight above nothing is hidden: what the facets project is all that is reflected, less those below the horizon
+    # at normal incidence nothing is masked: the reflected light is the projected area, minus facets below the horizon
     assert directional_albedo({"model": model, "params": params}, 0.0) <= 1.01
 
 
 def hemisphere_integral(curve, params, power, factor=np.ones_like):
-    """∫ f(θ) cos^power θ · factor(θ) dω, finely."""
+    """∫ f(θ) cos^power θ · factor(θ) dω with a fine quadrature."""
     edges = np.concatenate([[0], np.geomspace(1e-6, np.pi / 2, 400)])
     x, w = np.polynomial.legendre.leggauss(16)
     theta = edges[:-1, None] + 0.5 * np.diff(edges)[:, None] * (1 + x)
@@ -240,14 +240,14 @@ def hemisphere_integral(curve, params, power, factor=np.ones_like):
 
 
 @pytest.mark.parametrize("width", [0.03, 0.1, 0.3, 1.0])
-def test_facet_distributions_project_onto_the_surface_they_cover(width):
+def test_facet_distributions_are_normalized(width):
     ggx = TERMS["ggx"].curve("theta_h")
     assert hemisphere_integral(ggx, {"roughness": width}, 1) == pytest.approx(1.0, rel=1e-8)
-    beckmann = TERMS["cook_torrance"].curve("theta_h")  # its D is written without 1/π
+    beckmann = TERMS["cook_torrance"].curve("theta_h")  # D without 1/π
     assert hemisphere_integral(beckmann, {"sigma": width}, 1) == pytest.approx(np.pi, rel=1e-8)
     maxwell = TERMS["beard_maxwell"].curve("theta_h")
     assert hemisphere_integral(maxwell, {"sigma": width}, 1) == pytest.approx(1.0, rel=1e-8)
-    schlick = TERMS["schlick"].curve("theta_h")  # Z is written without 1/π
+    schlick = TERMS["schlick"].curve("theta_h")  # Z without 1/π
     assert hemisphere_integral(schlick, {"roughness": width}, 1) == pytest.approx(np.pi, rel=1e-8)
     ward = TERMS["ward_duer"].curve("theta_h")  # projects cos⁴ less than Beckmann; narrow, it is one quarter
     assert hemisphere_integral(ward, {"alpha": width}, -3) == pytest.approx(0.25, rel=1e-8)
@@ -256,13 +256,13 @@ def test_facet_distributions_project_onto_the_surface_they_cover(width):
 
 
 @pytest.mark.parametrize(("model", "name"), [("cook_torrance", "sigma"), ("ward", "alpha"), ("ward_duer", "alpha")])
-def test_slopes_reach_two(model, name):
-    """There facets are steeper than flat on the mean, and D still projects onto the surface."""
+def test_steep_slopes_are_normalized(model, name):
+    """Facets have a mean slope above one, and D is still normalized."""
     parameter = TERMS[model].parameter(name)
     assert parameter.maximum == 2.0
     power, area = (1, np.pi) if model == "cook_torrance" else (-3, 0.25)
-    found = hemisphere_integral(TERMS[model].curve("theta_h"), {name: parameter.maximum}, power)
-    assert found == pytest.approx(area, rel=1e-8)
+    projected = hemisphere_integral(TERMS[model].curve("theta_h"), {name: parameter.maximum}, power)
+    assert projected == pytest.approx(area, rel=1e-8)
 
 
 @pytest.mark.parametrize("sigma", [0.01, 0.05, 0.2, 1.0, 2.0])
@@ -276,7 +276,7 @@ def test_cook_torrance_peak_is_f0_over_four_pi_sigma_squared(sigma):
     ("ior", "extinction"), [(1.0, 0.0), (1.33, 0.0), (5.0, 0.0), (0.2, 3.9), (1.5, 7.3), (1.0, 10.0)]
 )
 def test_fresnel_equals_the_complex_amplitudes(ior, extinction):
-    cosine = np.linspace(1e-4, 1.0, 2001)  # below, the amplitudes lose their digits
+    cosine = np.linspace(1e-4, 1.0, 2001)  # below, the amplitudes lose precision
     expected = complex_fresnel(cosine, ior, extinction)
     np.testing.assert_allclose(fresnel(cosine, ior, extinction), expected, atol=1e-11)
 
@@ -288,7 +288,7 @@ def test_fresnel_at_the_ends():
 
 
 @pytest.mark.parametrize("model", [model for model in MODELS if TERMS[model].fixed])
-def test_fixed_parameters_are_put_in_and_default_to_what_is_declared(model):
+def test_fixed_parameters_are_completed_with_declared_defaults(model):
     term = TERMS[model]
     rng = np.random.default_rng(7)
     wi, wo = directions(rng, 50), directions(rng, 50)
@@ -365,20 +365,20 @@ def test_description_is_json_for_every_term():
 def test_outgoing_is_the_view_angle_alone():
     outgoing = {t.model for t in TERMS.values() for c in t.curves if c.depends_on_view}
     assert outgoing == {t.model for t in TERMS.values() for c in t.curves if c.angle is Angle.THETA_O}
-    assert outgoing == set(TERMS) - {"measured_btf"}  # which has no curves
+    assert outgoing == set(TERMS) - {"measured_btf"}  # it has no curves
     declared = {t.model for t in TERMS.values() for c in t.curves if c.depends_on_view and c is not VIEW}
     assert declared == {"ggx", "ggx_multiple", "measured_lv", "measured_hf"}
 
 
 @pytest.mark.parametrize("model", ANALYTIC)
 def test_any_term_may_depend_on_the_view_angle(model):
-    """Drawn, the curve multiplies by what it is at θo; until then it is not even looked at."""
+    """A drawn curve multiplies the term by its value at θo; otherwise it is not evaluated."""
     rng = np.random.default_rng(11)
     wi, wo = directions(rng, 200), directions(rng, 200)
     plain = {"model": model, "color": [1, 1, 1], "params": {}, "curves": {}}
     drawn = {**plain, "curves": {"theta_o": {"bands": [3.0] * 32 + [0.5] * 32}}}
     before = eval_brdf(plain, wi, wo)
-    if model == "ggx":  # masking, in the place of which it stands
+    if model == "ggx":  # it replaces masking
         alpha = TERMS["ggx"].parameter("roughness").default ** 2
         tan2 = 1 / wo[:, 2] ** 2 - 1
         before = before / (2 / (1 + np.sqrt(1 + alpha**2 * tan2)))[:, None]

@@ -1,4 +1,4 @@
-"""Edits relative to what a curve was: what no hand touches stays to the last bit, and nothing moves farther than it."""
+"""Edits relative to a curve: untouched bands stay bit-identical, and no band moves farther than the edit."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from relume.brdf.registry import TERMS
 
 CASES = [("cook_torrance", {"sigma": 0.01}), ("ggx", {"roughness": 0.05}), ("ggx", {"roughness": 0.245})]
 ANGLES = np.array([0.0, 0.879, 3.0, 20.0, 90.0])
-# the same numbers stand in client_web/tests/curveEdits.test.ts
+# the same numbers are in client_web/tests/curveEdits.test.ts
 TWIN = [12, 4.6061477767732395, 7.98575, 8.031796875, 6.723032069970845, 3.425655976676385, 1.1938775510204083, 0]
 
 
@@ -20,14 +20,14 @@ def document(model, params, drawn, name="theta_h"):
 
 
 def handles_of(bands, angles=ANGLES):
-    """Handles that pull nothing."""
+    """Handles without displacement."""
     middles = (np.arange(len(bands)) + 0.5) * (90 / len(bands))
     values = np.interp(angles, middles, bands)
     return [[float(x), float(v), float(v)] for x, v in zip(angles, values, strict=True)]
 
 
 @pytest.mark.parametrize(("model", "params"), CASES)
-def test_handles_that_pull_nothing_change_no_bit(model, params):
+def test_handles_without_displacement_change_no_bit(model, params):
     plain = {"model": model, "params": params}
     for curve in TERMS[model].curves:
         before = generated_bands(plain, curve)
@@ -40,7 +40,7 @@ def test_handles_that_pull_nothing_change_no_bit(model, params):
 @pytest.mark.parametrize("share", [1e-3, -1e-3])
 @pytest.mark.parametrize("index", range(5))
 @pytest.mark.parametrize(("model", "params"), CASES)
-def test_a_nudge_moves_nothing_by_more_than_its_share_and_nothing_beyond_its_neighbours(model, params, index, share):
+def test_a_small_displacement_stays_local_and_bounded(model, params, index, share):
     curve = TERMS[model].curve("theta_h")
     before = generated_bands({"model": model, "params": params}, curve)
     handles = handles_of(before[0])
@@ -57,7 +57,7 @@ def test_a_nudge_moves_nothing_by_more_than_its_share_and_nothing_beyond_its_nei
     assert change[0, at] == pytest.approx(share * before[0, at], rel=0.1)
 
 
-def test_a_curve_goes_where_its_handles_are_put():
+def test_a_curve_passes_through_its_handles():
     params = {"sigma": 0.1}
     curve = TERMS["cook_torrance"].curve("theta_h")
     before = generated_bands({"model": "cook_torrance", "params": params}, curve)[0]
@@ -70,7 +70,7 @@ def test_a_curve_goes_where_its_handles_are_put():
         assert (after >= 0).all()
 
 
-def test_nothing_moves_farther_than_the_handles_beside_it():
+def test_no_band_moves_farther_than_the_neighboring_handles():
     rng = np.random.default_rng(9)
     curve = TERMS["cook_torrance"].curve("theta_h")
     for sigma in rng.uniform(0.005, 0.5, 40):
@@ -86,7 +86,7 @@ def test_nothing_moves_farther_than_the_handles_beside_it():
 
 
 @pytest.mark.parametrize("name", ["theta_h", "theta_d"])
-def test_factors_and_offsets_are_of_bands_and_their_averages_hold(name):
+def test_factors_and_offsets_apply_to_band_averages(name):
     curve = TERMS["ggx"].curve(name)
     plain = {"model": "ggx", "params": {"roughness": 0.05}}
     before = generated_bands(plain, curve)
@@ -98,7 +98,7 @@ def test_factors_and_offsets_are_of_bands_and_their_averages_hold(name):
     edges = np.linspace(0, np.pi / 2, curve.num_bands + 1)
     gamma = edges[:-1, None] + np.diff(edges)[:, None] * (np.arange(4000) + 0.5) / 4000
     values = curve_values(term, curve, gamma.ravel()).reshape(3, curve.num_bands, -1)
-    # about a highlight directions count alike, which are as dense as the angle is large
+    # around a highlight directions have equal weight; their density is proportional to the angle
     averages = np.average(values, axis=2, weights=np.broadcast_to(gamma if name == "theta_h" else 1.0, values.shape))
     np.testing.assert_allclose(averages, curve_bands(term, curve), rtol=2e-3)
 
@@ -115,9 +115,9 @@ def test_an_outgoing_curve_has_no_steps():
     assert curve_values(term, curve, np.radians([50.0]))[0, 0] == pytest.approx(handles[1][2], rel=1e-3)
 
 
-def test_edits_stand_on_points_on_bands_and_on_parameters_as_they_are_now():
+def test_edits_apply_to_current_points_bands_and_parameters():
     edges = np.linspace(0, 90, 257)
-    ramp = np.diff(edges**3 / 3) / np.diff(edges**2 / 2)  # means of the angle over the directions of each band
+    ramp = np.diff(edges**3 / 3) / np.diff(edges**2 / 2)  # mean angle over the directions of each band
     handles = [[0.0, 10.0, 20.0], [90.0, 10.0, 20.0]]
     for ground in ({"points": [[0, 0], [90, 90]]}, {"bands": ramp.tolist()}):
         term, curve = document("cook_torrance", {"sigma": 0.2}, {**ground, "handles": handles})
@@ -130,7 +130,7 @@ def test_edits_stand_on_points_on_bands_and_on_parameters_as_they_are_now():
         np.testing.assert_array_equal(curve_bands(term, curve), 0.5 * generated_bands(plain, curve))
 
 
-def test_the_editor_bends_curves_alike():
+def test_the_editor_gives_the_same_curves():
     eight = {"factors": [1, 1, 2, 0, 1, 1, 1, 1], "offsets": [0, 0, 0, 3, 0, 0, 0, 0]}
     drawn = {**eight, "handles": [[0, 8, 12], [20, 4, 2], [45, 3, 9], [90, 0, 0]]}
     ground = np.broadcast_to([8.0, 6, 4, 3, 2, 1, 0.5, 0], (3, 8))

@@ -1,4 +1,4 @@
-"""Terms at pairs of directions that stay: the whole BRDF in plain NumPy is the oracle."""
+"""Terms at fixed pairs of directions, against the whole BRDF in plain NumPy."""
 
 import numpy as np
 import pytest
@@ -12,9 +12,9 @@ RNG = np.random.default_rng(4)
 
 
 def directions(*shape):
-    found = RNG.normal(size=(*shape, 3))
-    found[..., 2] = np.abs(found[..., 2])
-    return found / np.linalg.norm(found, axis=-1, keepdims=True)
+    vectors = RNG.normal(size=(*shape, 3))
+    vectors[..., 2] = np.abs(vectors[..., 2])
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
 WI, WO = directions(7, 300), directions(7, 1)
@@ -27,18 +27,18 @@ def document(model, **fields):
 
 def check(term, tolerance=1e-5):
     expected = np.moveaxis(eval_brdf(term, WI, WO), -1, 0)
-    found = PAIRS.values(term)
-    assert found.shape[1:] == WI.shape[:-1]
-    assert len(found) in (1, 3)
-    np.testing.assert_allclose(np.broadcast_to(found, expected.shape), expected, atol=tolerance * expected.max())
+    values = PAIRS.values(term)
+    assert values.shape[1:] == WI.shape[:-1]
+    assert len(values) in (1, 3)
+    np.testing.assert_allclose(np.broadcast_to(values, expected.shape), expected, atol=tolerance * expected.max())
 
 
 @pytest.mark.parametrize("model", ANALYTIC)
-def test_values_are_those_of_the_whole_brdf(model):
+def test_values_equal_the_whole_brdf(model):
     check(document(model))
 
 
-def test_each_edit_is_seen_whatever_was_asked_before():
+def test_each_edit_is_evaluated_regardless_of_earlier_calls():
     for exponent in (4.0, 30.0, 4.0, [3.0, 8.0, 20.0]):
         check(document("blinn_phong", params={"exponent": exponent}))
     check(document("ggx", params={"roughness": 0.2, "f0": [0.1, 0.5, 0.9]}))
@@ -48,7 +48,7 @@ def test_each_edit_is_seen_whatever_was_asked_before():
     check(document("blinn_phong", curves=drawn))
 
 
-def test_channels_that_are_alike_are_evaluated_once():
+def test_equal_channels_are_evaluated_once():
     assert len(PAIRS.values(document("blinn_phong"))) == 1
     assert len(PAIRS.values(document("blinn_phong", params={"exponent": [3.0, 8.0, 20.0]}))) == 3
 
@@ -62,7 +62,7 @@ def test_channels_that_are_alike_are_evaluated_once():
         (document("ward_anisotropic", params={"alpha_x": 0.3, "alpha_y": 0.3}), True),
     ],
 )
-def test_terms_that_look_the_same_from_all_around_are_known(term, expected):
+def test_isotropic_terms_are_recognized(term, expected):
     turned = [[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]]
     same = np.allclose(eval_brdf(term, WI, WO), eval_brdf(term, WI @ turned, WO @ turned), rtol=1e-5)
     assert same == expected

@@ -1,6 +1,6 @@
-"""Pixels in which a surface turns: thin chrome against many samples a pixel, and how many samples it takes.
+"""Pixels with changing normals: thin chrome against many samples per pixel, and the number of samples.
 
-A mirror shows the environment in the reflected direction; nothing else plays a part here.
+A mirror shows the environment in the reflected direction; nothing else contributes.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def mirrored(scene, normal, towards):
 
 
 def brute_force(scene):
-    """FINE² rays a pixel. Returns radiance (pixels, 3) and the ring's share of each pixel."""
+    """Trace FINE² rays per pixel. Returns radiance (pixels, 3) and the ring's coverage of each pixel."""
     width, height = SIZE[0] * FINE, SIZE[1] * FINE
     camera, geometry = scene.cameras[0], build_scene_buffers(scene)
     y, x = np.divmod(np.arange(width * height), width)
@@ -49,27 +49,27 @@ def brute_force(scene):
 
 
 def shown(scene, samples):
-    eye = scene.cameras[0].to_world[:3, 3]
+    camera_position = scene.cameras[0].to_world[:3, 3]
     on = samples.material != BACKGROUND
     radiance = samples.surface.diffuse.astype(np.float64)
-    towards = samples.surface.points.position[on] - eye
+    towards = samples.surface.points.position[on] - camera_position
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
     radiance[on] = mirrored(scene, samples.surface.points.normal[on], towards)
     weighted = radiance * samples.weight[:, None]
     return np.stack([np.bincount(samples.pixel, weighted[:, c], SIZE[0] * SIZE[1]) for c in range(3)], axis=1)
 
 
-def test_a_thin_ring_of_chrome_shows_what_brute_force_shows(ring):
-    exact, share = brute_force(ring)
-    found = shown(ring, sample_view(ring, build_scene_buffers(ring), "c", SIZE))
-    seen = share > 0.1
-    # a screen shows no more than white
-    error = np.abs(np.minimum(found, 1) - np.minimum(exact, 1))[seen]
+def test_a_thin_chrome_ring_equals_brute_force(ring):
+    exact, coverage = brute_force(ring)
+    image = shown(ring, sample_view(ring, build_scene_buffers(ring), "c", SIZE))
+    is_ring = coverage > 0.1
+    # displays clip at white
+    error = np.abs(np.minimum(image, 1) - np.minimum(exact, 1))[is_ring]
     assert np.sqrt(np.mean(error**2)) < 0.08
     assert np.percentile(error, 99) < 0.45
 
 
-def test_samples_of_a_pixel_are_turned_apart_and_few(ring):
+def test_samples_of_a_pixel_have_different_normals_and_are_few(ring):
     samples = sample_view(ring, build_scene_buffers(ring), "c", SIZE)
     count = np.bincount(samples.pixel)
     assert 3 <= count.max() <= 8
@@ -77,8 +77,8 @@ def test_samples_of_a_pixel_are_turned_apart_and_few(ring):
     np.testing.assert_allclose(np.bincount(samples.pixel, samples.weight), 1, atol=1e-6)
 
 
-def test_where_much_turns_the_number_of_samples_stays_bounded():
-    """A fat ring of 25 pixels across turns by more than four degrees a pixel nearly everywhere."""
+def test_the_number_of_samples_is_bounded_for_curved_surfaces():
+    """On a thick ring 25 pixels wide, normals change by more than four degrees per pixel nearly everywhere."""
     fat = make_tiny_scene(torus("ring", 0.4, 0.39, 0, 64, 64), camera=make_camera("c", [0, 0, 16], [0, 0, 0], 0.1))
     samples = sample_view(fat, build_scene_buffers(fat), "c", (32, 24))
     count = np.bincount(samples.pixel, minlength=32 * 24)
@@ -87,7 +87,7 @@ def test_where_much_turns_the_number_of_samples_stays_bounded():
 
 
 def two_floors(step):
-    """Two squares of one mesh that face the viewer, the one on the left nearer by a share of the distance."""
+    """Two squares of one mesh that face the camera, the left one nearer by a fraction of the distance."""
     near = 2 * (1 - step)
     corners = [[-2, -2, 2 - near], [0, -2, 2 - near], [0, 2, 2 - near], [-2, 2, 2 - near]]
     corners += [[-2, -2, 0], [2, -2, 0], [2, 2, 0], [-2, 2, 0]]
@@ -108,7 +108,7 @@ def test_a_step_between_parallel_faces_of_one_mesh_is_an_edge():
         assert 0 < samples.weight[own].min() < 1
 
 
-def test_a_floor_seen_along_itself_has_no_steps():
+def test_a_floor_at_grazing_angles_has_no_edges():
     corners = [[-50, 0, 50], [50, 0, 50], [50, 0, -50], [-50, 0, -50]]
     floor = make_tiny_scene(
         mesh("floor", corners, [[0, 1, 2], [0, 2, 3]], 0), camera=make_camera("c", [0, 0.3, 20], [0, 0.3, 0], 0.4)
@@ -116,4 +116,4 @@ def test_a_floor_seen_along_itself_has_no_steps():
     samples = sample_view(floor, build_scene_buffers(floor), "c", SIZE)
     several = np.nonzero(np.bincount(samples.pixel) > 1)[0]
     rows = np.unique(several // SIZE[0])
-    assert len(rows) <= 4  # where the floor ends
+    assert len(rows) <= 4  # the end of the floor

@@ -1,4 +1,4 @@
-"""View samples: their weights, their order, silhouettes, textures, normals and what lies behind everything."""
+"""View samples: weights, order, silhouettes, textures, normals and the background."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def sampled(scene, size=SIZE, view=None):
 
 
 @pytest.fixture(scope="module")
-def still():
+def still_samples():
     scene = still_life()
     return scene, sampled(scene)
 
@@ -37,14 +37,14 @@ def weight_by_pixel(samples, rows, size=SIZE):
     return out
 
 
-def test_shares_of_each_pixel_sum_to_one(still):
-    samples = still[1]
+def test_weights_of_each_pixel_sum_to_one(still_samples):
+    samples = still_samples[1]
     np.testing.assert_allclose(weight_by_pixel(samples, slice(None)), 1, atol=1e-6)
     assert samples.weight.min() >= 1 / 8 - 1e-6
 
 
-def test_sorted_by_material_then_along_the_picture(still):
-    samples = still[1]
+def test_samples_are_sorted_by_material_then_by_image_position(still_samples):
+    samples = still_samples[1]
     material = samples.material.astype(int)
     assert (np.diff(material) >= 0).all()
     assert set(material) == {0, 1, 2, BACKGROUND}
@@ -52,12 +52,12 @@ def test_sorted_by_material_then_along_the_picture(still):
         pixel = samples.pixel[material == index].astype(int)
         y, x = np.divmod(pixel, SIZE[0])
         step = np.hypot(np.diff(x), np.diff(y))
-        assert np.median(step) <= 2  # neighbours in memory are neighbours in the picture
+        assert np.median(step) <= 2  # neighbors in memory are neighbors in the image
     assert samples.num_rays > SIZE[0] * SIZE[1]
 
 
-def test_edges_have_more_samples_and_smooth_places_one(still):
-    samples = still[1]
+def test_edges_have_more_samples_than_smooth_regions(still_samples):
+    samples = still_samples[1]
     count = np.bincount(samples.pixel, minlength=SIZE[0] * SIZE[1]).reshape(SIZE[1], SIZE[0])
     assert count.min() == 1
     assert 2 <= count.max() <= 8
@@ -71,18 +71,18 @@ def test_edges_have_more_samples_and_smooth_places_one(still):
 
 
 def flat(record):
-    """All arrays of a record and of the records in it, by name."""
+    """All arrays of a record and of its nested records, by name."""
     fields = record._asdict() if hasattr(record, "_asdict") else vars(record)
-    found = {}
+    arrays = {}
     for name, value in fields.items():
-        found |= {name: value} if isinstance(value, np.ndarray) else flat(value) if name != "num_rays" else {}
-    return found
+        arrays |= {name: value} if isinstance(value, np.ndarray) else flat(value) if name != "num_rays" else {}
+    return arrays
 
 
 @pytest.mark.parametrize("is_rough", [False, True])
-def test_samples_found_window_by_window_are_those_found_at_once(still, is_rough, monkeypatch):
-    scene, at_once = still
-    if is_rough:  # in levels, which come before the order in the picture
+def test_samples_of_image_tiles_equal_those_of_the_whole_image(still_samples, is_rough, monkeypatch):
+    scene, at_once = still_samples
+    if is_rough:  # roughness levels are sorted before image positions
         texels = np.random.default_rng(1).integers(80, 255, (32, 32, 1), np.uint8)
         rough = Texture(texels, encoding=TextureEncoding("share", (1.0, 1.0, 1.0)))
         scene = replace(scene, materials=[replace(m, textures={"roughness": rough}) for m in scene.materials])
@@ -95,20 +95,20 @@ def test_samples_found_window_by_window_are_those_found_at_once(still, is_rough,
         np.testing.assert_array_equal(by_window[name], values, err_msg=name)
 
 
-@pytest.mark.parametrize(("room", "most"), [(4, 8), (3, 4), (2, 2)])
-def test_where_all_is_edges_a_pixel_has_as_many_as_there_is_room_for(room, most, monkeypatch):
+@pytest.mark.parametrize(("room", "max_samples"), [(4, 8), (3, 4), (2, 2)])
+def test_scenes_of_edges_use_the_available_number_of_samples(room, max_samples, monkeypatch):
     size, scene = (24, 24), tuft(4000)
     monkeypatch.setattr(view_samples, "_SAMPLES_PER_SIDE", room * size[0])
     samples = sampled(scene, size)
     count = np.bincount(samples.pixel, minlength=size[0] * size[1])
     assert 1.5 < count.mean() <= room
-    assert count.max() == most
+    assert count.max() == max_samples
     assert len(samples.pixel) <= view_samples.view_sample_limit(scene.materials, size[0] * size[1])
     np.testing.assert_allclose(weight_by_pixel(samples, slice(None), size), 1, atol=1e-6)
 
 
 def disc_coverage(radius, size, yfov, distance, fine=32):
-    """Share of each pixel that a disc facing the camera covers, by dense supersampling. (height, width)"""
+    """Coverage of each pixel by a disc facing the camera, by dense supersampling. (height, width)"""
     width, height = size
     half = np.tan(yfov / 2) * distance
     x = ((np.arange(width * fine) + 0.5) / fine / width * 2 - 1) * half * width / height
@@ -128,21 +128,21 @@ def disc_samples(radius):
 
 
 @pytest.mark.parametrize("radius", [0.31, 0.5, 0.731])
-def test_silhouette_of_a_disc_covers_what_it_should(radius):
+def test_the_silhouette_of_a_disc_has_the_right_coverage(radius):
     samples = disc_samples(radius)
     covered = weight_by_pixel(samples, samples.material == 0).reshape(SIZE[1], SIZE[0])
     exact = disc_coverage(radius, SIZE, 0.8, 2.0)
     error = covered - exact
     rim_pixels = (exact > 0) & (exact < 1)
-    # eight positions cannot cut every slanted edge better: the pattern's discrepancy over half-planes is 0.215
+    # the bound of eight positions: the discrepancy of the pattern over half-planes is 0.215
     assert np.abs(error).max() <= 0.215
     assert (np.abs(error[rim_pixels]) <= 1 / 8).mean() > 0.95
     assert np.sqrt(np.mean(error[rim_pixels] ** 2)) < 0.07
     assert abs(error.sum()) < 0.01 * exact.sum()
 
 
-def test_what_stands_for_a_part_of_a_pixel_lies_in_its_middle():
-    """A sample to one side of its part would shift what is seen along silhouettes."""
+def test_a_sample_lies_in_the_center_of_its_part_of_the_pixel():
+    """An off-center sample would shift silhouettes."""
     samples, fine = disc_samples(0.731), 32
     rim = np.nonzero((samples.material == 0) & (samples.weight < 1))[0]
     pixel_size = 2 * np.tan(0.4) * 2.0 / SIZE[1]
@@ -158,24 +158,24 @@ def test_what_stands_for_a_part_of_a_pixel_lies_in_its_middle():
     assert np.abs(within - middle).mean() < 0.15
 
 
-def test_position_lies_just_off_the_surface_on_the_viewers_side():
+def test_positions_are_offset_toward_the_viewer():
     scene = make_tiny_scene(
         sphere("ball", [0, 0, 0], 1, 0, num_rings=40), camera=make_camera("c", [0, 0.5, 4], [0, 0, 0], 0.7)
     )
-    samples, eye = sampled(scene), scene.cameras[0].to_world[:3, 3]
+    samples, camera_position = sampled(scene), scene.cameras[0].to_world[:3, 3]
     solid = samples.material == 0
     surface = samples.surface.points
     away = np.linalg.norm(surface.position[solid].astype(float), axis=1)
     assert np.abs(away - 1).max() < 0.004  # chords of the facets
-    towards = eye - surface.position[solid]
+    towards = camera_position - surface.position[solid]
     facing = (surface.normal[solid] * towards).sum(axis=1) / np.linalg.norm(towards, axis=1)
     assert facing.min() > 0
     outward = surface.position[solid] / away[:, None]
     assert (surface.normal[solid] * outward).sum(axis=1).min() > np.cos(np.radians(5))
 
 
-def test_frames_are_unit_and_square(still):
-    samples = still[1]
+def test_frames_are_orthonormal(still_samples):
+    samples = still_samples[1]
     solid = samples.material != BACKGROUND
     normal, tangent = samples.surface.points.normal[solid], samples.surface.points.tangent[solid]
     for v in (normal, tangent):
@@ -183,15 +183,15 @@ def test_frames_are_unit_and_square(still):
     assert np.abs((normal * tangent).sum(axis=1)).max() < 1e-5
 
 
-def test_background_samples_carry_the_environment_behind_them(still):
-    scene, samples = still
+def test_background_samples_carry_the_environment_behind_them(still_samples):
+    scene, samples = still_samples
     outside = samples.material == BACKGROUND
     whole = np.bincount(samples.pixel, minlength=SIZE[0] * SIZE[1])[samples.pixel] == 1
     rows = np.nonzero(outside & whole)[0]
     assert len(rows) > 300
     y, x = np.divmod(samples.pixel[rows].astype(int), SIZE[0])
     directions = camera_directions(scene.cameras[0], SIZE, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
-    half_pixel = 0.5 * 0.8 / SIZE[1]  # near an edge another position of the pixel may stand for all of it
+    half_pixel = 0.5 * 0.8 / SIZE[1]  # near an edge another position may represent the pixel
     np.testing.assert_allclose(samples.surface.points.position[rows], directions, atol=half_pixel)
     directions = samples.surface.points.position[rows]
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1, atol=1e-6)
@@ -205,14 +205,14 @@ def test_background_samples_carry_the_environment_behind_them(still):
 
 
 def flat_scene(material, repeat=1.0, size=1.0):
-    """A square that fills the picture of a camera which looks straight at it."""
+    """A square that fills the image of a camera facing it."""
     square = quad("square", np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * size, 0)
     square.uvs[:] = square.uvs * repeat
     camera = make_camera("c", [0, 0, 2], [0, 0, 0], 2 * np.arctan(0.5))
     return make_tiny_scene(square, camera=camera, materials=[material])
 
 
-def test_texture_lies_where_its_coordinates_say():
+def test_textures_follow_their_uv_coordinates():
     pixels = np.zeros((48, 48, 3), np.float32)
     pixels[:24, :, 0], pixels[:, 24:, 1], pixels[..., 2] = 1, 1, 0.25  # red above, green to the right
     samples = sampled(flat_scene(Material("M", WHITE, {"diffuse": Texture(pixels)})), (48, 48))
@@ -223,7 +223,7 @@ def test_texture_lies_where_its_coordinates_say():
     np.testing.assert_array_equal(samples.surface.specular[inner], 1)
 
 
-def test_far_checkers_become_grey_and_near_ones_stay():
+def test_distant_checkers_become_gray_and_near_ones_stay():
     near = sampled(flat_scene(Material("M", WHITE, {"specular": checker(32, 4)})))
     values = near.surface.specular[near.material == 0][:, 0]
     assert ((values < 0.02) | (values > 0.98)).mean() > 0.5
@@ -232,11 +232,11 @@ def test_far_checkers_become_grey_and_near_ones_stay():
     assert np.abs(grey - 0.5).max() < 0.05
 
 
-def test_mip_levels_keep_the_mean_and_a_footprint_of_a_texel_the_texels():
+def test_mip_levels_preserve_the_mean_and_small_footprints_the_texels():
     pixels = np.random.default_rng(3).random((32, 32, 3), np.float32)
     pyramid = MipMap(Texture(pixels))
     for level in map(pyramid.level, range(len(pyramid.levels))):
-        np.testing.assert_allclose(level.mean(axis=(0, 1)), pixels.mean(axis=(0, 1)), rtol=5e-4)  # halves
+        np.testing.assert_allclose(level.mean(axis=(0, 1)), pixels.mean(axis=(0, 1)), rtol=5e-4)  # half precision
     y, x = np.divmod(np.arange(32 * 32), 32)
     uv = np.column_stack([(x + 0.5) / 32, (y + 0.5) / 32]).astype(np.float32)
     exact = pyramid.sample(uv, np.full(1024, 1 / 32, np.float32))
@@ -253,12 +253,12 @@ def test_wrap_modes(wrap, at, same_as):
     pixels = np.random.default_rng(4).random((16, 16, 3), np.float32)
     pyramid = MipMap(Texture(pixels, (wrap, "clamp")))
     footprint = np.full(1, 1 / 16, np.float32)
-    found, expected = (pyramid.sample(np.float32([[u, 0.4]]), footprint) for u in (at, same_as))
-    np.testing.assert_allclose(found, expected, atol=1e-4)
+    actual, expected = (pyramid.sample(np.float32([[u, 0.4]]), footprint) for u in (at, same_as))
+    np.testing.assert_allclose(actual, expected, atol=1e-4)
 
 
 @pytest.mark.parametrize("strength", [0.0, 0.4, 5.0])
-def test_mapped_normals_are_unit_outward_and_lean_as_the_map_says(strength):
+def test_mapped_normals_are_unit_outward_and_follow_the_map(strength):
     lean = np.float32([strength, 0, 1])
     normals = np.tile(lean / np.linalg.norm(lean), (8, 8, 1)).astype(np.float32)
     samples = sampled(flat_scene(Material("M", WHITE, normal_map=Texture(normals)), size=3.0))
@@ -300,7 +300,7 @@ def test_mesh_without_tangents_or_coordinates_has_frames_all_the_same():
     np.testing.assert_allclose(np.linalg.norm(samples.surface.points.tangent, axis=1), 1, atol=1e-5)
 
 
-def test_back_faces_are_shaded_as_if_turned_round():
+def test_back_faces_are_shaded_with_flipped_normals():
     front = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]
     scene = make_tiny_scene(quad("back", front[::-1], 0), camera=make_camera("c", [0, 0, 3], [0, 0, 0], 0.5))
     samples = sampled(scene)

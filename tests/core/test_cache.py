@@ -1,4 +1,4 @@
-"""What lasts and what is made in passing share one budget; everybody can see who holds it."""
+"""Persistent and transient values share one budget, and their owners are reported."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ def put(memory, key, num_bytes):
 
 
 def is_there(memory, key):
-    """Without making it last."""
+    """Look up without making the value persistent."""
     return memory.transient.get_cached(key, Block) is not None
 
 
-def test_what_was_made_in_passing_goes_first():
+def test_transient_values_are_evicted_first():
     memory = Cache(BUDGET)
     put(memory, "oldest", 4_000)
     put(memory.transient, "passing", 3_000)
@@ -40,7 +40,7 @@ def test_what_was_made_in_passing_goes_first():
     assert memory.used_bytes == 6_000
 
 
-def test_what_is_made_in_passing_takes_no_more_than_its_share_of_what_lasts():
+def test_transient_values_take_a_bounded_part_of_the_budget():
     memory = Cache(BUDGET)
     for number in range(8):
         put(memory, number, 1_000)
@@ -55,14 +55,14 @@ def test_what_is_made_in_passing_takes_no_more_than_its_share_of_what_lasts():
     assert [is_there(memory, number) for number in range(8)] == [False] + [True] * 7
 
 
-def test_free_room_is_everybodys():
+def test_free_budget_is_available_to_all():
     memory = Cache(BUDGET)
     put(memory.transient, "large", 7_000)
     assert is_there(memory, "large")
     assert memory.used_bytes == 7_000
 
 
-def test_what_was_made_in_passing_lasts_once_somebody_else_has_found_it():
+def test_a_transient_value_becomes_persistent_on_reuse():
     memory = Cache(BUDGET)
     put(memory.transient, "found", 1_000)
     put(memory.transient, "not found", 1_000)
@@ -71,7 +71,7 @@ def test_what_was_made_in_passing_lasts_once_somebody_else_has_found_it():
     assert [is_there(memory, key) for key in ("found", "not found", "much")] == [True, False, True]
 
 
-def test_what_is_kept_is_made_once_and_counted_as_it_is():
+def test_a_value_is_computed_once_and_counted_by_its_size():
     memory, made, start = Cache(BUDGET), [], threading.Barrier(6)
     key = ("/data/bakes/0123456789abcdef.zarr", "lights", 1)
 
@@ -99,7 +99,7 @@ def test_what_is_kept_is_made_once_and_counted_as_it_is():
     }
 
 
-def test_what_is_larger_than_the_budget_is_handed_out_and_not_kept():
+def test_a_value_larger_than_the_budget_is_returned_and_not_cached():
     memory = Cache(BUDGET)
     put(memory, "other", 5_000)
     assert memory.get_value(("bake", "lights"), lambda: np.ones(BUDGET)).sum() == BUDGET
@@ -107,7 +107,7 @@ def test_what_is_larger_than_the_budget_is_handed_out_and_not_kept():
     assert memory.used_bytes == 5_000
 
 
-def test_making_one_thing_while_making_another_fails_leaves_no_trace():
+def test_a_failed_nested_computation_leaves_no_trace():
     memory = Cache(BUDGET)
 
     def fails():
@@ -120,7 +120,7 @@ def test_making_one_thing_while_making_another_fails_leaves_no_trace():
     assert memory.used_bytes == 80
 
 
-def test_bakes_that_nobody_uses_keep_their_floor_and_what_was_made_in_passing_goes_first():
+def test_unused_bakes_keep_their_minimum_and_transient_values_are_evicted_first():
     memory = Cache(BUDGET)
     put(memory.transient, ("left", "passing"), 500)
     put(memory, ("left", "old"), 500)
@@ -129,13 +129,13 @@ def test_bakes_that_nobody_uses_keep_their_floor_and_what_was_made_in_passing_go
     for bake in ("left", "used"):
         memory.get_value((bake, "lights"), lambda: np.zeros(5))
     memory.trim(700, {"used"})
-    assert memory.bytes_by_owner()[CacheOwner("lights", "")] == 40  # those in use
+    assert memory.bytes_by_owner()[CacheOwner("lights", "")] == 40  # those of open bakes
     keys = [("left", "passing"), ("left", "old"), ("used", "old"), ("left", "new")]
     assert [is_there(memory, key) for key in keys] == [False, False, True, True]
     assert memory.used_bytes == 1_040
 
 
-# Small whatever is done: numbers of terms and bands, what is made by code alone, files mapped into memory.
+# Always small: numbers of terms and bands, values computed from code alone, memory-mapped files.
 BOUNDED = {
     "assets/btf/direction_rings.py",
     "assets/environments/built_in.py",
@@ -173,8 +173,8 @@ BOUNDED = {
 }
 
 
-def test_no_other_cache_grows_beside_the_memory():
+def test_no_other_cache_can_grow():
     package = Path(relume.__file__).parent
     caches = re.compile(r"^from functools import .*\b(lru_cache|cache)\b", re.MULTILINE)
-    found = {path for path in package.rglob("*.py") if caches.search(path.read_text("utf-8"))}
-    assert {path.relative_to(package).as_posix() for path in found} == BOUNDED
+    paths = {path for path in package.rglob("*.py") if caches.search(path.read_text("utf-8"))}
+    assert {path.relative_to(package).as_posix() for path in paths} == BOUNDED

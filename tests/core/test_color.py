@@ -1,4 +1,4 @@
-"""Colour arithmetic against definitions and the bit patterns of the shared-exponent format."""
+"""Color arithmetic against definitions and the bit patterns of the shared-exponent format."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_srgb_curve_at_known_values_and_back():
         ((0, 0, 0), 0),
         ((1, 1, 1), 256 | 256 << 9 | 256 << 18 | 16 << 27),
         ((1, 0.5, 0), 256 | 128 << 9 | 16 << 27),
-        ((0.9999, 0, 0), 256 | 16 << 27),  # rounding up needs a bit more than the mantissa has
+        ((0.9999, 0, 0), 256 | 16 << 27),  # rounding up overflows the mantissa
         ((65408, 0, 0), 511 | 31 << 27),
         ((1e30, 1, 0), 511 | 31 << 27),
         ((np.inf, 0, 0), 511 | 31 << 27),

@@ -1,4 +1,4 @@
-"""Files are whole or absent, whatever happens while they are written."""
+"""Files are complete or absent, whatever happens while they are written."""
 
 import os
 import stat
@@ -29,7 +29,7 @@ def test_a_file_takes_its_name_when_the_block_has_ended(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_others_may_read_it_where_the_system_lets_them(tmp_path: Path) -> None:
+def test_the_file_mode_follows_the_umask(tmp_path: Path) -> None:
     plain, ours = tmp_path / "plain", tmp_path / "ours"
     plain.touch()
     with atomic_write(ours) as unfinished:
@@ -48,7 +48,7 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path, raised: 
 
 
 @pytest.mark.parametrize("call", ["fsync", "replace"])
-def test_a_full_disk_is_said_in_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str) -> None:
+def test_a_full_disk_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str) -> None:
     def no_space(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
@@ -58,19 +58,21 @@ def test_a_full_disk_is_said_in_a_sentence(tmp_path: Path, monkeypatch: pytest.M
     assert not list(tmp_path.iterdir())
 
 
-def test_a_missing_folder_is_said_in_a_sentence(tmp_path: Path) -> None:
+def test_a_missing_folder_is_reported(tmp_path: Path) -> None:
     with pytest.raises(RelumeError, match="check the folder"):
         write(tmp_path / "nowhere" / "a.bin")
 
 
-def test_a_folder_is_gone_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_is_removed_atomically(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / "kept.zarr"
     folder.mkdir()
     (folder / "one").write_text("1")
-    found: list[bool] = []
-    monkeypatch.setattr("shutil.rmtree", lambda path, **_: found.append(folder.exists() or not (path / "one").exists()))
-    remove_folder(folder)  # as if it were killed then
-    assert found == [False]
+    exists: list[bool] = []
+    monkeypatch.setattr(
+        "shutil.rmtree", lambda path, **_: exists.append(folder.exists() or not (path / "one").exists())
+    )
+    remove_folder(folder)  # as after a crash
+    assert exists == [False]
     remove_strays(tmp_path.parent, older_than_s=3600)
     assert len(list(tmp_path.glob(UNFINISHED))) == 1
     monkeypatch.undo()

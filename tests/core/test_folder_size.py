@@ -1,4 +1,4 @@
-"""What folders take, and what happens where somebody deletes them meanwhile."""
+"""Sizes of folders, also while somebody deletes them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_all_files_below_a_folder_are_counted(tmp_path: Path) -> None:
     assert folder_bytes(tmp_path / "none") == 0
 
 
-def test_a_folder_deleted_while_it_is_counted_takes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_deleted_while_it_is_measured_counts_as_empty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def deleted_meanwhile(folder: Path, **how: Any) -> Iterator[tuple[str, list[str], list[str]]]:
         walk = _WALK(folder, **how)
         yield next(walk)

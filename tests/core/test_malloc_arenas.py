@@ -1,4 +1,4 @@
-"""How many of glibc's arenas the threads of a server allocate from."""
+"""Number of glibc arenas that the threads of a server allocate from."""
 
 from __future__ import annotations
 
@@ -36,17 +36,19 @@ print(Path(sys.argv[1]).read_text().count("<heap nr="))
 
 
 @pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "mallopt"), reason="only glibc has arenas")
-@pytest.mark.parametrize(("how", "asked", "most"), [("shared", None, 2), ("alone", None, None), ("shared", "5", 5)])
-def test_threads_limit_malloc_arenas(tmp_path, how: str, asked: str | None, most: int | None) -> None:
+@pytest.mark.parametrize(
+    ("how", "asked", "max_arenas"), [("shared", None, 2), ("alone", None, None), ("shared", "5", 5)]
+)
+def test_threads_limit_malloc_arenas(tmp_path, how: str, asked: str | None, max_arenas: int | None) -> None:
     environment = {key: value for key, value in os.environ.items() if key != "MALLOC_ARENA_MAX"}
     if asked is not None:
         environment["MALLOC_ARENA_MAX"] = asked
     command = [sys.executable, "-c", COUNT, str(tmp_path / "info.xml"), how]
     count = int(subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout)
-    assert count == most if most is not None else count > 5
+    assert count == max_arenas if max_arenas is not None else count > 5
 
 
-def test_a_server_has_its_threads_share_them(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
+def test_a_server_limits_its_malloc_arenas(monkeypatch: pytest.MonkeyPatch, tmp_path) -> None:
     done: list[str] = []
     monkeypatch.setattr(app, "set_up", lambda *_: None)
     monkeypatch.setattr(app, "limit_malloc_arenas", lambda: done.append("arenas"))

@@ -1,4 +1,4 @@
-"""Folders of compiled kernels: others for other sources, the same for all checkouts, ours alone, always somewhere."""
+"""Folders of compiled kernels: keyed by their sources, shared by checkouts, private to the user, with a fallback."""
 
 from __future__ import annotations
 
@@ -38,18 +38,18 @@ def package(tmp_path):
 
 @pytest.fixture
 def user_cache(tmp_path, monkeypatch):
-    """A user's cache of this test; the process goes back to its own."""
+    """The user's cache folder of this test; the process switches back afterwards."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     cache_folder.cache_clear()
     yield tmp_path / "relume" / "numba"
     cache_folder.cache_clear()
 
 
-def test_kernels_are_made_of_those_they_call_and_of_modules_with_their_constants(package):
-    found = {
+def test_kernel_sources_include_callees_and_modules_of_constants(package):
+    sources = {
         path.relative_to(package).with_suffix("").as_posix() for path in kernel_sources(package / "kernel.py", package)
     }
-    assert found == {"kernel", "inner/__init__", "inner/helper", "inner/plain", "inner/scale"}
+    assert sources == {"kernel", "inner/__init__", "inner/helper", "inner/plain", "inner/scale"}
 
 
 _COMPILE = """
@@ -70,7 +70,7 @@ def _folder_of(checkout: Path, cache: Path) -> Path:
     return Path(output.stdout.split()[0])
 
 
-def test_another_checkout_finds_what_one_has_compiled_until_a_source_changes(tmp_path):
+def test_checkouts_share_compiled_kernels_until_a_source_changes(tmp_path):
     original = Path(numba_cache.__file__).parents[1]
     checkouts = [tmp_path / "one", tmp_path / "two"]
     for checkout in checkouts:
@@ -83,7 +83,7 @@ def test_another_checkout_finds_what_one_has_compiled_until_a_source_changes(tmp
     assert _folder_of(checkouts[1], tmp_path / "cache") != first
 
 
-def test_compiled_kernels_lie_in_the_folder_of_their_module(user_cache):
+def test_compiled_kernels_are_in_the_folder_of_their_module(user_cache):
     code = (
         "import numpy as np\n"
         "from relume.image_io.ocio.sampling import apply_lut\n"
@@ -103,7 +103,7 @@ def test_importing_relume_imports_no_numba():
     assert locators.startswith("relume.core.numba_cache.KernelLocator,")
 
 
-def test_functions_of_others_are_left_to_numba():
+def test_functions_outside_relume_use_numbas_own_cache():
     assert numba_cache.KernelLocator.from_function(lambda: None, __file__) is None
 
 
@@ -118,8 +118,8 @@ def test_unusable_user_cache_falls_back_to_a_temporary_folder(tmp_path, monkeypa
     assert cache_folder() == folder
 
 
-def test_folder_that_others_may_write_to_is_not_used(tmp_path, monkeypatch, user_cache):
-    # what lies in a kernel cache is run: somebody else's must not be
+def test_a_folder_writable_by_others_is_not_used(tmp_path, monkeypatch, user_cache):
+    # files of a kernel cache are executed: those of other users must not be
     ours = cache_folder()
     cache_folder.cache_clear()
     ours.chmod(0o777)
@@ -137,7 +137,7 @@ def _kernels(folder: Path, name: str, days: float) -> Path:
     return made
 
 
-def test_folders_unused_for_a_month_go_when_a_new_one_is_made(user_cache):
+def test_folders_unused_for_a_month_are_deleted_with_the_next_new_folder(user_cache):
     caches = cache_folder()
     old, recent = (
         _kernels(caches, "trace.old-0123456789abcdef", 31),
@@ -154,7 +154,7 @@ def test_folders_unused_for_a_month_go_when_a_new_one_is_made(user_cache):
     assert linked.is_symlink()
 
 
-def test_folder_in_use_is_marked_and_prunes_nothing(user_cache):
+def test_a_folder_in_use_is_marked_and_not_deleted(user_cache):
     checkout = Path(numba_cache.__file__).parents[2]
     present = _folder_of(checkout, user_cache.parent.parent)
     os.utime(present, (0, 0))

@@ -1,4 +1,4 @@
-"""Which code made something: another name for other sources, found by following imports."""
+"""Source hashes of results: they change with the sources, which are found by following imports."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ def package(tmp_path):
     return tmp_path / "package"
 
 
-def names(package, found):
-    return {path.relative_to(package).with_suffix("").as_posix() for path in found}
+def names(package, paths):
+    return {path.relative_to(package).with_suffix("").as_posix() for path in paths}
 
 
-def test_sources_are_all_that_is_imported_directly_or_not(package):
+def test_sources_include_direct_and_indirect_imports(package):
     bake = {"trace/rays", "light/lamp", "scene/__init__", "scene/mesh", "scene/model", "errors"}
     shown = {"shown/frame", "shown/only_here"}
     assert names(package, collect_sources(["trace.rays"], package=package)) == bake | shown
@@ -42,14 +42,14 @@ def test_sources_are_all_that_is_imported_directly_or_not(package):
     assert names(package, collect_sources(["trace.rays"], exclude=["shown"], package=package)) == bake
 
 
-def test_a_module_that_has_moved_is_missed_aloud(package):
+def test_a_missing_module_raises_an_error(package):
     with pytest.raises(ModuleNotFoundError, match="no sources"):
         collect_sources(["trace.photons"], package=package)
     with pytest.raises(ModuleNotFoundError, match="no sources"):
         collect_sources(["trace.rays"], exclude=["trace.photons"], package=package)
 
 
-def test_the_hash_follows_what_is_imported_and_nothing_else(package):
+def test_the_hash_depends_on_imported_sources_only(package):
     def current():
         return code_hash(collect_sources(["trace.rays"], package=package), package)
 
@@ -64,7 +64,7 @@ def test_the_hash_follows_what_is_imported_and_nothing_else(package):
     assert current() not in (first, second)
 
 
-def test_images_depend_on_the_code_of_frames_and_bakes_do_not():
+def test_image_hashes_depend_on_frame_code_and_bake_hashes_do_not():
     package = source_hash._PACKAGE
     images = names(package, collect_sources(source_hash._IMAGES))
     bakes = names(package, collect_sources(source_hash._BAKES, source_hash._AFTER_BAKES))

@@ -1,4 +1,4 @@
-"""Threads of kernels: which of them do what is asked for."""
+"""Thread pools of kernels: which threads run the work."""
 
 import os
 import sys
@@ -24,34 +24,34 @@ def ranges(kernel):
 
 
 def names_of(run):
-    """Of the pools that work, or the caller, each part once."""
-    found = []
-    run(lambda start, stop: found.append((start, stop, threading.current_thread().name)))
-    parts = sorted((start, stop) for start, stop, _ in found)
+    """Thread pools that do the work, or the caller, each part once."""
+    names = []
+    run(lambda start, stop: names.append((start, stop, threading.current_thread().name)))
+    parts = sorted((start, stop) for start, stop, _ in names)
     assert [start for start, _ in parts] == [0, *(stop for _, stop in parts[:-1])]
     assert parts[-1][1] == 1000
-    return {name.rsplit("_", 1)[0] for *_, name in found}
+    return {name.rsplit("_", 1)[0] for *_, name in names}
 
 
-def who_meet():
-    """Threads of two ranges, of which each waits for the other: one thread alone would wait in vain."""
-    both, found = threading.Barrier(2, timeout=30), set()
+def names_of_meeting_threads():
+    """Names of the threads of two ranges that wait for each other, which needs two threads."""
+    barrier, names = threading.Barrier(2, timeout=30), set()
 
     def meet(start, stop):
-        both.wait()
-        found.add(threading.current_thread())
+        barrier.wait()
+        names.add(threading.current_thread())
 
     for_ranges(meet, 2, 1)
-    return found
+    return names
 
 
 def of_frames():
-    """Who makes frames: the caller, and the pool's other threads unless it was done before they woke."""
+    """Threads that compute frames: the caller, and others of the pool unless it finished before they woke."""
     return {threading.current_thread().name.rsplit("_", 1)[0], "kernels-frame"}
 
 
 @pytest.mark.parametrize("run", [shares, ranges])
-def test_frames_what_follows_them_and_long_work_have_threads_of_their_own(run):
+def test_frames_follow_ups_and_long_work_have_separate_threads(run):
     assert names_of(run) <= of_frames()
     with low_priority():
         assert names_of(run) == {"kernels-beside"}
@@ -68,25 +68,25 @@ def test_frames_what_follows_them_and_long_work_have_threads_of_their_own(run):
 
 
 @pytest.mark.parametrize("run", [shares, ranges])
-def test_frames_that_are_made_at_once_keep_to_their_own_threads(run):
-    assert len(run_frame(who_meet)) == 2
-    both = threading.Barrier(2)
+def test_concurrent_frames_use_separate_threads(run):
+    assert len(run_frame(names_of_meeting_threads)) == 2
+    barrier = threading.Barrier(2)
 
     def crowded():
-        both.wait(30)
-        found = names_of(run)
-        both.wait(30)
-        return found
+        barrier.wait(30)
+        names = names_of(run)
+        barrier.wait(30)
+        return names
 
     with ThreadPoolExecutor(2, "hand") as hands:
-        found = [hands.submit(run_frame, crowded) for _ in range(2)]
-        assert [names.result() for names in found] == [{"hand"}, {"hand"}]
+        futures = [hands.submit(run_frame, crowded) for _ in range(2)]
+        assert [names.result() for names in futures] == [{"hand"}, {"hand"}]
     with pytest.raises(ZeroDivisionError):
         run_frame(lambda: 1 / 0)
-    assert len(run_frame(who_meet)) == 2
+    assert len(run_frame(names_of_meeting_threads)) == 2
 
 
-def test_a_failure_beside_frames_leaves_the_next_frame_as_it_was():
+def test_a_failure_does_not_affect_the_next_frame():
     def fails(start, stop):
         raise ZeroDivisionError
 
@@ -95,41 +95,41 @@ def test_a_failure_beside_frames_leaves_the_next_frame_as_it_was():
     assert names_of(shares) <= of_frames()
 
 
-def test_frames_are_made_by_the_caller_and_another():
-    found = who_meet()
-    assert threading.current_thread() in found
-    assert len(found) == 2
+def test_frames_are_computed_by_the_caller_and_another_thread():
+    names = names_of_meeting_threads()
+    assert threading.current_thread() in names
+    assert len(names) == 2
 
 
 def test_a_failure_is_raised_when_all_ranges_have_ended():
-    found = []
+    ended = []
 
     def fails(start, stop):
-        found.append(start)
+        ended.append(start)
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
         for_ranges(fails, 1000, 10)
-    assert sorted(found) == list(range(0, 1000, 10))
+    assert sorted(ended) == list(range(0, 1000, 10))
 
 
-def test_kernels_within_kernels_wait_for_nobody():
-    found = []
+def test_nested_kernels_do_not_wait():
+    names = []
     parallel_for_chunks(
-        lambda start, stop: parallel_for_chunks(lambda a, b: found.append((start + a, start + b)), stop - start), 1000
+        lambda start, stop: parallel_for_chunks(lambda a, b: names.append((start + a, start + b)), stop - start), 1000
     )
-    assert sum(stop - start for start, stop in found) == 1000
+    assert sum(stop - start for start, stop in names) == 1000
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="threads have no niceness of their own elsewhere")
-def test_frames_go_first():
+def test_frames_have_priority():
     def niceness():
-        found = []
-        shares(lambda start, stop: found.append(os.getpriority(os.PRIO_PROCESS, 0)))
-        return found
+        values = []
+        shares(lambda start, stop: values.append(os.getpriority(os.PRIO_PROCESS, 0)))
+        return values
 
     of_frames = max(niceness())
     with low_priority():
-        assert min(niceness()) > of_frames or of_frames == 19  # there is nothing beyond
+        assert min(niceness()) > of_frames or of_frames == 19  # 19 is the maximum
     with ThreadPoolExecutor(1, initializer=mark_background_thread) as long:
         assert min(long.submit(niceness).result()) > of_frames or of_frames == 19

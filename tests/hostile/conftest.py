@@ -1,4 +1,4 @@
-"""The server's fixtures, for its hostile clients."""
+"""The server's fixtures, for hostile clients."""
 
 from server_fixtures import ack_seconds, baked, client, control, empty_ledger, settings
 

@@ -1,4 +1,4 @@
-"""Small glTF files that are wrong in one place, and what refusing one means."""
+"""Small glTF files with one defect, and helpers that check their rejection."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def imported(data: bytes) -> Scene:
     return import_gltf(data, "test", LIGHT)
 
 
-def refused(data: bytes) -> str:
+def rejected(data: bytes) -> str:
     with pytest.raises(SceneError) as problem:
         imported(data)
     message = str(problem.value)

@@ -1,4 +1,4 @@
-"""Packed geometry that is damaged or lies about what it holds: refused in words, before anything large is made."""
+"""Compressed geometry that is damaged or has false sizes is rejected with a message before large allocations."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 import DracoPy
 import numpy as np
 import pytest
-from hostile_scenes import refused
+from hostile_scenes import rejected
 from packed_glb import SIDE, VECTORS, Glb, draco_bytes, draco_glb, meshopt_glb
 
 from relume.core.errors import SceneError
@@ -23,39 +23,39 @@ HUGE = 2**31
 
 
 @pytest.mark.parametrize("level", [0, 7])
-@pytest.mark.parametrize("share", [0.0, 0.1, 0.3, 0.6, 0.9])
-def test_truncated_draco_is_refused(level: int, share: float) -> None:
+@pytest.mark.parametrize("fraction", [0.0, 0.1, 0.3, 0.6, 0.9])
+def test_truncated_draco_is_rejected(level: int, fraction: float) -> None:
     packed, _ = draco_bytes(level)
-    assert "Draco" in refused(draco_glb(packed[: int(share * len(packed))] or b"D").bytes())
+    assert "Draco" in rejected(draco_glb(packed[: int(fraction * len(packed))] or b"D").bytes())
 
 
 @pytest.mark.parametrize("level", [0, 7])
-def test_damaged_draco_ends_in_words_or_in_a_scene(level: int) -> None:
+def test_damaged_draco_is_rejected_or_imported(level: int) -> None:
     (packed, _), rng = draco_bytes(level), np.random.default_rng(36)
     for _ in range(60):
         damaged = bytearray(packed)
-        for place in rng.integers(11, len(packed), 3):
-            damaged[place] = rng.integers(256)
+        for offset in rng.integers(11, len(packed), 3):
+            damaged[offset] = rng.integers(256)
         try:
             import_gltf(draco_glb(bytes(damaged)).bytes(), "test")
         except SceneError:
             continue
 
 
-def test_draco_that_claims_other_numbers_is_refused_before_it_is_decoded(monkeypatch: pytest.MonkeyPatch) -> None:
-    draco_bytes()  # decodes it once
+def test_draco_with_other_counts_is_rejected_before_decoding(monkeypatch: pytest.MonkeyPatch) -> None:
+    draco_bytes()  # decodes once
     monkeypatch.setattr("DracoPy.decode", lambda _: pytest.fail("it was decoded"))
     head = struct.pack("<5sBBBBH", b"DRACO", 2, 2, 1, 0, 0)
     many = b"\xff\xff\xff\xff\x07"
     for claims in (many + many, b"\x48" + many, b"\x48\x32", b"\xff" * 9):
-        assert "other numbers" in refused(draco_glb(head + claims + bytes(50)).bytes())
+        assert "other numbers" in rejected(draco_glb(head + claims + bytes(50)).bytes())
     for wrong in (b"BRACO" + head[5:], head[:7] + b"\0" + head[8:], head[:8] + b"\7" + head[9:]):
-        assert "damaged" in refused(draco_glb(wrong + bytes(50)).bytes())
+        assert "damaged" in rejected(draco_glb(wrong + bytes(50)).bytes())
     for unread in (head[:6] + b"\1" + head[7:], head[:9] + b"\0\x80"):
-        assert "npx @gltf-transform/cli copy" in refused(draco_glb(unread + bytes(50)).bytes())
+        assert "npx @gltf-transform/cli copy" in rejected(draco_glb(unread + bytes(50)).bytes())
 
 
-def test_draco_that_claims_more_than_it_can_hold_is_refused_before_it_is_decoded(
+def test_draco_with_impossible_counts_is_rejected_before_decoding(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     points, face = np.zeros((2_000_000, 3), np.float32), np.array([[0, 1, 2]], np.uint32)
@@ -66,10 +66,10 @@ def test_draco_that_claims_more_than_it_can_hold_is_refused_before_it_is_decoded
     for accessor, count in ((0, len(points)), (1, len(points)), (2, 3)):
         glb.document["accessors"][accessor]["count"] = count
     monkeypatch.setattr("DracoPy.decode", lambda _: pytest.fail("it was decoded"))
-    assert "claims more than its Draco data can hold" in refused(glb.bytes())
+    assert "claims more than its Draco data can hold" in rejected(glb.bytes())
 
 
-def test_attributes_that_draco_has_besides_end_in_words_within_a_limit_of_memory() -> None:
+def test_extra_draco_attributes_are_rejected_within_the_memory_limit() -> None:
     points, face = np.zeros((60_000, 3), np.float32), np.array([[0, 1, 2]], np.uint32)
     options = {"quantization_bits": 1, "compression_level": 0, "preserve_order": True}
     besides = {number: np.zeros((len(points), 127), np.uint8) for number in range(7, 57)}
@@ -85,22 +85,22 @@ def test_attributes_that_draco_has_besides_end_in_words_within_a_limit_of_memory
 
 @pytest.mark.parametrize("accessor", [0, 1, 2])
 @pytest.mark.parametrize("count", [3, SIDE * SIDE - 1, 300_000_000])
-def test_accessors_that_draco_does_not_fill_are_refused(accessor: int, count: int) -> None:
+def test_accessors_without_draco_data_are_rejected(accessor: int, count: int) -> None:
     glb = draco_glb()
     glb.document["accessors"][accessor]["count"] = count
-    refused(glb.bytes())
+    rejected(glb.bytes())
 
 
-def test_a_draco_extension_that_is_none_is_refused() -> None:
-    for part in (None, 3, {}, {"bufferView": -1, "attributes": {}}, {"bufferView": 99, "attributes": {}}):
+def test_an_invalid_draco_extension_is_rejected() -> None:
+    for extension in (None, 3, {}, {"bufferView": -1, "attributes": {}}, {"bufferView": 99, "attributes": {}}):
         glb = draco_glb()
-        glb.document["meshes"][0]["primitives"][0]["extensions"] = {"KHR_draco_mesh_compression": part}
-        refused(glb.bytes())
+        glb.document["meshes"][0]["primitives"][0]["extensions"] = {"KHR_draco_mesh_compression": extension}
+        rejected(glb.bytes())
 
 
 def packed_view(glb: Glb, view: int = 0) -> dict[str, Any]:
-    found: dict[str, Any] = glb.document["bufferViews"][view]["extensions"]["EXT_meshopt_compression"]
-    return found
+    extension: dict[str, Any] = glb.document["bufferViews"][view]["extensions"]["EXT_meshopt_compression"]
+    return extension
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def packed_view(glb: Glb, view: int = 0) -> dict[str, Any]:
         {"buffer": 9},
     ],
 )
-def test_meshopt_views_that_lie_are_refused_before_anything_is_made(changes: dict[str, Any]) -> None:
+def test_false_meshopt_views_are_rejected_before_allocation(changes: dict[str, Any]) -> None:
     glb = meshopt_glb()
     packed_view(glb).update(changes)
     if "count" in changes:
@@ -128,13 +128,13 @@ def test_meshopt_views_that_lie_are_refused_before_anything_is_made(changes: dic
         glb.document["accessors"][0]["count"] = max(1, changes["count"])
     data = glb.bytes()
     tracemalloc.start()
-    refused(data)
+    rejected(data)
     assert tracemalloc.get_traced_memory()[1] < 50e6
     tracemalloc.stop()
 
 
 @pytest.mark.parametrize("name", VECTORS)
-def test_truncated_and_damaged_meshopt_data_is_refused_or_decoded_within_its_bounds(name: str) -> None:
+def test_damaged_meshopt_data_is_rejected_or_decoded_within_bounds(name: str) -> None:
     vector, rng = VECTORS[name], np.random.default_rng(36)
     packed, count, stride = base64.b64decode(vector["packed"]), vector["count"], vector["stride"]
 
@@ -148,15 +148,15 @@ def test_truncated_and_damaged_meshopt_data_is_refused_or_decoded_within_its_bou
             decode(packed[:length])
     for _ in range(40):
         damaged = bytearray(packed)
-        for place in rng.integers(0, len(packed), 3):
-            damaged[place] = rng.integers(256)
+        for offset in rng.integers(0, len(packed), 3):
+            damaged[offset] = rng.integers(256)
         try:
             assert len(decode(bytes(damaged))) == count
         except MeshoptError:
             continue
 
 
-def test_indices_beyond_the_vertices_are_refused_after_unpacking() -> None:
+def test_decoded_indices_beyond_the_vertices_are_rejected() -> None:
     glb = meshopt_glb()
     glb.document["accessors"][0]["count"] = 20
-    assert "beyond its 20 vertices" in refused(glb.bytes())
+    assert "beyond its 20 vertices" in rejected(glb.bytes())

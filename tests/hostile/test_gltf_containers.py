@@ -4,39 +4,39 @@ from __future__ import annotations
 
 import pytest
 from glb_builder import Glb
-from hostile_scenes import changed, imported, refused
+from hostile_scenes import changed, imported, rejected
 
 
 @pytest.mark.parametrize("length", [0, 3, 4, 12, 19, 20, 100, 300])
 def test_import_refuses_a_truncated_glb(length: int) -> None:
-    refused(Glb().quad().bytes()[:length])
+    rejected(Glb().quad().bytes()[:length])
 
 
 @pytest.mark.parametrize(
     "data", [b"\x00" * 1000, b"glTF", b"glTF\x02\x00\x00\x00\xff\xff\xff\x7f", b"glTF\x02\x00\x00\x00\x0c\x00\x00\x00"]
 )
-def test_import_refuses_what_is_no_glb(data: bytes) -> None:
-    refused(data)
+def test_import_refuses_other_files(data: bytes) -> None:
+    rejected(data)
 
 
 def test_import_refuses_a_glb_cut_by_one_byte() -> None:
-    assert "truncated" in refused(Glb().quad().bytes()[:-1])
+    assert "truncated" in rejected(Glb().quad().bytes()[:-1])
 
 
 @pytest.mark.parametrize(
     "uri", ["mesh.bin", "../secret.bin", "http://127.0.0.1/x.bin", "/etc/passwd", "file:///etc/passwd"]
 )
 def test_import_opens_no_external_buffer(uri: str) -> None:
-    assert "outside the f" in refused(changed(buffers=[{"uri": uri, "byteLength": 4}]))
+    assert "outside the f" in rejected(changed(buffers=[{"uri": uri, "byteLength": 4}]))
 
 
-def test_import_says_how_to_pack() -> None:
-    message = refused(changed(buffers=[{"uri": "mesh.bin", "byteLength": 4}]))
+def test_import_explains_how_to_pack() -> None:
+    message = rejected(changed(buffers=[{"uri": "mesh.bin", "byteLength": 4}]))
     assert "@gltf-transform/cli copy" in message
 
 
 def test_import_refuses_json_of_too_many_values() -> None:
-    assert "values" in refused(b'{"asset":{"version":"2.0"},"nodes":[' + b"[]," * 4_000_001 + b"0]}")
+    assert "values" in rejected(b'{"asset":{"version":"2.0"},"nodes":[' + b"[]," * 4_000_001 + b"0]}")
 
 
 @pytest.mark.parametrize(
@@ -54,11 +54,11 @@ def test_import_refuses_json_of_too_many_values() -> None:
     ],
 )
 def test_import_refuses_json_that_is_no_gltf(text: bytes) -> None:
-    refused(text)
+    rejected(text)
 
 
-def test_import_says_how_to_unpack() -> None:
-    assert "@gltf-transform/cli ktxdecompress" in refused(changed(extensionsRequired=["KHR_texture_basisu"]))
+def test_import_explains_how_to_unpack() -> None:
+    assert "@gltf-transform/cli ktxdecompress" in rejected(changed(extensionsRequired=["KHR_texture_basisu"]))
 
 
 def test_import_shows_names_without_control_characters() -> None:
@@ -69,7 +69,7 @@ def test_import_shows_names_without_control_characters() -> None:
     assert len(warnings) == 5
     assert all(warning.isprintable() for warning in warnings)
     glb.document["meshes"][0]["primitives"][0]["attributes"]["X\nY"] = -1
-    refused(glb.bytes())
+    rejected(glb.bytes())
 
 
 def test_import_keeps_control_characters_out_of_names() -> None:

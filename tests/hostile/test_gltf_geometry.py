@@ -1,4 +1,4 @@
-"""Absurd accessors, meshes and node trees: refused before anything of their size is made."""
+"""Absurd accessors, meshes and node trees are rejected before allocation."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from glb_builder import QUAD, Glb, pack
-from hostile_scenes import changed, imported, refused, with_accessor
+from hostile_scenes import changed, imported, rejected, with_accessor
 
 from relume.scene_io.gltf import importer
 
@@ -32,50 +32,50 @@ from relume.scene_io.gltf import importer
     ],
 )
 def test_import_refuses_absurd_accessors(changes: dict[str, Any]) -> None:
-    refused(with_accessor(**changes))
+    rejected(with_accessor(**changes))
 
 
 def test_import_refuses_zeros_without_data_that_claim_gigabytes() -> None:
     sparse = {"count": 1, "indices": {"bufferView": 2, "componentType": 5123}, "values": {"bufferView": 0}}
     glb = Glb().quad()
     glb.document["accessors"][0] = {"componentType": 5126, "count": 70_000_000, "type": "VEC3", "sparse": sparse}
-    refused(glb.bytes())
+    rejected(glb.bytes())
 
 
 def test_import_refuses_views_that_reach_beyond_their_buffer() -> None:
     glb = Glb().quad()
     glb.document["bufferViews"][0]["byteLength"] = 10**9
-    assert "beyond its buffer" in refused(glb.bytes())
+    assert "beyond its buffer" in rejected(glb.bytes())
 
 
 @pytest.mark.parametrize("stride", [0, 4, 8, 253, 10**9])
 def test_import_refuses_strides_that_do_not_fit(stride: int) -> None:
     glb = Glb().quad()
     glb.document["bufferViews"][0]["byteStride"] = stride
-    refused(glb.bytes())
+    rejected(glb.bytes())
 
 
 def test_import_refuses_indices_out_of_range() -> None:
     glb = Glb().quad()
     glb.document["meshes"][0]["primitives"][0]["indices"] = glb.accessor(np.array([0, 1, 40_000], np.uint16))
-    assert "beyond its 4 vertices" in refused(glb.bytes())
+    assert "beyond its 4 vertices" in rejected(glb.bytes())
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e30])
 def test_import_refuses_positions_that_are_not_finite(value: float) -> None:
     positions = QUAD.copy()
     positions[2, 1] = value
-    assert "not finite" in refused(Glb().quad(POSITION=positions).bytes())
+    assert "not finite" in rejected(Glb().quad(POSITION=positions).bytes())
 
 
 def test_import_refuses_a_mesh_without_triangles() -> None:
     glb = Glb().quad()
     glb.document["meshes"][0]["primitives"][0]["mode"] = 1
-    assert "no triangles" in refused(glb.bytes())
+    assert "no triangles" in rejected(glb.bytes())
 
 
 def test_import_refuses_a_file_without_meshes() -> None:
-    assert "no triangles" in refused(pack({"asset": {"version": "2.0"}}, b""))
+    assert "no triangles" in rejected(pack({"asset": {"version": "2.0"}}, b""))
 
 
 def test_import_drops_degenerate_triangles_with_a_warning() -> None:
@@ -88,7 +88,7 @@ def test_import_drops_degenerate_triangles_with_a_warning() -> None:
 
 
 def test_import_refuses_a_mesh_of_degenerate_triangles_only() -> None:
-    assert "no triangles" in refused(Glb().quad(POSITION=np.zeros((4, 3), np.float32)).bytes())
+    assert "no triangles" in rejected(Glb().quad(POSITION=np.zeros((4, 3), np.float32)).bytes())
 
 
 @pytest.mark.parametrize(
@@ -102,8 +102,8 @@ def test_import_refuses_a_mesh_of_degenerate_triangles_only() -> None:
         [{"mesh": 0}] * 100_001,
     ],
 )
-def test_import_refuses_nodes_that_are_nowhere(nodes: list[dict[str, Any]]) -> None:
-    said = refused(changed(nodes=nodes))
+def test_import_refuses_missing_nodes(nodes: list[dict[str, Any]]) -> None:
+    said = rejected(changed(nodes=nodes))
     assert len(nodes) < 100_000 or "more than the 100,000 nodes that are read" in said
 
 
@@ -116,25 +116,25 @@ def test_import_refuses_nodes_that_are_nowhere(nodes: list[dict[str, Any]]) -> N
         [{"children": [0] * 50_000, "mesh": 0}],
     ],
 )
-def test_nodes_that_are_no_tree_appear_once_with_one_warning(nodes: list[dict[str, Any]]) -> None:
+def test_nodes_of_an_invalid_tree_appear_once_with_one_warning(nodes: list[dict[str, Any]]) -> None:
     scene = imported(changed(nodes=nodes))
     assert len(scene.meshes) == 1
     assert len([warning for warning in scene.warnings if "reached twice" in warning]) == 1
 
 
-def test_import_refuses_instances_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_import_refuses_too_many_instances(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importer, "MAX_INSTANCES", 2_000)
     glb = Glb().quad()
     glb.document["meshes"][0]["primitives"] *= 1_000
     glb.document["nodes"] = [{"mesh": 0}] * 3
     glb.document["scenes"] = [{"nodes": list(range(3))}]
-    assert "2,000 meshes" in refused(glb.bytes())
+    assert "2,000 meshes" in rejected(glb.bytes())
 
 
-def test_import_refuses_degenerate_triangles_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_import_refuses_too_many_degenerate_triangles(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importer, "MAX_CORNERS", 600)
     glb = Glb().quad()
     primitive = glb.document["meshes"][0]["primitives"][0]
     primitive["indices"] = glb.accessor(np.zeros(300, np.uint16))
     glb.document["meshes"][0]["primitives"] = [primitive] * 3
-    assert "triangles" in refused(glb.bytes())
+    assert "triangles" in rejected(glb.bytes())

@@ -8,21 +8,21 @@ import struct
 import PIL.Image
 import pytest
 from glb_builder import Glb
-from hostile_scenes import refused
+from hostile_scenes import rejected
 
 
 @pytest.mark.parametrize("uri", ["wood.png", "../wood.png", "https://127.0.0.1/wood.png"])
 def test_import_opens_no_external_image(uri: str) -> None:
     glb = Glb().quad({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})
     glb.document |= {"images": [{"uri": uri}], "textures": [{"source": 0}]}
-    assert "outside the f" in refused(glb.bytes())
+    assert "outside the f" in rejected(glb.bytes())
 
 
 def test_import_refuses_jpegs_of_too_many_scans() -> None:
     glb = Glb().quad({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})
     view = glb.view(b"\xff\xd8" + b"\xff\xda" * 500)
     glb.document |= {"images": [{"bufferView": view}], "textures": [{"source": 0}]}
-    assert "scans" in refused(glb.bytes())
+    assert "scans" in rejected(glb.bytes())
 
 
 def test_import_refuses_huge_images_before_decoding() -> None:
@@ -32,7 +32,7 @@ def test_import_refuses_huge_images_before_decoding() -> None:
     for data in (png, _png_of_ones(9_000, 8)):
         glb = Glb().quad({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})
         glb.document |= {"images": [{"bufferView": glb.view(data)}], "textures": [{"source": 0}]}
-        refused(glb.bytes())
+        rejected(glb.bytes())
 
 
 def _png_of_ones(width: int, height: int) -> bytes:
@@ -45,4 +45,4 @@ def _png_of_ones(width: int, height: int) -> bytes:
 def test_import_refuses_damaged_images(damage: bytes) -> None:
     glb = Glb().quad({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})
     glb.document |= {"images": [{"bufferView": glb.view(damage + b"\0" * 8)}], "textures": [{"source": 0}]}
-    assert "damaged" in refused(glb.bytes())
+    assert "damaged" in rejected(glb.bytes())

@@ -1,4 +1,4 @@
-"""Environment files that are broken, absurd or malicious: one clear SceneError, nothing else, no hang."""
+"""Broken, absurd or malicious environment files give one clear SceneError, and nothing hangs."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ def test_environment_refuses_damaged_files(data: bytes) -> None:
 @given(st.lists(st.tuples(st.integers(8, 380), st.integers(0, 255)), min_size=1, max_size=6))
 def test_environment_survives_any_changed_exr_header(changes: list[tuple[int, int]]) -> None:
     data = bytearray(EXR)
-    for place, value in changes:
-        data[place] = value
+    for offset, value in changes:
+        data[offset] = value
     with contextlib.suppress(SceneError):
         assert np.isfinite(read_environment(bytes(data), "sky").radiance).all()
 
@@ -67,15 +67,15 @@ def test_environment_survives_any_changed_exr_header(changes: list[tuple[int, in
     "window", [(0, 0, 99_999, 99_999), (0, 0, 199_999, 99_999), (0, 0, -1, -1), (0, 0, 2**31 - 1, 9)]
 )
 def test_environment_refuses_exr_sizes_before_reading(window: tuple[int, int, int, int]) -> None:
-    place = EXR.index(b"dataWindow\0box2i\0") + len(b"dataWindow\0box2i\0") + 4
+    offset = EXR.index(b"dataWindow\0box2i\0") + len(b"dataWindow\0box2i\0") + 4
     data = bytearray(EXR)
-    data[place : place + 16] = struct.pack("<4i", *window)
+    data[offset : offset + 16] = struct.pack("<4i", *window)
     with pytest.raises(SceneError):
         read_environment(bytes(data), "sky")
 
 
 def _exr_claiming(width: int, height: int, tile: tuple[int, int] | None) -> bytes:
-    """An EXR file that is all header: half RGB, zip, no pixels."""
+    """An EXR file with a header only: half RGB, zip, no pixels."""
 
     def attribute(name: str, kind: str, value: bytes) -> bytes:
         return f"{name}\0{kind}\0".encode() + struct.pack("<I", len(value)) + value
@@ -99,7 +99,7 @@ def _exr_claiming(width: int, height: int, tile: tuple[int, int] | None) -> byte
 
 
 @pytest.mark.parametrize("tile", [None, (64, 64), (16_384, 8_192), (2**31 - 1, 2**31 - 1), (1, 1)])
-def test_environment_allocates_nothing_for_a_claim_without_data(
+def test_environment_allocates_nothing_for_missing_data(
     tile: tuple[int, int] | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[str] = []
@@ -139,13 +139,13 @@ def _exr_file() -> bytes:
 EXR = _exr_file()
 
 
-def test_changed_exr_is_good_to_begin_with() -> None:
+def test_the_unchanged_exr_is_valid() -> None:
     np.testing.assert_array_equal(read_environment(EXR, "sky").radiance, np.full((8, 16, 3), 0.5, np.float32))
 
 
 @pytest.mark.parametrize("kind", ["png", "tga", "bmp", "tif", "pnm", "sgi", "dpx"])
 @pytest.mark.parametrize("suffix", [".exr", ".hdr"])
-def test_no_other_reader_has_a_try_at_what_is_no_hdr_and_no_exr(tmp_path: Path, kind: str, suffix: str) -> None:
+def test_other_formats_reach_no_other_reader(tmp_path: Path, kind: str, suffix: str) -> None:
     path = tmp_path / f"a.{kind}"
     output = oiio.ImageOutput.create(str(path))
     assert output.open(str(path), oiio.ImageSpec(8, 8, 3, oiio.UINT8))
@@ -164,7 +164,7 @@ def test_environment_refuses_missing_files(tmp_path: Path) -> None:
 @given(st.lists(st.tuples(st.integers(0, 60), st.integers(0, 255)), max_size=6), st.integers(0, 200))
 def test_environment_survives_any_changed_bytes(changes: list[tuple[int, int]], length: int) -> None:
     data = bytearray(hdr(8, 4, bytes([128, 64, 32, 129]) * 32))
-    for place, value in changes:
-        data[place] = value
+    for offset, value in changes:
+        data[offset] = value
     with contextlib.suppress(SceneError):
         assert np.isfinite(read_environment(bytes(data[:length]), "sky").radiance).all()

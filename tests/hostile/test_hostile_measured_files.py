@@ -1,4 +1,4 @@
-"""Files and ids that are no measured material."""
+"""Invalid files and ids of measured materials."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ URL = "/api/materials/measured"
 @pytest.mark.parametrize(
     "data", [b"", struct.pack("<3i", 90, 90, 180), struct.pack("<3i", 10**9, 10**9, 10**9) + b"\0" * 8000]
 )
-def test_file_that_is_no_measured_material_is_refused(client: TestClient, settings: Any, data: bytes) -> None:
+def test_invalid_measured_material_is_refused(client: TestClient, settings: Any, data: bytes) -> None:
     response = client.post(URL, files={"material": ("../../x.binary", data)})
     assert response.status_code == 422
     assert response.json()["type"] == "urn:relume:problem:material"
@@ -22,14 +22,14 @@ def test_file_that_is_no_measured_material_is_refused(client: TestClient, settin
     assert list(settings.data.glob("upload-*")) == []
 
 
-def test_measured_material_beyond_its_size_is_413(client: TestClient) -> None:
+def test_oversized_measured_material_is_413(client: TestClient) -> None:
     response = client.post(URL, files={"material": ("x.binary", b"\0" * 36_000_000)})
     assert response.status_code == 413
     assert response.json()["type"] == "urn:relume:problem:too-large"
 
 
 @pytest.mark.parametrize("identity", ["%2e%2e", "0123456789abcdef", "x" * 16, "0" * 400])
-def test_measured_material_that_is_none_is_not_found(client: TestClient, identity: str) -> None:
+def test_unknown_measured_material_is_not_found(client: TestClient, identity: str) -> None:
     for method in ("GET", "DELETE"):
         response = client.request(method, f"{URL}/{identity}")
         assert response.status_code in (404, 405, 422)

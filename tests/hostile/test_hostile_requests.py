@@ -1,4 +1,4 @@
-"""What clients of the REST calls send that mean harm or know no better: a clear refusal, and nothing lost."""
+"""Malicious or invalid REST requests are rejected clearly, and no data is lost."""
 
 import json
 from typing import Any
@@ -11,13 +11,13 @@ from session_client import Baked
 IDS = "0123456789abcdef"
 
 
-def test_file_that_is_no_scene_is_refused(client: TestClient) -> None:
+def test_invalid_scene_file_is_refused(client: TestClient) -> None:
     response = client.post("/api/scenes", files={"scene": ("../../x.glb", b"glTF\x02\x00\x00\x00\xff\xff\xff\x7f")})
     assert parse_problem(response)["type"] == "urn:relume:problem:scene"
     assert client.get("/api/scenes").json() == []
 
 
-def test_files_beside_a_scene_are_bounded_and_their_names_are_no_paths(client: TestClient, settings: Any) -> None:
+def test_referenced_files_are_bounded_and_their_names_are_not_paths(client: TestClient, settings: Any) -> None:
     obj = b"mtllib ../../relume.db\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
     beside = [("companions", (f"{number}.png", b"")) for number in range(901)]
     refused = client.post("/api/scenes", files=[("scene", ("a.obj", obj)), *beside])
@@ -29,7 +29,7 @@ def test_files_beside_a_scene_are_bounded_and_their_names_are_no_paths(client: T
     assert list(settings.data.glob("upload-*")) == []
 
 
-def test_import_that_takes_too_much_is_stopped(client: TestClient, settings: Any) -> None:
+def test_import_beyond_the_memory_limit_is_stopped(client: TestClient, settings: Any) -> None:
     settings.import_bytes = 64 * 1024**2  # less than an interpreter with NumPy needs
     response = client.post("/api/scenes", files={"scene": ("x.glb", b"glTF")})
     assert parse_problem(response)["status"] == 422
@@ -43,8 +43,8 @@ def test_upload_beyond_the_limit_is_413(client: TestClient) -> None:
 
 @pytest.mark.parametrize(("path", "field"), [("/api/environments", "environment"), ("/api/images", "image")])
 def test_environments_and_images_may_be_as_large_as_scenes(client: TestClient, path: str, field: str) -> None:
-    """Those of 4K have more bytes than any document."""
-    for num_mib, is_too_large in ((3, False), (4, True)):  # of a document 2 MiB are taken here
+    """4K images have more bytes than any document."""
+    for num_mib, is_too_large in ((3, False), (4, True)):  # documents have a limit of 2 MiB
         response = client.post(path, files={field: ("x.exr", b"\x00" * (num_mib * 1024**2))})
         assert (parse_problem(response)["status"] == 413) == is_too_large
 
@@ -72,7 +72,7 @@ def test_body_of_another_call_beyond_the_limit_is_413(client: TestClient) -> Non
 @pytest.mark.parametrize(
     "name", ["%00", "a%0Ab", "%20a", "..", "%2e%2e%2fetc%2fpasswd", "..%5c..", "x" * 81, "%E2%80%AE", "%7F"]
 )
-def test_look_name_that_is_none_is_refused(client: TestClient, name: str) -> None:
+def test_invalid_look_name_is_refused(client: TestClient, name: str) -> None:
     response = client.put(f"/api/looks/{name}", json={})
     assert parse_problem(response)["status"] in (404, 405, 422)
     assert client.get("/api/looks").json() == []
@@ -92,11 +92,11 @@ def test_look_name_that_is_none_is_refused(client: TestClient, name: str) -> Non
         b'{"materials":' + b"[" * 100_000,
     ],
 )
-def test_look_that_is_none_is_refused(client: TestClient, body: bytes) -> None:
+def test_invalid_look_is_refused(client: TestClient, body: bytes) -> None:
     assert parse_problem(client.put("/api/looks/a", content=body))["status"] == 422
 
 
-def test_look_beyond_its_size_is_413(client: TestClient) -> None:
+def test_oversized_look_is_413(client: TestClient) -> None:
     body = json.dumps({"materials": {"a": {"x": "y" * 262_144}}})
     assert parse_problem(client.put("/api/looks/a", content=body))["status"] == 413
 
@@ -118,7 +118,7 @@ def test_look_beyond_its_size_is_413(client: TestClient) -> None:
         {"surprise": 1},
     ],
 )
-def test_render_that_cannot_be_is_refused(client: TestClient, baked: Baked, change: dict[str, Any]) -> None:
+def test_impossible_render_is_refused(client: TestClient, baked: Baked, change: dict[str, Any]) -> None:
     request = {"bake": baked.bake, "view": "front", "looks": [{}], "format": "png"} | change
     assert parse_problem(client.post("/api/renders", json=request))["status"] in (404, 422)
 
@@ -138,7 +138,7 @@ def test_render_that_cannot_be_is_refused(client: TestClient, baked: Baked, chan
         {"preset": "ultra"},
     ],
 )
-def test_bake_that_cannot_be_is_refused(client: TestClient, baked: Baked, change: dict[str, Any]) -> None:
+def test_impossible_bake_is_refused(client: TestClient, baked: Baked, change: dict[str, Any]) -> None:
     response = client.post("/api/bakes", json={"scene": baked.scene, "size": [8, 8], "lights": 9} | change)
     assert parse_problem(response)["status"] in (404, 422)
 
@@ -187,13 +187,13 @@ def test_every_refusal_is_a_problem(client: TestClient, method: str, path: str, 
     ("method", "path"),
     [("DELETE", f"/api/scenes/{IDS}/cameras/a%00b"), ("GET", "/api/audit?who=%00"), ("GET", f"/api/shares/{IDS}%00")],
 )
-def test_null_characters_come_to_no_database(client: TestClient, method: str, path: str) -> None:
+def test_null_characters_never_reach_the_database(client: TestClient, method: str, path: str) -> None:
     refused = parse_problem(client.request(method, path))
     assert (refused["status"], refused["parameter"]) == (422, "the address")
 
 
 @pytest.mark.parametrize("path", ["/api/models/albedo", "/api/models/zernike-fit"])
-def test_names_that_are_no_unicode_are_refused_in_unicode(client: TestClient, path: str) -> None:
+def test_names_in_invalid_unicode_are_refused(client: TestClient, path: str) -> None:
     body = b'{"terms": [{"model": "lambert", "\\ud800": 1}]}'
     refused = parse_problem(client.post(path, content=body, headers={"Content-Type": "application/json"}))
     assert refused["status"] == 422
@@ -201,27 +201,25 @@ def test_names_that_are_no_unicode_are_refused_in_unicode(client: TestClient, pa
 
 
 @pytest.mark.parametrize(
-    ("content", "kind", "words"),
+    ("content", "kind", "message"),
     [
         (b"hello", "multipart/form-data; boundary=b", "the body cannot be read"),
         (b"\xff\xfe{", "application/json", "send what /api/openapi.json describes"),
     ],
 )
-def test_bodies_that_cannot_be_read_are_a_kind_of_problem(
-    client: TestClient, content: bytes, kind: str, words: str
-) -> None:
+def test_unreadable_bodies_are_a_problem(client: TestClient, content: bytes, kind: str, message: str) -> None:
     refused = parse_problem(client.post("/api/environments", content=content, headers={"Content-Type": kind}))
     assert refused["type"] == "urn:relume:problem:invalid-request"
     if refused["status"] == 400:
-        assert words in refused["detail"]
+        assert message in refused["detail"]
 
 
-def test_text_in_the_place_of_a_file_is_told_in_words(client: TestClient) -> None:
+def test_text_instead_of_a_file_is_refused_with_a_message(client: TestClient) -> None:
     refused = parse_problem(client.post("/api/scenes", files={"scene": (None, b"text")}))
     assert refused["detail"] == "/scene is a text; give a file, with a file name in its part of the form"
 
 
-def test_missing_data_directory_is_a_problem_not_a_trace(client: TestClient, settings: Any) -> None:
+def test_missing_data_directory_is_a_problem_without_a_traceback(client: TestClient, settings: Any) -> None:
     settings.data = settings.data / "gone"
     problem = parse_problem(client.get("/readyz"))
     assert problem["status"] == 507

@@ -1,4 +1,4 @@
-"""What clients of sessions send that mean harm or know no better: a clear refusal, and the session goes on."""
+"""Malicious or invalid session messages are rejected clearly, and the session continues."""
 
 import json
 import math
@@ -20,7 +20,7 @@ IDS = "0123456789abcdef"
 
 
 def is_alive(session: Session, revision: int) -> bool:
-    """Whether the session still takes an edit and shows it."""
+    """Return True if the session still takes an edit and shows it."""
     session.edit(revision, SIGMA, 0.25)
     return session.exact(revision).header["revision"] == revision
 
@@ -47,7 +47,7 @@ def is_alive(session: Session, revision: int) -> bool:
         '{"type": "edit", "revision": 1, "patch": ' + "[" * 30_000 + "]" * 30_000 + "}",
     ],
 )
-def test_malformed_message_is_a_problem_and_the_session_goes_on(client: TestClient, baked: Baked, text: str) -> None:
+def test_malformed_message_is_a_problem_and_the_session_continues(client: TestClient, baked: Baked, text: str) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.websocket.send_text(text)
@@ -158,7 +158,7 @@ def test_curve_of_a_hundred_thousand_points_is_too_big_a_message(client: TestCli
         {"type": "ack", "frame": 999},
     ],
 )
-def test_impossible_wish_is_a_problem(client: TestClient, baked: Baked, message: dict[str, Any]) -> None:
+def test_impossible_request_is_a_problem(client: TestClient, baked: Baked, message: dict[str, Any]) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.send_message(**message)
@@ -222,12 +222,12 @@ def test_session_on_no_bake_closes_4404(client: TestClient, bake: str) -> None:
     assert closed.value.args[0] == 4404
 
 
-def test_session_on_a_path_that_is_none_is_refused(client: TestClient) -> None:
+def test_session_on_an_unknown_path_is_refused(client: TestClient) -> None:
     with pytest.raises((WebSocketDenialResponse, WebSocketDisconnect)), open_session(client, "..%2f..%2fetc"):
         pass
 
 
-def test_session_on_damaged_store_says_so(client: TestClient, baked: Baked) -> None:
+def test_session_on_a_damaged_store_reports_it(client: TestClient, baked: Baked) -> None:
     store = client.app.state.services.bakes.store_path(baked.bake)  # type: ignore[attr-defined]
     (store / "zarr.json").write_bytes(b"{")
     with open_session(client, baked.bake) as session, pytest.raises(ConnectionError) as closed:
@@ -254,9 +254,7 @@ def test_a_session_that_does_not_begin_with_open_is_closed(client: TestClient, b
     assert closed.value.args[0] == 1008
 
 
-def test_a_client_that_says_nothing_is_closed(
-    client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_silent_client_is_closed(client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("relume_server.session.reader.OPEN_SECONDS", 0.05)
     opened = client.websocket_connect(session_path(baked.bake, {}), ["relume.v2"])
     with opened as websocket, pytest.raises(ConnectionError) as closed:

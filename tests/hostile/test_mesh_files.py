@@ -1,4 +1,4 @@
-"""OBJ, MTL, PLY and ZIP that are broken, absurd or malicious: one clear SceneError, nothing else, no hang."""
+"""Broken, absurd or malicious OBJ, MTL, PLY and ZIP files give one clear SceneError, and nothing hangs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ OBJ = b"mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nusemtl a\nf 1
 MTL = b"newmtl a\nKd 0.5 0.5 0.5\nKs 0.1 0.1 0.1\nNs 50\nmap_Kd wood.png\n"
 
 
-def refused(data: bytes) -> str:
+def rejected(data: bytes) -> str:
     with pytest.raises(SceneError) as problem:
         import_scene(data, "test", LIGHT)
     message = str(problem.value)
@@ -63,21 +63,21 @@ def packed(entries: dict[str, bytes], kind: int = zipfile.ZIP_DEFLATED) -> bytes
         b"f " + b"1 " * 600_000,
     ],
 )
-def test_obj_lines_that_are_wrong_are_refused(line: bytes) -> None:
-    refused(OBJ + line + b"\n")
+def test_invalid_obj_lines_are_refused(line: bytes) -> None:
+    rejected(OBJ + line + b"\n")
 
 
-def test_obj_without_faces_and_objects_without_end_are_refused() -> None:
-    assert "no triangles" in refused(b"v 0 0 0\nv 1 0 0\nv 0 1 0\n")
+def test_obj_without_faces_or_with_too_many_objects_is_refused() -> None:
+    assert "no triangles" in rejected(b"v 0 0 0\nv 1 0 0\nv 0 1 0\n")
     many = b"".join(b"o %d\nf 1 2 3\n" % i for i in range(10_001))
-    assert "objects" in refused(OBJ + many)
+    assert "objects" in rejected(OBJ + many)
 
 
 def test_obj_of_degenerate_faces_only_is_refused() -> None:
-    assert "no triangles" in refused(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 1 2\n")
+    assert "no triangles" in rejected(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 1 2\n")
 
 
-def test_numbers_that_are_not_finite_where_nothing_hangs_on_them_are_a_warning() -> None:
+def test_unused_numbers_that_are_not_finite_are_a_warning() -> None:
     scene = import_scene(OBJ.replace(b"vt 0 0", b"vt nan 0").replace(b"vn 0 0 1", b"vn inf 0 1"), "test", LIGHT)
     assert np.isfinite(scene.meshes[0].normals).all()
     assert len([warning for warning in scene.warnings if "not all finite" in warning]) == 2
@@ -104,9 +104,9 @@ def test_no_name_leads_out_of_the_folder(name: str, tmp_path: Path) -> None:
         (tmp_path / "in" / "m.mtl").write_bytes(image)
         with pytest.raises(SceneError, match="outside the folder"):
             import_scene(path, "test", LIGHT)
-    assert "outside the folder" in refused(packed({"scene.obj": library}))
-    assert "outside the folder" in refused(packed({"scene.obj": OBJ, "m.mtl": image}))
-    assert "outside the folder" in refused(library)
+    assert "outside the folder" in rejected(packed({"scene.obj": library}))
+    assert "outside the folder" in rejected(packed({"scene.obj": OBJ, "m.mtl": image}))
+    assert "outside the folder" in rejected(library)
 
 
 def test_no_link_leads_out_of_the_folder(tmp_path: Path) -> None:
@@ -119,21 +119,21 @@ def test_no_link_leads_out_of_the_folder(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("line", [b"Kd nan 0 0", b"Kd 1 2", b"Ns -1", b"Ns many", b"Kd 1e300", b"Pr inf"])
-def test_material_numbers_that_are_wrong_are_refused(line: bytes) -> None:
-    assert "material file" in refused(packed({"a.obj": OBJ, "m.mtl": MTL + line}))
+def test_invalid_material_numbers_are_refused(line: bytes) -> None:
+    assert "material file" in rejected(packed({"a.obj": OBJ, "m.mtl": MTL + line}))
 
 
-def test_material_files_without_end_are_refused() -> None:
-    assert "1,000 materials" in refused(
+def test_too_many_material_files_are_refused() -> None:
+    assert "1,000 materials" in rejected(
         packed({"a.obj": OBJ, "m.mtl": b"".join(b"newmtl %d\n" % i for i in range(1_001))})
     )
-    assert "larger than" in refused(packed({"a.obj": OBJ, "m.mtl": b" " * (9 << 20)}))
+    assert "larger than" in rejected(packed({"a.obj": OBJ, "m.mtl": b" " * (9 << 20)}))
 
 
 def test_huge_images_are_refused_before_decoding() -> None:
     ihdr = b"IHDR" + struct.pack(">IIBBBBB", 100_000, 100_000, 8, 2, 0, 0, 0)
     png = b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + ihdr + bytes(4)
-    refused(packed({"a.obj": OBJ, "m.mtl": MTL, "wood.png": png}))
+    rejected(packed({"a.obj": OBJ, "m.mtl": MTL, "wood.png": png}))
 
 
 @pytest.mark.parametrize(
@@ -169,51 +169,51 @@ def test_huge_images_are_refused_before_decoding() -> None:
         b"ply\nformat ascii 1.0\nelement vertex 3\nproperty list uchar int x\nend_header\n1 2\n",
     ],
 )
-def test_ply_files_that_are_wrong_are_refused(data: bytes) -> None:
-    refused(data)
+def test_invalid_ply_files_are_refused(data: bytes) -> None:
+    rejected(data)
 
 
-@pytest.mark.filterwarnings("default::DeprecationWarning")  # as where no test runs
+@pytest.mark.filterwarnings("default::DeprecationWarning")  # as outside of tests
 @pytest.mark.parametrize("more", [b"x\n", b"1 2 3 and so on\n", b"\x00", b"0x10"])
-def test_a_ply_with_words_behind_its_numbers_is_refused_outside_of_tests_too(more: bytes) -> None:
-    assert "words where numbers should be" in refused(text() + more)
+def test_a_ply_with_text_after_its_numbers_is_refused(more: bytes) -> None:
+    assert "words where numbers should be" in rejected(text() + more)
 
 
-def test_archives_that_are_wrong_are_refused() -> None:
+def test_invalid_archives_are_refused() -> None:
     good = packed({"a.obj": OBJ})
     for length in (2, 10, len(good) // 2, len(good) - 1):
-        refused(good[:length])
-    assert "0 scene files" in refused(packed({"a.txt": OBJ}))
-    assert "2 scene files" in refused(packed({"a.obj": OBJ, "b.ply": text()}))
-    assert "entries" in refused(packed({f"{i}.txt": b"" for i in range(1_001)}))
-    assert "unusual way" in refused(packed({"a.obj": OBJ}, zipfile.ZIP_LZMA))
+        rejected(good[:length])
+    assert "0 scene files" in rejected(packed({"a.txt": OBJ}))
+    assert "2 scene files" in rejected(packed({"a.obj": OBJ, "b.ply": text()}))
+    assert "entries" in rejected(packed({f"{i}.txt": b"" for i in range(1_001)}))
+    assert "unusual way" in rejected(packed({"a.obj": OBJ}, zipfile.ZIP_LZMA))
     encrypted = bytearray(good)
     encrypted[good.index(b"PK\1\2") + 8] |= 1
-    assert "password" in refused(bytes(encrypted))
+    assert "password" in rejected(bytes(encrypted))
     damaged = bytearray(good)
     damaged[45] ^= 0xFF
-    assert "damaged" in refused(bytes(damaged))
+    assert "damaged" in rejected(bytes(damaged))
 
 
-def test_bombs_are_refused_before_they_are_unpacked() -> None:
+def test_zip_bombs_are_refused_before_unpacking() -> None:
     data = bytearray(packed({"a.obj": b"\n" * 1_000_000}))
-    place = data.index(b"PK\1\2")
-    struct.pack_into("<I", data, place + 24, 1 << 30)  # what it claims to unpack to
-    assert "unpacks to more" in refused(bytes(data))
+    offset = data.index(b"PK\1\2")
+    struct.pack_into("<I", data, offset + 24, 1 << 30)  # the declared unpacked size
+    assert "unpacks to more" in rejected(bytes(data))
 
 
 def with_zip64_end(archive: bytes) -> bytes:
-    """The same, with a ZIP64 record that tells the list's length, and a plain one that tells of one short entry."""
-    place = archive.rindex(b"PK\5\6")
-    num_entries, num_bytes, start = struct.unpack_from("<HII", archive, place + 10)
+    """The archive with a ZIP64 record of the list's true length and a plain record of one short entry."""
+    offset = archive.rindex(b"PK\5\6")
+    num_entries, num_bytes, start = struct.unpack_from("<HII", archive, offset + 10)
     record = struct.pack("<4sQHHIIQQQQ", b"PK\6\6", 44, 45, 45, 0, 0, num_entries, num_entries, num_bytes, start)
-    locator = struct.pack("<4sIQI", b"PK\6\7", 0, place, 1)
-    plain = bytearray(archive[place:])
+    locator = struct.pack("<4sIQI", b"PK\6\7", 0, offset, 1)
+    plain = bytearray(archive[offset:])
     struct.pack_into("<HHII", plain, 8, 1, 1, 60, start)
-    return archive[:place] + record + locator + bytes(plain)
+    return archive[:offset] + record + locator + bytes(plain)
 
 
-def test_a_long_list_of_entries_is_not_read_whatever_the_records_at_the_end_say(
+def test_a_long_list_of_entries_is_never_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     archives = [packed({f"{k:05}" + "x" * 60: b"" for k in range(12_000)})]
@@ -228,7 +228,7 @@ def test_a_long_list_of_entries_is_not_read_whatever_the_records_at_the_end_say(
 
     monkeypatch.setattr(zipfile, "ZipInfo", Counted)
     for archive in archives:
-        assert "more than 1,000 entries" in refused(archive)
+        assert "more than 1,000 entries" in rejected(archive)
     assert num_read == 0
 
 
@@ -237,18 +237,18 @@ def test_an_archive_with_zip64_records_is_read() -> None:
 
 
 def test_an_empty_file_is_called_empty() -> None:
-    assert "empty: 0 bytes" in refused(b"")
+    assert "empty: 0 bytes" in rejected(b"")
 
 
 def test_an_archive_in_an_archive_is_not_opened() -> None:
-    assert "none of" in refused(packed({"a.obj": packed({"a.obj": OBJ})}))
+    assert "none of" in rejected(packed({"a.obj": packed({"a.obj": OBJ})}))
 
 
 FUZZED = {"obj": OBJ, "text": text(True), "little": binary("<", True), "zip": packed({"a.obj": OBJ, "m.mtl": MTL})}
 
 
 @pytest.mark.parametrize("kind", FUZZED)
-def test_fuzzed_files_are_good_to_begin_with(kind: str) -> None:
+def test_the_unchanged_mesh_files_are_valid(kind: str) -> None:
     assert len(import_scene(FUZZED[kind], "test", LIGHT).meshes) == 1
 
 
@@ -259,8 +259,8 @@ def test_fuzzed_files_are_good_to_begin_with(kind: str) -> None:
 )
 def test_any_changed_bytes_are_imported_or_refused(kind: str, changes: list[tuple[float, int]], cut: float) -> None:
     data = bytearray(FUZZED[kind])
-    for place, value in changes:
-        data[int(place * len(data))] = value
+    for offset, value in changes:
+        data[int(offset * len(data))] = value
     if cut < 0.3:
         data = data[: int(cut / 0.3 * len(data))]
     with contextlib.suppress(SceneError):

@@ -1,4 +1,4 @@
-"""Scene files with any bytes changed, and real broken ones: one clear SceneError, nothing else, no hang."""
+"""Scene files with random changed bytes, and real broken ones, give one clear SceneError, and nothing hangs."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from relume.scene_io.import_scene import import_scene
 @given(st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), min_size=1, max_size=12))
 def test_import_survives_any_changed_bytes(changes: list[tuple[float, int]]) -> None:
     data = bytearray(FUZZED)
-    for place, value in changes:
-        data[int(place * len(data))] = value
+    for offset, value in changes:
+        data[int(offset * len(data))] = value
     try:
         scene = imported(bytes(data))
     except SceneError:
@@ -43,7 +43,7 @@ def _rich_file() -> bytes:
 FUZZED = _rich_file()
 
 
-def test_fuzzed_file_is_good_to_begin_with() -> None:
+def test_the_unchanged_file_is_valid() -> None:
     scene = imported(FUZZED)
     assert [camera.name for camera in scene.cameras] == ["camera"]
     assert scene.warnings == ()

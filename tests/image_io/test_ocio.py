@@ -1,4 +1,4 @@
-"""OpenColorIO against itself: what relume shows, tables and exports is what a config's own processors give."""
+"""OpenColorIO against itself: displayed, tabulated and exported values equal those of a config's own processors."""
 
 from __future__ import annotations
 
@@ -45,20 +45,20 @@ U16 = NDArray[np.uint16]
 
 
 def sample_lut(table: U16, light: F32) -> F64:
-    """Display values by a table: the twin of the editor's shader.
+    """Display values by a table: the reference of the editor's shader.
 
     Args:
-        table: as `bake` makes it. (N, N, N, 3)
+        table: from `bake`. (N, N, N, 3)
         light: linear, after exposure. (n, 3)
     """
     roots = np.sqrt(np.maximum(light.astype(np.float64), 0))
     position = np.minimum(np.log1p(GAIN * roots) / (2 * np.log1p(GAIN)), 1) * (SIZE - 1)
     node = np.minimum(position.astype(int), SIZE - 2)
     fraction = position - node
-    # from the corner at 0 along the longest part first, to that at 1
+    # from the corner at 0 along the largest coordinate first, to the corner at 1
     order = np.argsort(-fraction, axis=1, kind="stable")
     steps = np.take_along_axis(fraction, order, axis=1)
-    weights = -np.diff(steps, axis=1, prepend=1, append=0)  # of the four corners
+    weights = -np.diff(steps, axis=1, prepend=1, append=0)  # weights of the four corners
     display = np.zeros(light.shape)
     for k in range(4):
         display += weights[:, k, None] * table[tuple(node.T)]
@@ -68,7 +68,7 @@ def sample_lut(table: U16, light: F32) -> F64:
 
 
 def lights(num: int, stops: tuple[float, float] = (-10, 8)) -> np.ndarray:
-    """Of luminances evenly in stops about middle grey, from grey to saturated. (num, 3)"""
+    """Colors with luminances uniform in stops around middle gray, from gray to saturated. (num, 3)"""
     rng = np.random.default_rng(5)
     grey, tint = 0.18 * 2 ** rng.uniform(*stops, (num, 1)), 3 * rng.dirichlet([0.6] * 3, num)
     share = rng.uniform(0, 1, (num, 1))
@@ -76,28 +76,28 @@ def lights(num: int, stops: tuple[float, float] = (-10, 8)) -> np.ndarray:
 
 
 def by_ocio(light: np.ndarray, transform: ocio.Transform) -> np.ndarray:
-    """What the config's own processor makes of it."""
+    """Apply the config's own processor."""
     out = light.copy()
     ocio.Config.CreateFromFile(STUDIO).getProcessor(transform).getDefaultCPUProcessor().applyRGB(out)
     return out
 
 
-def seen(light: np.ndarray, view: OcioView) -> np.ndarray:
+def display_values(light: np.ndarray, view: OcioView) -> np.ndarray:
     transform = ocio.DisplayViewTransform(src="lin_rec709_scene", display=view.display, view=view.view)
     return by_ocio(light, transform).clip(0, 1)
 
 
-def test_a_view_is_the_tone_map_that_the_config_has():
-    image = lights(40_000).reshape(200, 200, 3)  # more rows than go into one range
+def test_a_view_is_the_tone_map_of_the_config():
+    image = lights(40_000).reshape(200, 200, 3)  # more rows than one range of a kernel
     image[0, 0], image[0, 1] = np.nan, -1
     with using_config(STUDIO):
         shown = tone_map(image, 1.5, VIEW)
     black = np.where(np.isnan(image) | (image < 0), 0, image)
-    np.testing.assert_allclose(shown, seen((black * 2**1.5).astype(np.float32), VIEW), atol=1e-5)
+    np.testing.assert_allclose(shown, display_values((black * 2**1.5).astype(np.float32), VIEW), atol=1e-5)
 
 
 @pytest.mark.parametrize(
-    ("view", "mean", "most"),
+    ("view", "mean", "max_error"),
     [
         (VIEW, 0.04, 0.6),
         (OcioView("Display P3 - Display", "ACES 2.0 - SDR 100 nits (P3 D65)"), 0.04, 0.6),
@@ -106,64 +106,64 @@ def test_a_view_is_the_tone_map_that_the_config_has():
         (OcioView("Gamma 2.6 P3-D65 - Display", "Un-tone-mapped"), 0.045, 3.0),
     ],
 )
-def test_a_table_is_the_view_but_for_less_than_a_screen_shows(view, mean, most):
-    """In steps of 8 bits: on the mean, and of 999 in 1,000."""
+def test_a_table_equals_the_view_within_display_precision(view, mean, max_error):
+    """In 8-bit steps: the mean, and the 99.9 % quantile."""
     light = lights(30_000)
     with using_config(STUDIO):
         table, shown = get_config().table(view), tone_map(light[None], 0.0, view, use_table=True)[0]
     np.testing.assert_allclose(shown, sample_lut(table, light), atol=2e-5)
-    off = 255 * np.abs(sample_lut(table, light) - seen(light, view))
+    off = 255 * np.abs(sample_lut(table, light) - display_values(light, view))
     assert off.mean() < mean
-    assert np.quantile(off, 0.999) < most
-    assert off.max() < 15  # a saturated light on the edge of what a display has
+    assert np.quantile(off, 0.999) < max_error
+    assert off.max() < 15  # a saturated color at the edge of the display's gamut
     greys = np.repeat(np.geomspace(1e-4, 100, 500, dtype=np.float32)[:, None], 3, axis=1)
-    assert 255 * np.abs(sample_lut(table, greys) - seen(greys, view)).max() < 0.2
+    assert 255 * np.abs(sample_lut(table, greys) - display_values(greys, view)).max() < 0.2
 
 
-def test_exported_light_is_the_same_light_to_whoever_reads_the_chromaticities():
-    """In each of a config's linear spaces."""
+def test_exported_light_is_unchanged_by_its_chromaticities():
+    """In each linear space of the config."""
     light = lights(1000, (-10, 0))
     with using_config(STUDIO):
         spaces = [find_space(name) for name in get_config().spaces]
     assert len(spaces) > 15
     for space in spaces:
-        found = space.convert_image(light[None])[0]
+        exported = space.convert_image(light[None])[0]
         wanted = by_ocio(light, ocio.ColorSpaceTransform("lin_rec709_scene", space.name))
-        np.testing.assert_allclose(found, wanted, atol=1e-6, err_msg=space.name)
+        np.testing.assert_allclose(exported, wanted, atol=1e-6, err_msg=space.name)
         back = to_rec_709(space.chromaticities)
         back = np.eye(3) if back is None else back
-        np.testing.assert_allclose(found @ back.T, light, atol=3e-5, err_msg=space.name)
+        np.testing.assert_allclose(exported @ back.T, light, atol=3e-5, err_msg=space.name)
 
 
-def test_known_spaces_are_written_as_what_they_are():
+def test_known_spaces_are_written_with_their_names():
     with using_config(STUDIO):
-        found = {name: find_space(name) for name in ("lin_ap1", "ACES2065-1", "scene_linear", "Linear V-Gamut")}
+        spaces = {name: find_space(name) for name in ("lin_ap1", "ACES2065-1", "scene_linear", "Linear V-Gamut")}
         assert find_space(None).interop == "lin_rec709_scene"
-    assert [space.name for space in found.values()] == ["ACEScg", "ACES2065-1", "ACEScg", "Linear V-Gamut"]
-    assert [space.interop for space in found.values()] == ["lin_ap1_scene", "lin_ap0_scene", "lin_ap1_scene", None]
-    assert found["ACES2065-1"].chromaticities == INTEROP_SPACES["lin_ap0_scene"]
+    assert [space.name for space in spaces.values()] == ["ACEScg", "ACES2065-1", "ACEScg", "Linear V-Gamut"]
+    assert [space.interop for space in spaces.values()] == ["lin_ap1_scene", "lin_ap0_scene", "lin_ap1_scene", None]
+    assert spaces["ACES2065-1"].chromaticities == INTEROP_SPACES["lin_ap0_scene"]
 
 
-def test_a_picture_in_aces_is_read_as_the_light_that_it_was(tmp_path):
-    """By relume's own reader of maps; coverage stays coverage."""
+def test_an_exported_aces_image_is_read_back(tmp_path):
+    """By relume's own reader of maps; coverage is unchanged."""
     light = np.concatenate([lights(32 * 16, (-6, 4)), np.full((32 * 16, 1), 0.25, np.float32)], 1).reshape(16, 32, 4)
     scene = still_life()
     look = validate({}, default_look(scene.materials))
     with using_config(STUDIO):
         space = find_space("ACES2065-1")
         attributes = build_attributes(Provenance("a", "b", "c"), scene.cameras[0], (32, 16), look, [], space)
-        export_exr(tmp_path / "a.exr", lambda *of: light, look, [], attributes, "float", space=space)
-    found = read_environment(tmp_path / "a.exr", "a").radiance
-    np.testing.assert_allclose(found, light[..., :3], rtol=1e-3, atol=1e-4)
+        export_exr(tmp_path / "a.exr", lambda *arguments: light, look, [], attributes, "float", space=space)
+    radiance = read_environment(tmp_path / "a.exr", "a").radiance
+    np.testing.assert_allclose(radiance, light[..., :3], rtol=1e-3, atol=1e-4)
 
 
 @pytest.mark.parametrize("name", ["ACEScct", "Raw", "sRGB - Display", "../../etc/passwd", ""])
-def test_no_picture_is_exported_in_what_is_not_linear_light(name):
+def test_images_are_exported_only_in_linear_spaces(name):
     with using_config(STUDIO), pytest.raises(ParameterError, match="linear colour space"):
         find_space(name)
 
 
-def test_configs_that_cannot_be_used_say_why_in_one_sentence(tmp_path):
+def test_unusable_configs_report_the_reason(tmp_path):
     blind = b"ocio_profile_version: 1\nroles: {default: raw}\ncolorspaces: []\n"
     bad = {"text": b"hello", "empty": b"", "blind.ocio": blind, "bytes.ocio": b"\xf7" * 99, "a.ocioz": b"PK\3\4"}
     asked = r"^RELUME_OCIO is .* give (the path|a config that has displays)"
@@ -175,7 +175,7 @@ def test_configs_that_cannot_be_used_say_why_in_one_sentence(tmp_path):
         assert "\n" not in str(raised.value)
 
 
-def test_an_old_config_is_told_which_of_its_spaces_is_ours(tmp_path, caplog):
+def test_an_old_config_logs_the_matching_space(tmp_path, caplog):
     path = tmp_path / "config.ocio"
     path.write_text(OLD)
     with pytest.raises(ParameterError, match=r"RELUME_OCIO_SPACE .* lin, raw, film, broken"):

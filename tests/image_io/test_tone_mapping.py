@@ -1,4 +1,4 @@
-"""Tone maps against NumPy twins and what each must do with black, grey and white."""
+"""Tone maps against NumPy, and their values for black, gray and white."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ AGX_INSET = np.array(
 AGX_POLYNOMIAL = [15.5, -40.14, 31.96, -6.868, 0.4298, 0.1191, -0.00232]
 
 
-def agx_twin(rgb):
+def agx_numpy(rgb):
     ev = np.log2(np.maximum(rgb @ AGX_INSET.T, 1e-10))
     encoded = (np.clip(ev, -12.47393, 4.026069) + 12.47393) / (4.026069 + 12.47393)
     # the published outset is the inverse of the inset
     return np.clip(np.polyval(AGX_POLYNOMIAL, encoded) @ np.linalg.inv(AGX_INSET).T, 0, 1)
 
 
-def filmic_twin(x):
+def filmic_numpy(x):
     return srgb_encode(x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14))
 
 
-TWINS = {"agx": agx_twin, "filmic": filmic_twin, "none": srgb_encode}
+TWINS = {"agx": agx_numpy, "filmic": filmic_numpy, "none": srgb_encode}
 
 
-def test_names_are_those_that_a_look_may_have():
+def test_names_are_those_of_look_documents():
     assert set(TONE_MAPS) == set(get_args(ToneMap)) == set(TWINS)
 
 
 @pytest.mark.parametrize("name", TONE_MAPS)
 @pytest.mark.parametrize("exposure", [0.0, -2.0, 3.5])
-def test_tone_map_equals_its_twin(name, exposure):
+def test_tone_map_equals_numpy(name, exposure):
     rng = np.random.default_rng(3)
-    image = np.exp(rng.normal(size=(300, 200, 3)) * 3).astype(np.float32)  # more rows than go into one range
+    image = np.exp(rng.normal(size=(300, 200, 3)) * 3).astype(np.float32)  # more rows than one range of a kernel
     shown = tone_map(image, exposure, name)
     assert shown.dtype == np.float32
     assert shown.shape == image.shape
@@ -52,7 +52,7 @@ def test_tone_map_equals_its_twin(name, exposure):
 
 
 @pytest.mark.parametrize("name", TONE_MAPS)
-def test_greys_stay_grey_and_grow(name):
+def test_grays_stay_gray_and_monotonic(name):
     grey = np.geomspace(1e-4, 100, 200, dtype=np.float32)
     shown = tone_map(np.repeat(grey[None, :, None], 3, axis=2), 0.0, name)[0]
     np.testing.assert_allclose(shown - shown[:, :1], 0, atol=1e-3)
@@ -62,7 +62,7 @@ def test_greys_stay_grey_and_grow(name):
 
 
 @pytest.mark.parametrize("name", TONE_MAPS)
-def test_what_is_no_radiance_still_gives_a_picture(name):
+def test_invalid_radiance_still_gives_an_image(name):
     image = np.float32([[[np.nan] * 3, [np.inf] * 3, [-5.0] * 3, [3e38] * 3]])
     shown = tone_map(image, 20.0, name)[0]
     assert (shown >= 0).all()
@@ -72,7 +72,7 @@ def test_what_is_no_radiance_still_gives_a_picture(name):
     assert shown[[1, 3]].min() > 0.97
 
 
-def test_unknown_map_and_wrong_shape_are_refused():
+def test_unknown_map_and_wrong_shape_are_rejected():
     with pytest.raises(ParameterError, match="agx"):
         tone_map(np.zeros((2, 2, 3), np.float32), 0.0, "reinhard")
     with pytest.raises(ShapeMismatchError):

@@ -1,4 +1,4 @@
-"""Pictures read back by libraries that did not write them, and files that appear whole or not at all."""
+"""Images read back by other libraries, and files that are complete or absent."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ def test_exr_keeps_linear_radiance_to_the_last_bit(tmp_path, image):
     assert list(buffer.spec().channelnames) == ["R", "G", "B"]
 
 
-def test_png_holds_what_the_screen_shows(tmp_path, image):
+def test_png_has_the_displayed_values(tmp_path, image):
     write_image(tmp_path / "a.png", image, 1.0, "filmic")
     shown = OpenImageIO.ImageBuf(str(tmp_path / "a.png")).get_pixels(OpenImageIO.UINT8)
     np.testing.assert_array_equal(shown, np.round(tone_map(image, 1.0, "filmic") * 255))
 
 
-def test_webp_is_close_to_what_the_screen_shows(tmp_path, image):
+def test_webp_is_close_to_the_displayed_values(tmp_path, image):
     write_image(tmp_path / "a.WEBP", image)
     with Image.open(tmp_path / "a.WEBP") as opened:
         shown = np.asarray(opened.convert("RGB"), np.float64)
@@ -42,7 +42,7 @@ def test_webp_is_close_to_what_the_screen_shows(tmp_path, image):
     assert np.abs(shown - tone_map(image, 0.0, "agx") * 255).mean() < 4
 
 
-def test_png_says_what_its_colors_are(tmp_path, image, monkeypatch):
+def test_png_declares_its_color_space(tmp_path, image, monkeypatch):
     monkeypatch.setattr("relume.image_io.write_image.tone_map", lambda shown, exposure, view: shown)
     views = ["agx", OcioView("sRGB - Display", "Un-tone-mapped"), OcioView("Display P3 - Display", "Un-tone-mapped")]
     tagged = []
@@ -54,23 +54,23 @@ def test_png_says_what_its_colors_are(tmp_path, image, monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["a.png", "a.webp", "a.exr"])
-def test_coverage_is_kept_beside_the_colours(tmp_path, image, name):
+def test_coverage_is_written_as_alpha(tmp_path, image, name):
     alpha = np.linspace(0, 1, 48, dtype=np.float32)[None, :, None] * np.ones((32, 1, 1), np.float32)
     write_image(tmp_path / name, np.concatenate([image * alpha, alpha], axis=-1))
     buffer = OpenImageIO.ImageBuf(str(tmp_path / name))
     assert buffer.spec().alpha_channel == 3
-    if name == "a.exr":  # multiplied by it already, as the format wants it
+    if name == "a.exr":  # premultiplied, as the format requires
         np.testing.assert_array_equal(buffer.get_pixels(OpenImageIO.FLOAT)[..., :3], image * alpha)
         return
     with Image.open(tmp_path / name) as opened:
         assert opened.mode == "RGBA"
-        found = np.asarray(opened, np.float64)
-    np.testing.assert_allclose(found[..., 3], 255 * alpha[..., 0], atol=0.51)
+        pixels = np.asarray(opened, np.float64)
+    np.testing.assert_allclose(pixels[..., 3], 255 * alpha[..., 0], atol=0.51)
     solid = alpha[..., 0] > 0.1
-    assert np.abs(found[..., :3] - tone_map(image, 0.0, "agx") * 255)[solid].mean() < 4
+    assert np.abs(pixels[..., :3] - tone_map(image, 0.0, "agx") * 255)[solid].mean() < 4
 
 
-def test_image_of_a_transposed_view_is_written_right(tmp_path, image):
+def test_a_transposed_array_is_written_correctly(tmp_path, image):
     write_image(tmp_path / "a.exr", image.transpose(1, 0, 2))
     read = OpenImageIO.ImageBuf(str(tmp_path / "a.exr")).get_pixels(OpenImageIO.FLOAT)
     np.testing.assert_array_equal(read, image.transpose(1, 0, 2))
@@ -98,7 +98,7 @@ def test_failure_leaves_the_old_file_and_nothing_else(tmp_path, image, name, mon
 
 
 @pytest.mark.parametrize("name", ["a.exr", "a.png", "a.webp"])
-def test_missing_folder_is_named_plainly(tmp_path, image, name):
+def test_a_missing_folder_is_named(tmp_path, image, name):
     with pytest.raises(RelumeError, match="cannot be written"):
         write_image(tmp_path / "nowhere" / name, image)
 

@@ -1,4 +1,4 @@
-"""Fixtures: a file of an image, and the shelf that it is on; nobody asks what bakes are off by."""
+"""Fixtures: an image file and a library with it; bakes skip the measurement of their error."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ SIDE = 32
 
 
 def stripes(side=SIDE):
-    """Colours that differ everywhere. (side, side, 3) uint8"""
+    """Colors that differ everywhere. (side, side, 3) uint8"""
     ramp = np.linspace(20, 250, side).astype(np.uint8)
     rows, columns = np.meshgrid(ramp, ramp, indexing="ij")
     return np.stack([rows, columns, 255 - rows // 2], axis=-1)
@@ -29,6 +29,6 @@ def image_file(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def named(image_file, tmp_path_factory):
-    """The name by which looks mean the image."""
+    """The name of the image in looks."""
     with IMAGES.with_search_folder(tmp_path_factory.mktemp("shelf") / "images") as library_folder:
         yield store(library_folder, image_file, "Stripes").texture

@@ -1,4 +1,4 @@
-"""Small bakes by any method, and what a look shows of them."""
+"""Small bakes of any method, and their images of a look."""
 
 from session_edits import run_until_exact
 
@@ -18,7 +18,7 @@ def open_small_bake(scene, method, folder):
 
 
 def render_exact(transfer, look, method):
-    """Radiance, once it is exact. (height, width, 3)"""
+    """Exact radiance. (height, width, 3)"""
     if method == "probes":
         picture = FreeCameraPicture(transfer, "front")
         picture.set_look(look)

@@ -1,4 +1,4 @@
-"""Images over HTTP: sent, listed, shown by a session and its undo, refused, and deleted when nobody needs them."""
+"""Images over HTTP: uploaded, listed, shown in sessions with undo, rejected, and deleted when unused."""
 
 import io
 import time
@@ -32,33 +32,33 @@ def client(tmp_path_factory):
         yield opened
 
 
-def send(client, content, name="stripes.png"):
+def upload(client, content, name="stripes.png"):
     return client.post(URL, files={"image": (name, content)})
 
 
 @pytest.fixture(scope="module")
-def sent(client, image_file):
-    response = send(client, image_file.read_bytes())
+def uploaded(client, image_file):
+    response = upload(client, image_file.read_bytes())
     assert response.status_code == 201, response.text
     assert response.headers["Location"] == f"{URL}/{response.json()['id']}"
     return response.json()
 
 
-def test_it_is_listed_and_shown(client, sent):
-    assert (sent["name"], sent["size"], sent["warnings"]) == ("stripes", [32, 32], [])
-    assert client.get(URL).json() == [sent] == [client.get(f"{URL}/{sent['id']}").json()]
-    with Image.open(io.BytesIO(client.get(sent["thumbnail"]).content)) as picture:
+def test_an_uploaded_image_is_listed_and_shown(client, uploaded):
+    assert (uploaded["name"], uploaded["size"], uploaded["warnings"]) == ("stripes", [32, 32], [])
+    assert client.get(URL).json() == [uploaded] == [client.get(f"{URL}/{uploaded['id']}").json()]
+    with Image.open(io.BytesIO(client.get(uploaded["thumbnail"]).content)) as picture:
         assert picture.size == (96, 96)
 
 
 def png(width, height):
-    kept = io.BytesIO()
-    Image.new("RGB", (width, height)).save(kept, "PNG")
-    return kept.getvalue()
+    buffer = io.BytesIO()
+    Image.new("RGB", (width, height)).save(buffer, "PNG")
+    return buffer.getvalue()
 
 
 @pytest.mark.parametrize(
-    ("content", "says"),
+    ("content", "message"),
     [
         (b"", "save it as PNG"),
         (b"\x89PNG\r\n\x1a\n" + 40 * b"x", "save it as PNG"),
@@ -67,62 +67,62 @@ def png(width, height):
         (png(2 * MAX_SIDE + 1, 1), f"at most {2 * MAX_SIDE}×{2 * MAX_SIDE}"),
     ],
 )
-def test_what_is_no_image_or_too_large_leaves_nothing(content, says, tmp_path):
+def test_invalid_and_oversized_images_leave_no_files(content, message, tmp_path):
     (tmp_path / "x.png").write_bytes(content)
-    with pytest.raises(SceneError, match=says):
+    with pytest.raises(SceneError, match=message):
         store(tmp_path / "shelf", tmp_path / "x.png", "x")
     assert not (tmp_path / "shelf").exists()
 
 
-def test_a_large_one_is_kept_smaller_and_says_so(tmp_path):
+def test_a_large_image_is_downsampled_with_a_warning(tmp_path):
     texels = np.zeros((4, MAX_SIDE + 2, 3), np.uint8)
     texels[:, 1::2] = 100
     Image.fromarray(texels).save(tmp_path / "wide.png")
-    with IMAGES.with_search_folder(tmp_path / "shelf") as shelf:
-        record = store(shelf, tmp_path / "wide.png", "wide")
-        found = load_texture(record.texture).pixels
-    assert record.size == (MAX_SIDE // 2 + 1, 2) == found.shape[1::-1]
-    assert (found == 50).all()
+    with IMAGES.with_search_folder(tmp_path / "shelf") as library:
+        record = store(library, tmp_path / "wide.png", "wide")
+        pixels = load_texture(record.texture).pixels
+    assert record.size == (MAX_SIDE // 2 + 1, 2) == pixels.shape[1::-1]
+    assert (pixels == 50).all()
     assert "4098×4" in record.warnings[0]
 
 
-def test_the_same_file_again_takes_the_new_name(image_file, tmp_path):
+def test_uploading_the_same_image_again_takes_the_new_name(image_file, tmp_path):
     first, again = (store(tmp_path / "shelf", image_file, name) for name in ("One", "Two"))
     assert (again.id, again.name, len(records(tmp_path / "shelf"))) == (first.id, "Two", 1)
 
 
-def test_an_exr_keeps_its_reflectances_and_says_what_was_held(tmp_path):
+def test_an_exr_keeps_its_reflectances_and_reports_clamping(tmp_path):
     pixels = np.array([[[0.001, 0.5, 2.0], [0.25, -1.0, np.nan]]], np.float32)
     path = str(tmp_path / "map.exr")
     out = OpenImageIO.ImageOutput.create(path)
     assert out.open(path, OpenImageIO.ImageSpec(2, 1, 3, OpenImageIO.FLOAT))
     assert out.write_image(pixels)
     assert out.close()
-    with IMAGES.with_search_folder(tmp_path / "shelf") as shelf:
-        record = store(shelf, tmp_path / "map.exr", "map")
-        found = load_texture(record.texture).pixels.astype(np.float32)
-        IMAGES.remove(shelf, record.id)
+    with IMAGES.with_search_folder(tmp_path / "shelf") as library:
+        record = store(library, tmp_path / "map.exr", "map")
+        stored = load_texture(record.texture).pixels.astype(np.float32)
+        IMAGES.remove(library, record.id)
         assert not IMAGES.exists(record.texture)
     assert len(record.warnings) == 2
-    np.testing.assert_allclose(found, [[[0.001, 0.5, 1.0], [0, 0, 0]]], rtol=1e-3)
+    np.testing.assert_allclose(stored, [[[0.001, 0.5, 1.0], [0, 0, 0]]], rtol=1e-3)
 
 
-def test_one_that_a_saved_look_or_a_link_shows_stays(client, sent):
-    look = {"materials": {"Ball": {"terms": [{"model": "lambert", "texture": sent["texture"]}]}}}
+def test_an_image_of_a_saved_look_or_share_link_is_not_deleted(client, uploaded):
+    look = {"materials": {"Ball": {"terms": [{"model": "lambert", "texture": uploaded["texture"]}]}}}
     assert client.put("/api/looks/painted", json=look).status_code == 201
-    response = client.delete(f"{URL}/{sent['id']}")
+    response = client.delete(f"{URL}/{uploaded['id']}")
     assert response.status_code == 409
     assert "look 'painted'" in response.json()["detail"]
     assert client.delete("/api/looks/painted", headers={"If-Match": "*"}).status_code == 204
-    assert client.get(f"{URL}/{sent['id']}").status_code == 200
+    assert client.get(f"{URL}/{uploaded['id']}").status_code == 200
 
 
-def test_one_that_a_session_shows_stays_until_the_session_is_forgotten(client, sent):
+def test_an_image_of_a_session_is_not_deleted_before_the_session(client, uploaded):
     resumes = client.app.state.services.live.resumes
     default = {"materials": {"Ball": {"terms": []}}}
-    shows = {"materials": {"Ball": {"terms": [{"model": "lambert", "texture": sent["texture"]}]}}}
+    shows = {"materials": {"Ball": {"terms": [{"model": "lambert", "texture": uploaded["texture"]}]}}}
     token = resumes.open("0123456789abcdef", LookState(default, shows, 0), VisibleViews(["front"], "front"))
-    url = f"{URL}/{sent['id']}"
+    url = f"{URL}/{uploaded['id']}"
     open_now = client.delete(url)
     resumes.close(token, time.monotonic())
     lost = client.delete(url)
@@ -132,28 +132,28 @@ def test_one_that_a_session_shows_stays_until_the_session_is_forgotten(client, s
     assert resumes.looks(time.monotonic()) == []
 
 
-def test_what_an_image_of_metalness_makes_is_listed_and_goes_with_it(client):
-    image = send(client, png(3, 2), "metal.png").json()
+def test_images_derived_from_a_metallic_map_are_deleted_with_it(client):
+    image = upload(client, png(3, 2), "metal.png").json()
     url, terms = f"{URL}/{image['id']}", [{"model": "lambert", "texture": None}, {"model": "ggx", "texture": None}]
     asked = {"scene": 16 * "0", "material": "Ball", "terms": terms}
     made = client.post(f"{url}/metalness", json=asked)
     assert made.status_code == 201, made.text
     textures = [term["texture"] for term in made.json()["terms"]]
-    listed = {one["texture"]: (one["metalness"], one["base"]) for one in client.get(URL).json()}
+    listed = {entry["texture"]: (entry["metalness"], entry["base"]) for entry in client.get(URL).json()}
     assert [listed[texture] for texture in textures] == 2 * [(image["texture"], None)]
-    for changed, says in (
+    for changed, message in (
         ({"terms": terms[:1]}, "add what is missing"),
         ({"terms": [{**terms[0], "texture": "diffuse"}, terms[1]]}, "import the scene again"),
     ):
         response = client.post(f"{url}/metalness", json={**asked, **changed})
         assert 400 <= response.status_code < 500
-        assert says in response.json()["detail"]
+        assert message in response.json()["detail"]
     look = {"materials": {"Ball": {"terms": made.json()["terms"]}}}
     assert client.put("/api/looks/metal", json=look).status_code == 201
     assert client.delete(url).status_code == 409
     assert client.delete("/api/looks/metal", headers={"If-Match": "*"}).status_code == 204
     assert client.delete(url).status_code == 204
-    assert not {*textures, image["texture"]} & {one["texture"] for one in client.get(URL).json()}
+    assert not {*textures, image["texture"]} & {entry["texture"] for entry in client.get(URL).json()}
 
 
 def wait(is_done):
@@ -165,8 +165,8 @@ def wait(is_done):
 
 
 @pytest.mark.slow
-def test_a_ball_of_a_material_shows_its_images(client, sent):
-    """The scene's own and one that was sent; what is not here is refused by its name."""
+def test_a_material_preview_shows_its_images(client, uploaded):
+    """The scene's own image and an uploaded one; an unknown image is rejected by its name."""
     scene = client.post("/api/example-scenes/still_life").json()["id"]
     url = f"/api/scenes/{scene}/ball"
 
@@ -177,16 +177,20 @@ def test_a_ball_of_a_material_shows_its_images(client, sent):
             assert picture.size == (64, 64)
             return np.asarray(picture.convert("RGB"), int)[8:56, 24:40]
 
-    plain, wood, striped = ball(texture=None), ball(texture="diffuse"), ball(texture=sent["texture"])
+    plain, wood, striped = ball(texture=None), ball(texture="diffuse"), ball(texture=uploaded["texture"])
     assert np.ptp(plain, axis=2).max() < 30
     assert (wood[..., 0] - wood[..., 2]).mean() > 40  # brown
     assert np.abs(striped - wood).max() > 40
-    for place, material, texture in ((scene, "Lid", "diffuse"), (scene, "Tray", "image:0"), ("0" * 16, "Tray", None)):
+    for scene_id, material, texture in (
+        (scene, "Lid", "diffuse"),
+        (scene, "Tray", "image:0"),
+        ("0" * 16, "Tray", None),
+    ):
         asked = {"material": material, "terms": [{"model": "lambert", "texture": texture}]}
-        assert client.post(f"/api/scenes/{place}/ball", json=asked).status_code in (404, 422)
+        assert client.post(f"/api/scenes/{scene_id}/ball", json=asked).status_code in (404, 422)
 
 
-def test_a_session_shows_what_a_batch_renders_and_goes_back(client, sent):
+def test_a_session_equals_a_render_and_undo_restores_it(client, uploaded):
     services = client.app.state.services
     scene = register_scene(services.bakes.data_dir, services.bakes.ledger, still_life())
     bake = services.bakes.submit(scene, Recipe("direct", ("front",), (64, 48), 60))
@@ -194,7 +198,7 @@ def test_a_session_shows_what_a_batch_renders_and_goes_back(client, sent):
     with open_session(client, bake) as session:
         path = "/materials/Floor/terms/0/texture"
         pictures = [session.exact(0)]
-        for revision, texture in enumerate((sent["texture"], "image:0000000000000000", "diffuse"), 1):
+        for revision, texture in enumerate((uploaded["texture"], "image:0000000000000000", "diffuse"), 1):
             session.edit(revision, path, texture)
             if revision == 2:
                 assert "image that was sent" in session.text("problem")["problem"]["detail"]
@@ -203,7 +207,7 @@ def test_a_session_shows_what_a_batch_renders_and_goes_back(client, sent):
     before, painted, after = (picture.payload for picture in pictures)
     assert before != painted
     assert len(after) == len(painted)
-    look = {"materials": {"Floor": {"terms": [{"model": "lambert", "texture": sent["texture"]}]}}}
+    look = {"materials": {"Floor": {"terms": [{"model": "lambert", "texture": uploaded["texture"]}]}}}
     request = {"bake": bake, "view": "front", "looks": [look, {}], "format": "png"}
     url = client.post("/api/renders", json=request).headers["location"]
     wait(lambda: client.get(url).json()["state"] == "ready")

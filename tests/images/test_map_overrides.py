@@ -1,4 +1,4 @@
-"""An image that a look names shows what a bake shows whose scene has it: in fixed views, in moving ones, in truths."""
+"""An image of a look gives the same pictures as a bake whose scene has it: fixed, free camera, reference."""
 
 import copy
 from dataclasses import replace
@@ -22,7 +22,7 @@ from relume.scene.texture_encoding import decode
 
 
 def painted(scene, texture):
-    """The look in which the scene's floor shows a texture, and nothing but it multiplies its light."""
+    """The look in which the scene's floor shows a texture and its color is white."""
     document = copy.deepcopy(default_look(scene.materials))
     first, *others = document["materials"]["Floor"]["terms"]
     document["materials"]["Floor"]["terms"] = [{**first, "color": [1.0, 1.0, 1.0], "texture": texture}, *others]
@@ -30,14 +30,14 @@ def painted(scene, texture):
 
 
 def with_own(scene, texture):
-    """The scene whose floor has the texture in its file; of the same id, which seeds what is drawn."""
+    """The scene whose floor has the texture in its file; with the same id, which seeds random numbers."""
     floor, *others = scene.materials
     return replace(scene, materials=(replace(floor, textures={"diffuse": texture}), *others))
 
 
 @pytest.fixture(scope="module", params=["gather", "probes"])
 def bakes(request, corner, named, tmp_path_factory):
-    """The corner, and the corner whose floor has the image: each with the method it was baked by."""
+    """The corner, and the corner whose floor has the image: each with its method."""
     folder = tmp_path_factory.mktemp("images")
     scenes = corner, with_own(corner, load_texture(named))
     return (
@@ -47,45 +47,45 @@ def bakes(request, corner, named, tmp_path_factory):
     )
 
 
-def test_pictures_are_those_of_a_scene_that_has_the_image(bakes, named):
-    """A moving view's own textures are kept in half precision; those of looks are not."""
+def test_pictures_equal_those_of_a_scene_with_the_image(bakes, named):
+    """Free cameras store the scene's textures in half precision; those of looks are not."""
     method, (plain, own), (bare, baked) = bakes
-    found, expected = (
+    actual, expected = (
         render_exact(bare, painted(plain, named), method),
         render_exact(baked, painted(own, "diffuse"), method),
     )
     assert relative_rmse(render_exact(bare, painted(plain, None), method), expected) > 0.1
-    assert relative_rmse(found, expected) < (1e-3 if method == "probes" else 1e-6)
+    assert relative_rmse(actual, expected) < (1e-3 if method == "probes" else 1e-6)
 
 
-def test_a_look_without_it_shows_again_what_it_did(bakes, named):
+def test_removing_the_image_restores_the_picture(bakes, named):
     method, (plain, _), (bare, _) = bakes
     before = render_exact(bare, painted(plain, None), method)
     render_exact(bare, painted(plain, named), method)
     np.testing.assert_array_equal(render_exact(bare, painted(plain, None), method), before)
 
 
-def test_what_other_surfaces_get_from_it_follows(bakes, named):
-    """In light that surfaces reflect alone, walls show the image of the floor: cells took its colours."""
+def test_indirect_light_follows_the_image(bakes, named):
+    """With only indirect light, walls show the image of the floor: patches have its colors."""
     method, (plain, own), (bare, baked) = bakes
 
     def reflected(scene, texture):
         look = painted(scene, texture)
         return look.model_copy(update={"transport": look.transport.model_copy(update={"show": "indirect"})})
 
-    found = render_exact(bare, reflected(plain, named), method)
+    actual = render_exact(bare, reflected(plain, named), method)
     expected = render_exact(baked, reflected(own, "diffuse"), method)
-    assert relative_rmse(found, expected) < (1e-3 if method == "probes" else 1e-6)
+    assert relative_rmse(actual, expected) < (1e-3 if method == "probes" else 1e-6)
     assert relative_rmse(render_exact(bare, reflected(plain, None), method), expected) > 0.1
 
 
-def test_truths_show_it(corner, named):
+def test_references_show_the_image(corner, named):
     own = with_own(corner, load_texture(named))
-    found, expected = (
+    actual, expected = (
         reference_image(scene, "front", painted(scene, texture), (20, 16), 16, reflects=True)
         for scene, texture in ((corner, named), (own, "diffuse"))
     )
-    np.testing.assert_allclose(found, expected, rtol=1e-5)
+    np.testing.assert_allclose(actual, expected, rtol=1e-5)
 
 
 def test_terms_of_one_channel_share_it(corner, named):
@@ -97,36 +97,36 @@ def test_terms_of_one_channel_share_it(corner, named):
 
 
 @pytest.mark.parametrize("texture", ["image:0000000000000000", "image:../x", "image:", 3, "albedo"])
-def test_an_image_that_is_not_here_is_no_texture(corner, texture):
+def test_a_missing_image_is_no_texture(corner, texture):
     document = copy.deepcopy(default_look(corner.materials))
     document["materials"]["Floor"]["terms"][0]["texture"] = texture
     with pytest.raises(ParameterError, match=r"terms/0/texture.*image that was sent"):
         validate(document, default_look(corner.materials))
 
 
-def test_where_there_is_no_place_in_textures_moving_views_project_as_fixed_ones_do(corner, named, tmp_path):
-    """Every face of a box, whose corners have no place, is met by rays: both say where the image lies there."""
+def test_free_cameras_use_the_triplanar_mapping_of_fixed_views(corner, named, tmp_path):
+    """Rays hit every face of a box without UV coordinates: both give the same positions in the image."""
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float32)
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     faces = [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))]
     box = mesh("box", corners, faces, 0, normals=corners / np.sqrt(3))
     scene = make_tiny_scene(box, camera=corner.cameras[0], materials=corner.materials[:1])
     moving = open_small_bake(scene, "probes", tmp_path)
-    found = overridden_textures(moving.stored_scene, moving.positions, (ProbeMapOverrides((named, None)),))
-    eyes = np.random.default_rng(2).normal(size=(60, 3)).astype(np.float32)
-    directions = -eyes / np.linalg.norm(eyes, axis=1, keepdims=True)
+    actual = overridden_textures(moving.stored_scene, moving.positions, (ProbeMapOverrides((named, None)),))
+    camera_positions = np.random.default_rng(2).normal(size=(60, 3)).astype(np.float32)
+    directions = -camera_positions / np.linalg.norm(camera_positions, axis=1, keepdims=True)
     geometry = build_scene_buffers(scene)
     hits = trace_rays(geometry.embree, -4 * directions, directions)
     assert len(set(hits.face // 2)) == 6
     share = np.column_stack([1 - hits.uv.sum(axis=1), hits.uv])
-    places = np.einsum("nk,nkc->nc", share, found.uvs[found.uv_faces[hits.face]])
+    places = np.einsum("nk,nkc->nc", share, actual.uvs[actual.uv_faces[hits.face]])
     expected = surface_at(geometry, hits, directions, scene.materials, 1e-3).uv
     np.testing.assert_allclose(places, expected[:, :2], atol=1e-3)
-    assert (found.uv_scale[hits.face] == 1).all()
+    assert (actual.uv_scale[hits.face] == 1).all()
 
 
-def test_a_shader_is_sent_the_image_once_it_is_named(bakes, named):
-    """The floor's row names a texture whose finest level is the image, after the bake's own."""
+def test_the_browser_gets_the_image_when_a_look_uses_it(bakes, named):
+    """The row of the floor names a texture whose finest level is the image, after the textures of the bake."""
     method, (plain, _), (bare, _) = bakes
     if method != "probes":
         pytest.skip("fixed views have no shader")

@@ -1,4 +1,4 @@
-"""An image of metalness makes of a material what an import makes of it whose file has the map."""
+"""A metallic map divides a material like the import of a file with that map."""
 
 import copy
 import json
@@ -47,25 +47,25 @@ def complete(terms):
 
 
 @pytest.fixture(scope="module")
-def shelf(tmp_path_factory):
+def library(tmp_path_factory):
     with IMAGES.with_search_folder(tmp_path_factory.mktemp("metal") / "images") as folder:
         yield folder
 
 
 @pytest.fixture(scope="module")
-def sent(shelf, tmp_path_factory):
-    """Keeps an image by its texels, and returns its record."""
+def uploaded(library, tmp_path_factory):
+    """Store an image of these texels and return its record."""
     folder = tmp_path_factory.mktemp("files")
 
     def keep_pixels(pixels, name):
         Image.fromarray(pixels).save(folder / f"{name}.png")
-        return store(shelf, folder / f"{name}.png", name)
+        return store(library, folder / f"{name}.png", name)
 
     return keep_pixels
 
 
 def shown(scene, terms):
-    """Diffuse colour and reflectance head-on of every texel. (side, side, 3) each"""
+    """Diffuse color and normal-incidence reflectance of every texel. (side, side, 3) each"""
 
     def texels(name):
         texture = scene.materials[0].textures.get(name) if name in ("diffuse", "specular", None) else load_texture(name)
@@ -76,68 +76,68 @@ def shown(scene, terms):
     return diffuse["color"] * texels(diffuse["texture"]), f0 * ggx["color"] * texels(ggx["texture"])
 
 
-def made(shelf, scene, terms, image):
-    return with_metalness(shelf, terms, image.id, scene.id, "Tray", lambda _scene, _name: scene.materials[0])
+def override(library, scene, terms, image):
+    return with_metalness(library, terms, image.id, scene.id, "Tray", lambda _scene, _name: scene.materials[0])
 
 
 @pytest.mark.parametrize("base", [BASE, None], ids=["map", "colour"])
-def test_it_is_what_an_import_makes_of_the_map(base, shelf, sent):
-    """Of a base colour that a map says, an image in its place says, or a colour alone: texel by texel."""
-    image, expected = sent(METAL, "Metal"), imported(base, METAL)
+def test_an_override_equals_the_import_of_the_map(base, library, uploaded):
+    """For a base color from a map, from an override, or from one color: texel by texel."""
+    image, expected = uploaded(METAL, "Metal"), imported(base, METAL)
     plain = imported(base, None, metallic=0)
-    terms = made(shelf, plain, complete(plain.materials[0].terms), image)
-    found, wanted = shown(plain, terms), shown(expected, expected.materials[0].terms)
-    np.testing.assert_allclose(found, np.broadcast_arrays(*wanted), atol=3e-6)  # looks have six digits
+    terms = override(library, plain, complete(plain.materials[0].terms), image)
+    actual, wanted = shown(plain, terms), shown(expected, expected.materials[0].terms)
+    np.testing.assert_allclose(actual, np.broadcast_arrays(*wanted), atol=3e-6)  # numbers of looks have six digits
     np.testing.assert_allclose(terms[1]["params"]["f0"], expected.materials[0].terms[1]["params"]["f0"], atol=1e-6)
-    assert np.std(found[0]) > 0.1
+    assert np.std(actual[0]) > 0.1
 
 
-def test_an_image_of_the_base_colour_stays_under_it(shelf, sent):
-    """And under another image of metalness after that."""
-    plain, (tint, highlight) = (found := imported(None, None, metallic=0)), complete(found.materials[0].terms)
-    terms = [{**tint, "texture": sent(BASE, "Colour").texture}, highlight]
+def test_a_base_color_override_is_preserved(library, uploaded):
+    """Also with another metallic map after that."""
+    plain, (tint, highlight) = (scene := imported(None, None, metallic=0)), complete(scene.materials[0].terms)
+    terms = [{**tint, "texture": uploaded(BASE, "Colour").texture}, highlight]
     for packed, name in ((METAL, "Metal"), (255 - METAL, "Other")):
-        terms, expected = made(shelf, plain, terms, sent(packed, name)), imported(BASE, packed)
+        terms, expected = override(library, plain, terms, uploaded(packed, name)), imported(BASE, packed)
         np.testing.assert_allclose(shown(plain, terms), shown(expected, expected.materials[0].terms), atol=1e-6)
 
 
 @pytest.mark.parametrize("base", [BASE, BASE // 8, np.full_like(BASE, 20)], ids=["bright", "dark", "black"])
-def test_what_a_file_shared_out_is_put_together_first(base, shelf, sent):
-    """Of a material with a map of metalness, the base colour is found from its own textures, but for their bytes."""
+def test_a_divided_base_color_is_recombined_first(base, library, uploaded):
+    """The base color of a material with a metallic map is recovered from its own textures, within 8-bit rounding."""
     was, expected = imported(base, METAL), imported(base, 255 - METAL)
-    image = sent(255 - METAL, "Other")
-    terms = made(shelf, was, complete(was.materials[0].terms), image)
-    found, wanted = shown(was, terms), shown(expected, expected.materials[0].terms)
-    np.testing.assert_allclose(found, wanted, atol=0.02)
-    again = made(shelf, was, terms, image)
-    np.testing.assert_allclose(shown(was, again), found, atol=1e-6)
+    image = uploaded(255 - METAL, "Other")
+    terms = override(library, was, complete(was.materials[0].terms), image)
+    actual, wanted = shown(was, terms), shown(expected, expected.materials[0].terms)
+    np.testing.assert_allclose(actual, wanted, atol=0.02)
+    again = override(library, was, terms, image)
+    np.testing.assert_allclose(shown(was, again), actual, atol=1e-6)
 
 
-def test_a_metal_of_one_colour_scatters_where_it_is_none(shelf, sent):
+def test_a_metal_of_one_color_becomes_diffuse_where_the_map_is_zero(library, uploaded):
     was, expected = imported(metallic=1), imported(None, METAL)
-    terms = made(shelf, was, complete(was.materials[0].terms), sent(METAL, "Metal"))
-    found, wanted = shown(was, terms), shown(expected, expected.materials[0].terms)
-    np.testing.assert_allclose(found, wanted, atol=0.003)
+    terms = override(library, was, complete(was.materials[0].terms), uploaded(METAL, "Metal"))
+    actual, wanted = shown(was, terms), shown(expected, expected.materials[0].terms)
+    np.testing.assert_allclose(actual, wanted, atol=0.003)
 
 
 @pytest.mark.parametrize("value", [0, 40_000])
-def test_one_texel_of_sixteen_bits_is_metal_everywhere_or_nowhere(value, shelf, tmp_path):
+def test_a_16_bit_map_of_one_texel_is_metal_everywhere_or_nowhere(value, library, tmp_path):
     Image.fromarray(np.full((1, 1), value, np.uint16)).save(tmp_path / "x.png")
     was, metallic = imported(BASE, metallic=0), value // 257 / 255
-    terms = made(shelf, was, complete(was.materials[0].terms), store(shelf, tmp_path / "x.png", "x"))
+    terms = override(library, was, complete(was.materials[0].terms), store(library, tmp_path / "x.png", "x"))
     expected = imported(BASE, metallic=metallic)
     wanted = shown(expected, expected.materials[0].terms)
     np.testing.assert_allclose(shown(was, terms), np.broadcast_arrays(*wanted), atol=0.005)
 
 
-def test_what_has_no_base_colour_or_no_highlight_says_so(shelf, sent):
+def test_materials_without_base_color_or_highlight_are_rejected(library, uploaded):
     scene = imported(BASE, metallic=0)
     for term in complete(scene.materials[0].terms):
         with pytest.raises(ParameterError, match=r"lambert.*ggx: add what is missing"):
-            made(shelf, scene, [term], sent(METAL, "Metal"))
+            override(library, scene, [term], uploaded(METAL, "Metal"))
 
 
-def test_a_material_is_read_alone(shelf, tmp_path):
+def test_a_material_is_read_without_the_others(library, tmp_path):
     scene = imported(BASE, METAL)
     save_scene(scene, tmp_path)
     material = load_material(tmp_path, "Tray")
@@ -149,33 +149,38 @@ def test_a_material_is_read_alone(shelf, tmp_path):
         load_material(tmp_path / "x", "Tray")
 
 
-def test_what_it_was_made_of_is_kept_and_checked(shelf, sent):
-    scene, image = imported(BASE, metallic=0), sent(METAL, "Metal")
-    diffuse, _ = made(shelf, scene, complete(scene.materials[0].terms), image)
+def test_the_recipe_of_derived_images_is_stored_and_checked(library, uploaded):
+    scene, image = imported(BASE, metallic=0), uploaded(METAL, "Metal")
+    diffuse, _ = override(library, scene, complete(scene.materials[0].terms), image)
     identity = diffuse["texture"].removeprefix("image:")
-    of = get_record(shelf, identity).recipe
-    assert (of.channel, of.metalness, of.base, of.scene) == ("diffuse", image.texture, "diffuse", scene.id)
-    assert of.images == (image.texture,)
-    record = shelf / identity / "image.json"
-    kept = record.read_text()
-    record.write_text(json.dumps({**json.loads(kept), "made_of": {"channel": "diffuse"}}))
+    recipe = get_record(library, identity).recipe
+    assert (recipe.channel, recipe.metalness, recipe.base, recipe.scene) == (
+        "diffuse",
+        image.texture,
+        "diffuse",
+        scene.id,
+    )
+    assert recipe.images == (image.texture,)
+    record = library / identity / "image.json"
+    text = record.read_text()
+    record.write_text(json.dumps({**json.loads(text), "made_of": {"channel": "diffuse"}}))
     with pytest.raises(SceneError, match="damaged"):
-        get_record(shelf, identity)
-    record.write_text(kept)
+        get_record(library, identity)
+    record.write_text(text)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["direct", "gather", "probes"])
-def test_pictures_are_those_of_a_scene_that_has_the_map(method, shelf, sent, tmp_path):
-    """By every method, with light between surfaces where that has it."""
+def test_pictures_equal_those_of_a_scene_with_the_metallic_map(method, library, uploaded, tmp_path):
+    """For every method, with indirect light where the method has it."""
     files = imported(BASE, metallic=0), imported(BASE, METAL)
     wall = Material("Wall", ({"model": "lambert", "color": [0.8, 0.8, 0.8], "texture": None},))
     plain = corner([replace(files[0].materials[0], name="Floor"), wall])
     own = replace(plain, materials=(replace(files[1].materials[0], name="Floor"), wall))
     document = copy.deepcopy(default_look(plain.materials))
     terms = document["materials"]["Floor"]["terms"]
-    document["materials"]["Floor"]["terms"] = made(shelf, plain, complete(terms), sent(METAL, "Metal"))
-    found, without, expected = (
+    document["materials"]["Floor"]["terms"] = override(library, plain, complete(terms), uploaded(METAL, "Metal"))
+    actual, without, expected = (
         shown_by(open_small_bake(scene, method, tmp_path / name), validate(look, default_look(scene.materials)), method)
         for scene, look, name in (
             (plain, document, "found"),
@@ -183,5 +188,5 @@ def test_pictures_are_those_of_a_scene_that_has_the_map(method, shelf, sent, tmp
             (own, default_look(own.materials), "own"),
         )
     )
-    assert relative_rmse(found, expected) < (1e-3 if method == "probes" else 1e-5)
+    assert relative_rmse(actual, expected) < (1e-3 if method == "probes" else 1e-5)
     assert relative_rmse(without, expected) > 0.1

@@ -1,4 +1,4 @@
-"""An image in the place of a normal map shows what a bake shows whose scene has that map."""
+"""An image as a normal map gives the same pictures as a bake whose scene has that map."""
 
 import copy
 from dataclasses import replace
@@ -32,11 +32,11 @@ SIDE = 64
 SCALE = 1.5
 
 
-def waves(side=SIDE, lean=0.4, seed=0):
-    """Normals that lean as a wavy ground does, and finer ones that pixels cover. (side, side, 3) uint8"""
+def waves(side=SIDE, slope=0.4, seed=0):
+    """Normals of a wavy ground, with finer waves below the pixel size. (side, side, 3) uint8"""
     y, x = 2 * np.pi * np.mgrid[0:side, 0:side] / side
     fine = np.random.default_rng(seed).normal(0, 0.1, (side, side, 2))
-    slopes = np.stack([lean * np.sin(3 * x + y), lean * np.cos(2 * y - x)], axis=-1) + fine
+    slopes = np.stack([slope * np.sin(3 * x + y), slope * np.cos(2 * y - x)], axis=-1) + fine
     normals = np.concatenate([slopes, np.ones((side, side, 1))], axis=-1)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     return np.round(127.5 * (normals + 1)).astype(np.uint8)
@@ -46,24 +46,24 @@ def waves(side=SIDE, lean=0.4, seed=0):
 def named(tmp_path_factory):
     folder = tmp_path_factory.mktemp("normals")
     Image.fromarray(waves()).save(folder / "waves.png")
-    with IMAGES.with_search_folder(folder / "images") as shelf:
-        yield store(shelf, folder / "waves.png", "Waves").texture
+    with IMAGES.with_search_folder(folder / "images") as library:
+        yield store(library, folder / "waves.png", "Waves").texture
 
 
 def with_tangents(scene):
-    """Tangents along u, as imports of materials with a normal map have them."""
+    """Tangents along u, as from imports of materials with a normal map."""
     meshes = [replace(m, tangents=compute_tangents(m.positions, m.normals, m.uvs, m.faces)) for m in scene.meshes]
     return replace(scene, meshes=tuple(meshes))
 
 
 @pytest.fixture(scope="module", params=["flat", pytest.param("bumpy", marks=pytest.mark.slow)])
 def plain(request):
-    """A floor and a ball on it, and a wall, that shine; whether they have bumps of their own."""
+    """A glossy floor, a ball and a wall; the parameter: with normal maps in the scene."""
     shiny = {"model": "ggx", "texture": None, "params": {"roughness": 0.4, "f0": 0.5}, "roughness_map": "roughness"}
     floor = {"model": "lambert", "color": [0.2, 0.3, 0.2]}, shiny
     wall = {**floor[0], "color": [0.8, 0.5, 0.2]}, shiny
     own = (
-        Texture(waves(seed=1, lean=0.3)[::-1].copy(), encoding=TextureEncoding("normal"))
+        Texture(waves(seed=1, slope=0.3)[::-1].copy(), encoding=TextureEncoding("normal"))
         if request.param == "bumpy"
         else None
     )
@@ -71,7 +71,7 @@ def plain(request):
 
 
 def with_own(scene, name, scale=SCALE):
-    """The scene whose floor has the map in its file; of the same id, which seeds what is drawn."""
+    """The scene whose floor has the map in its file; with the same id, which seeds random numbers."""
     floor, *others = scene.materials
     return replace(scene, materials=(replace(floor, normal_map=load_normal_map(NormalMap(name, scale))), *others))
 
@@ -83,54 +83,55 @@ def bakes(request, plain, named, tmp_path_factory):
     return [bake_corner_scene(scene, request.param, folder / str(k)) for k, scene in enumerate(scenes)]
 
 
-def bumpy(scene, name, scale=SCALE, **others):
-    """The look whose floor has an image as its normal map; None: its own."""
+def normal_mapped(scene, name, scale=SCALE, **others):
+    """The look whose floor has an image as its normal map; None: the scene's own."""
     document = copy.deepcopy(default_look(scene.materials))
     if name is not None:
         document["materials"]["Floor"]["normal_map"] = {"image": name, "scale": scale}
     return validate(document | others, default_look(scene.materials))
 
 
-def test_pictures_are_those_of_a_scene_that_has_the_map(bakes, plain, named):
-    """In light that is turned, too. Triangles of the coarse ball have one axis of textures each, corners one between;
-    points of cells are bent into the sight of other photons."""
+def test_pictures_equal_those_of_a_scene_with_the_normal_map(bakes, plain, named):
+    """Also in a rotated environment. Triangles of the coarse ball have one tangent each, vertices an interpolated one;
+    patch points see other photons.
+    """
     bare, baked = bakes
-    most, usual = (0.015, 1e-6) if bare.method == "direct" else (0.015, 0.003)
+    max_error, usual = (0.015, 1e-6) if bare.method == "direct" else (0.015, 0.003)
     for others in ({}, {"environment": {"map": None, "rotation": 40.0}}):
-        found = render_exact(bare, bumpy(plain, named, **others), bare.method)
-        expected = render_exact(baked, bumpy(plain, None, **others), bare.method)
-        assert relative_rmse(found, expected) < most
-        assert np.median(np.abs(found - expected) / expected) < usual
-        assert relative_rmse(render_exact(bare, bumpy(plain, None, **others), bare.method), expected) > 0.4
+        actual = render_exact(bare, normal_mapped(plain, named, **others), bare.method)
+        expected = render_exact(baked, normal_mapped(plain, None, **others), bare.method)
+        assert relative_rmse(actual, expected) < max_error
+        assert np.median(np.abs(actual - expected) / expected) < usual
+        assert relative_rmse(render_exact(bare, normal_mapped(plain, None, **others), bare.method), expected) > 0.4
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("bakes", ["gather"], indirect=True)
-def test_what_surfaces_send_is_of_the_normals_that_are_seen(bakes, plain, named):
-    """Of the normals of the bake it would be 27 % off."""
+def test_indirect_light_uses_the_mapped_normals(bakes, plain, named):
+    """With the normals of the bake it would be 27 % off."""
     bare, baked = bakes
     reflected = {"transport": {"show": "indirect"}}
-    found = render_exact(bare, bumpy(plain, named, **reflected), bare.method)
-    expected = render_exact(baked, bumpy(plain, None, **reflected), bare.method)
-    assert relative_rmse(found, expected) < 0.05
-    assert np.median(np.abs(found - expected)) < 0.01 * expected.mean()
+    actual = render_exact(bare, normal_mapped(plain, named, **reflected), bare.method)
+    expected = render_exact(baked, normal_mapped(plain, None, **reflected), bare.method)
+    assert relative_rmse(actual, expected) < 0.05
+    assert np.median(np.abs(actual - expected)) < 0.01 * expected.mean()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("bakes", ["gather"], indirect=True)
-def test_gather_rays_are_given_up_and_go_on(bakes, plain, named, monkeypatch):
-    """Where a hand comes back while they are traced; what was traced is not traced again."""
+def test_tracing_of_gather_rays_is_cancelled_and_resumed(bakes, plain, named, monkeypatch):
+    """If an edit arrives during tracing; traced rays are not traced again."""
     bare, _ = bakes
     monkeypatch.setattr(map_override_store, "_SAMPLES_PER_STEP", 64)
     linked, traced = NormalRetracer.gather_hits, []
 
     def counted(self, points, wo, pattern):
-        traced.extend(points.seed.tolist() if pattern.num_rays == RAYS_PER_SAMPLE else ())  # others are of cells
+        traced.extend(points.seed.tolist() if pattern.num_rays == RAYS_PER_SAMPLE else ())  # others are of patches
         return linked(self, points, wo, pattern)
 
     monkeypatch.setattr(NormalRetracer, "gather_hits", counted)
     picture = Picture(bare, "front", Cache(1 << 28))
-    picture.set_look(bumpy(plain, named, 1.25))
+    picture.set_look(normal_mapped(plain, named, 1.25))
     images = picture._images
     floor, light = images.by_name["Floor"], images.light
     with pytest.raises(CancelledError):
@@ -140,38 +141,38 @@ def test_gather_rays_are_given_up_and_go_on(bakes, plain, named, monkeypatch):
     assert sorted(traced) == sorted(images.view.surface_points(0).seed.tolist())
 
 
-def test_lights_that_come_up_are_traced(bakes, plain, named):
-    """And those that go down hidden: bits are those of the bake, on the floor, where frames are equal."""
+def test_lights_above_the_mapped_horizon_are_traced(bakes, plain, named):
+    """And lights below it are hidden: bits equal those of the bake on the floor, where the frames are equal."""
     bare, baked = bakes
     picture = Picture(bare, "front", bare.cache)
-    picture.set_look(bumpy(plain, named))
+    picture.set_look(normal_mapped(plain, named))
     view, expected, before = picture._images.view, baked.views["front"], bare.views["front"]
-    (rows, found), (their_rows, theirs), (_, old) = (_floor_of(each) for each in (view, expected, before))
+    (rows, actual), (their_rows, theirs), (_, old) = (_floor_of(each) for each in (view, expected, before))
     np.testing.assert_array_equal(rows, their_rows)
-    assert np.count_nonzero(np.unpackbits(found ^ theirs)) < 2e-3 * np.count_nonzero(np.unpackbits(theirs))
+    assert np.count_nonzero(np.unpackbits(actual ^ theirs)) < 2e-3 * np.count_nonzero(np.unpackbits(theirs))
     assert np.count_nonzero(np.unpackbits(old ^ theirs)) > 0.03 * np.count_nonzero(np.unpackbits(theirs))
 
 
 def _floor_of(view):
-    """Places of the floor's samples, in an order that views share, and the bits of each. (n, 3), (n, bytes)"""
+    """Positions of the floor's samples, in an order that views share, and the bits of each. (n, 3), (n, bytes)"""
     position = view.surface_points(0).position
     rows = np.flatnonzero(position[:, 1] < 1e-3)
     rows = rows[np.lexsort(position[rows].T)]
     return position[rows], view._read_visibility(0)[rows]
 
 
-def test_normals_and_levels_are_those_of_the_bake(bakes, plain, named):
+def test_normals_and_roughness_levels_equal_the_bake(bakes, plain, named):
     bare, baked = bakes
     picture = Picture(bare, "front", bare.cache)
-    picture.set_look(bumpy(plain, named))
+    picture.set_look(normal_mapped(plain, named))
     view, expected = picture._images.view, baked.views["front"]
     np.testing.assert_allclose(view.ratios[0], expected.ratios[0], rtol=1e-5)
     assert np.mean(view.level == expected.level) > 0.95
     assert len(np.unique(view.level)) > 8
-    (rows, found), (their_rows, theirs) = (_normals_of(each) for each in (view, expected))
+    (rows, actual), (their_rows, theirs) = (_normals_of(each) for each in (view, expected))
     np.testing.assert_array_equal(rows, their_rows)
-    np.testing.assert_allclose(found[rows[:, 1] < 1e-3], theirs[rows[:, 1] < 1e-3], atol=1e-4)
-    np.testing.assert_allclose(found, theirs, atol=0.12)  # of the ball, see above
+    np.testing.assert_allclose(actual[rows[:, 1] < 1e-3], theirs[rows[:, 1] < 1e-3], atol=1e-4)
+    np.testing.assert_allclose(actual, theirs, atol=0.12)  # on the ball, see above
 
 
 def _normals_of(view):
@@ -180,88 +181,88 @@ def _normals_of(view):
     return points.position[rows], points.normal[rows]
 
 
-def test_a_look_without_it_shows_again_what_it_did(bakes, plain, named):
+def test_removing_the_normal_map_restores_the_picture(bakes, plain, named):
     bare, _ = bakes
     picture = Picture(bare, "front", bare.cache)
-    found = []
+    images = []
     for name in (None, named, None, named):
-        picture.set_look(bumpy(plain, name))
-        found.append(run_until_exact(picture).image())
-    np.testing.assert_array_equal(found[2], found[0])
-    np.testing.assert_array_equal(found[3], found[1])
+        picture.set_look(normal_mapped(plain, name))
+        images.append(run_until_exact(picture).image())
+    np.testing.assert_array_equal(images[2], images[0])
+    np.testing.assert_array_equal(images[3], images[1])
 
 
-def test_no_strength_is_no_bumps(bakes, plain, named):
-    """A scale of 0 leaves the surface as it is without any, whatever it had."""
+def test_a_scale_of_zero_is_a_flat_surface(bakes, plain, named):
+    """Regardless of the scene's own normal map."""
     bare, _ = bakes
     picture = Picture(bare, "front", bare.cache)
-    picture.set_look(bumpy(plain, named, 0.0))
+    picture.set_look(normal_mapped(plain, named, 0.0))
     positions, normals = _normals_of(picture._images.view)
     on_floor = positions[:, 1] < 1e-3
     np.testing.assert_allclose(normals[on_floor], np.broadcast_to([0, 1, 0], normals[on_floor].shape), atol=1e-6)
 
 
 @pytest.mark.parametrize("method", ["direct", pytest.param("gather", marks=pytest.mark.slow)])
-def test_what_is_seen_in_a_mirror_leans_as_well(named, method, tmp_path):
-    """A floor and a ball before a wall that is a mirror, among the pixels of the mirror."""
+def test_mirror_images_use_the_mapped_normals(named, method, tmp_path):
+    """A floor and a ball before a mirror: the pixels of the mirror."""
     chrome = {"model": "ggx", "texture": None, "color": [0.9, 0.9, 0.9], "params": {"roughness": 0.03, "f0": 1.0}}
     shiny = {"model": "ggx", "texture": None, "params": {"roughness": 0.4, "f0": 0.5}, "roughness_map": "roughness"}
     scene = with_tangents(corner([Material("Floor", (shiny,)), Material("Wall", (chrome,))]))
     bare, baked = (open_small_bake(s, method, tmp_path / str(k)) for k, s in enumerate((scene, with_own(scene, named))))
     in_mirror = bare.views["front"].material_ids() == 1
-    found, plain, expected = (
-        render_exact(transfer, bumpy(scene, name), method)[in_mirror]
+    actual, plain, expected = (
+        render_exact(transfer, normal_mapped(scene, name), method)[in_mirror]
         for transfer, name in ((bare, named), (bare, None), (baked, None))
     )
-    assert relative_rmse(found, expected) < 0.01
+    assert relative_rmse(actual, expected) < 0.01
     assert relative_rmse(plain, expected) > 0.4
 
 
-def test_truths_show_it(plain, named):
-    found, expected = (
-        reference_image(scene, "front", bumpy(scene, name), (16, 16), 0)
+def test_references_show_the_normal_map(plain, named):
+    actual, expected = (
+        reference_image(scene, "front", normal_mapped(scene, name), (16, 16), 0)
         for scene, name in ((plain, named), (with_own(plain, named), None))
     )
-    np.testing.assert_allclose(found, expected, rtol=1e-5)
-    assert relative_rmse(reference_image(plain, "front", bumpy(plain, None), (16, 16), 0), expected) > 0.3
+    np.testing.assert_allclose(actual, expected, rtol=1e-5)
+    assert relative_rmse(reference_image(plain, "front", normal_mapped(plain, None), (16, 16), 0), expected) > 0.3
 
 
 @pytest.mark.slow
-def test_moving_views_show_it(plain, named, tmp_path):
-    """In straight light, and in all."""
+def test_free_cameras_show_the_normal_map(plain, named, tmp_path):
+    """With direct light, and with all light."""
     bare, baked = (
         open_small_bake(s, "probes", tmp_path / str(k)) for k, s in enumerate((plain, with_own(plain, named)))
     )
-    for show, most in (("direct", 2e-3), ("all", 0.015)):
+    for show, tolerance in (("direct", 2e-3), ("all", 0.015)):
         light = {"transport": {"show": show}}
-        found, expected = (
-            render_exact(transfer, bumpy(plain, name, **light), "probes")
+        actual, expected = (
+            render_exact(transfer, normal_mapped(plain, name, **light), "probes")
             for transfer, name in ((bare, named), (baked, None))
         )
-        assert relative_rmse(found, expected) < most
-        assert relative_rmse(render_exact(bare, bumpy(plain, None, **light), "probes"), expected) > 0.3
+        assert relative_rmse(actual, expected) < tolerance
+        assert relative_rmse(render_exact(bare, normal_mapped(plain, None, **light), "probes"), expected) > 0.3
 
 
 @pytest.mark.slow
-def test_meshes_without_tangents_get_those_of_imports(named, tmp_path):
+def test_meshes_without_tangents_get_the_tangents_of_imports(named, tmp_path):
     scene = corner([Material("Floor", ({"model": "lambert"},)), Material("Wall", ({"model": "lambert"},))])
     none = replace(scene, meshes=tuple(replace(m, tangents=0 * m.tangents) for m in scene.meshes))
     moving = open_small_bake(none, "probes", tmp_path)
     assert len(moving.stored_scene.tangents) == 0
-    found = overridden_textures(
+    actual = overridden_textures(
         moving.stored_scene, moving.positions, (ProbeMapOverrides(normals=NormalMap(named)), NO_OVERRIDES)
     ).tangents
     expected = np.concatenate([mesh.tangents for mesh in with_tangents(scene).meshes])
     normals = np.concatenate([mesh.normals for mesh in scene.meshes])
-    across = found[:, :3] - normals * np.einsum("nc,nc->n", found[:, :3], normals)[:, None]
+    across = actual[:, :3] - normals * np.einsum("nc,nc->n", actual[:, :3], normals)[:, None]
     of_floor = slice(0, 4)
     np.testing.assert_allclose(across[of_floor], expected[of_floor, :3], atol=1e-6)
-    assert not found[4:8].any()  # of the wall, which shows no image
+    assert not actual[4:8].any()  # the wall shows no image
     of_ball = np.linalg.norm(expected[:, :3], axis=1) > 0
     of_ball[:8] = False
     length = np.linalg.norm(across[of_ball], axis=1, keepdims=True)
     assert np.einsum("nc,nc->n", across[of_ball] / length, expected[of_ball, :3]).min() > 0.999
-    np.testing.assert_array_equal(found[of_ball, 3], expected[of_ball, 3])
+    np.testing.assert_array_equal(actual[of_ball, 3], expected[of_ball, 3])
 
 
 @pytest.mark.parametrize(
@@ -280,7 +281,7 @@ def test_meshes_without_tangents_get_those_of_imports(named, tmp_path):
         ({"image": "NAME", "scale": "1"}, "scale"),
     ],
 )
-def test_what_is_no_normal_map_is_refused(given, where, named):
+def test_invalid_normal_maps_are_rejected(given, where, named):
     scene = corner([Material("Floor", ({"model": "lambert"},)), Material("Wall", ({"model": "lambert"},))])
     document = copy.deepcopy(default_look(scene.materials))
     named_here = (
@@ -291,7 +292,7 @@ def test_what_is_no_normal_map_is_refused(given, where, named):
         validate(document, default_look(scene.materials))
 
 
-def test_none_is_none_and_its_strength_is_one(named):
+def test_no_normal_map_has_strength_one(named):
     scene = corner([Material("Floor", ({"model": "lambert"},)), Material("Wall", ({"model": "lambert"},))])
     default = default_look(scene.materials)
     assert validate({"materials": {"Floor": {"normal_map": None}}}, default) == validate({}, default)
@@ -299,7 +300,7 @@ def test_none_is_none_and_its_strength_is_one(named):
     assert look.materials["Floor"].normals == NormalMap(named, 1.0)
 
 
-def test_it_says_the_numbers_of_its_file(named):
+def test_a_normal_map_is_listed_with_its_values(named):
     texture = load_normal_map(NormalMap(named, 2.0))
     values, plain = decode(texture.pixels, texture.encoding), waves() / 127.5 - 1
     np.testing.assert_array_equal(texture.pixels, waves())
@@ -308,20 +309,20 @@ def test_it_says_the_numbers_of_its_file(named):
 
 
 @pytest.mark.parametrize("pixel", [(0, 0, 0), (127, 127, 127), (128, 128, 255), (255, 255, 0)])
-def test_images_that_are_no_normals_leave_pictures_finite(pixel, tmp_path, named):
-    """Black, grey, and normals that look into the surface."""
+def test_images_without_normals_give_finite_pictures(pixel, tmp_path, named):
+    """Black, gray, and normals that point into the surface."""
     scene = with_tangents(
         corner([Material("Floor", ({"model": "lambert"},)), Material("Wall", ({"model": "lambert"},))])
     )
     bare = bake_corner_scene(scene, "direct", tmp_path)
     Image.fromarray(np.full((1, 1, 3), pixel, np.uint8)).save(tmp_path / "x.png")
-    with IMAGES.with_search_folder(tmp_path / "images") as shelf:
-        record = store(shelf, tmp_path / "x.png", "x")
-        assert np.isfinite(render_exact(bare, bumpy(scene, record.texture, 10.0), "direct")).all()
+    with IMAGES.with_search_folder(tmp_path / "images") as library:
+        record = store(library, tmp_path / "x.png", "x")
+        assert np.isfinite(render_exact(bare, normal_mapped(scene, record.texture, 10.0), "direct")).all()
 
 
 class Older:
-    """A store of before: some arrays and attributes are not there."""
+    """An older store: some arrays and attributes are missing."""
 
     def __init__(self, store, arrays=(), attributes=()):
         self._store, self._arrays = store, arrays
@@ -336,8 +337,8 @@ class Older:
         return self._store.read(path, start, stop)
 
 
-def test_bakes_of_before_show_them_where_they_know_enough(bakes, plain, named):
-    """Without bumps of their own and without gather rays; else they say what to do, and the picture stays."""
+def test_older_bakes_show_normal_maps_where_possible(bakes, plain, named):
+    """Without normal maps of the scene and without gather rays; otherwise the error says what to do."""
     bare, _ = bakes
     older = Older(bare.store, ("scene/face_mesh", "surface_normal"))
     view = replace(bare.views["front"], store=older, overridden={})
@@ -345,41 +346,41 @@ def test_bakes_of_before_show_them_where_they_know_enough(bakes, plain, named):
     picture = Picture(transfer, "front", bare.cache)
     before = run_until_exact(picture).image()
     if bare.method == "direct" and plain.materials[0].normal_map is None:
-        picture.set_look(bumpy(plain, named))
+        picture.set_look(normal_mapped(plain, named))
         assert relative_rmse(run_until_exact(picture).image(), before) > 0.1
         return
     with pytest.raises(StoreError, match=r"too old.*bake the scene again"):
-        picture.set_look(bumpy(plain, named))
+        picture.set_look(normal_mapped(plain, named))
     np.testing.assert_array_equal(run_until_exact(picture).image(), before)
 
 
-def test_bakes_that_do_not_tell_bumps_are_refused(bakes, plain, named):
+def test_bakes_without_normal_mapping_data_are_rejected(bakes, plain, named):
     bare, _ = bakes
     view = replace(bare.views["front"], store=Older(bare.store, (), ("shortest_normals",)), overridden={})
     with pytest.raises(StoreError, match="bake the scene again"):
-        Picture(replace(bare, views={"front": view}), "front", bare.cache).set_look(bumpy(plain, named))
+        Picture(replace(bare, views={"front": view}), "front", bare.cache).set_look(normal_mapped(plain, named))
 
 
-def test_what_has_no_place_in_textures_is_projected_on(tmp_path):
-    """In pictures and truths alike, where pixels are not as wide: an image that leans alike everywhere."""
+def test_surfaces_without_uv_coordinates_are_normal_mapped(tmp_path):
+    """In pictures and references alike, whose pixels have other footprints: an image with one normal everywhere."""
     Image.fromarray(np.full((4, 4, 3), (176, 100, 240), np.uint8)).save(tmp_path / "slope.png")
-    with IMAGES.with_search_folder(tmp_path / "images") as shelf:
-        _project_on(store(shelf, tmp_path / "slope.png", "Slope").texture, tmp_path)
+    with IMAGES.with_search_folder(tmp_path / "images") as library:
+        _apply_triplanar_map(store(library, tmp_path / "slope.png", "Slope").texture, tmp_path)
 
 
-def _project_on(named, tmp_path):
+def _apply_triplanar_map(named, tmp_path):
     scene = corner([Material("Floor", ({"model": "lambert"},)), Material("Wall", ({"model": "lambert"},))])
     bare = replace(scene, meshes=tuple(replace(m, uvs=0 * m.uvs, tangents=0 * m.tangents) for m in scene.meshes[:2]))
     transfer = bake_corner_scene(replace(bare, id="0" * len(bare.id)), "direct", tmp_path)
-    look = bumpy(bare, named)
+    look = normal_mapped(bare, named)
     picture = Picture(transfer, "front", transfer.cache)
     picture.set_look(look)
     positions, normals = _normals_of(picture._images.view)
-    of_truth = with_overrides(bare, look)
-    samples = sample_view(of_truth, build_scene_buffers(of_truth), "front", (40, 30))
+    reference_scene = with_overrides(bare, look)
+    samples = sample_view(reference_scene, build_scene_buffers(reference_scene), "front", (40, 30))
     points, rows = samples.surface.points, np.flatnonzero(samples.material == 0)
     rows = rows[np.lexsort(points.position[rows].T)]
     np.testing.assert_allclose(positions, points.position[rows], atol=1e-6)
     np.testing.assert_allclose(normals, points.normal[rows], atol=1e-4)
     assert np.all(normals[:, 0] > 0.3)
-    assert np.all(normals[:, 2] > 0.1)  # green below a half leans down the image, towards the viewer here
+    assert np.all(normals[:, 2] > 0.1)  # green below one half tilts down the image, toward the viewer here

@@ -1,4 +1,4 @@
-"""An image in the place of a map of roughness shows what a bake shows whose scene has that map."""
+"""An image as a roughness map gives the same pictures as a bake whose scene has that map."""
 
 import copy
 from dataclasses import replace
@@ -23,17 +23,17 @@ SIDE = 64
 
 @pytest.fixture(scope="module")
 def named(tmp_path_factory):
-    """The name of an image whose green is smooth in some squares, rough in others; red and blue are something else."""
+    """The name of an image whose green is smooth in some squares, rough in others; red and blue differ."""
     folder = tmp_path_factory.mktemp("rough")
     y, x = np.mgrid[0:SIDE, 0:SIDE]
     green = np.where((x * 4 // SIDE + y * 4 // SIDE) % 2, 40 + x, 180)
     Image.fromarray(np.stack([255 - x, green, y], axis=-1).astype(np.uint8)).save(folder / "rough.png")
-    with IMAGES.with_search_folder(folder / "images") as shelf:
-        yield store(shelf, folder / "rough.png", "Rough").texture
+    with IMAGES.with_search_folder(folder / "images") as library:
+        yield store(library, folder / "rough.png", "Rough").texture
 
 
 def bumps():
-    """Normals that lean to and fro from texel to texel."""
+    """Normals that alternate from texel to texel."""
     lean = np.random.default_rng(3).normal(0, 0.15, (128, 128, 2))
     normals = np.concatenate([lean, np.ones((128, 128, 1))], axis=-1)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
@@ -42,7 +42,7 @@ def bumps():
 
 @pytest.fixture(scope="module")
 def plain():
-    """A bumpy floor and a ball on it, as rough everywhere; a wall that shines as well."""
+    """A normal-mapped floor and a ball of constant roughness; a glossy wall."""
     shiny = {"model": "ggx", "color": [1.0, 1.0, 1.0], "texture": None, "params": {"roughness": 0.4, "f0": 0.5}}
     floor = {"model": "lambert", "color": [0.2, 0.3, 0.2]}, {**shiny, "roughness_map": "roughness"}
     wall = {**floor[0], "color": [0.8, 0.5, 0.2]}, shiny
@@ -51,7 +51,7 @@ def plain():
 
 
 def with_own(scene, name):
-    """The scene whose floor has the map in its file, and says its mean; of the same id, which seeds what is drawn."""
+    """The scene whose floor has the map and its mean in its file; with the same id, which seeds random numbers."""
     floor, *others = scene.materials
     diffuse, shiny = floor.terms
     shiny = {**shiny, "params": {**shiny["params"], "roughness": mean_roughness(name)}}
@@ -67,7 +67,7 @@ def bakes(request, plain, named, tmp_path_factory):
 
 
 def rough(scene, follows, roughness, **others):
-    """The look whose floor follows a map, of this mean."""
+    """The look whose floor follows a map of this mean."""
     document = copy.deepcopy(default_look(scene.materials))
     document["materials"]["Floor"]["terms"][1]["roughness_map"] = follows
     document["materials"]["Floor"]["terms"][1]["params"]["roughness"] = roughness
@@ -83,40 +83,41 @@ def shown(transfer, *looks):
     return picture.image()
 
 
-def test_pictures_are_those_of_a_scene_that_has_the_map(bakes, plain, named):
-    """Slider and turned light, too. Shadows are found by blocks of neighbours, and gather rays have other seeds, where
-    samples came in another order: edges differ by a few thousandths, and what surfaces send by noise."""
+def test_pictures_equal_those_of_a_scene_with_the_roughness_map(bakes, plain, named):
+    """Also with the slider and a rotated environment. Shadows are traced by blocks of neighbors, and gather rays have
+    other seeds where samples are in another order: edges differ by a few thousandths, indirect light by noise.
+    """
     bare, baked = bakes
-    mean, (most, usual) = mean_roughness(named), (4e-3, 1e-5) if bare.method == "direct" else (0.03, 0.01)
+    mean, (max_error, usual) = mean_roughness(named), (4e-3, 1e-5) if bare.method == "direct" else (0.03, 0.01)
     turned = {"environment": {"map": None, "rotation": 40.0}}
     for roughness, others in ((mean, {}), (0.3, turned)):
-        found = shown(bare, rough(plain, named, mean), rough(plain, named, roughness, **others))
+        actual = shown(bare, rough(plain, named, mean), rough(plain, named, roughness, **others))
         expected = shown(baked, rough(plain, True, roughness, **others))
-        assert relative_rmse(found, expected) < most
-        assert np.median(np.abs(found - expected) / expected) < usual
+        assert relative_rmse(actual, expected) < max_error
+        assert np.median(np.abs(actual - expected) / expected) < usual
         assert relative_rmse(shown(bare, rough(plain, True, roughness, **others)), expected) > 0.05
 
 
-def test_levels_are_those_of_the_bake(bakes, plain, named):
+def test_roughness_levels_equal_the_bake(bakes, plain, named):
     bare, baked = bakes
     picture = Picture(bare, "front", bare.cache)
     picture.set_look(rough(plain, named, 0.4))
     other = Picture(bare, "front", bare.cache)
     other.set_look(rough(plain, named, 0.3))
     view, expected = picture._images.view, baked.views["front"]
-    assert other._images.view is view  # pictures of one image share what is sorted by it
+    assert other._images.view is view  # pictures with the same map share the sorted view
     np.testing.assert_allclose(view.ratios[0], expected.ratios[0], rtol=1e-5)
     assert np.all(view.level == expected.level)
     assert len(np.unique(view.level)) > 8
 
 
-def test_a_look_without_it_shows_again_what_it_did(bakes, plain, named):
+def test_removing_the_roughness_map_restores_the_picture(bakes, plain, named):
     bare, _ = bakes
     before = shown(bare, rough(plain, True, 0.4))
     np.testing.assert_array_equal(shown(bare, rough(plain, named, 0.4), rough(plain, True, 0.4)), before)
 
 
-def test_the_picture_goes_on_showing_what_it_did_until_it_is_there(bakes, plain, named):
+def test_the_picture_is_unchanged_until_the_map_is_ready(bakes, plain, named):
     bare, _ = bakes
     picture = Picture(bare, "front", bare.cache)
     picture.set_look(rough(plain, True, 0.4))
@@ -125,20 +126,20 @@ def test_the_picture_goes_on_showing_what_it_did_until_it_is_there(bakes, plain,
     advance = picture.advance(None)
     assert advance.complete
     assert not advance.exact
-    assert relative_rmse(picture.image(), before) < 0.05  # what is seen by angle alone follows at once
+    assert relative_rmse(picture.image(), before) < 0.05  # terms without the map follow at once
 
 
-def test_truths_show_it(plain, named):
+def test_references_show_the_roughness_map(plain, named):
     mean, own = mean_roughness(named), with_own(plain, named)
-    found, expected = (
+    actual, expected = (
         reference_image(scene, "front", rough(scene, follows, mean), (16, 16), 0)
         for scene, follows in ((plain, named), (own, "roughness"))
     )
-    assert relative_rmse(found, expected) < 1e-3
+    assert relative_rmse(actual, expected) < 1e-3
     assert relative_rmse(reference_image(plain, "front", rough(plain, True, mean), (16, 16), 0), expected) > 0.05
 
 
-def test_terms_of_a_material_follow_one(plain, named):
+def test_terms_of_a_material_share_one_map(plain, named):
     document = copy.deepcopy(default_look(plain.materials))
     first, shiny = document["materials"]["Floor"]["terms"]
     document["materials"]["Floor"]["terms"] = [first, {**shiny, "roughness_map": named}, shiny]
@@ -147,26 +148,26 @@ def test_terms_of_a_material_follow_one(plain, named):
 
 
 @pytest.mark.parametrize("follows", ["image:0000000000000000", "image:../x", "map", 3, True])
-def test_an_image_that_is_not_here_is_no_map(plain, follows):
+def test_a_missing_image_is_no_roughness_map(plain, follows):
     with pytest.raises(ParameterError, match=r"terms/1/roughness_map.*image that was sent"):
         rough(plain, follows, 0.4)
 
 
-def test_one_that_is_gone_leaves_the_picture_as_it_was(bakes, plain, named, tmp_path):
+def test_a_deleted_map_leaves_the_picture_unchanged(bakes, plain, named, tmp_path):
     bare, _ = bakes
     Image.fromarray(np.full((4, 4, 3), 99, np.uint8)).save(tmp_path / "x.png")
     picture = Picture(bare, "front", bare.cache)
     before = run_until_exact(picture).image()
-    with IMAGES.with_search_folder(tmp_path / "images") as shelf:
-        record = store(shelf, tmp_path / "x.png", "x")
+    with IMAGES.with_search_folder(tmp_path / "images") as library:
+        record = store(library, tmp_path / "x.png", "x")
         look = rough(plain, record.texture, 0.4)
-        IMAGES.remove(shelf, record.id)
+        IMAGES.remove(library, record.id)
         with pytest.raises(NotFoundError):
             picture.set_look(look)
     np.testing.assert_array_equal(run_until_exact(picture).image(), before)
 
 
-def test_it_says_the_number_of_its_green(named):
+def test_a_roughness_map_is_listed_with_its_mean(named):
     texture = load_roughness_map(named)
     assert texture.pixels.shape == (SIDE, SIDE, 1)
     assert decode(texture.pixels, texture.encoding).mean() == pytest.approx(1, rel=1e-6)
@@ -174,12 +175,12 @@ def test_it_says_the_number_of_its_green(named):
 
 
 @pytest.mark.parametrize("value", [0, 255])
-def test_images_of_one_value_have_no_levels(value, bakes, plain, tmp_path):
+def test_images_of_one_value_have_no_roughness_levels(value, bakes, plain, tmp_path):
     bare, _ = bakes
     Image.fromarray(np.full((1, 1, 3), value, np.uint8)).save(tmp_path / "x.png")
-    with IMAGES.with_search_folder(tmp_path / "images") as shelf:
-        record = store(shelf, tmp_path / "x.png", "x")
-        assert get_record(shelf, record.id).roughness == value / 255
+    with IMAGES.with_search_folder(tmp_path / "images") as library:
+        record = store(library, tmp_path / "x.png", "x")
+        assert get_record(library, record.id).roughness == value / 255
         picture = Picture(bare, "front", bare.cache)
         picture.set_look(rough(plain, record.texture, 0.4))
         assert np.isfinite(run_until_exact(picture).image()).all()

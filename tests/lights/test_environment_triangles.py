@@ -52,8 +52,8 @@ def corners_of(lights):
 def tiles_of(radiance, num_lights):
     """The tiles behind `tessellate_environment`, in its order: corners (M, 3, 3) and the texels in each."""
     tiles = choose_tiles(radiance, num_lights)
-    found = tiles.locate(texel_directions(*radiance.shape[:2]).reshape(-1, 3).astype(float))
-    return tiles.corners, [np.nonzero(found == m)[0] for m in range(len(tiles.codes))]
+    tile = tiles.locate(texel_directions(*radiance.shape[:2]).reshape(-1, 3).astype(float))
+    return tiles.corners, [np.nonzero(tile == m)[0] for m in range(len(tiles.codes))]
 
 
 def texel_power(radiance):
@@ -138,11 +138,11 @@ def test_moments_of_texels_are_those_of_their_oracle():
 
 def test_where_light_is_uniform_triangles_are_their_tiles():
     radiance = np.ones((256, 512, 3), np.float32)
-    found, (tiles, _) = corners_of(tessellate_environment(radiance, 300)), tiles_of(radiance, 300)
+    corners, (tiles, _) = corners_of(tessellate_environment(radiance, 300)), tiles_of(radiance, 300)
     angles = solid_angles(tiles)
-    np.testing.assert_allclose(solid_angles(found), angles, rtol=0.1)
-    assert solid_angles(found).sum() == pytest.approx(4 * np.pi, rel=0.02)
-    assert np.linalg.norm(found - tiles, axis=2).max() < 0.1 * np.sqrt(angles.max())
+    np.testing.assert_allclose(solid_angles(corners), angles, rtol=0.1)
+    assert solid_angles(corners).sum() == pytest.approx(4 * np.pi, rel=0.02)
+    assert np.linalg.norm(corners - tiles, axis=2).max() < 0.1 * np.sqrt(angles.max())
 
 
 def test_power_is_the_environments(lights):
@@ -180,9 +180,9 @@ def test_shadow_rays_go_into_their_triangle_towards_its_light(lights):
 
 
 def test_same_environment_gives_the_same_triangles_bit_for_bit():
-    one, two = tessellate_environment(studio(), 300), tessellate_environment(studio(), 300)
+    first, second = tessellate_environment(studio(), 300), tessellate_environment(studio(), 300)
     for name in ("nodes", "direction", "irradiance"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+        np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
 
 
 @pytest.mark.parametrize("asked", [8, 9, 10, 11, 100, 101, 102, 500])
@@ -274,9 +274,9 @@ def test_directions_are_located_in_the_tile_they_lie_in(relightable):
     tiles = choose_tiles(studio(), 500, relightable)
     directions = np.random.default_rng(7).normal(size=(4000, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    found = tiles.locate(directions)
+    tile = tiles.locate(directions)
     depth = depth_inside(tiles.corners, directions)
-    assert (depth[np.arange(len(found)), found] > -1e-9).all()
+    assert (depth[np.arange(len(tile)), tile] > -1e-9).all()
     np.testing.assert_array_equal(tiles.locate(tiles.centroids), np.arange(len(tiles.codes)))
     np.testing.assert_array_equal(tiles.locate(tiles.corners.mean(axis=1)), np.arange(len(tiles.codes)))
 

@@ -50,7 +50,7 @@ def sample_numpy(name, light, strata, k, shift, p):
     u, v = strata.corner[k] + strata.size * ((np.asarray(strata.uv[k], float) + shift) % 1)
     if geometry.kind == "rectangle":
         corner, (e, f) = rectangle(geometry)
-        place, normal, area = corner + u * e + v * f, np.cross(e, f), np.linalg.norm(np.cross(e, f))
+        position, normal, area = corner + u * e + v * f, np.cross(e, f), np.linalg.norm(np.cross(e, f))
     else:
         pieces = np.concatenate([light.corner[:, None], light.corner[:, None] + light.edges], axis=1).astype(float)
         areas = np.linalg.norm(np.cross(pieces[:, 1] - pieces[:, 0], pieces[:, 2] - pieces[:, 0]), axis=1) / 2
@@ -58,8 +58,8 @@ def sample_numpy(name, light, strata, k, shift, p):
         piece = int(np.searchsorted(upto, u, side="right"))
         a, b, c = pieces[piece]
         root = np.sqrt((u - upto[piece] + areas[piece] / area) / (areas[piece] / area))
-        place, normal = a + root * (1 - v) * (b - a) + root * v * (c - a), np.cross(b - a, c - a)
-    away = place - p
+        position, normal = a + root * (1 - v) * (b - a) + root * v * (c - a), np.cross(b - a, c - a)
+    away = position - p
     cosine = -unit(away) @ unit(normal)
     cosine = abs(cosine) if name == "two-sided" else max(cosine, 0)
     patch = area / len(strata.uv)
@@ -99,14 +99,14 @@ def test_rectangle_gives_what_lambert_s_formula_says(direction, rotation):
     corner, (e, f) = rectangle(geometry)
     points = RNG.uniform([-0.5, 0, -0.5], [0.5, 0.3, 0.5], (200, 3)).astype(np.float32)
     normals = np.tile(np.array([0, 1, 0], np.float32), (200, 1))
-    light, seen = prepare_local_lights(geometry), np.full((200, 8), 255, np.uint8)
-    found = compute_irradiance(light, make_light_strata(light, 64), make_surface_points(points, normals), seen)
+    light, visible = prepare_local_lights(geometry), np.full((200, 8), 255, np.uint8)
+    actual = compute_irradiance(light, make_light_strata(light, 64), make_surface_points(points, normals), visible)
     expected = [
         polygon_irradiance(np.array([corner, corner + e, corner + e + f, corner + f]), p, np.array([0, 1, 0]))
         for p in points.astype(float)
     ]
-    np.testing.assert_allclose(found, expected, rtol=0.05)
-    np.testing.assert_allclose(found.mean(), np.mean(expected), rtol=1e-3)
+    np.testing.assert_allclose(actual, expected, rtol=0.05)
+    np.testing.assert_allclose(actual.mean(), np.mean(expected), rtol=1e-3)
 
 
 def test_unrotated_rectangle_stands_upright_and_its_edges_turn_about_its_direction():
@@ -128,12 +128,14 @@ def test_two_triangles_shine_as_the_rectangle_they_make():
     triangles = np.array([[a, b, c], [a, c, d]], np.float32)
     points = RNG.uniform([-1, -0.5, -1], [1, 0.5, 1], (400, 3)).astype(np.float32)
     normals = np.tile(np.array([0, 1, 0], np.float32), (400, 1))
-    at, seen = make_surface_points(points, normals), np.full((400, 32), 255, np.uint8)
-    one, two = (
+    at, visible = make_surface_points(points, normals), np.full((400, 32), 255, np.uint8)
+    of_triangles, of_rectangle = (
         prepare_local_lights(geometry),
         prepare_local_lights(GEOMETRIES["one-sided"], make_emissive_triangles(triangles, False)),
     )
-    as_one, as_two = (compute_irradiance(light, make_light_strata(light, 64), at, seen) for light in (one, two))
+    as_one, as_two = (
+        compute_irradiance(light, make_light_strata(light, 64), at, visible) for light in (of_triangles, of_rectangle)
+    )
     np.testing.assert_allclose(as_two, as_one, rtol=0.05)
     np.testing.assert_allclose(as_two.mean(), as_one.mean(), rtol=2e-3)
 
@@ -143,13 +145,13 @@ def test_emitter_without_area_gives_no_light(corners):
     light = prepare_local_lights(GEOMETRIES["one-sided"], make_emissive_triangles(corners, True))
     strata = make_light_strata(light, 64)
     up = np.array([[0, 1, 0]], np.float32)
-    seen = np.full((1, 32), 255, np.uint8)
-    assert compute_irradiance(light, strata, make_surface_points(0 * up, up), seen) == 0
+    visible = np.full((1, 32), 255, np.uint8)
+    assert compute_irradiance(light, strata, make_surface_points(0 * up, up), visible) == 0
 
 
 def test_light_that_touches_a_surface_is_finite():
     up = np.array([[0, 1, 0]], np.float32)
     for geometry in (LightGeometry("point"), LightGeometry("rectangle", (0, 0, 0), (0, 1, 0), size=(1e-4, 1e4))):
-        light, seen = prepare_local_lights(geometry), np.full((1, 32), 255, np.uint8)
-        found = compute_irradiance(light, make_light_strata(light, 64), make_surface_points(0 * up, up), seen)
-        assert np.isfinite(found).all()
+        light, visible = prepare_local_lights(geometry), np.full((1, 32), 255, np.uint8)
+        actual = compute_irradiance(light, make_light_strata(light, 64), make_surface_points(0 * up, up), visible)
+        assert np.isfinite(actual).all()

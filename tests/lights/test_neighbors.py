@@ -10,8 +10,10 @@ from relume.lights.neighbors import find_neighbors
 from relume.lights.spherical_triangles import tessellate_environment
 
 
-def sets_of(neighbours):
-    return [set(part.tolist()) for part in np.split(neighbours.neighbors, neighbours.first[1:-1])]
+def sets_of(neighbors):
+    return [
+        set(neighbors_of_light.tolist()) for neighbors_of_light in np.split(neighbors.neighbors, neighbors.first[1:-1])
+    ]
 
 
 def random_directions(count):

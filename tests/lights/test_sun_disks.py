@@ -7,11 +7,11 @@ from relume.assets.environments.equirect import texel_directions, texel_solid_an
 from relume.lights.sun_disks import NUM_TARGET_SETS, NUM_TARGETS, remove_sun_disks
 
 
-def sky(*suns, size=(128, 256)):
+def sky(*disks, size=(128, 256)):
     """Grey, brighter above; each sun an axis, a radius in degrees, and its radiance."""
     towards = texel_directions(*size).astype(np.float64)
     radiance = np.repeat(1 + 0.5 * towards[..., 1:2], 3, axis=2)
-    for axis, radius, light in suns:
+    for axis, radius, light in disks:
         axis = np.asarray(axis) / np.linalg.norm(axis)
         radiance[towards @ axis > np.cos(np.radians(radius))] += light
     return radiance.astype(np.float32)
@@ -29,14 +29,14 @@ OTHER = ([-1, 0.4, 0.5], 1.5, [3e3, 4e3, 6e3])
 @pytest.mark.parametrize("suns", [(HARD,), (HARD, OTHER)])
 def test_suns_and_what_is_left_are_the_whole_map(suns):
     radiance = sky(*suns)
-    found = remove_sun_disks(radiance)
-    assert len(found.sun_disks) == len(suns)
+    removed = remove_sun_disks(radiance)
+    assert len(removed.sun_disks) == len(suns)
     np.testing.assert_allclose(
-        sum(sun.irradiance for sun in found.sun_disks) + brought(found.residual), brought(radiance), rtol=1e-5
+        sum(sun.irradiance for sun in removed.sun_disks) + brought(removed.residual), brought(radiance), rtol=1e-5
     )
-    np.testing.assert_allclose(found.residual, sky(), atol=0.1)
+    np.testing.assert_allclose(removed.residual, sky(), atol=0.1)
     axis = np.asarray(HARD[0]) / np.linalg.norm(HARD[0])
-    first = max(found.sun_disks, key=lambda sun: sun.mean @ axis)
+    first = max(removed.sun_disks, key=lambda sun: sun.mean @ axis)
     assert first.mean @ axis > np.cos(np.radians(0.5)) * np.linalg.norm(first.mean)
     np.testing.assert_allclose(first.irradiance / first.irradiance[0], np.array(HARD[2]) / HARD[2][0], rtol=1e-3)
 
@@ -55,6 +55,6 @@ def test_targets_are_spread_as_the_light_is():
     "radiance", [sky(), sky(([0, 1, 0.1], 4, [2e3] * 3)), sky((HARD[0], 1.5, [120.0] * 3))], ids=["none", "wide", "dim"]
 )
 def test_light_of_wide_or_dim_places_stays(radiance):
-    found = remove_sun_disks(radiance)
-    assert found.sun_disks == ()
-    assert found.residual is radiance
+    removed = remove_sun_disks(radiance)
+    assert removed.sun_disks == ()
+    assert removed.residual is radiance

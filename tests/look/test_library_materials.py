@@ -147,9 +147,9 @@ def test_every_preset_evaluates_like_its_fit(fits):
 
 
 def test_every_preset_is_a_valid_part_of_a_look():
-    found = presets()
-    assert len({preset.id for preset in found}) == len(found) > 600
-    for preset in found:
+    all_presets = presets()
+    assert len({preset.id for preset in all_presets}) == len(all_presets) > 600
+    for preset in all_presets:
         for term in preset.terms:
             assert complete_term((preset.id,), term, None) == term
         assert preset.group in {*GROUPS, "metal"}
@@ -173,10 +173,10 @@ def test_a_point_of_the_map_is_the_material_there():
     plane = navigation_map()
     for k in range(0, len(plane.presets), 7):
         expected = plane.presets[k].terms
-        for found, term in zip(plane.at(plane.f0[k], plane.sigma[k]), expected, strict=True):
-            np.testing.assert_allclose(found["color"], term["color"], rtol=1e-6, atol=1e-9)
+        for actual, term in zip(plane.at(plane.f0[k], plane.sigma[k]), expected, strict=True):
+            np.testing.assert_allclose(actual["color"], term["color"], rtol=1e-6, atol=1e-9)
             for name, value in term["params"].items():
-                assert found["params"][name] == pytest.approx(value, rel=1e-6)
+                assert actual["params"][name] == pytest.approx(value, rel=1e-6)
 
 
 def test_between_materials_colours_and_parameters_are_barycentric():
@@ -186,9 +186,9 @@ def test_between_materials_colours_and_parameters_are_barycentric():
         f0 = weights @ plane.f0[triangle]
         sigma = np.exp(weights @ np.log(plane.sigma[triangle]))
         diffuse, highlight = plane.at(f0, sigma)
-        for found, index in ((diffuse, 0), (highlight, 1)):
+        for blended, index in ((diffuse, 0), (highlight, 1)):
             colors = np.array([plane.presets[k].terms[index]["color"] for k in triangle])
-            np.testing.assert_allclose(found["color"], weights @ colors, rtol=1e-6, atol=1e-9)
+            np.testing.assert_allclose(blended["color"], weights @ colors, rtol=1e-6, atol=1e-9)
         assert highlight["params"]["sigma"] == pytest.approx(sigma, rel=1e-9)
         ior = highlight["params"]["ior"]
         assert ((ior - 1) / (ior + 1)) ** 2 == pytest.approx(f0, rel=1e-9)

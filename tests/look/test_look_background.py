@@ -20,7 +20,7 @@ def test_default_shows_the_map_and_a_ground_catches():
 
 
 def test_looks_and_stores_of_before_have_one_too():
-    old = {name: part for name, part in DEFAULT.items() if name != "background"}
+    old = {name: value for name, value in DEFAULT.items() if name != "background"}
     assert complete({"background": {"kind": "color"}}, complete({}, old))["background"]["kind"] == "color"
     assert validate(old, DEFAULT).background.kind == "map"
 

@@ -25,9 +25,9 @@ DOCUMENTS = st.dictionaries(st.sampled_from(["materials", "lights", "display"]),
 
 @given(DOCUMENTS, DOCUMENTS)
 def test_it_leads_from_one_look_to_another(before: dict[str, Any], after: dict[str, Any]) -> None:
-    kept = copy.deepcopy((before, after))
+    originals = copy.deepcopy((before, after))
     assert jsonpatch.apply_patch(before, diff_looks(before, after)) == after
-    assert (before, after) == kept
+    assert (before, after) == originals
 
 
 @given(DOCUMENTS)

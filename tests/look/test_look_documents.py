@@ -83,8 +83,8 @@ def test_look_does_not_follow_later_changes_of_its_document(default):
 
 
 def test_lights_are_added_completed_and_taken_away(default):
-    lamp = {"op": "add", "path": "/lights/Lamp", "value": {"kind": "rectangle", "size": [1, 2]}}
-    added = apply_patch(default, [lamp], default)
+    addition = {"op": "add", "path": "/lights/Lamp", "value": {"kind": "rectangle", "size": [1, 2]}}
+    added = apply_patch(default, [addition], default)
     assert added["lights"]["Lamp"] == {
         "kind": "rectangle", "intensity": 1.0, "color": [1.0, 1.0, 1.0], "enabled": True, "emission": [1.0, 1.0, 1.0],
         "position": [0.0, 1.0, 0.0], "direction": [0.0, -1.0, 0.0], "rotation": 0.0, "size": [1, 2],
@@ -138,5 +138,5 @@ def test_shown_paths_are_equal_where_the_picture_is(default, transport, paths):
 
 
 def test_a_store_that_knows_no_transport_shows_all_of_it(default):
-    older = {name: part for name, part in default.items() if name != "transport"}
+    older = {name: value for name, value in default.items() if name != "transport"}
     assert complete({}, older)["transport"] == default["transport"]

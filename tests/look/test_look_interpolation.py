@@ -54,8 +54,8 @@ def test_what_has_nothing_between_changes_half_way_and_stays_valid():
     assert (ball(before)[1]["model"], ball(after)[1]["model"]) == ("blinn_phong", "phong")
     assert ("Lamp" in before["lights"], "Lamp" in after["lights"]) == (False, True)
     assert ball(after)[0]["color"] == pytest.approx([0.302, 0.4, 0.498])
-    for found in (before, after):
-        assert complete(found, DEFAULT) == found
+    for between in (before, after):
+        assert complete(between, DEFAULT) == between
 
 
 def test_many_keyframes_share_the_way_and_whole_numbers_stay_whole():
@@ -74,10 +74,10 @@ def test_drawn_curves_of_as_many_points_go_point_by_point():
     first, last = copy.deepcopy(look()), copy.deepcopy(look())
     ball(first)[1]["curves"] = {"theta_h": {"points": [[0.0, 1.0], [30.0, 0.0]]}}
     ball(last)[1]["curves"] = {"theta_h": {"points": [[0.0, 3.0], [50.0, 0.0]]}}
-    found = ball(interpolate_looks([complete(first, DEFAULT), complete(last, DEFAULT)], 0.5))[1]["curves"]["theta_h"][
+    curve = ball(interpolate_looks([complete(first, DEFAULT), complete(last, DEFAULT)], 0.5))[1]["curves"]["theta_h"][
         "points"
     ]
-    assert found == [[0.0, 2.0], [40.0, 0.0]]
+    assert curve == [[0.0, 2.0], [40.0, 0.0]]
 
 
 def of_map(color, f0, sigma):
@@ -96,8 +96,8 @@ def test_a_way_across_the_map_goes_through_what_lies_between():
     for share, end in ((0.0, ends[0]), (1.0, ends[1])):
         assert ball(interpolate_looks(ends, share, "map"))[1]["params"] == ball(end)[1]["params"]
     nearly = [ball(interpolate_looks(ends, share, "map")) for share in (1e-9, 1 - 1e-9)]
-    for found, end in zip(nearly, ends, strict=True):
-        np.testing.assert_allclose([t["color"] for t in found], [t["color"] for t in ball(end)], atol=1e-6)
+    for actual, end in zip(nearly, ends, strict=True):
+        np.testing.assert_allclose([t["color"] for t in actual], [t["color"] for t in ball(end)], atol=1e-6)
     between = interpolate_looks(ends, 0.5, "map")
     assert complete(between, DEFAULT) == between
     params = ball(between)[1]["params"]
@@ -105,8 +105,8 @@ def test_a_way_across_the_map_goes_through_what_lies_between():
     assert ((params["ior"] - 1) / (params["ior"] + 1)) ** 2 == pytest.approx(0.26)
     passed = navigation_map().at(0.26, 0.15)
     beside = [
-        np.array([t["color"] for t in ball(end)]) - np.array([t["color"] for t in navigation_map().at(*place)])
-        for end, place in zip(ends, ((0.02, 0.05), (0.5, 0.45)), strict=True)
+        np.array([t["color"] for t in ball(end)]) - np.array([t["color"] for t in navigation_map().at(*point)])
+        for end, point in zip(ends, ((0.02, 0.05), (0.5, 0.45)), strict=True)
     ]
     expected = np.array([t["color"] for t in passed]) + np.mean(beside, axis=0)
     np.testing.assert_allclose([t["color"] for t in ball(between)], np.maximum(expected, 0), atol=1e-6)

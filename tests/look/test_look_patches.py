@@ -58,9 +58,9 @@ def nested(depth):
 )
 def test_patch_that_does_not_fit_is_refused_and_nothing_changes(default, patch):
     before = copy.deepcopy(default)
-    with pytest.raises(EditError) as caught:
+    with pytest.raises(EditError) as raised:
         apply_patch(default, patch, default)
-    assert len(str(caught.value)) < 600
+    assert len(str(raised.value)) < 600
     assert default == before
 
 

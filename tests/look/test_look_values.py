@@ -140,24 +140,24 @@ from relume.scene.model import Light, Material
 )
 def test_bad_value_is_refused_with_its_pointer_and_what_is_allowed(default, path, value, pointer, allowed):
     before = copy.deepcopy(default)
-    with pytest.raises(ParameterError) as caught:
+    with pytest.raises(ParameterError) as raised:
         apply_patch(default, [{"op": "add", "path": path, "value": value}], default)
-    assert caught.value.name == pointer
-    assert allowed in caught.value.allowed
-    assert len(str(caught.value)) < 600
-    assert "\n" not in str(caught.value)
+    assert raised.value.name == pointer
+    assert allowed in raised.value.allowed
+    assert len(str(raised.value)) < 600
+    assert "\n" not in str(raised.value)
     assert default == before
     # the same document whole, as a file or a PUT would bring it, is refused likewise
     document = jsonpatch.apply_patch(default, [{"op": "add", "path": path, "value": value}])
-    with pytest.raises(ParameterError) as caught:
+    with pytest.raises(ParameterError) as raised:
         validate(document, default)
-    assert caught.value.name == pointer
+    assert raised.value.name == pointer
 
 
 def test_scene_with_a_bad_term_is_refused_with_its_pointer():
-    with pytest.raises(ParameterError) as caught:
+    with pytest.raises(ParameterError) as raised:
         default_look([Material("Cup", ({"model": "ggx", "params": {"roughness": 0.0}},))])
-    assert caught.value.name == "/materials/Cup/terms/0/params/roughness"
+    assert raised.value.name == "/materials/Cup/terms/0/params/roughness"
 
 
 @pytest.mark.parametrize(
@@ -170,6 +170,6 @@ def test_scene_with_a_bad_term_is_refused_with_its_pointer():
     ],
 )
 def test_scene_with_a_bad_light_is_refused_with_its_pointer(fields, pointer):
-    with pytest.raises(ParameterError) as caught:
+    with pytest.raises(ParameterError) as raised:
         default_look(MATERIALS, [Light("A", fields)])
-    assert caught.value.name == pointer
+    assert raised.value.name == pointer

@@ -16,7 +16,9 @@ PANEL = {"kind": "rectangle", "position": [2.0, 3.0, 1.0], "rotation": 25.0, "si
 @pytest.mark.parametrize("degrees", [70.0, 500.0, -30.0])
 def test_a_panel_turns_as_a_whole(default, direction, degrees):
     document = complete({"lights": {"Sheet": {**PANEL, "direction": direction}}}, default)
-    lit, turned = (validate(of, default) for of in (document, rotated_lights(document, degrees, MIDDLE)))
+    lit, turned = (
+        validate(look_document, default) for look_document in (document, rotated_lights(document, degrees, MIDDLE))
+    )
     before, after = (rectangle(look.lights["Sheet"].geometry) for look in (lit, turned))
     turn = Rotation.from_euler("y", degrees, degrees=True)
     np.testing.assert_allclose(after[0], MIDDLE + turn.apply(before[0] - MIDDLE), atol=1e-9)

@@ -69,9 +69,9 @@ def test_error_falls_with_kept_coefficients_and_is_small_at_thirty(model, params
     coefficients = daubechies.analysis(curve)
     order = np.argsort(-np.abs(coefficients))
     errors = []
-    for kept in (1, 3, 10, 30, 100, 256):
+    for num_coefficients in (1, 3, 10, 30, 100, 256):
         some = np.zeros_like(coefficients)
-        some[order[:kept]] = coefficients[order[:kept]]
+        some[order[:num_coefficients]] = coefficients[order[:num_coefficients]]
         errors.append(np.linalg.norm(daubechies.synthesis(some) - curve) / np.linalg.norm(curve))
     assert all(b < a for a, b in itertools.pairwise(errors))
     assert errors[3] < 5e-3  # 30 of 256, the budget of an incremental frame; the periodic seam at the peak costs most

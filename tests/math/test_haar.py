@@ -14,9 +14,9 @@ def matrix(length):
     rows[0] = length**-0.5
     for j in range(1, length):
         level = j.bit_length() - 1
-        width, place = length >> level, j - (1 << level)
-        rows[j, place * width : place * width + width // 2] = width**-0.5
-        rows[j, place * width + width // 2 : (place + 1) * width] = -(width**-0.5)
+        width, column = length >> level, j - (1 << level)
+        rows[j, column * width : column * width + width // 2] = width**-0.5
+        rows[j, column * width + width // 2 : (column + 1) * width] = -(width**-0.5)
     return rows
 
 

@@ -29,8 +29,8 @@ def test_vectors_are_orthonormal_and_all_of_them_give_the_curves_back():
     gram = components.vectors @ components.vectors.T
     np.testing.assert_allclose(gram, np.eye(40), atol=1e-12)
     np.testing.assert_allclose(components.mean, curves.mean(axis=0))
-    found = components.synthesis(components.analysis(curves))
-    np.testing.assert_allclose(found, curves, atol=1e-12 * curves.max())
+    reconstructed = components.synthesis(components.analysis(curves))
+    np.testing.assert_allclose(reconstructed, curves, atol=1e-12 * curves.max())
 
 
 def test_no_other_vectors_of_that_number_are_better():
@@ -82,14 +82,14 @@ def test_bands_along_a_slider_are_those_of_a_look():
 
 
 def test_product_of_curves_has_every_pair():
-    one, two = np.array([1.0, 2, 3]), np.array([5.0, 7])
-    assert joint([one, two]).tolist() == [5, 7, 10, 14, 15, 21]
-    assert joint([one]).tolist() == [1, 2, 3]
+    left, right = np.array([1.0, 2, 3]), np.array([5.0, 7])
+    assert joint([left, right]).tolist() == [5, 7, 10, 14, 15, 21]
+    assert joint([left]).tolist() == [1, 2, 3]
     assert [curve.name for curve in curves_of_parameter(TERMS["ggx"], "roughness")] == ["theta_h", "theta_i"]
 
 
 def test_norms():
     exact = np.array([[3.0, 4.0], [30.0, 40.0], [0.0, 0.0]])
-    found = exact + np.array([[0.0, 0.5], [0.0, 0.5], [0.0, 0.0]])
-    assert worst_relative_rms(found, exact) == pytest.approx(0.1)
-    assert relative_rms(found, exact) == pytest.approx(np.sqrt(0.5 / 2525))
+    approximation = exact + np.array([[0.0, 0.5], [0.0, 0.5], [0.0, 0.0]])
+    assert worst_relative_rms(approximation, exact) == pytest.approx(0.1)
+    assert relative_rms(approximation, exact) == pytest.approx(np.sqrt(0.5 / 2525))

@@ -75,8 +75,8 @@ def test_nothing_arrives_from_below():
 
 
 def test_every_function_stands_on_one_rung():
-    rungs = recurrence()
-    places = [*rungs.cosine, *rungs.sine[rungs.order > 0]]
+    table = recurrence()
+    places = [*table.cosine, *table.sine[table.order > 0]]
     assert sorted(places) == list(range(NUM_FUNCTIONS))
 
 
@@ -94,18 +94,18 @@ def scattered():
 
 def test_light_vectors_are_those_of_the_oracle(scattered):
     points, visible, lights = scattered
-    found, expected = (
+    actual, expected = (
         incident_coefficients(points, visible, lights, ()),
         incident_coefficients_numpy(points, visible, lights),
     )
-    assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
+    assert np.abs(actual - expected).max() < 1e-5 * np.abs(expected).max()
 
 
 def test_the_first_number_is_the_irradiance(scattered):
     points, visible, lights = scattered
     cosine = np.maximum(points.normal.astype(np.float64) @ lights.direction.astype(np.float64).T, 0)
-    seen = np.unpackbits(visible, axis=1, count=300, bitorder="little")
-    irradiance = (seen * cosine) @ lights.irradiance
+    is_visible = np.unpackbits(visible, axis=1, count=300, bitorder="little")
+    irradiance = (is_visible * cosine) @ lights.irradiance
     np.testing.assert_allclose(
         np.sqrt(np.pi) * incident_coefficients(points, visible, lights, ())[..., 0], irradiance, rtol=1e-4, atol=1e-4
     )
@@ -115,10 +115,10 @@ def test_functions_along_one_direction_are_all_functions():
     wi, _ = hemisphere(6, 8)
 
     @nb.njit
-    def along(rungs, x, y, out):
-        evaluate_basis_along(rungs, x, y, out)
+    def along(table, x, y, out):
+        evaluate_basis_along(table, x, y, out)
 
-    for one, expected in zip(wi, project(wi), strict=True):
+    for direction, expected in zip(wi, project(wi), strict=True):
         out = np.full(NUM_FUNCTIONS, np.nan, np.float32)
-        along(recurrence(), np.float32(one[0]), np.float32(one[1]), out)
+        along(recurrence(), np.float32(direction[0]), np.float32(direction[1]), out)
         np.testing.assert_allclose(out, expected, atol=1e-5)

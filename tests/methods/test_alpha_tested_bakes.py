@@ -23,7 +23,7 @@ from relume.store.bake_protocol import Recipe
 
 __all__ = ["unmeasured"]  # a fixture
 
-LAMP = LightGeometry("point", (0.2, 1.8, 0.5))
+POINT_LIGHT = LightGeometry("point", (0.2, 1.8, 0.5))
 
 
 def bars():
@@ -58,21 +58,23 @@ def test_lamps_of_an_opened_bake_shine_through(scene, direct):
     x, z = np.random.default_rng(1).uniform(-1, 1, (2, 2000))
     points = make_surface_points(np.stack([x, np.full_like(x, 1e-3), z], axis=1), np.tile([0, 1, 0], (2000, 1)))
     geometry = build_scene_buffers(scene)
-    lamp = prepare_local_lights(LAMP)
-    wanted = trace_light_visibility(geometry.embree, geometry.epsilon, lamp, make_light_strata(lamp, 64), points)
-    found = direct.local.shadows(LAMP, points).visible
-    np.testing.assert_array_equal(found, wanted)
-    assert 0.3 < (found & 1).mean() < 0.9
+    prepared = prepare_local_lights(POINT_LIGHT)
+    wanted = trace_light_visibility(
+        geometry.embree, geometry.epsilon, prepared, make_light_strata(prepared, 64), points
+    )
+    visible = direct.local.shadows(POINT_LIGHT, points).visible
+    np.testing.assert_array_equal(visible, wanted)
+    assert 0.3 < (visible & 1).mean() < 0.9
 
 
 @pytest.mark.parametrize("method", ["direct", "gather"])
 def test_pictures_agree_with_brute_force(scene, method, tmp_path):
-    found = opened(scene, method, tmp_path)
-    look = make_look(found)
+    bake = opened(scene, method, tmp_path)
+    look = make_look(bake)
     wanted = reference_image(
         scene, "front", look, (48, 36), 0 if method == "direct" else 1024, reflects=method == "gather"
     )
-    picture = render_image(found, "front", look)
+    picture = render_image(bake, "front", look)
     assert relative_rmse(picture, wanted) < 0.03
     whole = [Material(material.name, material.terms) for material in scene.materials]
     without = make_tiny_scene(*scene.meshes, camera=scene.cameras[0], environment=studio(), materials=whole)
@@ -80,20 +82,20 @@ def test_pictures_agree_with_brute_force(scene, method, tmp_path):
 
 
 def test_a_moving_eye_sees_through_and_shaders_are_told(scene, tmp_path):
-    found = opened(scene, "probes", tmp_path)
-    holes = found.embree.alpha_test
+    bake = opened(scene, "probes", tmp_path)
+    holes = bake.embree.alpha_test
     assert holes is not None
-    np.testing.assert_array_equal(holes.image >= 0, found.stored_scene.face_material == 1)
-    assert constants(found)["has_alpha_test"]
-    look = make_look(found)
+    np.testing.assert_array_equal(holes.image >= 0, bake.stored_scene.face_material == 1)
+    assert constants(bake)["has_alpha_test"]
+    look = make_look(bake)
     wanted = reference_image(scene, "front", look, (48, 36), 0)
-    assert relative_rmse(render_image(found, "front", look), wanted) < 0.2
+    assert relative_rmse(render_image(bake, "front", look), wanted) < 0.2
 
 
 def test_bakes_of_whole_surfaces_hold_nothing_of_holes(scene, tmp_path):
     whole = [Material(material.name, material.terms) for material in scene.materials]
     without = make_tiny_scene(*scene.meshes, camera=scene.cameras[0], environment=studio(), materials=whole)
-    found = opened(without, "probes", tmp_path)
-    assert found.embree.alpha_test is None
-    assert not constants(found)["has_alpha_test"]
+    bake = opened(without, "probes", tmp_path)
+    assert bake.embree.alpha_test is None
+    assert not constants(bake)["has_alpha_test"]
     assert not (tmp_path / "probes.zarr" / "alpha_masks").exists()

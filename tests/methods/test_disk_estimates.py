@@ -53,8 +53,8 @@ def nothing_was_tried(monkeypatch):
 
 def planned(scene, recipe):
     plan = METHODS[recipe.method].plan(scene, recipe)
-    found = estimate_disk(METHODS[recipe.method], scene, recipe, plan)
-    return replace(plan, disk_bytes=found.store, scratch_bytes=found.scratch)
+    estimate = estimate_disk(METHODS[recipe.method], scene, recipe, plan)
+    return replace(plan, disk_bytes=estimate.store, scratch_bytes=estimate.scratch)
 
 
 @pytest.mark.parametrize("make", [glasses, lambda: cornell_box("sky")], ids=["glass", "box"])

@@ -87,10 +87,10 @@ def sent_by_cells(cells, lights, first=1, last=24, reflectances=REFLECTANCES):
 
 def by_square(sent):
     """All that is sent, in every direction that is told apart. (cells, squares, 3)"""
-    found = np.repeat(sent.isotropic[:NUM_CELLS, None].astype(float), SIDE * SIDE, axis=1)
+    radiance = np.repeat(sent.isotropic[:NUM_CELLS, None].astype(float), SIDE * SIDE, axis=1)
     has = sent.lobe[:NUM_CELLS] >= 0
-    found[has] += (sent.scale[:, None] * sent.table)[sent.lobe[:NUM_CELLS][has]]
-    return found
+    radiance[has] += (sent.scale[:, None] * sent.table)[sent.lobe[:NUM_CELLS][has]]
+    return radiance
 
 
 @pytest.fixture(scope="module")
@@ -122,8 +122,8 @@ def bands_of(model):
 
 def image(model, bands, active, lights, receivers):
     term = TERMS[model]
-    found = Projector(term, contract(term, bands, active), lights, receivers).project(0, len(receivers.normal))
-    return found[:, 0] if active is None else np.einsum("njc,cj->nc", found.astype(float), bands[active])
+    pixels = Projector(term, contract(term, bands, active), lights, receivers).project(0, len(receivers.normal))
+    return pixels[:, 0] if active is None else np.einsum("njc,cj->nc", pixels.astype(float), bands[active])
 
 
 def image_numpy(model, bands, receivers):
@@ -153,8 +153,8 @@ def test_rays_are_summed_where_a_term_knows_no_direction(lights, receivers):
     bands = {"theta_i": np.full((3, 64), [[0.5], [1.0], [0.25]])}
     behind = replace(receivers, wo=np.where(np.arange(30)[:, None] < 3, -receivers.wo, receivers.wo))
     expected = image_numpy("lambert", bands, behind)
-    found = image("lambert", bands, None, lights, behind)
-    np.testing.assert_allclose(found, expected, rtol=2e-5, atol=1e-6 * expected.max())
+    actual = image("lambert", bands, None, lights, behind)
+    np.testing.assert_allclose(actual, expected, rtol=2e-5, atol=1e-6 * expected.max())
     assert expected[3:].min() > 0
     assert not expected[:3].any()
 
@@ -163,10 +163,10 @@ def test_rays_are_summed_where_a_term_knows_no_direction(lights, receivers):
 def test_rays_are_added_as_plain_numpy_adds_them(model, lights, receivers):
     bands = bands_of(model)
     expected = image_numpy(model, bands, receivers)
-    found = image(model, bands, None, lights, receivers)
+    actual = image(model, bands, None, lights, receivers)
     # an angle within rounding of a band's edge may fall to either side
-    np.testing.assert_allclose(found, expected, rtol=5e-3, atol=5e-3 * np.abs(expected).max())
-    assert np.median(np.abs(found - expected)) < 1e-4 * np.abs(expected).max()
+    np.testing.assert_allclose(actual, expected, rtol=5e-3, atol=5e-3 * np.abs(expected).max())
+    assert np.median(np.abs(actual - expected)) < 1e-4 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize(("model", "curve"), CURVES)
@@ -189,10 +189,10 @@ def test_several_settings_at_once_are_those_one_by_one(lights, receivers):
 
 def test_reflected_light_adds_to_the_lights_own(lights, receivers):
     lit = ref.only_above(ref.make_random_receivers(30, lights.num_lights, seed=6), lights)
-    both = replace(receivers, visible=lit.visible)
+    direct_and_indirect = replace(receivers, visible=lit.visible)
     bands = bands_of("blinn_phong")
     parts = [image("blinn_phong", bands, None, lights, r) for r in (lit, receivers)]
-    np.testing.assert_allclose(image("blinn_phong", bands, None, lights, both), sum(parts), rtol=1e-5)
+    np.testing.assert_allclose(image("blinn_phong", bands, None, lights, direct_and_indirect), sum(parts), rtol=1e-5)
 
 
 def test_black_surfaces_reflect_nothing_and_number_of_bounces_counts(cells, lights):
@@ -211,11 +211,13 @@ def test_first_and_further_reflections_are_all_of_them(cells, lights):
 
 
 def test_reflectance_takes_each_texture_where_a_term_names_it(cells):
-    found = cells.reflectance_operator(REFLECTANCES)
-    known = [unpack_reflectance(of_material)[..., 0] for of_material in REFLECTANCES]
-    expected = np.where(cells.material[:, None] == 0, known[0][0], known[1][0] + known[1][1] * cells.textures[0])
-    np.testing.assert_allclose(found.reflectance, np.minimum(expected, 1), rtol=1e-5)
-    np.testing.assert_array_equal(found.rows, np.flatnonzero(cells.material == 1))
+    reflectance_map = cells.reflectance_operator(REFLECTANCES)
+    unpacked = [unpack_reflectance(of_material)[..., 0] for of_material in REFLECTANCES]
+    expected = np.where(
+        cells.material[:, None] == 0, unpacked[0][0], unpacked[1][0] + unpacked[1][1] * cells.textures[0]
+    )
+    np.testing.assert_allclose(reflectance_map.reflectance, np.minimum(expected, 1), rtol=1e-5)
+    np.testing.assert_array_equal(reflectance_map.rows, np.flatnonzero(cells.material == 1))
 
 
 def test_reflectance_of_diffuse_terms():
@@ -232,9 +234,9 @@ def test_reflectance_of_highlights():
         blinn = {**plain, "model": "blinn_phong", "params": {"exponent": exponent}}
         np.testing.assert_allclose(reflectance(blinn), _by_drawing(blinn), rtol=0.02)
     lambert = {**plain, "model": "lambert", "params": {}}
-    both = unpack_reflectance(pack_reflectance([lambert, {**blinn, "texture": "specular"}]))[..., 0]
-    np.testing.assert_allclose(both[0], [1.0, 0.5, 0.0], rtol=1e-6)
-    np.testing.assert_allclose(both[2], reflectance(blinn), atol=0.5 / 128)
+    combined = unpack_reflectance(pack_reflectance([lambert, {**blinn, "texture": "specular"}]))[..., 0]
+    np.testing.assert_allclose(combined[0], [1.0, 0.5, 0.0], rtol=1e-6)
+    np.testing.assert_allclose(combined[2], reflectance(blinn), atol=0.5 / 128)
 
 
 def _by_drawing(document):
@@ -258,7 +260,7 @@ def against_paths(scene, transfer, index, every, spp):
     view, look, name = transfer.views["front"], default_look(transfer), transfer.material_names[index]
     reflected = transfer.outgoing_patch_light(illumination_from_look(look, transfer.material_names, has_bounces=True))
     rows, lit = view.rows(index), view.receivers(index, reflected)
-    chosen, dark = np.arange(0, rows.stop - rows.start, every), replace(lit, visible=0 * lit.visible)
+    rows_compared, dark = np.arange(0, rows.stop - rows.start, every), replace(lit, visible=0 * lit.visible)
     radiance = np.zeros((len(lit.normal), 3))
     for document in look.materials[name].terms:
         bands = {c.name: curve_bands(document, c) for c in TERMS[document["model"]].curves}
@@ -266,51 +268,56 @@ def against_paths(scene, transfer, index, every, spp):
     position = view.store.read("views/0/position", rows.start, rows.stop)
     ones = np.ones_like(position)
     points = ReferencePoints(position, lit.normal, lit.tangent, lit.wo, {"diffuse": ones, "specular": ones}, ones[:, 0])
-    points = points.samples_of(chosen)
+    points = points.samples_of(rows_compared)
     traced = (
         build_scene_buffers(scene),
         environment_texels(scene.environment),
         look,
         points,
-        np.full(len(chosen), index),
+        np.full(len(rows_compared), index),
     )
-    found = reference_indirect(scene, *traced, [LightPaths(False, 1, 4)], 48, spp, seed=index)
-    return radiance[chosen], found.mean[0], found.variance[0], position[chosen]
+    reference = reference_indirect(scene, *traced, [LightPaths(False, 1, 4)], 48, spp, seed=index)
+    return radiance[rows_compared], reference.mean[0], reference.variance[0], position[rows_compared]
 
 
 def test_gathered_light_is_that_of_path_tracing(corner, gathered):
     """Some hundred points: their mean by a percent, each within the noise of paths and rays."""
     parts = [against_paths(corner, gathered, index, 12, 24)[:3] for index in range(len(gathered.material_names))]
-    found, expected, variance = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    deviation = np.sqrt(variance.sum(axis=0)) / len(found)  # of the mean
-    assert np.all(np.abs(found.mean(axis=0) - expected.mean(axis=0)) < 4 * deviation + 0.01 * expected.mean(axis=0))
-    square, noise = ((found - expected) ** 2).mean(), variance.mean()
-    assert np.sqrt(max(0.0, square - noise) / (expected**2).mean()) < 0.12
+    reference, gathered_light, variance = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    deviation = np.sqrt(variance.sum(axis=0)) / len(reference)  # of the mean
+    assert np.all(
+        np.abs(reference.mean(axis=0) - gathered_light.mean(axis=0))
+        < 4 * deviation + 0.01 * gathered_light.mean(axis=0)
+    )
+    square, noise = ((reference - gathered_light) ** 2).mean(), variance.mean()
+    assert np.sqrt(max(0.0, square - noise) / (gathered_light**2).mean()) < 0.12
 
 
 def test_a_metal_floor_throws_light_where_it_goes(tmp_path):
     """A sun low in the west over rough metal: the eastern wall gets almost twice what the northern one gets."""
-    sky = np.full((32, 64, 3), 0.02, np.float32)
+    radiance = np.full((32, 64, 3), 0.02, np.float32)
     sun = ref.unit(np.array([-0.75, 0.66, 0.0]))
-    sky[texel_directions(32, 64) @ sun > 0.95] = 20.0
+    radiance[texel_directions(32, 64) @ sun > 0.95] = 20.0
     white = Material("White", [{"model": "lambert", "color": [0.7, 0.7, 0.7], "texture": None}])
     rough = {"model": "ggx", "color": [1, 1, 1], "texture": None, "params": {"roughness": 0.55, "f0": 0.9}}
     floor = quad("floor", [(-1, 0, 1), (1, 0, 1), (1, 0, -1), (-1, 0, -1)], 1)
     east = quad("east", [(1, 0, -1), (1, 0, 1), (1, 1.2, 1), (1, 1.2, -1)], 0, (0, 0, 1))
     north = quad("north", [(-1, 0, -1), (1, 0, -1), (1, 1.2, -1), (-1, 1.2, -1)], 0)
-    eye = make_camera("front", (-0.9, 0.9, 2.2), (0.2, 0.5, -0.3), 0.9)
+    camera = make_camera("front", (-0.9, 0.9, 2.2), (0.2, 0.5, -0.3), 0.9)
     scene = make_tiny_scene(
-        floor, east, north, camera=eye, environment=sky, materials=[white, Material("Metal", [rough])]
+        floor, east, north, camera=camera, environment=radiance, materials=[white, Material("Metal", [rough])]
     )
     transfer = bake_corner_scene(scene, "gather", tmp_path)
-    found, expected, variance, place = against_paths(scene, transfer, 0, 1, 64)  # its noise is that of the 48 paths
+    reference, expected, variance, position = against_paths(
+        scene, transfer, 0, 1, 64
+    )  # its noise is that of the 48 paths
     means = []
-    for wall in (place[:, 0] > 0.99, place[:, 2] < -0.99):
-        mean, truth = found[wall].mean(), expected[wall].mean()
+    for wall in (position[:, 0] > 0.99, position[:, 2] < -0.99):
+        mean, expected_mean = reference[wall].mean(), expected[wall].mean()
         deviation = np.sqrt(variance[wall].sum(axis=0)).mean() / wall.sum()  # channels have the same paths
-        assert abs(mean - truth) < 0.04 * truth + 3 * deviation
-        assert deviation < 0.03 * truth
-        means.append(truth)
+        assert abs(mean - expected_mean) < 0.04 * expected_mean + 3 * deviation
+        assert deviation < 0.03 * expected_mean
+        means.append(expected_mean)
     assert means[0] > 1.5 * means[1]
 
 
@@ -369,15 +376,15 @@ def test_pictures_of_some_paths_add_up_to_that_of_all(gathered):
     whole = render_image(gathered, "front", default_look(gathered))
     parts = [showing(gathered, show) for show in ("direct", "first_bounce", "further_bounces")]
     np.testing.assert_allclose(sum(parts), whole, rtol=1e-4, atol=1e-6)
-    assert all(part.mean() > 0.005 * whole.mean() for part in parts)
+    assert all(path_image.mean() > 0.005 * whole.mean() for path_image in parts)
 
 
 def test_bounces_are_counted_from_direct_light(gathered, direct):
     unreflected = showing(gathered, "direct")
     np.testing.assert_array_equal(showing(gathered, "all", 0), unreflected)
     np.testing.assert_array_equal(unreflected, render_image(direct, "front", default_look(direct)))
-    one = showing(gathered, "all", 1)
-    np.testing.assert_allclose(one - unreflected, showing(gathered, "first_bounce"), atol=2e-5)
+    first_bounce = showing(gathered, "all", 1)
+    np.testing.assert_allclose(first_bounce - unreflected, showing(gathered, "first_bounce"), atol=2e-5)
     assert not showing(gathered, "further_bounces", 1).any()
     assert not showing(gathered, "first_bounce", 0).any()
     for show in ("first_bounce", "further_bounces"):
@@ -401,9 +408,9 @@ def test_what_is_shown_may_change_in_a_session(gathered, monkeypatch):
             assert isinstance(need, SparsePreview)
             picture.install(need, need.run(lambda share: None, lambda: False))
             picture.advance(None)
-            glimpse = picture.image()
+            preview = picture.image()
             exact = run_until_exact(picture).image()
-            assert relative_rmse(glimpse, exact) < 0.5 * relative_rmse(showing(gathered, "first_bounce"), exact)
+            assert relative_rmse(preview, exact) < 0.5 * relative_rmse(showing(gathered, "first_bounce"), exact)
         np.testing.assert_array_equal(run_until_exact(picture).image(), showing(gathered, show))
 
 
@@ -433,5 +440,5 @@ def test_light_that_is_turned_is_glimpsed_with_what_it_reflects(gathered, monkey
     assert isinstance(need, SparsePreview)
     picture.install(need, need.run(lambda share: None, lambda: False))
     assert not picture.advance(None).exact
-    glimpse, exact = picture.image(), run_until_exact(picture).image()
-    assert relative_rmse(glimpse, exact) < 0.7 * relative_rmse(still, exact)
+    preview, exact = picture.image(), run_until_exact(picture).image()
+    assert relative_rmse(preview, exact) < 0.7 * relative_rmse(still, exact)

@@ -48,7 +48,7 @@ def test_a_store_has_as_many_as_its_recipe_asks_for(corner, tmp_path: Path, meth
     assert 150 <= store.shape("patches/material")[0] <= 200
     if method == "gather":
         usual = bake_in_process(METHODS[method], corner, recipe_of(method), tmp_path / "t.zarr")
-        few, plenty = (open_transfer(of, Cache(1 << 30)) for of in (path, usual))
+        few, plenty = (open_transfer(store_path, Cache(1 << 30)) for store_path in (path, usual))
         look = validate({"transport": {"show": "indirect"}}, few.default_look)
         assert relative_rmse(*(render_image(transfer, "front", look) for transfer in (few, plenty))) < 0.08
 

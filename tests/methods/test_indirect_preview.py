@@ -30,8 +30,8 @@ def seen_of(transfer, light):
     """What cells send in the end, exactly, as others see it in the mean."""
     cells, on_cells, paths = transfer.patches, transfer.indirect._direct_light, light.paths
     reflecting = cells.reflectance_operator(light.reflectances)
-    arrived = on_cells.incident_light(light, reflecting, is_preview=False)
-    return solve_indirect(cells, reflecting, arrived, paths.first, paths.last).mean_to_others(cells)
+    incident = on_cells.incident_light(light, reflecting, is_preview=False)
+    return solve_indirect(cells, reflecting, incident, paths.first, paths.last).mean_to_others(cells)
 
 
 def blue_wall(document):

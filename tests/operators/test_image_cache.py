@@ -35,9 +35,9 @@ def test_images_used_longest_ago_are_forgotten(tmp_path):
     images, folder = ImageFiles(tmp_path, CODE, 2 * FILE_BYTES), tmp_path / CODE
     folder.mkdir()
     for second, key in enumerate(("a", "b")):
-        known = set(folder.iterdir())
+        files = set(folder.iterdir())
         images.get(key, SHAPE, lambda key=key: shaded(ord(key)))
-        (path,) = set(folder.iterdir()) - known
+        (path,) = set(folder.iterdir()) - files
         os.utime(path, (second, second))
     assert images.get("a", SHAPE, refuse).image[0, 0, 0] == ord("a")  # and so it is the newest
     images.get("c", SHAPE, lambda: shaded(ord("c")))

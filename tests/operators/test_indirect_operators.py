@@ -96,8 +96,8 @@ def test_all_rows_are_the_projector(model, receivers):
     term = TERMS[model]
     bands = bands_of(term)
     expected = exact_image(term, bands, receivers, light(2))
-    found = image_by_rows(term, bands, receivers, light(2))
-    np.testing.assert_allclose(found, expected, rtol=2e-3, atol=3e-4 * np.abs(expected).max())
+    image = image_by_rows(term, bands, receivers, light(2))
+    np.testing.assert_allclose(image, expected, rtol=2e-3, atol=3e-4 * np.abs(expected).max())
 
 
 def test_channels_may_differ(receivers):
@@ -112,8 +112,8 @@ def test_channels_may_differ(receivers):
 def test_error_falls_with_the_coefficients_kept(receivers, monkeypatch):
     term = TERMS["lambert"]
     expected, errors = exact_image(term, bands_of(term), receivers, light(2)), []
-    for kept in (4, 16, 64):
-        monkeypatch.setattr(rows_module, "NUM_COEFFICIENTS", kept)
+    for num_coefficients in (4, 16, 64):
+        monkeypatch.setattr(rows_module, "NUM_COEFFICIENTS", num_coefficients)
         errors.append(np.linalg.norm(image_by_rows(term, bands_of(term), receivers, light(2)) - expected))
     assert errors[0] > 3 * errors[1] > 9 * errors[2]
     assert errors[1] < 0.03 * np.linalg.norm(expected)
@@ -143,22 +143,22 @@ def test_of_coefficients_that_matter_alike_none_displaces_a_better_one():
     details = np.ones((9, 4), np.float32)
     details[-1] = 100
     index = np.arange(8, -1, -1, dtype=np.int32)
-    kept, scale, weights = np.empty(3, np.int32), np.empty(3, np.float32), np.empty((3, 4), np.int16)
-    select_coefficients(index, details, np.ones(16, np.float32), kept, scale, weights)
-    assert kept.tolist() == [0, 1, 2]
+    indices, scale, weights = np.empty(3, np.int32), np.empty(3, np.float32), np.empty((3, 4), np.int16)
+    select_coefficients(index, details, np.ones(16, np.float32), indices, scale, weights)
+    assert indices.tolist() == [0, 1, 2]
     np.testing.assert_allclose(scale[:, None] * weights, [[100] * 4, [1] * 4, [1] * 4], rtol=1e-4)
 
 
-@pytest.mark.parametrize("num_seen", [1, 2, 13, 64])
-def test_transform_of_few_cells_is_that_of_all(num_seen):
-    rng = np.random.default_rng(num_seen)
-    seen = np.sort(rng.choice(64, num_seen, replace=False)).astype(np.int32)
-    sums = rng.random((num_seen, 5), np.float32)
+@pytest.mark.parametrize("num_patches", [1, 2, 13, 64])
+def test_transform_of_few_cells_is_that_of_all(num_patches):
+    rng = np.random.default_rng(num_patches)
+    patches = np.sort(rng.choice(64, num_patches, replace=False)).astype(np.int32)
+    sums = rng.random((num_patches, 5), np.float32)
     whole = np.zeros((64, 5))
-    whole[seen] = sums
+    whole[patches] = sums
     index, details = np.empty(65, np.int32), np.empty((65, 5), np.float32)
-    num = transform(seen.copy(), sums.copy(), 6, index, details)
-    found = np.zeros((64, 5))
-    found[index[:num]] = details[:num]
+    num = transform(patches.copy(), sums.copy(), 6, index, details)
+    actual = np.zeros((64, 5))
+    actual[index[:num]] = details[:num]
     assert len(set(index[:num])) == num
-    np.testing.assert_allclose(found, haar(whole), atol=1e-6)
+    np.testing.assert_allclose(actual, haar(whole), atol=1e-6)

@@ -59,8 +59,8 @@ def test_each_level_has_columns_of_its_own(bounds):
     level = np.searchsorted(bounds, np.arange(96), side="right") - 1
     expected = np.zeros((2, 3, 48))
     for sample in range(bounds[-1]):
-        tile, place = divmod(sample, 48)
-        expected[tile, :, place] = np.einsum("cj,cj->c", change[level[sample]], transport[tile, :, :, place])
+        tile, row = divmod(sample, 48)
+        expected[tile, :, row] = np.einsum("cj,cj->c", change[level[sample]], transport[tile, :, :, row])
     np.testing.assert_allclose(image, expected, atol=1e-4)
 
 
@@ -127,10 +127,10 @@ def test_wavelet_product_is_the_product_in_bands(lights):
 
 def test_progress_rises_to_one_and_cancelling_stops(lights):
     receivers = ref.only_above(ref.make_random_receivers(3000, lights.num_lights, seed=4), lights)
-    told = []
-    frozen_of("lambert", "theta_i", lights, receivers, progress=told.append)
-    assert max(told) == pytest.approx(1.0)
-    assert min(told) > 0
+    fractions = []
+    frozen_of("lambert", "theta_i", lights, receivers, progress=fractions.append)
+    assert max(fractions) == pytest.approx(1.0)
+    assert min(fractions) > 0
     with pytest.raises(CancelledError):
         frozen_of("lambert", "theta_i", lights, receivers, is_canceled=lambda: True)
 
@@ -164,11 +164,11 @@ def test_cache_returns_what_it_has():
 
 def test_larger_than_the_budget_is_refused_before_anything_is_made_or_dropped():
     cache = Cache(1000)
-    kept = cache.get("small", LinearOperator, 480, lambda: operator(480))
+    small = cache.get("small", LinearOperator, 480, lambda: operator(480))
     with pytest.raises(MemoryBudgetError) as refused:
         cache.get("large", LinearOperator, 1001, lambda: pytest.fail("made"))
     assert (refused.value.needed_bytes, refused.value.allowed_bytes) == (1001, 1000)
-    assert cache.get_cached("small", LinearOperator) is kept
+    assert cache.get_cached("small", LinearOperator) is small
 
 
 @pytest.mark.parametrize("problem", [CancelledError("cancelled"), MemoryError(), KeyboardInterrupt()])
@@ -194,11 +194,11 @@ def test_two_who_want_the_same_thing_at_once_make_it_once():
         time.sleep(0.05)
         return operator(480)
 
-    found = []
+    operators = []
 
     def want():
         start.wait()
-        found.append(cache.get("k", LinearOperator, 480, make))
+        operators.append(cache.get("k", LinearOperator, 480, make))
 
     threads = [threading.Thread(target=want) for _ in range(8)]
     for thread in threads:
@@ -206,8 +206,8 @@ def test_two_who_want_the_same_thing_at_once_make_it_once():
     for thread in threads:
         thread.join()
     assert len(made) == 1
-    assert len({id(one) for one in found}) == 1
-    assert cache.used_bytes == found[0].num_bytes
+    assert len({id(built) for built in operators}) == 1
+    assert cache.used_bytes == operators[0].num_bytes
 
 
 def test_one_who_gives_up_lets_the_others_make_it_once():

@@ -62,8 +62,8 @@ def frozen_along(document, parameter, lights, receivers):
     return linearised, frozen
 
 
-def relative(found, expected):
-    return np.sqrt(np.mean((found - expected) ** 2) / np.mean(np.float64(expected) ** 2))
+def relative(actual, expected):
+    return np.sqrt(np.mean((actual - expected) ** 2) / np.mean(np.float64(expected) ** 2))
 
 
 def spread_evenly(document, parameter, lights, receivers):
@@ -74,9 +74,9 @@ def spread_evenly(document, parameter, lights, receivers):
     return Projector(term, contract(term, bands, None), lights, receivers).project(0, len(receivers.normal))[:, 0]
 
 
-def beyond(found, expected, even):
+def beyond(actual, expected, even):
     """Largest error of a sample, as a share of itself and of a hundredth of what it would show, spread evenly."""
-    return float((np.abs(found - expected) / (np.float64(expected) + 0.01 * even + 1e-12)).max())
+    return float((np.abs(actual - expected) / (np.float64(expected) + 0.01 * even + 1e-12)).max())
 
 
 @pytest.mark.parametrize(("model", "parameter"), ALL)
@@ -120,8 +120,8 @@ def test_several_settings_at_once_are_each_alone(lights, receivers):
     together = Projector(term, contract(term, bands, None), lights, receivers).project(0, 70)
     assert together.shape == (70, 5, 3)
     for k in range(5):
-        one = {**bands, "alpha": bands["alpha"][:, k]}
-        alone = Projector(term, contract(term, one, None), lights, receivers).project(0, 70)[:, 0]
+        setting_bands = {**bands, "alpha": bands["alpha"][:, k]}
+        alone = Projector(term, contract(term, setting_bands, None), lights, receivers).project(0, 70)[:, 0]
         np.testing.assert_allclose(together[:, k], alone, rtol=1e-5)
 
 
@@ -161,8 +161,8 @@ def test_every_band_is_held_at_any_value(model, parameter):
         document = {"model": model, "params": {parameter: float(value)}}
         exact = products(model, parameter, [value])[0]
         floor = 0.01 * max(float(exact @ weights), 1e-3 * brightest) / weights.sum()
-        found = linearised.coefficients(bands_of(document))[0] @ nodes
-        assert (np.abs(found - exact) / (exact + floor)).max() < MAX_ERROR
+        actual = linearised.coefficients(bands_of(document))[0] @ nodes
+        assert (np.abs(actual - exact) / (exact + floor)).max() < MAX_ERROR
 
 
 @pytest.mark.parametrize(("model", "parameter"), SLIDERS)

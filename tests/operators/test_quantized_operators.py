@@ -101,7 +101,7 @@ def test_a_thin_operator_adds_what_its_chosen_samples_say():
     change, image = RNG.normal(size=(3, 4)), np.zeros((1, 3, 48), np.float32)
     thin.add(change, image)
     for sample in (0, 17, 39):
-        told = (thin.columns_at(sample) * change).sum(axis=1)
-        np.testing.assert_allclose(image[0, :, sample], told, rtol=1e-4, atol=1e-5 * np.abs(image).max())
+        expected = (thin.columns_at(sample) * change).sum(axis=1)
+        np.testing.assert_allclose(image[0, :, sample], expected, rtol=1e-4, atol=1e-5 * np.abs(image).max())
     np.testing.assert_allclose(thin.importance, 2 * few.importance)  # one stands for four
     assert subsampled_bytes(40, 10, 4) == quantized_bytes(10, 4) + near.nbytes + weight.nbytes

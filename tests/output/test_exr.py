@@ -41,10 +41,10 @@ def test_halves_are_rounded_and_nothing_becomes_infinite(tmp_path):
     image = np.random.default_rng(4).uniform(0, 3, (200, 48, 3)).astype(np.float32)
     image[0, 0] = (1e6, 1e-6, 0)
     write_exr(tmp_path / "a.exr", image_channels(image), {})
-    spec, found = read(tmp_path / "a.exr")
+    spec, pixels = read(tmp_path / "a.exr")
     assert str(spec.format) == "half"
     assert list(spec.channelnames) == ["R", "G", "B"]
-    np.testing.assert_array_equal(found, np.minimum(image, 65504).astype(np.float16).astype(np.float32))
+    np.testing.assert_array_equal(pixels, np.minimum(image, 65504).astype(np.float16).astype(np.float32))
     write_exr(tmp_path / "b.exr", image_channels(image), {}, "float")
     np.testing.assert_array_equal(read(tmp_path / "b.exr")[1], image)
 
@@ -52,9 +52,9 @@ def test_halves_are_rounded_and_nothing_becomes_infinite(tmp_path):
 def test_alpha_and_layers_are_channels_of_their_names(tmp_path):
     image = np.random.default_rng(4).uniform(0, 3, (32, 48, 4)).astype(np.float32)
     write_exr(tmp_path / "a.exr", [*image_channels(image), *image_channels(image[..., :3], "light_Key")], {}, "float")
-    spec, found = read(tmp_path / "a.exr")
+    spec, pixels = read(tmp_path / "a.exr")
     order = [spec.channelnames.index(name) for name in ("R", "G", "B", "A", "light_Key.R", "light_Key.B")]
-    np.testing.assert_array_equal(found[..., order], image[..., [0, 1, 2, 3, 0, 2]])
+    np.testing.assert_array_equal(pixels[..., order], image[..., [0, 1, 2, 3, 0, 2]])
 
 
 def test_a_layer_for_each_light_that_shines_and_each_kind_of_path():
@@ -77,17 +77,17 @@ def test_a_layer_for_each_light_that_shines_and_each_kind_of_path():
 def test_light_groups_are_direct_and_reflected_light_of_each_light():
     look = look_with(lights={"Key": POINT, "Off": POINT | {"enabled": False}})
     groups = light_group_layers(look, has_indirect=True)
-    both = ["light_environment_direct", "light_environment_indirect", "light_Key_direct", "light_Key_indirect"]
-    assert names_of(groups) == both
+    names = ["light_environment_direct", "light_environment_indirect", "light_Key_direct", "light_Key_indirect"]
+    assert names_of(groups) == names
     assert [layer.look.transport.paths for layer in groups[:2]] == [(True, 1, 0), (False, 1, 24)]
-    assert names_of(light_group_layers(look, has_indirect=False)) == both[::2]
+    assert names_of(light_group_layers(look, has_indirect=False)) == names[::2]
     # a compositor finds what it asks for
-    assert names_of(light_group_layers(look_with(), has_indirect=False)) == both[:1]
+    assert names_of(light_group_layers(look_with(), has_indirect=False)) == names[:1]
     shown = look_with(transport={"show": "first_bounce"})
     (first,) = light_group_layers(shown, has_indirect=True)
-    assert (first.name, first.look.transport.paths) == (both[1], (False, 1, 1))
+    assert (first.name, first.look.transport.paths) == (names[1], (False, 1, 1))
     behind = look_with(background={"kind": "color"})
-    assert names_of(light_group_layers(behind, has_indirect=True)) == [*both[:2], "light_background"]
+    assert names_of(light_group_layers(behind, has_indirect=True)) == [*names[:2], "light_background"]
 
 
 def test_names_of_light_groups_keep_what_they_end_with():
@@ -151,19 +151,19 @@ def test_attributes_say_where_the_picture_comes_from(tmp_path):
     image = np.ones((SIZE[1], SIZE[0], 3), np.float32)
     export_exr(tmp_path / "a.exr", lambda look, progress: image, look, layers, attributes)
     spec, _ = read(tmp_path / "a.exr")
-    found = {attribute.name: attribute.value for attribute in spec.extra_attribs}
-    assert validate(json.loads(found["relume:look"]), default_look(still_life().materials)) == look
-    assert json.loads(found["relume:layers"]) == {"light_environment": "environment", "light_unnamed": "灯"}
-    assert json.loads(found["relume:sceneName"]) == "still\0life 灯"
-    assert (found["relume:scene"], found["relume:bake"]) == ("5" * 16, "b" * 16)
-    assert found["relume:environment"] == "studio"
-    assert "W/(sr m^2)" in found["relume:units"]
-    assert found["Software"].startswith("relume ")
-    np.testing.assert_allclose(found["chromaticities"][:2], (0.64, 0.33))
-    np.testing.assert_allclose(json.loads(found["relume:camera"])["to_world"], camera.to_world.ravel())
-    np.testing.assert_allclose(found["worldToNDC"], world_to_ndc(camera, SIZE).ravel(), rtol=1e-5, atol=1e-6)
-    eye = np.append(camera.to_world[:3, 3], 1) @ np.reshape(found["worldToCamera"], (4, 4))
-    np.testing.assert_allclose(eye, [0, 0, 0, 1], atol=1e-5)
+    attributes_read = {attribute.name: attribute.value for attribute in spec.extra_attribs}
+    assert validate(json.loads(attributes_read["relume:look"]), default_look(still_life().materials)) == look
+    assert json.loads(attributes_read["relume:layers"]) == {"light_environment": "environment", "light_unnamed": "灯"}
+    assert json.loads(attributes_read["relume:sceneName"]) == "still\0life 灯"
+    assert (attributes_read["relume:scene"], attributes_read["relume:bake"]) == ("5" * 16, "b" * 16)
+    assert attributes_read["relume:environment"] == "studio"
+    assert "W/(sr m^2)" in attributes_read["relume:units"]
+    assert attributes_read["Software"].startswith("relume ")
+    np.testing.assert_allclose(attributes_read["chromaticities"][:2], (0.64, 0.33))
+    np.testing.assert_allclose(json.loads(attributes_read["relume:camera"])["to_world"], camera.to_world.ravel())
+    np.testing.assert_allclose(attributes_read["worldToNDC"], world_to_ndc(camera, SIZE).ravel(), rtol=1e-5, atol=1e-6)
+    camera_position = np.append(camera.to_world[:3, 3], 1) @ np.reshape(attributes_read["worldToCamera"], (4, 4))
+    np.testing.assert_allclose(camera_position, [0, 0, 0, 1], atol=1e-5)
 
 
 @pytest.mark.parametrize("catcher", [True, False])
@@ -186,17 +186,17 @@ def test_points_in_the_world_are_found_in_the_picture():
 def test_export_tells_how_far_it_is_and_leaves_nothing_where_it_fails(tmp_path):
     look = look_with(lights={"Key": POINT})
     layers = light_and_path_layers(look, has_indirect=False)
-    told: list[float] = []
+    fractions: list[float] = []
 
     def render(look, progress):
         progress(0.5)
         progress(1.0)
-        if len(told) > 5:
+        if len(fractions) > 5:
             raise RuntimeError("stopped")
         return np.ones((4, 6, 3), np.float32)
 
-    export_exr(tmp_path / "a.exr", render, look, layers[:1], {}, progress=told.append)
-    assert told == [0.25, 0.5, 0.75, 1.0]
+    export_exr(tmp_path / "a.exr", render, look, layers[:1], {}, progress=fractions.append)
+    assert fractions == [0.25, 0.5, 0.75, 1.0]
     with pytest.raises(RuntimeError):
-        export_exr(tmp_path / "b.exr", render, look, layers, {}, progress=told.append)
+        export_exr(tmp_path / "b.exr", render, look, layers, {}, progress=fractions.append)
     assert [path.name for path in tmp_path.iterdir()] == ["a.exr"]

@@ -33,7 +33,7 @@ def test_layers_of_lights_and_of_paths_each_sum_to_the_picture(gathered, tmp_pat
 def test_light_groups_sum_to_the_picture(gathered, tmp_path):
     layers, channel = exported(gathered, tmp_path, "color", "light_groups")
     names = [layer.name for layer in layers]
-    groups = {f"light_{of}_{kind}" for of in ("environment", "Key", "Fill") for kind in ("direct", "indirect")}
+    groups = {f"light_{light}_{kind}" for light in ("environment", "Key", "Fill") for kind in ("direct", "indirect")}
     assert set(names) == {"light_background", *groups}
     assert_sum(channel, names)
 
@@ -48,15 +48,15 @@ def exported(transfer, folder, background, layering):
 
     look = make_look(transfer, change)
     layers = make_layers(layering, look, has_indirect=True)
-    told: list[float] = []
+    fractions: list[float] = []
     path = folder / "a.exr"
     with open_copy(transfer) as other:  # one for all layers, as in a server
         export_exr(
-            path, lambda of, progress: render_image(other, "front", of, progress=progress), look, layers, {},
-            progress=told.append,
+            path, lambda edited, progress: render_image(other, "front", edited, progress=progress), look, layers, {},
+            progress=fractions.append,
         )  # fmt: skip
-    assert told == sorted(told)
-    assert told[-1] == 1.0
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
     buffer = OpenImageIO.ImageBuf(str(path))
     pixels, names = buffer.get_pixels(OpenImageIO.FLOAT), buffer.spec().channelnames
     return layers, {name: pixels[..., k] for k, name in enumerate(names)}

@@ -24,13 +24,13 @@ def test_middle_of_a_diffuse_ball_is_the_light_of_its_half_space() -> None:
 
 def test_highlight_adds_to_the_body_and_corners_stay_empty() -> None:
     body = render_preview([term("lambert")], 24)
-    both = render_preview([term("lambert"), term("cook_torrance", params={"sigma": 0.2})], 24)
-    assert np.all(both >= body - 1e-6)
-    assert both.max() > 1.05 * body.max()
-    np.testing.assert_array_equal(both[0, 0], body[-1, -1])
+    combined = render_preview([term("lambert"), term("cook_torrance", params={"sigma": 0.2})], 24)
+    assert np.all(combined >= body - 1e-6)
+    assert combined.max() > 1.05 * body.max()
+    np.testing.assert_array_equal(combined[0, 0], body[-1, -1])
 
 
-@pytest.mark.parametrize("model", sorted(name for name, found in TERMS.items() if not name.startswith("measured")))
+@pytest.mark.parametrize("model", sorted(name for name, term_class in TERMS.items() if not name.startswith("measured")))
 def test_every_term_makes_a_ball(model: str) -> None:
     image = render_preview([term(model)], 8)
     assert np.isfinite(image).all()
@@ -44,8 +44,8 @@ def test_a_ball_shows_its_images_in_color_and_place() -> None:
     pixels[:35, :, 0] = pixels[35:, :, 2] = 255
     images = {"diffuse": Texture(pixels, encoding=TextureEncoding("srgb", (1.0, 1.0, 1.0)))}
     plain = render_preview([term("lambert", texture=None)], 32)
-    dressed = render_preview([term("lambert", texture="diffuse")], 32, images)
-    ratio = dressed[2:30, 14:18] / plain[2:30, 14:18]
+    textured = render_preview([term("lambert", texture="diffuse")], 32, images)
+    ratio = textured[2:30, 14:18] / plain[2:30, 14:18]
     reds, blues = (ratio[..., channel].mean(axis=1) > 0.5 for channel in (0, 2))
     assert reds.any()
     assert blues.any()

@@ -31,8 +31,8 @@ def walls() -> Viewport:
     printed = Material(
         "Printed", ({"model": "lambert", "color": [1, 1, 1], "texture": "diffuse"},), {"diffuse": Texture(green)}
     )
-    sky = Environment("sky", np.ones((8, 16, 3), np.float32))
-    return Viewport.from_scene(make_scene("Walls", [left, right], [red, printed], [facing(3)], sky))
+    environment = Environment("sky", np.ones((8, 16, 3), np.float32))
+    return Viewport.from_scene(make_scene("Walls", [left, right], [red, printed], [facing(3)], environment))
 
 
 def test_surfaces_have_their_colours_and_their_places(walls: Viewport) -> None:
@@ -43,9 +43,9 @@ def test_surfaces_have_their_colours_and_their_places(walls: Viewport) -> None:
     assert left[0] > 2 * left[1]
     assert right[1] > 1.5 * right[0]
     assert outside.max() < 60
-    place = walls.point_at(facing(3), SIZE, 32 + 8, 24 - 4)
+    point = walls.point_at(facing(3), SIZE, 32 + 8, 24 - 4)
     step = 2 * 3 * np.tan(0.4) / 48  # metres a pixel, on the plane
-    np.testing.assert_allclose(place, [8 * step, 4 * step, 0], atol=1e-5)
+    np.testing.assert_allclose(point, [8 * step, 4 * step, 0], atol=1e-5)
     assert walls.point_at(facing(3), SIZE, 1, 1) is None
 
 
@@ -61,13 +61,13 @@ def test_a_surface_is_darker_where_it_turns_away(walls: Viewport) -> None:
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_the_framing_camera_sees_the_scene_and_its_corners_hold_it(name: str) -> None:
     scene = built_in(name)
-    finder = Viewport.from_scene(scene)
-    image = finder.image(finder.default_camera, SIZE)
+    viewport = Viewport.from_scene(scene)
+    image = viewport.image(viewport.default_camera, SIZE)
     assert len(np.unique(image.reshape(-1, 3), axis=0)) > 20
     positions = np.concatenate([mesh.positions[mesh.faces.ravel()] for mesh in scene.meshes])
-    assert (finder.bounds_min <= positions.min(axis=0) + 1e-6).all()
-    assert (finder.bounds_max >= positions.max(axis=0) - 1e-6).all()
-    place = finder.point_at(finder.default_camera, SIZE, 32, 24)
-    assert place is not None
-    assert (place >= finder.bounds_min - 1e-3).all()
-    assert (place <= finder.bounds_max + 1e-3).all()
+    assert (viewport.bounds_min <= positions.min(axis=0) + 1e-6).all()
+    assert (viewport.bounds_max >= positions.max(axis=0) - 1e-6).all()
+    point = viewport.point_at(viewport.default_camera, SIZE, 32, 24)
+    assert point is not None
+    assert (point >= viewport.bounds_min - 1e-3).all()
+    assert (point <= viewport.bounds_max + 1e-3).all()

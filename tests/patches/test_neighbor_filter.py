@@ -50,15 +50,15 @@ def by_hand(pixel, is_same):
 
 def test_pixels_around_share_by_a_tent_and_edges_of_the_picture_by_what_is_there():
     pixel, position, normal = grid()
-    found = shared_by(pixel, position, normal).diffuse.matrix
-    np.testing.assert_allclose(found.toarray(), by_hand(pixel, lambda a, b: True), rtol=1e-6)
-    np.testing.assert_allclose(found.sum(axis=1), 1, rtol=1e-6)
+    matrix = shared_by(pixel, position, normal).diffuse.matrix
+    np.testing.assert_allclose(matrix.toarray(), by_hand(pixel, lambda a, b: True), rtol=1e-6)
+    np.testing.assert_allclose(matrix.sum(axis=1), 1, rtol=1e-6)
 
 
 def test_samples_of_one_pixel_count_as_one():
     pixel, position, normal = (np.concatenate([a, a[:20]]) for a in grid())
-    found = shared_by(pixel, position, normal).diffuse.matrix
-    np.testing.assert_allclose(found.toarray(), by_hand(pixel, lambda a, b: True), rtol=1e-6)
+    matrix = shared_by(pixel, position, normal).diffuse.matrix
+    np.testing.assert_allclose(matrix.toarray(), by_hand(pixel, lambda a, b: True), rtol=1e-6)
 
 
 def test_other_pieces_of_a_surface_take_no_part():
@@ -67,20 +67,20 @@ def test_other_pieces_of_a_surface_take_no_part():
     x, y = pixel % WIDTH, pixel // WIDTH
     normal[x > 4] = [1, 0, 0]
     position[(x <= 4) & (y > 3), 1] += 0.5
-    found = shared_by(pixel, position, normal).diffuse.matrix.toarray()
+    matrix = shared_by(pixel, position, normal).diffuse.matrix.toarray()
     piece = np.where(x > 4, 2, np.where(y > 3, 1, 0))
     flat = piece != 2  # on the wall, depth as the floor has it is a rise
-    assert not found[piece[:, None] != piece[None, :]].any()
+    assert not matrix[piece[:, None] != piece[None, :]].any()
     expected = by_hand(pixel, lambda a, b: piece[a] == piece[b])
-    np.testing.assert_allclose(found[np.ix_(flat, flat)], expected[np.ix_(flat, flat)], rtol=1e-6)
+    np.testing.assert_allclose(matrix[np.ix_(flat, flat)], expected[np.ix_(flat, flat)], rtol=1e-6)
 
 
 def test_samples_of_different_channels_share_nothing():
     pixel, position, normal = (np.concatenate([a, a]) for a in grid())
     chance = np.repeat(np.array([-3, -4], np.float32), len(pixel) // 2)
-    found = shared_by(pixel, position, normal, chance).diffuse.matrix.toarray()
-    assert not found[chance[:, None] != chance].any()
-    np.testing.assert_allclose(found.sum(axis=1), 1, rtol=1e-6)
+    matrix = shared_by(pixel, position, normal, chance).diffuse.matrix.toarray()
+    assert not matrix[chance[:, None] != chance].any()
+    np.testing.assert_allclose(matrix.sum(axis=1), 1, rtol=1e-6)
 
 
 def test_highlights_are_shared_by_what_is_turned_alike():
@@ -91,20 +91,20 @@ def test_highlights_are_shared_by_what_is_turned_alike():
     def both(degrees):
         angle = np.radians(degrees) * is_turned
         normal[:, 0], normal[:, 1] = np.sin(angle), np.cos(angle)
-        found = shared_by(pixel, position, normal)
-        return found.diffuse.matrix.toarray(), found.highlights.matrix.toarray()
+        weights = shared_by(pixel, position, normal)
+        return weights.diffuse.matrix.toarray(), weights.highlights.matrix.toarray()
 
     all_alike = by_hand(pixel, lambda a, b: True)
-    for found in (*both(2.0), both(5.0)[0]):
-        np.testing.assert_allclose(found, all_alike, rtol=1e-6)
+    for matrix in (*both(2.0), both(5.0)[0]):
+        np.testing.assert_allclose(matrix, all_alike, rtol=1e-6)
     np.testing.assert_allclose(both(5.0)[1], by_hand(pixel, lambda a, b: is_turned[a] == is_turned[b]), rtol=1e-6)
 
 
 def test_tents_follow_each_other_and_highlights_have_one():
     pixel, position, normal = grid(lambda pixel: pixel % 5 > 0)
-    found = shared_by(pixel, position, normal, num_passes=3)
-    assert (found.diffuse.num_passes, found.highlights.num_passes) == (3, 1)
-    rings, among = found.diffuse.find_dependencies(4, 11)
+    weights = shared_by(pixel, position, normal, num_passes=3)
+    assert (weights.diffuse.num_passes, weights.highlights.num_passes) == (3, 1)
+    rings, among = weights.diffuse.find_dependencies(4, 11)
     values = np.random.default_rng(9).random((len(pixel), 3))
     once = by_hand(pixel, lambda a, b: True)
     shared = values[among]
@@ -132,13 +132,13 @@ def test_projected_points_are_the_weighted_mean_of_points_alone(model, is_active
 
     def project(rays, ranges):
         projector = Projector(term, contraction, lights, replace(points, rays=rays))
-        return np.concatenate([projector.project(*of) for of in ranges])
+        return np.concatenate([projector.project(*rows) for rows in ranges])
 
     dark = project((), [(0, num)])
     separate = project((alone,), [(0, num)]) - dark
     nobody = FilterWeights(csr_array((num, num), dtype=np.float32), 1)
     of_term = FilterWeights(csr_array(weights / weights.sum(axis=1)[:, None]), times)
-    both = NeighborFilter(of_term, nobody) if model == "lambert" else NeighborFilter(nobody, of_term)
-    shared = project((replace(alone, sharing=both),), [(0, 50), (50, num)]) - dark
+    neighbor_filter = NeighborFilter(of_term, nobody) if model == "lambert" else NeighborFilter(nobody, of_term)
+    shared = project((replace(alone, sharing=neighbor_filter),), [(0, 50), (50, num)]) - dark
     expected = np.einsum("pq,qjc->pjc", np.linalg.matrix_power(of_term.matrix.toarray(), times), separate)
     np.testing.assert_allclose(shared, expected, rtol=2e-4, atol=2e-5 * np.abs(expected).max())

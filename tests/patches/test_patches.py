@@ -74,8 +74,8 @@ def test_hits_just_below_the_points_of_a_plane_are_found_on_it():
     near, far = np.float32(-1.2), np.float32(-2)
     z = np.where(np.arange(3000) < 200, near, far)
     x = np.where(z == near, rng.uniform(-2.7, -2.5, 3000), rng.uniform(-2.5, 2.5, 3000))
-    place = np.stack([x, rng.random(3000), z + 1e-4 + rng.uniform(-2e-7, 2e-7, 3000)], axis=1)
-    keys = np.concatenate([place, np.tile([0, 0, 1], (3000, 1))], axis=1).astype(np.float32)
+    position = np.stack([x, rng.random(3000), z + 1e-4 + rng.uniform(-2e-7, 2e-7, 3000)], axis=1)
+    keys = np.concatenate([position, np.tile([0, 0, 1], (3000, 1))], axis=1).astype(np.float32)
     tree, members = grow_tree(keys, np.ones(3000, np.float32), np.zeros(3000, np.int32), 1, 200)
     is_near = [set(z[rows]) == {near} for rows in members]
     assert {len(set(z[rows])) for rows in members} == {1}
@@ -151,9 +151,9 @@ def test_cells_are_small_where_a_polished_floor_mirrors_them(box):
     mirrored = choose_patches(polished, build_scene_buffers(polished), ("front",), (400, 400), NUM_CELLS)
     blocks = [k for k, material in enumerate(plain.materials) if material.name.endswith("block")]
 
-    def share(of):
-        is_low = (of.position[:, :, 1].mean(axis=1) < 0.5) & (of.normal[:, :, 2].mean(axis=1) > 0.5)
-        return np.mean(np.isin(of.material, blocks) & is_low)
+    def share(patches):
+        is_low = (patches.position[:, :, 1].mean(axis=1) < 0.5) & (patches.normal[:, :, 2].mean(axis=1) > 0.5)
+        return np.mean(np.isin(patches.material, blocks) & is_low)
 
     assert share(mirrored) > 1.15 * share(cells)
 
@@ -224,9 +224,9 @@ def test_order_and_division_of_points_do_not_matter(box):
     _, geometry, cells = box
     points, pattern = points_of(cells, 30), make_pattern(16, 0, 3)
     whole = trace_gather_rays(geometry, cells.tree, points, points.normal, pattern).patch
-    part = points.rows(slice(11, 23))
+    subset = points.rows(slice(11, 23))
     np.testing.assert_array_equal(
-        trace_gather_rays(geometry, cells.tree, part, part.normal, pattern).patch, whole[11:23]
+        trace_gather_rays(geometry, cells.tree, subset, subset.normal, pattern).patch, whole[11:23]
     )
 
 
@@ -250,14 +250,14 @@ def test_cells_know_how_textures_lie_on_them():
     tangents = np.broadcast_to(np.float32([1, 0, 0, 1]), scene.meshes[0].tangents.shape)
     scene = replace(scene, meshes=(replace(scene.meshes[0], tangents=tangents), *scene.meshes[1:]))
     cells = choose_patches(scene, build_scene_buffers(scene), ("front",), (40, 30), 100)
-    points, place = patch_sample_points(cells.position, cells.normal), cells.uv.reshape(-1, 5)
+    points, uv = patch_sample_points(cells.position, cells.normal), cells.uv.reshape(-1, 5)
     of_floor = np.repeat(cells.material == 0, POINTS_PER_PATCH) & (points.position[:, 1] < 1e-3)
-    chosen = np.flatnonzero(of_floor)
-    assert len(chosen) > 20
-    normal, tangent, turn = points.normal[chosen], points.tangent[chosen], place[chosen, 3:4]
+    floor_patches = np.flatnonzero(of_floor)
+    assert len(floor_patches) > 20
+    normal, tangent, turn = points.normal[floor_patches], points.tangent[floor_patches], uv[floor_patches, 3:4]
     assert np.median(normal[:, 0]) > 0.5  # they lean to where red says, but for those bent into sight
     expected = np.array([1, 0, 0]) - normal[:, :1] * normal
     expected /= np.linalg.norm(expected, axis=1, keepdims=True)
     np.testing.assert_allclose(np.cos(turn) * tangent + np.sin(turn) * np.cross(normal, tangent), expected, atol=1e-4)
-    smooth = cells.surface_normal.reshape(-1, 3)[chosen]
+    smooth = cells.surface_normal.reshape(-1, 3)[floor_patches]
     np.testing.assert_allclose(np.abs(smooth), np.broadcast_to([0, 1, 0], smooth.shape), atol=1e-6)  # of both sides

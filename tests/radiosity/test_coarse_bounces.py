@@ -77,8 +77,8 @@ def test_what_arrives_quickly_is_what_arrives_in_squares(cells, arrived):
 @pytest.mark.parametrize("wall", [MATT, SHINY])
 def test_what_is_sent_quickly_is_about_what_is_sent(cells, arrived, wall, first, last):
     reflecting = cells.reflectance_operator((MATT, wall))
-    known = IncidentLight(arrived.irradiance, arrived.coefficients[: len(reflecting.rows)])
-    exact, quick = (of(cells, reflecting, known, first, last) for of in (solve_indirect, solve_indirect_fast))
+    incident = IncidentLight(arrived.irradiance, arrived.coefficients[: len(reflecting.rows)])
+    exact, quick = (solve(cells, reflecting, incident, first, last) for solve in (solve_indirect, solve_indirect_fast))
     assert relative_rmse(quick.isotropic, exact.isotropic) < 0.03
     assert np.linalg.norm(quick.coefficients - exact.coefficients) <= 0.05 * np.linalg.norm(exact.coefficients)
 
@@ -87,11 +87,13 @@ def test_a_difference_knows_the_rows_of_both():
     rng = np.random.default_rng(1)
     even, vectors = rng.random((2, 5, 3)).astype(np.float32), rng.random((2, 2, 3, NUM_OUTGOING)).astype(np.float32)
     falls = np.array([[0.1, 0.2], [0.3, 0.4]], np.float32)
-    one, other = (
+    left, right = (
         OutgoingRadiance(even[k], np.array(rows), vectors[k], falls[k]) for k, rows in enumerate(([0, 3], [3, 4]))
     )
-    found = one.subtract(other)
-    np.testing.assert_array_equal(found.isotropic, even[0] - even[1])
-    np.testing.assert_array_equal(found.rows, [0, 3, 4])
-    np.testing.assert_array_equal(found.roughening, [falls[0, 0], falls[0, 1], falls[1, 1]])
-    np.testing.assert_array_equal(found.coefficients, [vectors[0, 0], vectors[0, 1] - vectors[1, 0], -vectors[1, 1]])
+    difference = left.subtract(right)
+    np.testing.assert_array_equal(difference.isotropic, even[0] - even[1])
+    np.testing.assert_array_equal(difference.rows, [0, 3, 4])
+    np.testing.assert_array_equal(difference.roughening, [falls[0, 0], falls[0, 1], falls[1, 1]])
+    np.testing.assert_array_equal(
+        difference.coefficients, [vectors[0, 0], vectors[0, 1] - vectors[1, 0], -vectors[1, 1]]
+    )

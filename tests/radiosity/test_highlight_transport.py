@@ -48,8 +48,8 @@ def cells_of(normal):
 
 def flat(spread=0.0):
     rng = np.random.default_rng(7)
-    one = np.repeat(ref.unit(rng.normal(size=(NUM_CELLS, 1, 3))), 4, axis=1)
-    return ref.unit(one + spread * rng.normal(size=one.shape)).astype(np.float32)
+    normals = np.repeat(ref.unit(rng.normal(size=(NUM_CELLS, 1, 3))), 4, axis=1)
+    return ref.unit(normals + spread * rng.normal(size=normals.shape)).astype(np.float32)
 
 
 @pytest.fixture(scope="module")
@@ -59,8 +59,8 @@ def lights():
 
 def mean_over_squares(document, wi):
     """A term seen in each square by light from one direction, its mean over 64 places, by the cosine. (3, squares)"""
-    place = (np.arange(SIDE * 8) + 0.5) * (2 / (SIDE * 8)) - 1
-    x, y = np.meshgrid(place, place, indexing="ij")
+    offsets = (np.arange(SIDE * 8) + 0.5) * (2 / (SIDE * 8)) - 1
+    x, y = np.meshgrid(offsets, offsets, indexing="ij")
     wo = directions_at(x, y)
     weight = np.where(x * x + y * y < 1, wo[..., 2] * (1 + wo[..., 2]) ** 2, 1e-12)
     value = eval_brdf(document, wi, wo) * weight[..., None]
@@ -103,8 +103,8 @@ def expected(cells, lights, documents, cell):
     t, b = cells.frames[cell].astype(float)
     n, out = np.cross(t, b), np.zeros((3, SIDE * SIDE))
     for p, normal in enumerate(cells.points.normal.reshape(-1, 4, 3)[cell].astype(float)):
-        seen = np.unpackbits(cells.visible[cell, p], bitorder="little")[: lights.num_lights]
-        for m in np.flatnonzero(seen):
+        visible = np.unpackbits(cells.visible[cell, p], bitorder="little")[: lights.num_lights]
+        for m in np.flatnonzero(visible):
             d = lights.direction[m].astype(float)
             if (cosine := d @ normal) <= 0:
                 continue
@@ -121,11 +121,11 @@ def test_cells_send_lights_as_their_highlights_do(lights, spread):
     cells, documents = cells_of(flat(spread)), [metal(0.5, (0.5, 0.8, 0.3))]
     reflectances = (pack_reflectance([MATT, *documents]),)
     lobes = cells.highlight_tables(reflectances, cells.reflectance_operator(reflectances))
-    found = outgoing_in_highlights(cells, lobes, DirectLobes(lights, cells.visibility_bits(lobes.rows)))
+    actual = outgoing_in_highlights(cells, lobes, DirectLobes(lights, cells.visibility_bits(lobes.rows)))
     area = bin_solid_angles()
     exact = expected(cells, lights, unpack_lobes(reflectances[0]), 3)
-    assert np.sqrt(np.sum(area * (found[3] - exact) ** 2) / np.sum(area * exact**2)) < 0.06
-    np.testing.assert_allclose(found[3] @ area, exact @ area, rtol=0.04)
+    assert np.sqrt(np.sum(area * (actual[3] - exact) ** 2) / np.sum(area * exact**2)) < 0.06
+    np.testing.assert_allclose(actual[3] @ area, exact @ area, rtol=0.04)
 
 
 _LOCAL = fine_bin_centers()[60]
@@ -146,24 +146,24 @@ class _OneRay:
 def test_rays_of_lamps_are_sent_as_lights_are():
     cells, reflectances = cells_of(flat()), (pack_reflectance([metal(0.3)]),)
     lobes = cells.highlight_tables(reflectances, cells.reflectance_operator(reflectances))
-    found = outgoing_in_highlights(cells, lobes, DirectLobes(rays=[_OneRay()]))
+    actual = outgoing_in_highlights(cells, lobes, DirectLobes(rays=[_OneRay()]))
     exact = mean_over_squares(unpack_lobes(reflectances[0])[0], _LOCAL) * [[1], [2], [3]]
     for cell in range(NUM_CELLS):
-        assert np.linalg.norm(found[cell] - exact) < 0.03 * np.linalg.norm(exact)
+        assert np.linalg.norm(actual[cell] - exact) < 0.03 * np.linalg.norm(exact)
 
 
 def test_nothing_of_a_highlight_is_sent_twice(lights):
     """With its table, functions and the even part say what is matt alone."""
     cells = cells_of(flat())
-    both, matt = ((pack_reflectance(terms),) for terms in ([MATT, metal(0.3)], [MATT]))
-    reflecting, plain = cells.reflectance_operator(both), cells.reflectance_operator(matt)
+    glossy, matt = ((pack_reflectance(terms),) for terms in ([MATT, metal(0.3)], [MATT]))
+    reflecting, plain = cells.reflectance_operator(glossy), cells.reflectance_operator(matt)
     rows = reflecting.rows
-    arrived = IncidentLight(cells.irradiance(lights), cells.incident_coefficients(rows, lights, 6))
-    lobes = cells.highlight_tables(both, reflecting)
-    found = first_bounce(reflecting, arrived, (lobes, np.zeros((NUM_CELLS, 3, SIDE * SIDE), np.float32)))
+    incident = IncidentLight(cells.irradiance(lights), cells.incident_coefficients(rows, lights, 6))
+    lobes = cells.highlight_tables(glossy, reflecting)
+    actual = first_bounce(reflecting, incident, (lobes, np.zeros((NUM_CELLS, 3, SIDE * SIDE), np.float32)))
     held = plain.reflectance * reflecting.energy_scale
-    np.testing.assert_allclose(found.isotropic, held / np.pi * arrived.irradiance, atol=1e-5)
-    assert not found.coefficients.any()
+    np.testing.assert_allclose(actual.isotropic, held / np.pi * incident.irradiance, atol=1e-5)
+    assert not actual.coefficients.any()
 
 
 def test_only_highlights_that_functions_miss_have_tables():
@@ -180,17 +180,17 @@ def test_only_highlights_that_functions_miss_have_tables():
 def test_small_steps_of_a_hand_make_no_other_light():
     assert pack_reflectance([metal(0.3)]) == pack_reflectance([metal(0.3001)])
     assert pack_reflectance([metal(0.3)]) != pack_reflectance([metal(0.31)])
-    one, other = unpack_lobes(pack_reflectance([metal(0.3)])), unpack_lobes(pack_reflectance([metal(0.31)]))
-    assert abs(one[0]["params"]["roughness"] - 0.3) < 0.003
-    assert abs(other[0]["params"]["roughness"] - 0.31) < 0.003
-    assert abs(reflectance_matrix(one[0])[0, 0] - reflectance_matrix(metal(0.3))[0, 0]) < 0.01
+    before, after = unpack_lobes(pack_reflectance([metal(0.3)])), unpack_lobes(pack_reflectance([metal(0.31)]))
+    assert abs(before[0]["params"]["roughness"] - 0.3) < 0.003
+    assert abs(after[0]["params"]["roughness"] - 0.31) < 0.003
+    assert abs(reflectance_matrix(before[0])[0, 0] - reflectance_matrix(metal(0.3))[0, 0]) < 0.01
 
 
 def test_squares_of_different_cells_are_subtracted_by_cell():
     ones = np.ones((2, 3, SIDE * SIDE), np.float32)
-    found = BinnedRadiance(np.array([1, 4]), 3 * ones).subtract(BinnedRadiance(np.array([4, 7]), ones))
-    np.testing.assert_array_equal(found.rows, [1, 4, 7])
-    np.testing.assert_array_equal(found.radiance[:, 0, 0], [3, 2, -1])
+    difference = BinnedRadiance(np.array([1, 4]), 3 * ones).subtract(BinnedRadiance(np.array([4, 7]), ones))
+    np.testing.assert_array_equal(difference.rows, [1, 4, 7])
+    np.testing.assert_array_equal(difference.radiance[:, 0, 0], [3, 2, -1])
 
 
 def test_every_bin_has_one_number():

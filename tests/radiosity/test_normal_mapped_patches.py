@@ -24,9 +24,9 @@ class Traced:
     def check(self):
         """Nothing lacks."""
 
-    def visibility(self, points, before, known):
-        self.points, self.before, self.known = points, before, known
-        return np.full_like(known, 7)
+    def visibility(self, points, before, bits):
+        self.points, self.before, self.known = points, before, bits
+        return np.full_like(bits, 7)
 
     def gather_hits(self, points, wo, pattern):
         assert wo is points.normal
@@ -38,8 +38,8 @@ def named(tmp_path_factory):
     folder = tmp_path_factory.mktemp("normals")
     texel = np.round(127.5 * (np.array(LEAN) / np.linalg.norm(LEAN) + 1)).astype(np.uint8)
     Image.fromarray(np.broadcast_to(texel, (2, 2, 3)).copy()).save(folder / "slope.png")
-    with IMAGES.with_search_folder(folder / "images") as shelf:
-        yield store(shelf, folder / "slope.png", "Slope").texture
+    with IMAGES.with_search_folder(folder / "images") as library:
+        yield store(library, folder / "slope.png", "Slope").texture
 
 
 @pytest.fixture
@@ -60,21 +60,21 @@ def cells():
 
 def test_they_lean_as_their_texels_do(cells, named):
     """Green leans up the image, against v."""
-    found = normal_mapped_patches(cells, (None, NormalMap(named)), Traced())
-    normal = found.points.normal.reshape(NUM_CELLS, POINTS, 3)
+    mapped = normal_mapped_patches(cells, (None, NormalMap(named)), Traced())
+    normal = mapped.points.normal.reshape(NUM_CELLS, POINTS, 3)
     x, y, z = np.array(LEAN) / np.linalg.norm(LEAN)
     np.testing.assert_allclose(normal[1::2], np.broadcast_to([x, z, -y], normal[1::2].shape), atol=0.01)
     np.testing.assert_array_equal(normal[::2], cells.points.normal.reshape(normal.shape)[::2])
-    np.testing.assert_allclose(np.einsum("nc,nc->n", found.points.normal, found.points.tangent), 0, atol=1e-6)
+    np.testing.assert_allclose(np.einsum("nc,nc->n", mapped.points.normal, mapped.points.tangent), 0, atol=1e-6)
 
 
 def test_their_rays_are_traced_and_no_others(cells, named):
     traced = Traced()
-    found = normal_mapped_patches(cells, (None, NormalMap(named)), traced)
-    assert (found.visible[1::2] == 7).all()
-    assert (found.gather_hits[1::2] == 9).all()
-    np.testing.assert_array_equal(found.visible[::2], cells.visible[::2])
-    np.testing.assert_array_equal(found.gather_hits[::2], cells.gather_hits[::2])
+    mapped = normal_mapped_patches(cells, (None, NormalMap(named)), traced)
+    assert (mapped.visible[1::2] == 7).all()
+    assert (mapped.gather_hits[1::2] == 9).all()
+    np.testing.assert_array_equal(mapped.visible[::2], cells.visible[::2])
+    np.testing.assert_array_equal(mapped.gather_hits[::2], cells.gather_hits[::2])
     np.testing.assert_array_equal(traced.known, cells.visible[1::2].reshape(-1, 3))
     np.testing.assert_array_equal(traced.before, np.broadcast_to(np.float32([0, 1, 0]), traced.before.shape))
     seeds = cells.points.seed.reshape(NUM_CELLS, POINTS)
@@ -84,14 +84,14 @@ def test_their_rays_are_traced_and_no_others(cells, named):
 def test_frames_are_those_of_the_normals(cells, named):
     """What they send is turned with them, whatever was known of the others."""
     assert np.allclose(cells.frames[:, 0] @ [0, 1, 0], 0, atol=1e-6)
-    found = normal_mapped_patches(cells, (None, NormalMap(named)), Traced())
-    mean = found.points.normal.reshape(NUM_CELLS, POINTS, 3).mean(axis=1)
-    np.testing.assert_allclose(np.einsum("gfc,gc->gf", found.frames, mean), 0, atol=1e-5)
+    mapped = normal_mapped_patches(cells, (None, NormalMap(named)), Traced())
+    mean = mapped.points.normal.reshape(NUM_CELLS, POINTS, 3).mean(axis=1)
+    np.testing.assert_allclose(np.einsum("gfc,gc->gf", mapped.frames, mean), 0, atol=1e-5)
 
 
-@pytest.mark.parametrize("lacking", ["uv", "surface_normal"])
-def test_those_of_bakes_that_do_not_say_how_textures_lie_stay(cells, named, lacking):
-    older = replace(cells, **{lacking: None})
+@pytest.mark.parametrize("missing", ["uv", "surface_normal"])
+def test_those_of_bakes_that_do_not_say_how_textures_lie_stay(cells, named, missing):
+    older = replace(cells, **{missing: None})
     assert normal_mapped_patches(older, (NormalMap(named), None), Traced()) is older
 
 

@@ -69,12 +69,12 @@ def test_a_blended_surface_stops_its_share_of_directions_evenly_from_everywhere(
     scene = card_before_wall(np.full((1, 1), 77, np.uint8))
     embree = build_scene_buffers(scene).embree
     directions = unit(np.concatenate([rng.uniform(-0.2, 0.2, (4000, 2)), -np.ones((4000, 1))], axis=1))
-    found = []
+    fractions = []
     for x, y in ((0.3, 0.3), (0.7, 0.4)):
         start = np.array([[x, y, 1]]) - 0.5 * directions / directions[:, 2:]
-        found.append(trace_rays(embree, start.astype(np.float32), directions.astype(np.float32)).face >= 2)
-    assert found[0].mean() == pytest.approx(77 / 255, abs=0.03)
-    np.testing.assert_array_equal(found[0], found[1])
+        fractions.append(trace_rays(embree, start.astype(np.float32), directions.astype(np.float32)).face >= 2)
+    assert fractions[0].mean() == pytest.approx(77 / 255, abs=0.03)
+    np.testing.assert_array_equal(fractions[0], fractions[1])
 
 
 def test_chances_that_are_given_share_out_opacity():
@@ -96,13 +96,17 @@ def test_light_comes_through_holes_to_points_and_from_lamps():
     up = np.tile(-DOWN, (len(x), 1))
     wanted = opacity_behind(scene.materials[1].opacity, 1.0, x, y)
     clear = np.abs(wanted - 0.5) > 1e-3
-    seen = trace_visibility(geometry.embree, points, up, -DOWN[None]).visible[:, 0] & 1
-    np.testing.assert_array_equal(seen[clear] == 1, (wanted < 0.5)[clear])
-    lamp = prepare_local_lights(LightGeometry("directional", direction=(0.0, 0.0, -1.0)))
-    from_lamp = trace_light_visibility(
-        geometry.embree, geometry.epsilon, lamp, make_light_strata(lamp, 1), make_surface_points(points, up)
+    visible = trace_visibility(geometry.embree, points, up, -DOWN[None]).visible[:, 0] & 1
+    np.testing.assert_array_equal(visible[clear] == 1, (wanted < 0.5)[clear])
+    directional = prepare_local_lights(LightGeometry("directional", direction=(0.0, 0.0, -1.0)))
+    light_visibility = trace_light_visibility(
+        geometry.embree,
+        geometry.epsilon,
+        directional,
+        make_light_strata(directional, 1),
+        make_surface_points(points, up),
     )
-    np.testing.assert_array_equal((from_lamp[:, 0] & 1)[clear] == 1, (wanted < 0.5)[clear])
+    np.testing.assert_array_equal((light_visibility[:, 0] & 1)[clear] == 1, (wanted < 0.5)[clear])
 
 
 @pytest.mark.parametrize("share", [0.1, 0.25, 0.6, 0.95])

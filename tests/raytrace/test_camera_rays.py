@@ -12,9 +12,11 @@ def test_rays_go_through_the_image_plane_of_the_camera():
     camera, rng = built_in("still_life").cameras[0], np.random.default_rng(5)
     x, y = (rng.uniform(0, side, 500).astype(np.float32) for side in SIZE)
     half = np.tan(camera.yfov / 2)
-    place = np.stack([(2 * x / SIZE[0] - 1) * half * SIZE[0] / SIZE[1], (1 - 2 * y / SIZE[1]) * half, -np.ones(500)], 1)
-    along = place @ camera.to_world[:3, :3].T
+    position = np.stack(
+        [(2 * x / SIZE[0] - 1) * half * SIZE[0] / SIZE[1], (1 - 2 * y / SIZE[1]) * half, -np.ones(500)], 1
+    )
+    along = position @ camera.to_world[:3, :3].T
     expected = along / np.linalg.norm(along, axis=1, keepdims=True)
-    found = camera_directions(camera, SIZE, x, y)
-    assert found.dtype == np.float32
-    np.testing.assert_allclose(found, expected, atol=2e-7)
+    directions = camera_directions(camera, SIZE, x, y)
+    assert directions.dtype == np.float32
+    np.testing.assert_allclose(directions, expected, atol=2e-7)

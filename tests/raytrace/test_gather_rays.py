@@ -71,8 +71,8 @@ def test_highlights_of_every_size_are_estimated_without_bias(exponent, num_gloss
 
 def test_glossy_rays_reduce_the_noise_of_a_highlight():
     def noise(pattern):
-        found = [weight @ half_cosines(wi)[0] ** 3000 for wi, weight in (rays_of(pattern, p) for p in range(60))]
-        return np.std(found) / np.mean(found)
+        estimates = [weight @ half_cosines(wi)[0] ** 3000 for wi, weight in (rays_of(pattern, p) for p in range(60))]
+        return np.std(estimates) / np.mean(estimates)
 
     assert noise(make_pattern(128, 128, 1)) < 0.3 * noise(make_pattern(256, 0, 1))
 

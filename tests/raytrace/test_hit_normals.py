@@ -15,14 +15,14 @@ def test_normals_are_those_of_the_surface():
     geometry, camera, size = build_scene_buffers(scene), scene.cameras[0], (48, 36)
     y, x = np.divmod(np.arange(size[0] * size[1]), size[0])
     directions = camera_directions(camera, size, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
-    seen = trace_rays(geometry.embree, camera.to_world[:3, 3].astype(np.float32), directions)
+    first_hits = trace_rays(geometry.embree, camera.to_world[:3, 3].astype(np.float32), directions)
     rng = np.random.default_rng(1)
-    uv, face = seen.uv.copy(), np.where(rng.random(len(x)) < 0.1, np.int32(-1), seen.face)
+    uv, face = first_hits.uv.copy(), np.where(rng.random(len(x)) < 0.1, np.int32(-1), first_hits.face)
     uv[::3, 0] = 0  # on an edge
     from_behind = rng.random(len(uv)) < 0.5
     towards = np.where(from_behind[:, None], -directions, directions)
-    hits = Hits(face, uv, seen.distance)
+    hits = Hits(face, uv, first_hits.distance)
     expected = surface_at(geometry, hits, towards).points.normal
-    found = normals_at(geometry, hits, towards)
-    np.testing.assert_allclose(found, expected, atol=2e-6)
-    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1, atol=1e-6)
+    normals = normals_at(geometry, hits, towards)
+    np.testing.assert_allclose(normals, expected, atol=2e-6)
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-6)

@@ -55,18 +55,18 @@ def test_bits_are_those_of_segments_that_meet_no_triangle(surfaces, light):
     made = prepare_local_lights(light)
     strata = make_light_strata(made, 16)
     points = make_surface_points(position, normal, first=100)
-    seen = trace_light_visibility(geometry.embree, geometry.epsilon, made, strata, points)
-    bits = np.unpackbits(seen, axis=1, bitorder="little")[:, : len(strata.uv)].astype(bool)
+    visibility = trace_light_visibility(geometry.embree, geometry.epsilon, made, strata, points)
+    bits = np.unpackbits(visibility, axis=1, bitorder="little")[:, : len(strata.uv)].astype(bool)
     triangles = geometry.positions[geometry.faces].astype(float)
     wrong = 0
     for k in range(len(strata.uv)):
-        found = [
+        actual = [
             light_sample(made, strata, k, *cranley_patterson_offset(strata, n), *p)
             for n, p in zip(points.seed, position, strict=True)
         ]
-        direction, distance = np.array([f[:3] for f in found]), np.array([f[3] for f in found])
+        direction, distance = np.array([f[:3] for f in actual]), np.array([f[3] for f in actual])
         end = position + direction * np.minimum(distance, 100)[:, None]
-        asked = (np.einsum("nc,nc->n", direction, normal) > 0) & (np.array([f[4] for f in found]) > 0)
+        asked = (np.einsum("nc,nc->n", direction, normal) > 0) & (np.array([f[4] for f in actual]) > 0)
         wrong += np.sum(bits[:, k] != (asked & ~crosses(triangles, position.astype(float), end)))
     assert wrong <= 2e-3 * bits.size, "but for rays that graze an edge"
     assert 0.05 < bits.mean() < 0.95
@@ -85,7 +85,7 @@ def test_very_many_samples_are_asked_in_fours_where_neighbours_agree():
     bits = np.unpackbits(
         trace_light_visibility(embree_of(hides), 1e-5, made, strata, points), axis=1, bitorder="little"
     )
-    place = np.array(
+    offset = np.array(
         [
             [
                 light_sample(made, strata, k, *cranley_patterson_offset(strata, n), *p)[:4]
@@ -94,7 +94,7 @@ def test_very_many_samples_are_asked_in_fours_where_neighbours_agree():
             for n, p in zip(points.seed, position, strict=True)
         ]
     )
-    end = position[:, None] + place[..., :3] * place[..., 3:]
+    end = position[:, None] + offset[..., :3] * offset[..., 3:]
     start = np.repeat(position.astype(float), MIN_GROUPED_SAMPLES, axis=0)
     free = ~crosses(hides.positions[hides.faces].astype(float), start, end.reshape(-1, 3)).reshape(
         32, MIN_GROUPED_SAMPLES
@@ -126,19 +126,19 @@ NORMALS = np.tile(UP, (300, 1))
 def test_surface_that_shines_does_not_shadow_itself():
     """The ceiling is the lamp: as bright as a rectangle where nothing is."""
     corners = CEILING.positions[CEILING.faces]
-    lamp = LightGeometry("mesh", material="Lamp")
-    found = irradiance(embree_of(CEILING), lamp, FLOOR, NORMALS, make_emissive_triangles(corners, False))
-    assert np.all(found > 0.3)
+    emitter = LightGeometry("mesh", material="Lamp")
+    actual = irradiance(embree_of(CEILING), emitter, FLOOR, NORMALS, make_emissive_triangles(corners, False))
+    assert np.all(actual > 0.3)
     open_air = embree_of(quad("far", [[90, 0, 0], [91, 0, 0], [91, 1, 0], [90, 1, 0]], 0))
-    free = irradiance(open_air, lamp, FLOOR, NORMALS, make_emissive_triangles(corners, False))
-    np.testing.assert_array_equal(found, free)
+    free = irradiance(open_air, emitter, FLOOR, NORMALS, make_emissive_triangles(corners, False))
+    np.testing.assert_array_equal(actual, free)
 
 
 @pytest.mark.parametrize("height", [2.0, 2.0 - 1e-6])
 def test_rectangle_in_the_plane_of_a_ceiling_is_not_shadowed_by_it(height):
     light = LightGeometry("rectangle", (0.0, height, 0.0), size=(0.5, 0.5))
-    found = irradiance(embree_of(CEILING), light, FLOOR, NORMALS)
-    assert np.all(found > 0.01)
+    actual = irradiance(embree_of(CEILING), light, FLOOR, NORMALS)
+    assert np.all(actual > 0.01)
 
 
 def test_light_inside_a_wall_or_above_the_ceiling_lights_nothing():

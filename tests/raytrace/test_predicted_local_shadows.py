@@ -29,15 +29,15 @@ def surfaces():
     return geometry, samples.surface.points.position[solid], samples.surface.points.normal[solid]
 
 
-def predicted(seen, asked):
+def predicted(visible, is_traced):
     """Whether each ray of points reaches the light. seen, asked: (n, samples), of all rays that are traced"""
-    found = seen.copy()
-    for first in range(0, len(seen), BLOCK):
+    result = visible.copy()
+    for first in range(0, len(visible), BLOCK):
         block = slice(first, first + BLOCK)
-        of_probes = seen[block][PROBES[: len(seen[block])]][asked[block][PROBES[: len(seen[block])]]]
+        of_probes = visible[block][PROBES[: len(visible[block])]][is_traced[block][PROBES[: len(visible[block])]]]
         if len(of_probes) and of_probes.all() == of_probes.any():
-            found[block] = asked[block] & of_probes.any()
-    return found
+            result[block] = is_traced[block] & of_probes.any()
+    return result
 
 
 @pytest.mark.parametrize(
@@ -56,19 +56,19 @@ def test_blocks_whose_probes_agree_are_predicted_and_all_others_traced(surfaces,
     strata = make_light_strata(made, 4)
     along = (made, strata, make_surface_points(position, normal))
     rough = trace_moving_light(geometry.embree, geometry.epsilon, *along)
-    seen, asked = (
+    visible, is_traced = (
         np.unpackbits(trace_light_visibility(scene, geometry.epsilon, *along), axis=1, bitorder="little")[
             :, : len(strata.uv)
         ]
         > 0
         for scene in (geometry.embree, FAR)
     )
-    expected = np.packbits(predicted(seen, asked), axis=1, bitorder="little")
+    expected = np.packbits(predicted(visible, is_traced), axis=1, bitorder="little")
     np.testing.assert_array_equal(rough.visible, expected)
     np.testing.assert_allclose(rough.irradiance, compute_irradiance(*along, expected), rtol=2e-6)
-    wrong = np.unpackbits(rough.visible ^ np.packbits(seen, axis=1, bitorder="little"))
-    assert wrong.sum() < 0.02 * seen.size
-    assert 0.05 < seen.mean() < 0.95
+    wrong = np.unpackbits(rough.visible ^ np.packbits(visible, axis=1, bitorder="little"))
+    assert wrong.sum() < 0.02 * visible.size
+    assert 0.05 < visible.mean() < 0.95
 
 
 def test_points_that_no_light_reaches_stay_dark(surfaces):

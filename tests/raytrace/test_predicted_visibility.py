@@ -38,13 +38,18 @@ def both(scene, size, num_lights):
     geometry, position, normal = samples_of(scene, size)
     lights = tessellate_environment(scene.environment.radiance, num_lights)
     full = trace_visibility(geometry.embree, position, normal, lights.direction)
-    found = trace_visibility_masks(
+    predicted = trace_visibility_masks(
         geometry.embree, position, normal, make_light_targets(lights.direction, lights.irradiance)
     )
     count = lights.num_lights
-    assert found.rays.num_full == full.num_rays
+    assert predicted.rays.num_full == full.num_rays
     cosine = np.maximum(normal @ lights.direction.T, 0)
-    return bits_of(full.visible, count), bits_of(found.visible, count), cosine * lights.irradiance[:, 1], found.rays
+    return (
+        bits_of(full.visible, count),
+        bits_of(predicted.visible, count),
+        cosine * lights.irradiance[:, 1],
+        predicted.rays,
+    )
 
 
 def in_pixels(scene, size, values):
@@ -110,51 +115,55 @@ def test_predicted_bits_are_those_of_a_full_trace(scene, num_lights, saving, bou
     assert 0.1 < full[weight > 0].mean() < 0.999
 
 
-def twin(seen, facing, position, lights):
+def twin(visible, facing, position, lights):
     """The same bits and number of rays, sample by sample, from the answers of a full trace."""
     neighbours, power = find_neighbors(lights.direction), luminance(lights.irradiance)
     beside, strong = np.split(neighbours.neighbors, neighbours.first[1:-1]), power > 5e-3 * power.sum()
-    bits, rays = np.zeros_like(seen), 0
-    for start in range(0, len(seen), 64):
-        rows = np.arange(start, min(start + 64, len(seen)))
-        known = np.zeros_like(seen)
-        everything, nothing = np.ones(seen.shape[1], bool), np.full(seen.shape[1], UNKNOWN)
-        whole, doubt = flood(seen, facing, known, rows, ends(position, rows), nothing, everything, beside)
+    bits, rays = np.zeros_like(visible), 0
+    for start in range(0, len(visible), 64):
+        rows = np.arange(start, min(start + 64, len(visible)))
+        is_traced = np.zeros_like(visible)
+        everything, nothing = np.ones(visible.shape[1], bool), np.full(visible.shape[1], UNKNOWN)
+        whole, doubt = flood(visible, facing, is_traced, rows, ends(position, rows), nothing, everything, beside)
         for quarter in np.split(rows, range(16, len(rows), 16)):
-            held, deep = flood(seen, facing, known, quarter, ends(position, quarter), whole, doubt | strong, beside)
-            held, _ = flood(seen, facing, known, quarter, quarter, held, deep | strong, beside)
-            for light in range(seen.shape[1]):
+            held, deep = flood(
+                visible, facing, is_traced, quarter, ends(position, quarter), whole, doubt | strong, beside
+            )
+            held, _ = flood(visible, facing, is_traced, quarter, quarter, held, deep | strong, beside)
+            for light in range(visible.shape[1]):
                 number = ((light + quarter[0]) * 2_654_435_761 & 0xFFFFFFFF) * 128 >> 32
                 if number < len(quarter) and held[light] in (LIT, HIDDEN):
                     row = quarter[number]
-                    assert known[row, light] or not facing[row, light] or seen[row, light] == (held[light] == LIT)
-                    known[row, light] |= facing[row, light]
-            bits[quarter] = np.where(known[quarter], seen[quarter], facing[quarter] & (held == LIT))
-        rays += known.sum()
+                    assert (
+                        is_traced[row, light] or not facing[row, light] or visible[row, light] == (held[light] == LIT)
+                    )
+                    is_traced[row, light] |= facing[row, light]
+            bits[quarter] = np.where(is_traced[quarter], visible[quarter], facing[quarter] & (held == LIT))
+        rays += is_traced.sum()
     return bits, rays
 
 
 def ends(position, rows):
     here = position[rows].astype(np.float64)
-    one = np.argmax(((here - here.mean(axis=0)) ** 2).sum(axis=1))
-    return rows[[one, np.argmax(((here - here[one]) ** 2).sum(axis=1))]]
+    farthest = np.argmax(((here - here.mean(axis=0)) ** 2).sum(axis=1))
+    return rows[[farthest, np.argmax(((here - here[farthest]) ** 2).sum(axis=1))]]
 
 
-def predict(seen, facing, known, rows, light):
+def predict(visible, facing, is_traced, rows, light):
     if not facing[rows, light].any():
         return BELOW
-    answers = seen[rows, light][known[rows, light]]
+    answers = visible[rows, light][is_traced[rows, light]]
     return UNKNOWN if len(answers) == 0 or answers.any() != answers.all() else LIT if answers.all() else HIDDEN
 
 
-def flood(seen, facing, known, rows, samples, before, doubt, beside):
-    lights = range(seen.shape[1])
+def flood(visible, facing, is_traced, rows, samples, before, doubt, beside):
+    lights = range(visible.shape[1])
     held = np.array([before[m] if facing[rows, m].any() else BELOW for m in lights])
     queue = [m for m in lights if held[m] != BELOW and doubt[m]]
     for m in queue:  # grows as it runs
-        known[samples, m] |= facing[samples, m]
-        held[m] = predict(seen, facing, known, rows, m)
-        answers = seen[rows, m][known[rows, m]]
+        is_traced[samples, m] |= facing[samples, m]
+        held[m] = predict(visible, facing, is_traced, rows, m)
+        answers = visible[rows, m][is_traced[rows, m]]
         if (before[m] == LIT and not answers.all()) or (before[m] == HIDDEN and answers.any()):
             queue += [o for o in beside[m] if o not in queue and held[o] != BELOW]
     doubted = np.zeros(len(held), bool)
@@ -166,14 +175,14 @@ def flood(seen, facing, known, rows, samples, before, doubt, beside):
 def test_kernel_does_what_its_twin_does():
     geometry, position, normal = samples_of(still_life(), (26, 20))
     lights = tessellate_environment(studio(), 300)
-    seen = bits_of(trace_visibility(geometry.embree, position, normal, lights.direction).visible, lights.num_lights)
-    found = trace_visibility_masks(
+    visible = bits_of(trace_visibility(geometry.embree, position, normal, lights.direction).visible, lights.num_lights)
+    actual = trace_visibility_masks(
         geometry.embree, position, normal, make_light_targets(lights.direction, lights.irradiance)
     )
-    assert found.rays.num_wrong == 0  # the twin does not mend
-    bits, rays = twin(seen, normal @ lights.direction.T > 0, position, lights)
-    np.testing.assert_array_equal(bits_of(found.visible, lights.num_lights), bits)
-    assert found.rays.num_traced == rays
+    assert actual.rays.num_wrong == 0  # the twin does not mend
+    bits, rays = twin(visible, normal @ lights.direction.T > 0, position, lights)
+    np.testing.assert_array_equal(bits_of(actual.visible, lights.num_lights), bits)
+    assert actual.rays.num_traced == rays
 
 
 @pytest.mark.parametrize("num_samples", [1, 2, 15, 17, 63, 65, 130])
@@ -182,26 +191,26 @@ def test_any_number_of_samples_and_lights(num_samples, num_lights):
     geometry, position, normal = samples_of(still_life(), (48, 36))
     position, normal = position[:num_samples], normal[:num_samples]
     lights = first_of(tessellate_environment(studio(), 50), num_lights)
-    found = trace_visibility_masks(
+    actual = trace_visibility_masks(
         geometry.embree, position, normal, make_light_targets(lights.direction, lights.irradiance)
     )
     full = trace_visibility(geometry.embree, position, normal, lights.direction)
-    assert found.visible.shape == full.visible.shape
-    assert found.rays.num_traced <= found.rays.num_full == full.num_rays
+    assert actual.visible.shape == full.visible.shape
+    assert actual.rays.num_traced <= actual.rays.num_full == full.num_rays
     if num_samples <= 2:  # both are traced
-        np.testing.assert_array_equal(found.visible, full.visible)
-    assert not np.unpackbits(found.visible, axis=1, bitorder="little")[:, num_lights:].any()
+        np.testing.assert_array_equal(actual.visible, full.visible)
+    assert not np.unpackbits(actual.visible, axis=1, bitorder="little")[:, num_lights:].any()
 
 
 def test_nothing_to_trace_is_no_error():
     geometry, position, normal = samples_of(still_life(), (24, 18))
     lights = tessellate_environment(studio(), 50)
-    found = trace_visibility_masks(
+    actual = trace_visibility_masks(
         geometry.embree, position[:0], normal[:0], make_light_targets(lights.direction, lights.irradiance)
     )
-    assert found.visible.shape == (0, 7)
-    assert found.rays.num_traced == found.rays.num_full == 0
-    assert found.rays.error_rate == 0
+    assert actual.visible.shape == (0, 7)
+    assert actual.rays.num_traced == actual.rays.num_full == 0
+    assert actual.rays.error_rate == 0
 
 
 def test_threads_change_neither_bits_nor_counts(monkeypatch):

@@ -189,11 +189,11 @@ def test_first_hits_are_embreexs_own():
     directions = camera_directions(camera, (50, 37), (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
     origin = camera.to_world[:3, 3].astype(np.float32)
     hits = trace_rays(geometry.embree, origin, directions)
-    found = embreex_scene(geometry).run(np.tile(origin, (len(directions), 1)), directions, output=True)
-    same = hits.face == found["primID"]
+    embreex_hits = embreex_scene(geometry).run(np.tile(origin, (len(directions), 1)), directions, output=True)
+    same = hits.face == embreex_hits["primID"]
     assert (~same).mean() < 1e-3  # a ray through the edge of two triangles may be given to either
     hit = same & (hits.face >= 0)
-    np.testing.assert_allclose(hits.distance[hit], found["tfar"][hit], rtol=1e-5)
-    np.testing.assert_allclose(hits.uv[hit], np.column_stack([found["u"], found["v"]])[hit], atol=2e-4)
+    np.testing.assert_allclose(hits.distance[hit], embreex_hits["tfar"][hit], rtol=1e-5)
+    np.testing.assert_allclose(hits.uv[hit], np.column_stack([embreex_hits["u"], embreex_hits["v"]])[hit], atol=2e-4)
     assert np.isinf(hits.distance[hits.face < 0]).all()
     assert 0.3 < (hits.face >= 0).mean() < 0.99

@@ -21,10 +21,10 @@ def truth() -> np.ndarray:
 
 
 def added(passes) -> Estimate:
-    found = Estimate.empty(*passes[0].shape[:2])
+    total = Estimate.empty(*passes[0].shape[:2])
     for picture in passes:
-        found = found.add(picture)
-    return found
+        total = total.add(picture)
+    return total
 
 
 def estimate(passes: int, noise: float, seed: int = 2) -> Estimate:
@@ -38,19 +38,19 @@ def judged(scale: float, passes: int = 8, noise: float = 0.05) -> Comparison:
 
 @pytest.mark.parametrize("passes", [2, 3, 4, 8, 32, 64])
 def test_perfect_frame_differs_by_the_noise_alone(passes: int) -> None:
-    found = judged(1.0, passes)
-    assert found.noise == pytest.approx(0.05 / np.sqrt(passes), rel=0.05)
-    assert found.rmse == pytest.approx(found.noise, rel=0.05)
-    assert (found.error, found.significant_pixel_fraction) == (None, 0.0)
-    assert found.error_upper_bound < found.noise * (1.5 if passes == 2 else 0.5)
+    comparison = judged(1.0, passes)
+    assert comparison.noise == pytest.approx(0.05 / np.sqrt(passes), rel=0.05)
+    assert comparison.rmse == pytest.approx(comparison.noise, rel=0.05)
+    assert (comparison.error, comparison.significant_pixel_fraction) == (None, 0.0)
+    assert comparison.error_upper_bound < comparison.noise * (1.5 if passes == 2 else 0.5)
 
 
 def test_error_of_a_frame_is_found_below_the_noise() -> None:
-    found = judged(1.01)
-    assert found.noise > 0.015
-    assert found.error == pytest.approx(0.01, rel=0.1)
-    assert found.error < found.error_upper_bound < 1.2 * found.error
-    assert found.significant_pixel_fraction > 0.9  # of blocks; a pixel alone does not tell
+    comparison = judged(1.01)
+    assert comparison.noise > 0.015
+    assert comparison.error == pytest.approx(0.01, rel=0.1)
+    assert comparison.error < comparison.error_upper_bound < 1.2 * comparison.error
+    assert comparison.significant_pixel_fraction > 0.9  # of blocks; a pixel alone does not tell
 
 
 def test_more_passes_less_noise_same_error() -> None:
@@ -63,9 +63,9 @@ def test_more_passes_less_noise_same_error() -> None:
 def test_few_wrong_pixels_are_found_and_the_others_left_alone() -> None:
     frame = truth()
     frame[10:13, 20:26] *= 2
-    found, differs = compare(frame, estimate(16, 0.05))
+    comparison, differs = compare(frame, estimate(16, 0.05))
     assert differs[10:13, 20:26].mean() > 0.9
-    assert 18 / 4800 <= found.significant_pixel_fraction < 40 / 4800
+    assert 18 / 4800 <= comparison.significant_pixel_fraction < 40 / 4800
 
 
 def test_of_what_is_called_different_few_are_so_by_chance() -> None:
@@ -78,12 +78,16 @@ def test_of_what_is_called_different_few_are_so_by_chance() -> None:
 
 
 def test_truth_without_noise_calls_rounding_no_difference() -> None:
-    found, _ = compare(truth(), estimate(4, 0.0))
-    assert (found.noise, found.error, found.significant_pixel_fraction) == (pytest.approx(0, abs=1e-6), None, 0.0)
+    comparison, _ = compare(truth(), estimate(4, 0.0))
+    assert (comparison.noise, comparison.error, comparison.significant_pixel_fraction) == (
+        pytest.approx(0, abs=1e-6),
+        None,
+        0.0,
+    )
     wrong = truth()
     wrong[:4] *= 1.01
-    found, differs = compare(wrong, estimate(4, 0.0))
-    assert found.error == pytest.approx(0.01 * np.sqrt((truth()[:4] ** 2).sum() / (truth() ** 2).sum()), rel=1e-3)
+    comparison, differs = compare(wrong, estimate(4, 0.0))
+    assert comparison.error == pytest.approx(0.01 * np.sqrt((truth()[:4] ** 2).sum() / (truth() ** 2).sum()), rel=1e-3)
     assert differs[:4].all()
     assert not differs[4:].any()
 
@@ -91,8 +95,8 @@ def test_truth_without_noise_calls_rounding_no_difference() -> None:
 def test_black_truth_is_compared_without_dividing_by_it() -> None:
     black = np.zeros(SHAPE, np.float32)
     nothing = added([black] * 4)
-    found, differs = compare(black, nothing)
-    assert found == Comparison(0.0, 0.0, None, None, 0.0, 0.0)
+    comparison, differs = compare(black, nothing)
+    assert comparison == Comparison(0.0, 0.0, None, None, 0.0, 0.0)
     assert np.all(error_map(black, nothing, differs) == error_map(black, nothing, differs)[0, 0])
 
 
@@ -106,8 +110,8 @@ def test_map_is_grey_where_noise_explains_and_coloured_where_not() -> None:
     frame = truth()
     frame[:20] *= 1.5
     frame[40:] *= 0.6
-    known = estimate(16, 0.02)
-    shown = error_map(frame, known, compare(frame, known)[1]).astype(int)
+    reference = estimate(16, 0.02)
+    shown = error_map(frame, reference, compare(frame, reference)[1]).astype(int)
     warm, cold = shown[..., 0] - shown[..., 2] > 60, shown[..., 2] - shown[..., 0] > 60
     grey = shown.max(axis=-1) == shown.min(axis=-1)
     assert warm[:20].all()
@@ -118,10 +122,10 @@ def test_map_is_grey_where_noise_explains_and_coloured_where_not() -> None:
 def sun_and_sky() -> np.ndarray:
     """A coloured sky with a sun of 2.2° that is ten thousand times as bright."""
     d = texel_directions(64, 128).astype(float)
-    sky = 0.4 + 0.3 * d[..., 1:2] * [0.6, 0.8, 1.0] + 0.15 * np.sin(9 * d[..., :1]) * [1.0, 0.5, 0.2]
+    radiance = 0.4 + 0.3 * d[..., 1:2] * [0.6, 0.8, 1.0] + 0.15 * np.sin(9 * d[..., :1]) * [1.0, 0.5, 0.2]
     towards = np.array([-1, 1.2, 1.0]) / np.linalg.norm([-1, 1.2, 1.0])
     sun = (d @ towards > np.cos(np.radians(2.2)))[..., None] * np.array([3e3, 2.7e3, 2.2e3])
-    return np.maximum(sky + sun, 0).astype(np.float32)
+    return np.maximum(radiance + sun, 0).astype(np.float32)
 
 
 def metals(roughness: float):
@@ -149,26 +153,26 @@ def test_right_frame_under_a_small_sun_is_not_blamed_and_wrong_ones_are(roughnes
     scene, size = metals(roughness), (40, 30)
     look = validate({}, default_look(scene.materials))
     frame = reference_image(scene, "front", look, size, 1024, pass_index=1_000)
-    known = added([reference_image(scene, "front", look, size, 16, pass_index=k) for k in range(16)])
-    found, _ = compare(frame, known)
-    assert found.significant_pixel_fraction <= 0.01
-    assert found.error is None or found.error < 0.01
+    reference = added([reference_image(scene, "front", look, size, 16, pass_index=k) for k in range(16)])
+    comparison, _ = compare(frame, reference)
+    assert comparison.significant_pixel_fraction <= 0.01
+    assert comparison.error is None or comparison.error < 0.01
 
     floor = {"terms": [{"model": "lambert", "color": [0.525, 0.4725, 0.42]}]}
     brighter = {"materials": {"Floor": floor}}
     of_brighter = validate(brighter, default_look(scene.materials))
     lit = reference_image(scene, "front", of_brighter, size, 1024, pass_index=1_000)
     of_floor = np.abs(lit - frame).max(axis=2) > 0.02 * frame.max(axis=2)
-    differs = compare(lit, known)[1]
+    differs = compare(lit, reference)[1]
     assert of_floor.mean() > 0.3
     assert differs[of_floor].mean() > 2 / 3  # a server draws four times as many texels
 
     shifted = frame.copy()
     ball = (slice(8, 22), slice(8, 19))
     shifted[ball] = np.roll(frame[ball], 1, axis=1)
-    change, noise = np.abs(luminance(shifted) - luminance(frame)), luminance(known.means).std(axis=0, ddof=1) / 4
+    change, noise = np.abs(luminance(shifted) - luminance(frame)), luminance(reference.means).std(axis=0, ddof=1) / 4
     off = (change > 6 * noise) & (change > 0.5 * luminance(frame))
-    differs = compare(shifted, known)[1]
+    differs = compare(shifted, reference)[1]
     assert off.sum() > 20
     assert differs[off].mean() > 0.85
     differs[ball] = False

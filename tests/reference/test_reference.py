@@ -67,10 +67,12 @@ def test_floor_under_one_texel_has_the_closed_form() -> None:
         textures={},
         roughness=np.ones(2, np.float32),
     )
-    found = reference_radiance(build_scene_buffers(scene), environment_texels(scene.environment), points, [[WHITE]])[0]
+    outgoing = reference_radiance(build_scene_buffers(scene), environment_texels(scene.environment), points, [[WHITE]])[
+        0
+    ]
     expected = radiance[4, 16] * texel_solid_angles(16, 32)[4] / np.pi * wi[1]
     assert wi[:2].min() > 0.5
-    np.testing.assert_allclose(found, [np.zeros(3), expected], rtol=1e-6)
+    np.testing.assert_allclose(outgoing, [np.zeros(3), expected], rtol=1e-6)
 
 
 DRAWN = {"theta_h": [{"points": [[0, 9.0], [20, 2.0], [90, 0.1]], "channels": "rg"}, {"bands": [0.5, 2.0] * 128}]}
@@ -96,15 +98,15 @@ def test_terms_agree_with_the_plain_brdf(model: str, curves: dict[str, object]) 
         wo[None].astype(np.float32), {"diffuse": np.array([[1.0, 0.5, 0.25]], np.float32)},
         np.ones(1, np.float32),
     )  # fmt: skip
-    found = reference_radiance(build_scene_buffers(scene), environment_texels(scene.environment), points, [[document]])[
-        0, 0
-    ]
+    radiance = reference_radiance(
+        build_scene_buffers(scene), environment_texels(scene.environment), points, [[document]]
+    )[0, 0]
     frame = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]], float)  # rows: tangent, n × t, normal
     u, v = np.meshgrid((np.arange(48) + 0.5) / 48, (np.arange(24) + 0.5) / 24)
     wi = uv_to_direction(u, v) @ frame.T
     light = scene.environment.radiance * texel_solid_angles(24, 48)[:, None, None]
     value = eval_brdf(document, wi, frame @ wo) * np.maximum(wi[..., 2:], 0)
-    np.testing.assert_allclose(found, (value * light).sum(axis=(0, 1)) * [1.0, 0.5, 0.25], rtol=1e-4)
+    np.testing.assert_allclose(radiance, (value * light).sum(axis=(0, 1)) * [1.0, 0.5, 0.25], rtol=1e-4)
 
 
 def corner_of(albedo):
@@ -190,13 +192,13 @@ def test_drawn_texels_estimate_all_of_them() -> None:
     frame = repeat([0, 1, 0]), repeat([1, 0, 0]), repeat([0, 0.6, 0.8])
     points = ReferencePoints(repeat([0.6, 1e-3, 0.4]), *frame, {}, repeat([1.0])[:, 0])
     terms = [WHITE, {**WHITE, "model": "cook_torrance", "params": {"sigma": 0.3}}]
-    truth = reference_radiance(geometry, texels, points.samples_of(slice(0, 1)), [terms])[0, 0]
+    expected = reference_radiance(geometry, texels, points.samples_of(slice(0, 1)), [terms])[0, 0]
     spread = []
     for spp in (32, 256):
         means = reference_radiance(geometry, texels, points, [terms], spp)[0, ::16]
         error = means.std(axis=0, ddof=1) / np.sqrt(len(means))
         assert np.all(error > 0)
-        np.testing.assert_array_less(np.abs(means.mean(axis=0) - truth), 4 * error)
+        np.testing.assert_array_less(np.abs(means.mean(axis=0) - expected), 4 * error)
         spread.append(means.std(axis=0).mean())
     assert spread[1] < spread[0] / 2
 
@@ -217,9 +219,9 @@ def test_rendered_frame_agrees(tmp_path: Path) -> None:
     default = default_look(scene.materials)
     partial = {"environment": {"intensity": 0.5}, "materials": {"Ball": {"terms": [WHITE]}}}
     frame = render_image(open_transfer(store, Cache(1 << 30)), "front", validate(partial, default))
-    truth = image_of(scene, size, 0, **partial)
-    assert relative_rmse(frame, truth) < 0.005
-    assert frame.mean() == pytest.approx(truth.mean(), rel=0.002)
+    expected = image_of(scene, size, 0, **partial)
+    assert relative_rmse(frame, expected) < 0.005
+    assert frame.mean() == pytest.approx(expected.mean(), rel=0.002)
 
 
 def test_rotation_is_that_of_a_map_turned_by_hand() -> None:
@@ -237,10 +239,10 @@ def test_rotation_is_that_of_a_map_turned_by_hand() -> None:
 def test_it_can_be_cancelled_and_tells_how_far_it_is() -> None:
     scene = still_life()
     look = validate({}, default_look(scene.materials))
-    told: list[float] = []
-    reference_image(scene, "front", look, (24, 18), 10, told.append)
-    assert told == sorted(told)
-    assert told[-1] == pytest.approx(1.0)
+    fractions: list[float] = []
+    reference_image(scene, "front", look, (24, 18), 10, fractions.append)
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == pytest.approx(1.0)
     with pytest.raises(CancelledError):
         reference_image(scene, "front", look, (24, 18), 10, is_canceled=lambda: True)
 
@@ -289,8 +291,8 @@ def test_frame_under_each_kind_of_local_light_agrees(lit_bake: tuple[Scene, Fixe
     lights = {"mesh": {"enabled": kind == "mesh"}, **({} if kind == "mesh" else {kind: LIGHTS[kind]})}
     look = validate({"environment": {"intensity": 0.0}, "lights": lights}, transfer.default_look)
     frame = render_image(transfer, "front", look)
-    truth = reference_image(scene, "front", look, (48, 36), 1024 if kind in ("rectangle", "mesh") else 1)
-    assert truth.mean() > 0.01
-    assert frame.mean() == pytest.approx(truth.mean(), rel=0.01)
+    expected = reference_image(scene, "front", look, (48, 36), 1024 if kind in ("rectangle", "mesh") else 1)
+    assert expected.mean() > 0.01
+    assert frame.mean() == pytest.approx(expected.mean(), rel=0.01)
     # curves in bands and few samples; the wall touches the floor, and few samples of it are near
-    assert relative_rmse(frame, truth) < {"rectangle": 0.03, "mesh": 0.07}.get(kind, 0.02)
+    assert relative_rmse(frame, expected) < {"rectangle": 0.03, "mesh": 0.07}.get(kind, 0.02)

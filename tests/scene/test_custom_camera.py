@@ -10,7 +10,7 @@ from relume.core.errors import ParameterError
 from relume.scene.custom_camera import MAX_DISTANCE_M, make_custom_camera, read_custom_camera, with_cameras
 from relume.scene.examples.catalog import built_in
 
-EYE = [1, 0, 0, 3, 0, 1, 0, 2, 0, 0, 1, 9, 0, 0, 0, 1]
+POSE = [1, 0, 0, 3, 0, 1, 0, 2, 0, 0, 1, 9, 0, 0, 0, 1]
 
 
 def turned(degrees: float, scale: float = 1.0) -> list[float]:
@@ -22,11 +22,11 @@ def turned(degrees: float, scale: float = 1.0) -> list[float]:
 
 
 def changed(index: int, value: float) -> list[float]:
-    return [*EYE[:index], value, *EYE[index + 1 :]]
+    return [*POSE[:index], value, *POSE[index + 1 :]]
 
 
 def test_camera_of_a_scene_has_its_place_and_angle() -> None:
-    camera = make_custom_camera("Hero", EYE, 40).camera
+    camera = make_custom_camera("Hero", POSE, 40).camera
     assert camera.name == "Hero"
     assert camera.to_world[:3, 3].tolist() == [3, 2, 9]
     assert camera.yfov == pytest.approx(math.radians(40))
@@ -44,7 +44,7 @@ def test_scale_is_taken_out_and_what_is_left_stays_the_same_text(scale: float) -
 @pytest.mark.parametrize(
     ("to_world", "said"),
     [
-        (EYE[:15], "16 finite numbers"),
+        (POSE[:15], "16 finite numbers"),
         (changed(3, math.nan), "16 finite numbers"),
         (changed(3, math.inf), "16 finite numbers"),
         (changed(15, 2.0), "the last four"),
@@ -64,13 +64,13 @@ def test_what_is_no_camera_is_refused(to_world: list[float], said: str) -> None:
 @pytest.mark.parametrize("yfov", [0.0, -40.0, 180.0, math.nan, math.inf])
 def test_angle_that_shows_nothing_is_refused(yfov: float) -> None:
     with pytest.raises(ParameterError, match="degrees"):
-        make_custom_camera("Hero", EYE, yfov)
+        make_custom_camera("Hero", POSE, yfov)
 
 
 @pytest.mark.parametrize("name", ["", " Hero", "a/b", "a\\b", "..", "x" * 81, "line\nbreak"])
 def test_name_that_is_no_part_of_an_address_is_refused(name: str) -> None:
     with pytest.raises(ParameterError, match="printable characters"):
-        make_custom_camera(name, EYE, 40)
+        make_custom_camera(name, POSE, 40)
 
 
 @pytest.mark.parametrize(
@@ -78,12 +78,12 @@ def test_name_that_is_no_part_of_an_address_is_refused(name: str) -> None:
     [
         None,
         [],
-        {"name": "Hero", "to_world": EYE},
-        {"name": "Hero", "to_world": EYE, "yfov": 40, "znear": 1},
-        {"name": 7, "to_world": EYE, "yfov": 40},
+        {"name": "Hero", "to_world": POSE},
+        {"name": "Hero", "to_world": POSE, "yfov": 40, "znear": 1},
+        {"name": 7, "to_world": POSE, "yfov": 40},
         {"name": "Hero", "to_world": "1000", "yfov": 40},
-        {"name": "Hero", "to_world": [*EYE[:15], True], "yfov": 40},
-        {"name": "Hero", "to_world": EYE, "yfov": "40"},
+        {"name": "Hero", "to_world": [*POSE[:15], True], "yfov": 40},
+        {"name": "Hero", "to_world": POSE, "yfov": "40"},
     ],
 )
 def test_document_that_is_no_camera_is_refused(document: object) -> None:
@@ -94,7 +94,7 @@ def test_document_that_is_no_camera_is_refused(document: object) -> None:
 def test_a_scene_with_more_cameras_is_the_same_scene() -> None:
     scene = built_in("cornell_box")
     own = scene.cameras[0].name
-    more = with_cameras(scene, [make_custom_camera("Hero", EYE, 40).camera, make_custom_camera(own, EYE, 50).camera])
+    more = with_cameras(scene, [make_custom_camera("Hero", POSE, 40).camera, make_custom_camera(own, POSE, 50).camera])
     assert more.id == scene.id
     assert {camera.name for camera in more.cameras} == {*(camera.name for camera in scene.cameras), "Hero"}
     assert next(camera for camera in more.cameras if camera.name == own).yfov == pytest.approx(math.radians(50))

@@ -50,13 +50,16 @@ def test_scenes_of_before_there_were_effects_still_open(tmp_path: Path) -> None:
 
 def test_what_is_left_out_of_a_long_list_weighs_least() -> None:
     scene = imported()
-    found = [ignored("a little thing")] * MAX_WARNINGS + [approximated("a mean")] * 3 + [unsupported("a hole")]
-    listed = finalize("test", scene.meshes, scene.materials, scene.cameras, LIGHT, found).warnings
+    warnings = [ignored("a little thing")] * MAX_WARNINGS + [approximated("a mean")] * 3 + [unsupported("a hole")]
+    listed = finalize("test", scene.meshes, scene.materials, scene.cameras, LIGHT, warnings).warnings
     assert listed[:4] == ("a hole", "a mean", "a mean", "a mean")
     assert (listed[-1], listed[-1].severity, len(listed)) == ("and 4 more of the kind", "ignored", MAX_WARNINGS + 1)
 
 
 def test_a_remark_survives_documents_and_processes() -> None:
-    remark = approximated("a mean")
-    for copy in (warning_of(json.loads(json.dumps(remark.document()))), pickle.loads(pickle.dumps(remark))):
-        assert (copy, copy.severity) == (remark, remark.severity)
+    import_warning = approximated("a mean")
+    for copy in (
+        warning_of(json.loads(json.dumps(import_warning.document()))),
+        pickle.loads(pickle.dumps(import_warning)),
+    ):
+        assert (copy, copy.severity) == (import_warning, import_warning.severity)

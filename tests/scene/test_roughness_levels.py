@@ -11,8 +11,10 @@ from relume.scene.model import Material, Texture, TextureEncoding
 from relume.scene.roughness_levels import MAX_LEVELS, levels_of_material, select_level
 
 
-def material_of(pixels: object, most: float = 1.0) -> Material:
-    texture = Texture(np.array(pixels, np.uint8)[..., None], encoding=TextureEncoding("share", (most, most, most)))
+def material_of(pixels: object, max_value: float = 1.0) -> Material:
+    texture = Texture(
+        np.array(pixels, np.uint8)[..., None], encoding=TextureEncoding("share", (max_value, max_value, max_value))
+    )
     return Material("rough", (), {"roughness": texture})
 
 
@@ -26,7 +28,7 @@ def test_a_material_without_a_map_has_no_levels() -> None:
 
 
 def test_levels_lie_between_the_ends_of_the_map() -> None:
-    ratios = levels_of_material(material_of(np.arange(256).reshape(16, 16), most=2.0))
+    ratios = levels_of_material(material_of(np.arange(256).reshape(16, 16), max_value=2.0))
     assert len(ratios) == MAX_LEVELS
     assert np.all(np.diff(ratios) > 0)
     assert ratios[0] < 0.01

@@ -208,10 +208,10 @@ def test_opacity_is_kept_and_changes_the_id(tmp_path: Path) -> None:
         material = dataclasses.replace(small_scene().materials[0], opacity=Opacity(alpha, ("clamp", "mirror"), cutoff))
         scene = small_scene(materials=[material])
         save_scene(scene, tmp_path)
-        kept = load_scene(tmp_path).materials[0].opacity
-        assert kept is not None
-        np.testing.assert_array_equal(kept.alpha, alpha)
-        assert (kept.wrap, kept.cutoff) == (("clamp", "mirror"), cutoff)
+        loaded = load_scene(tmp_path).materials[0].opacity
+        assert loaded is not None
+        np.testing.assert_array_equal(loaded.alpha, alpha)
+        assert (loaded.wrap, loaded.cutoff) == (("clamp", "mirror"), cutoff)
         ids.add(scene.id)
     assert len(ids) == 4
 
@@ -257,9 +257,9 @@ def test_maps_of_roughness_are_kept(tmp_path: Path) -> None:
     texture = Texture(pixels, ("clamp", "mirror"), TextureEncoding("share", (2.0, 2.0, 2.0)))
     material = dataclasses.replace(small_scene().materials[0], textures={"roughness": texture})
     save_scene(small_scene(materials=[material]), tmp_path)
-    kept = load_scene(tmp_path).materials[0].textures["roughness"]
-    np.testing.assert_array_equal(kept.pixels, pixels)
-    assert (kept.wrap, kept.encoding) == (texture.wrap, texture.encoding)
+    loaded = load_scene(tmp_path).materials[0].textures["roughness"]
+    np.testing.assert_array_equal(loaded.pixels, pixels)
+    assert (loaded.wrap, loaded.encoding) == (texture.wrap, texture.encoding)
 
 
 @pytest.mark.parametrize(

@@ -157,13 +157,13 @@ def test_five_models_are_on_show(scene: Scene) -> None:
 def test_the_studio_has_a_large_key_and_a_small_lamp(scene: Scene) -> None:
     radiance = scene.environment.radiance.mean(-1).astype(np.float64)
     power = radiance * texel_solid_angles(*radiance.shape)[:, None]
-    lamp = radiance > 100
-    key = (radiance > 5) & ~lamp
+    is_bright = radiance > 100
+    key = (radiance > 5) & ~is_bright
     solid_angle = np.broadcast_to(texel_solid_angles(*radiance.shape)[:, None], radiance.shape)
-    assert solid_angle[lamp].sum() < 0.01
+    assert solid_angle[is_bright].sum() < 0.01
     assert solid_angle[key].sum() > 0.15
-    assert 0.1 < power[lamp].sum() / power[key].sum() < 1.5
-    assert (texel_directions(*radiance.shape)[lamp | key][:, 1] > 0).all()
+    assert 0.1 < power[is_bright].sum() / power[key].sum() < 1.5
+    assert (texel_directions(*radiance.shape)[is_bright | key][:, 1] > 0).all()
 
 
 def test_the_views_show_the_still_life(scene: Scene, meshes: dict[str, Mesh]) -> None:

@@ -22,8 +22,8 @@ def random_bytes(height: int = 9, width: int = 7, seed: int = 1) -> np.ndarray:
 
 
 def test_display_values_are_linear_times_a_scale() -> None:
-    found = decode(np.array([[[0, 188, 255]]], np.uint8), TextureEncoding("srgb", (1.0, 2.0, 0.5)))
-    np.testing.assert_allclose(found, [[[0, 2 * 0.5029, 0.5]]], atol=1e-4)
+    decoded = decode(np.array([[[0, 188, 255]]], np.uint8), TextureEncoding("srgb", (1.0, 2.0, 0.5)))
+    np.testing.assert_allclose(decoded, [[[0, 2 * 0.5029, 0.5]]], atol=1e-4)
 
 
 def test_normals_are_scaled_turned_and_of_length_one() -> None:
@@ -44,12 +44,12 @@ def test_pixels_without_a_coding_are_values() -> None:
 def test_means_and_made_textures_go_over_all_rows() -> None:
     height = 2 * ROWS_PER_BATCH + 3
     values = np.random.default_rng(3).random((height, 5, 3), np.float32) * np.float32([1, 4, 0.25])
-    most = values.max(axis=(0, 1)).astype(np.float64)
-    made = encode_rows(lambda rows: values[rows], (height, 5), most, ("clamp", "repeat"))
+    max_values = values.max(axis=(0, 1)).astype(np.float64)
+    made = encode_rows(lambda rows: values[rows], (height, 5), max_values, ("clamp", "repeat"))
     assert made.pixels.dtype == np.uint8
     assert made.wrap == ("clamp", "repeat")
-    display = np.round(255 * (get_texture_values(made) / most) ** (1 / 2.2))
-    np.testing.assert_allclose(display, 255 * (values / most) ** (1 / 2.2), atol=4)
+    display = np.round(255 * (get_texture_values(made) / max_values) ** (1 / 2.2))
+    np.testing.assert_allclose(display, 255 * (values / max_values) ** (1 / 2.2), atol=4)
     np.testing.assert_allclose(mean_value(made), values.mean(axis=(0, 1)), rtol=2e-3)
 
 
@@ -61,8 +61,8 @@ def test_pyramids_of_bytes_are_those_of_their_values(size: tuple[int, int]) -> N
     assert [level.shape for level in of_bytes.levels] == [level.shape for level in of_values.levels]
     uv = np.random.default_rng(4).uniform(-2, 2, (500, 2)).astype(np.float32)
     for footprint in (0.0, 0.1, 0.4, 3.0):
-        found, wanted = (pyramid.sample(uv, np.full(500, footprint, np.float32)) for pyramid in (of_bytes, of_values))
-        np.testing.assert_allclose(found, wanted, rtol=1e-3, atol=1e-4)
+        actual, wanted = (pyramid.sample(uv, np.full(500, footprint, np.float32)) for pyramid in (of_bytes, of_values))
+        np.testing.assert_allclose(actual, wanted, rtol=1e-3, atol=1e-4)
 
 
 def scene_with(texture: Texture) -> Scene:
@@ -75,9 +75,9 @@ def test_bytes_and_codings_are_kept_in_archives(tmp_path: Path) -> None:
     coded = Texture(random_bytes(), ("mirror", "clamp"), TextureEncoding("srgb", (0.5, 1.0, 2.0)))
     scene = scene_with(coded)
     save_scene(scene, tmp_path)
-    kept = load_scene(tmp_path).materials[0].textures["diffuse"]
-    np.testing.assert_array_equal(kept.pixels, coded.pixels)
-    assert (kept.wrap, kept.encoding) == (coded.wrap, coded.encoding)
+    loaded = load_scene(tmp_path).materials[0].textures["diffuse"]
+    np.testing.assert_array_equal(loaded.pixels, coded.pixels)
+    assert (loaded.wrap, loaded.encoding) == (coded.wrap, coded.encoding)
     other = scene_with(dataclasses.replace(coded, encoding=TextureEncoding("srgb")))
     assert other.id != scene.id
 

@@ -21,15 +21,15 @@ def test_look_ups_between_corners_are_what_is_between_their_colours() -> None:
     rng = np.random.default_rng(3)
     calm = 0.5 + 0.15 * rng.random((50, 3, 4))
     gaudy = rng.random((50, 3, 4))
-    for corners, most in ((calm, 0.006), (gaudy, 0.1)):
+    for corners, max_error in ((calm, 0.006), (gaudy, 0.1)):
         image, places, white = draw_color_image(corners.astype(np.float32))
         pyramid = MipMap(Texture(np.ascontiguousarray(image[..., :3]), WRAP, TextureEncoding("srgb")))
         share = rng.dirichlet([1, 1, 1], (50, 40))
         uv = np.einsum("nkc,ncd->nkd", share, places).reshape(-1, 2).astype(np.float32)
-        found = pyramid.sample(uv, np.zeros(len(uv), np.float32))
+        sampled = pyramid.sample(uv, np.zeros(len(uv), np.float32))
         expected = np.einsum("nkc,ncd->nkd", share, corners[..., :3]).reshape(-1, 3)
-        assert np.abs(found - expected).max() < most
-        assert np.sqrt(np.mean((found - expected) ** 2)) < 0.012
+        assert np.abs(sampled - expected).max() < max_error
+        assert np.sqrt(np.mean((sampled - expected) ** 2)) < 0.012
         np.testing.assert_array_equal(pyramid.sample(white[None], np.zeros(1, np.float32)), [[1, 1, 1]])
 
 

@@ -62,12 +62,12 @@ def test_meshopt_unpacks_as_its_reference_does(name: str) -> None:
     packed, count, stride = base64.b64decode(vector["packed"]), vector["count"], vector["stride"]
     plain = np.frombuffer(base64.b64decode(vector["plain"]), np.uint8)
     if vector["mode"] == "ATTRIBUTES":
-        found = FILTERS[vector["filter"]](decode_vertices(packed, count, stride)).reshape(-1)
+        decoded = FILTERS[vector["filter"]](decode_vertices(packed, count, stride)).reshape(-1)
     else:
         decode = decode_triangles if vector["mode"] == "TRIANGLES" else decode_sequence
-        found = decode(packed, count).astype(f"<u{stride}").view(np.uint8)
+        decoded = decode(packed, count).astype(f"<u{stride}").view(np.uint8)
     if vector["filter"] == "OCTAHEDRAL":  # halves are rounded to even numbers here, up there
         kind = "i1" if stride == 4 else "<i2"
-        assert np.abs(found.view(kind).astype(int) - plain.view(kind)).max() <= 1
+        assert np.abs(decoded.view(kind).astype(int) - plain.view(kind)).max() <= 1
     else:
-        np.testing.assert_array_equal(found, plain)
+        np.testing.assert_array_equal(decoded, plain)

@@ -264,10 +264,10 @@ def test_an_image_that_is_repeated_more_often_than_another_is_tiled() -> None:
     material = {"normalTexture": of_bumps, "pbrMetallicRoughness": {"baseColorTexture": of_base, "metallicFactor": 0}}
     scene = imported(glb.quad(material))
     assert not scene.warnings
-    found = scene.materials[0].normal_map
-    assert found is not None
+    normal_map = scene.materials[0].normal_map
+    assert normal_map is not None
     # u of the bumps is 4 u of the base − 0.5, two texels of four; v is 2 v + 0.5, three of six
-    np.testing.assert_array_equal(found.pixels, np.tile(np.roll(bumps, (-3, 2), axis=(0, 1)), (2, 4, 1)))
+    np.testing.assert_array_equal(normal_map.pixels, np.tile(np.roll(bumps, (-3, 2), axis=(0, 1)), (2, 4, 1)))
     np.testing.assert_allclose(scene.meshes[0].uvs, QUAD_UVS * [0.5, 2] + [0.25, 0.5])
 
 

@@ -19,8 +19,8 @@ LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 
 def instanced(node: dict[str, Any] | None = None, **attributes: Any) -> Glb:
     glb = Glb().quad()
-    known = {name: glb.accessor(np.asarray(values, np.float32)) for name, values in attributes.items()}
-    extension = {"EXT_mesh_gpu_instancing": {"attributes": known}}
+    accessors = {name: glb.accessor(np.asarray(values, np.float32)) for name, values in attributes.items()}
+    extension = {"EXT_mesh_gpu_instancing": {"attributes": accessors}}
     glb.document["nodes"][0] |= {"name": "tree", "extensions": extension, **(node or {})}
     return glb
 
@@ -60,7 +60,7 @@ def test_many_meshes_of_one_material_are_joined(monkeypatch: pytest.MonkeyPatch)
     assert mesh.name == "tree"
     for name in ("positions", "normals", "tangents", "uvs"):
         np.testing.assert_array_equal(getattr(mesh, name), np.concatenate([getattr(m, name) for m in apart.meshes]))
-    corners = np.concatenate([one.positions[one.faces] for one in apart.meshes])
+    corners = np.concatenate([scene_mesh.positions[scene_mesh.faces] for scene_mesh in apart.meshes])
     np.testing.assert_array_equal(mesh.positions[mesh.faces], corners)
 
 
@@ -103,9 +103,9 @@ def test_nodes_that_go_round_are_shown_once_and_said() -> None:
     scene = imported(glb)
     assert len(scene.meshes) == 2
     np.testing.assert_allclose(scene.meshes[1].positions, QUAD + np.array([1, 1, 0]), atol=1e-6)
-    told = sorted(str(warning) for warning in scene.warnings)
-    assert [warning.split(" is ")[0] for warning in told] == ["node 0 ('tree')", "node 1 ('')", "node 2 ('')"]
-    assert all("reached twice" in warning for warning in told)
+    messages = sorted(str(warning) for warning in scene.warnings)
+    assert [warning.split(" is ")[0] for warning in messages] == ["node 0 ('tree')", "node 1 ('')", "node 2 ('')"]
+    assert all("reached twice" in warning for warning in messages)
 
 
 @pytest.mark.parametrize("extension", [[], {"attributes": 3}, {"attributes": {"TRANSLATION": -1}}, {}])

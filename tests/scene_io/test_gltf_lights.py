@@ -92,8 +92,8 @@ def test_material_without_emission_is_no_light() -> None:
 
 
 def test_equal_names_are_told_apart_and_ranges_are_warned_of() -> None:
-    lamp = {"type": "point", "name": "Lamp/1", "range": 3.0}
-    scene = imported(with_lights([lamp, lamp]))
+    point_light = {"type": "point", "name": "Lamp/1", "range": 3.0}
+    scene = imported(with_lights([point_light, point_light]))
     assert [light.name for light in scene.lights] == ["Lamp-1", "Lamp-1 2"]
     assert len([warning for warning in scene.warnings if "range" in warning]) == 2
 

@@ -62,8 +62,8 @@ def test_specular_gives_both_ends_of_the_fresnel_curve() -> None:
     cos_theta_d = np.linspace(0, 1, 5)
     for channel, wanted in enumerate([0.5 / 9, 1 / 9, 1.0]):
         expected = 0.4 * schlick(cos_theta_d, wanted)
-        found = ggx["color"][channel] * schlick(cos_theta_d, ggx["params"]["f0"][channel])
-        np.testing.assert_allclose(found, expected, atol=1e-6)
+        actual = ggx["color"][channel] * schlick(cos_theta_d, ggx["params"]["f0"][channel])
+        np.testing.assert_allclose(actual, expected, atol=1e-6)
 
 
 def test_metals_do_not_mind_what_is_said_of_dielectrics() -> None:
@@ -89,9 +89,9 @@ def test_a_coat_is_a_second_highlight_that_dims_what_is_below() -> None:
     assert coat["params"] == {"roughness": 0.1, "f0": 0.04}
     for under, plain in ((lambert, bare[0]), (below, bare[1])):
         assert under["color"] == plain["color"]
-        kept = np.array(under["curves"]["theta_o"]["factors"])
-        middle = np.cos((np.arange(len(kept)) + 0.5) * np.pi / 2 / len(kept))
-        np.testing.assert_allclose(kept, 1 - 0.5 * schlick(middle, 0.04), atol=2e-3)
+        transmitted = np.array(under["curves"]["theta_o"]["factors"])
+        middle = np.cos((np.arange(len(transmitted)) + 0.5) * np.pi / 2 / len(transmitted))
+        np.testing.assert_allclose(transmitted, 1 - 0.5 * schlick(middle, 0.04), atol=2e-3)
 
 
 def test_anisotropy_stretches_along_the_turned_tangent() -> None:
@@ -121,9 +121,9 @@ def test_it_is_told_where_a_coat_has_other_bumps_than_what_it_covers(is_bumpy, h
     bumps = {"index": glb.texture([[[200, 150, 220]]])}
     coat = {"clearcoatFactor": 1} | ({"clearcoatNormalTexture": bumps} if has_own else {})
     scene = imported({"clearcoat": coat}, glb, **({"normalTexture": bumps} if is_bumpy else {}))
-    told = [str(warning) for warning in scene.warnings if "coat" in str(warning)]
-    assert len(told) == (words is not None)
-    assert all(words in warning for warning in told)
+    messages = [str(warning) for warning in scene.warnings if "coat" in str(warning)]
+    assert len(messages) == (words is not None)
+    assert all(words in warning for warning in messages)
 
 
 def test_a_turned_normal_map_means_the_same_directions() -> None:
@@ -163,15 +163,15 @@ def test_sheen_is_a_term_that_dims_what_lies_below_it() -> None:
 def test_what_lies_below_a_sheen_is_dimmed_as_the_specification_says(theta_o: float) -> None:
     """min(1 − E(θi), 1 − E(θo)): of even light as much to the thousandth, of light from anywhere about as much."""
     theta = (np.arange(300) + 0.5) * np.pi / 600
-    kept = 1 - sheen_albedo(theta, 0.8)
-    expected, arriving = np.minimum(kept, np.interp(theta_o, theta, kept)), np.sin(theta) * np.cos(theta)
+    transmitted = 1 - sheen_albedo(theta, 0.8)
+    expected, weights = np.minimum(transmitted, np.interp(theta_o, theta, transmitted)), np.sin(theta) * np.cos(theta)
     light, view = sheen_attenuation(1.0, 0.8, by_light=True)
     shown = light(theta) * view(np.array(theta_o))
-    assert shown @ arriving == pytest.approx(expected @ arriving, rel=1e-3)
-    error = np.sqrt((shown - expected) ** 2 @ arriving / (expected**2 @ arriving))
+    assert shown @ weights == pytest.approx(expected @ weights, rel=1e-3)
+    error = np.sqrt((shown - expected) ** 2 @ weights / (expected**2 @ weights))
     assert error < 0.12  # by the viewer's angle alone it is 0.18 where that is large, and 0.15 where it is small
     by_view = sheen_attenuation(1.0, 0.8, by_light=False)[1](np.array(theta_o))
-    assert by_view * arriving.sum() == pytest.approx(expected @ arriving, rel=1e-3)
+    assert by_view * weights.sum() == pytest.approx(expected @ weights, rel=1e-3)
 
 
 @pytest.mark.parametrize(

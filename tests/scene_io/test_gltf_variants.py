@@ -138,7 +138,9 @@ def test_a_variant_as_rough_follows_the_map_and_one_with_another_has_its_mean() 
     glb = Glb()
     own, other = (glb.texture([[[0, low, 0], [0, high, 0]]]) for low, high in ((50, 200), (10, 30)))
     rough = [{"metallicRoughnessTexture": {"index": index}} for index in (own, own, other)]
-    materials = [plain(name, 1, 1, 1, **of) for name, of in zip(("own", "same", "smooth"), rough, strict=True)]
+    materials = [
+        plain(name, 1, 1, 1, **parameters) for name, parameters in zip(("own", "same", "smooth"), rough, strict=True)
+    ]
     mappings = [[{"material": 1, "variants": [0]}, {"material": 2, "variants": [1]}]]
     scene = imported(dressed(glb, materials, mappings))
     day, night = (scene.variants[name]["materials"]["own"]["terms"][1] for name in ("day", "night"))

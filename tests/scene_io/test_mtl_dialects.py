@@ -145,11 +145,11 @@ def test_plastic_of_every_program_reflects_as_a_dielectric(
     assert [term["model"] for term in material.terms[:2]] == ["lambert", "ggx"]
     assert params_of(material)["f0"] == pytest.approx([f0] * 3, abs=1e-6)
     assert params_of(material)["roughness"] == pytest.approx(roughness, abs=1e-3)
-    (remark,) = scene.warnings
-    assert remark.startswith("Ks of material 'M' is read as ")
-    assert "4 % (F0 0.04)" in remark
-    assert ("Blender" in remark) == library.startswith("# Blender")
-    assert remark.severity == "approximated"
+    (import_warning,) = scene.warnings
+    assert import_warning.startswith("Ks of material 'M' is read as ")
+    assert "4 % (F0 0.04)" in import_warning
+    assert ("Blender" in import_warning) == library.startswith("# Blender")
+    assert import_warning.severity == "approximated"
 
 
 def test_a_coat_of_the_pbr_extension_is_a_coat(tmp_path: Path) -> None:
@@ -201,8 +201,8 @@ def test_images_that_stand_alone_are_not_dimmed_by_numbers_that_are_not_there(tm
 def test_one_remark_tells_of_all_materials(tmp_path: Path) -> None:
     (tmp_path / "m.mtl").write_text(MAYA + MAYA.replace("newmtl M", "newmtl N"))
     (tmp_path / "thing.obj").write_text(TRIANGLE + "usemtl N\nf 3/3 2/2 1/1\n")
-    (remark,) = import_scene(tmp_path / "thing.obj", "thing", LIGHT).warnings
-    assert "'M' and 1 more" in remark
+    (import_warning,) = import_scene(tmp_path / "thing.obj", "thing", LIGHT).warnings
+    assert "'M' and 1 more" in import_warning
 
 
 @pytest.mark.parametrize("line", ["Ka spectral x.rfl", "illum on", "Pc -1", "aniso nan"])
@@ -257,11 +257,11 @@ def test_a_lost_map_is_wrong_and_named(tmp_path: Path, line: str, words: tuple[s
     (tmp_path / "broken.png").write_bytes(b"no image")
     scene = scene_of(tmp_path, f"newmtl M\nKd 1 1 1\n{line}\n")
     assert scene.materials[0].normal_map is None
-    (remark,) = scene.warnings
-    assert remark.severity == "unsupported"
-    assert all(word in remark for word in words)
+    (import_warning,) = scene.warnings
+    assert import_warning.severity == "unsupported"
+    assert all(word in import_warning for word in words)
 
 
 def test_a_map_of_ambient_light_is_not_missed(tmp_path: Path) -> None:
-    (remark,) = scene_of(tmp_path, "newmtl M\nKd 1 1 1\nmap_Ka x.png\n").warnings
-    assert remark.severity == "ignored"
+    (import_warning,) = scene_of(tmp_path, "newmtl M\nKd 1 1 1\nmap_Ka x.png\n").warnings
+    assert import_warning.severity == "ignored"

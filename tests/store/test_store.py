@@ -201,7 +201,7 @@ def test_absurd_metadata_is_refused_before_anything_is_allocated(tmp_path: Path,
         open_store(store)
 
 
-@pytest.mark.parametrize("place", ["codecs", "index_codecs"])
+@pytest.mark.parametrize("field", ["codecs", "index_codecs"])
 @pytest.mark.parametrize(
     "names",
     [
@@ -214,12 +214,12 @@ def test_absurd_metadata_is_refused_before_anything_is_allocated(tmp_path: Path,
     ],
 )
 def test_what_names_other_codecs_than_relumes_is_not_handed_to_them(
-    tmp_path: Path, place: str, names: list[str] | None
+    tmp_path: Path, field: str, names: list[str] | None
 ) -> None:
     store = build(tmp_path)
     document = json.loads((store / SPEC.path / "zarr.json").read_text())
     configuration = document["codecs"][0]["configuration"]
-    configuration[place] = None if names is None else [{"name": name, "configuration": {}} for name in names]
+    configuration[field] = None if names is None else [{"name": name, "configuration": {}} for name in names]
     edit_json(store / SPEC.path / "zarr.json", codecs=document["codecs"])
     with pytest.raises(StoreError, match=r"other codecs|unreadable metadata"):
         open_store(store)

@@ -32,16 +32,16 @@ ROOM = {"ggx": {"roughness": 0.1}, "cook_torrance": {"sigma": 0.1}, "ward_anisot
 FINE = {"ggx": 150, "cook_torrance": 80, "ward_anisotropic": 80}  # a side; of the first 0.3 % off, of others 0.04 %
 
 
-def floor_under(lamp, *, is_seen=True):
+def floor_under(light, *, is_visible=True):
     """A floor that is seen from above, and all of a lamp's samples seen, or none."""
     x, z = (a.ravel() for a in np.meshgrid(np.linspace(-1, 1, SIDE), np.linspace(-1.2, 1.2, SIDE)))
     position = np.stack([x, 0 * x, z], axis=1)
     normal, tangent = (np.tile(np.array(axis, np.float32), (len(x), 1)) for axis in ([0, 1, 0], [1, 0, 0]))
     wo = ref.unit(np.array([0, 1.5, 3.0]) - position).astype(np.float32)
-    strata = make_light_strata(lamp, 64)
-    seen = np.full((len(x), len(strata.uv) // 8), 255 if is_seen else 0, np.uint8)
+    strata = make_light_strata(light, 64)
+    visible = np.full((len(x), len(strata.uv) // 8), 255 if is_visible else 0, np.uint8)
     points = SurfacePoints(position.astype(np.float32), normal, tangent, np.arange(len(x), dtype=np.uint32))
-    rays = LocalRays(lamp, strata, np.ones(3, np.float32), seen)
+    rays = LocalRays(light, strata, np.ones(3, np.float32), visible)
     return ShadingPoints(points, wo, np.empty((len(x), 0), np.uint8), (rays,))
 
 
@@ -54,11 +54,11 @@ def by_quadrature(term, bands, receivers, fine):
     """What a floor gets of `PANEL`, the mean over many places of it at their exact angles. (n, 3)"""
     corner, (e, f) = rectangle(PANEL)
     step = (np.arange(fine) + 0.5) / fine
-    place = corner + (step[:, None, None] * e + step[:, None] * f).reshape(-1, 3)
+    positions = corner + (step[:, None, None] * e + step[:, None] * f).reshape(-1, 3)
     normal = np.cross(e, f)
     out = []
     for position, wo in zip(receivers.points.position.astype(float), receivers.wo.astype(float), strict=True):
-        away = place - position
+        away = positions - position
         squared = (away**2).sum(axis=1)
         x, y, z = ref.unit(away).T
         wi, o = np.stack([x, -z, y], axis=1), np.array([wo[0], -wo[2], wo[1]])
@@ -71,9 +71,9 @@ def by_quadrature(term, bands, receivers, fine):
     return np.array(out)
 
 
-def error(found, expected):
+def error(actual, expected):
     """Relative RMSE."""
-    return np.sqrt(np.square(found - expected).mean() / np.square(expected).mean())
+    return np.sqrt(np.square(actual - expected).mean() / np.square(expected).mean())
 
 
 @pytest.mark.parametrize("model", ROOM)
@@ -82,8 +82,8 @@ def test_lamps_have_no_grain_in_narrow_lobes(model):
     term, bands = curves_of(model, ROOM[model])
     receivers = floor_under(prepare_local_lights(PANEL))
     expected = by_quadrature(term, bands, receivers, FINE[model])
-    found = Shader(term, contract(term, bands, None), NO_LIGHTS, receivers).project(0, SIDE**2)[:, 0]
-    assert error(found, expected) < 0.01
+    radiance = Shader(term, contract(term, bands, None), NO_LIGHTS, receivers).project(0, SIDE**2)[:, 0]
+    assert error(radiance, expected) < 0.01
     for active in (c.name for c in term.curves if not c.depends_on_view):
         transport = Projector(term, contract(term, bands, active), NO_LIGHTS, receivers).project(0, SIDE**2)
         assert error(np.einsum("njc,cj->nc", transport.astype(float), bands[active]), expected) < 0.01
@@ -91,7 +91,7 @@ def test_lamps_have_no_grain_in_narrow_lobes(model):
 
 def test_a_lamp_that_nobody_sees_gives_nothing():
     term, bands = curves_of("ggx", {})
-    hidden = floor_under(prepare_local_lights(PANEL), is_seen=False)
+    hidden = floor_under(prepare_local_lights(PANEL), is_visible=False)
     assert not Shader(term, contract(term, bands, None), NO_LIGHTS, hidden).project(0, SIDE**2).any()
 
 
@@ -101,8 +101,8 @@ def test_beside_other_light_a_lamp_is_found_less_finely():
     contraction, receivers = contract(term, bands, None), floor_under(prepare_local_lights(PANEL))
     beside = np.full((SIDE**2, 3), 2.0, np.float32)
     alone = Shader(term, contraction, NO_LIGHTS, receivers).project(0, SIDE**2)[:, 0]
-    found = Shader(term, contraction, NO_LIGHTS, receivers, beside).project(0, SIDE**2)[:, 0]
-    away = np.abs(found - alone)
+    radiance = Shader(term, contraction, NO_LIGHTS, receivers, beside).project(0, SIDE**2)[:, 0]
+    away = np.abs(radiance - alone)
     assert 1e-6 < away.max() < 1e-3 * (2 + alone.max())
 
 
@@ -117,17 +117,17 @@ def panel_in(columns, rows, begin=0.0, end=1.0):
 
 
 @pytest.mark.parametrize(
-    ("columns", "rows", "roughness", "most"), [(1, 1, 0.1, 0.01), (4, 1, 0.1, 0.02), (24, 16, 0.3, 0.05)]
+    ("columns", "rows", "roughness", "max_error"), [(1, 1, 0.1, 0.01), (4, 1, 0.1, 0.02), (24, 16, 0.3, 0.05)]
 )
-def test_a_mesh_shines_as_the_panel_that_it_is(columns, rows, roughness, most):
+def test_a_mesh_shines_as_the_panel_that_it_is(columns, rows, roughness, max_error):
     """Parts of several pieces overlap and leave gaps, of which a narrower lobe would see something."""
     term, bands = curves_of("ggx", {"roughness": roughness})
     mesh = prepare_local_lights(MESH, make_emissive_triangles(panel_in(columns, rows), False))
-    expected, found = (
-        Shader(term, contract(term, bands, None), NO_LIGHTS, floor_under(lamp)).project(0, SIDE**2)[:, 0]
-        for lamp in (prepare_local_lights(PANEL), mesh)
+    expected, actual = (
+        Shader(term, contract(term, bands, None), NO_LIGHTS, floor_under(light)).project(0, SIDE**2)[:, 0]
+        for light in (prepare_local_lights(PANEL), mesh)
     )
-    assert error(found, expected) < most
+    assert error(actual, expected) < max_error
 
 
 def test_what_a_wall_leaves_of_a_lamp_is_mirrored():
@@ -141,13 +141,13 @@ def test_what_a_wall_leaves_of_a_lamp_is_mirrored():
         for ends in ((0, 1), (-2.3, 3.1))
     )
     of_panel, strata = floor_under(open_air), make_light_strata(behind, MESH_SAMPLE_FACTOR * SAMPLES)
-    seen = trace_light_visibility(blocks, 1e-5, behind, strata, of_panel.points)
-    of_lamp = replace(of_panel, rays=(LocalRays(behind, strata, np.ones(3, np.float32), seen),))
-    expected, found = (
+    visibility = trace_light_visibility(blocks, 1e-5, behind, strata, of_panel.points)
+    lit = replace(of_panel, rays=(LocalRays(behind, strata, np.ones(3, np.float32), visibility),))
+    expected, actual = (
         Shader(term, contract(term, bands, None), NO_LIGHTS, receivers).project(0, SIDE**2)[:, 0]
-        for receivers in (of_panel, of_lamp)
+        for receivers in (of_panel, lit)
     )
-    assert error(found, expected) < 0.05
+    assert error(actual, expected) < 0.05
 
 
 @pytest.mark.parametrize(("num_pieces", "num"), [(1, 64), (2, 256), (50, 256), (1000, 256), (3, 4), (1, 1)])
@@ -166,7 +166,7 @@ def test_what_does_not_lie_flat_is_asked_sample_by_sample():
     sides = [corners, corners[:, [1, 2, 0]], corners[:, [2, 0, 1]]]
     faces = [f for side in sides for f in (side, side[::-1] + np.cross(*np.diff(side, axis=0)[:2]))]
     triangles = np.array([t for f in faces for t in (f[[0, 1, 2]], f[[0, 2, 3]])])
-    lamp = prepare_local_lights(MESH, make_emissive_triangles(triangles, True))
-    parts = make_emitter_parts(lamp, make_light_strata(lamp, 64))
+    light = prepare_local_lights(MESH, make_emissive_triangles(triangles, True))
+    parts = make_emitter_parts(light, make_light_strata(light, 64))
     assert np.all(parts.radius[:5] == NOT_FLAT_RADIUS)
     assert 0.3 < np.mean(parts.radius[85:] < 1) < 1

@@ -76,9 +76,9 @@ def test_random_triangles_in_any_order_of_corners():
     rng = np.random.default_rng(1)
     for extent in (1, 6, 40, 250):
         for corners in rng.uniform(0, 256 - extent) + rng.uniform(0, extent, (25, 3)):
-            found = [shares_of(corners[order])[0] for order in ([0, 1, 2], [2, 0, 1], [1, 0, 2], [2, 1, 0])]
-            np.testing.assert_array_equal(found, np.broadcast_to(found[0], (4, NUM_BANDS)))
-            np.testing.assert_allclose(np.cumsum(found[0]), fine_below(corners), atol=2.5 / FINE)
+            shares = [shares_of(corners[order])[0] for order in ([0, 1, 2], [2, 0, 1], [1, 0, 2], [2, 1, 0])]
+            np.testing.assert_array_equal(shares, np.broadcast_to(shares[0], (4, NUM_BANDS)))
+            np.testing.assert_allclose(np.cumsum(shares[0]), fine_below(corners), atol=2.5 / FINE)
 
 
 def test_shares_are_not_negative_and_sum_to_one():

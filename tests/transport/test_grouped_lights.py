@@ -20,11 +20,11 @@ def lights():
 @pytest.mark.parametrize("num_points", [1, 48, 64])
 @pytest.mark.parametrize("num_lights", [5, 64, 603])
 def test_bits_turned_over_and_back_are_the_same(num_points, num_lights):
-    seen = np.random.default_rng(1).random((num_points, num_lights)) < 0.5
-    rows = np.packbits(seen, axis=1, bitorder="little")
+    visible = np.random.default_rng(1).random((num_points, num_lights)) < 0.5
+    rows = np.packbits(visible, axis=1, bitorder="little")
     words = np.empty(num_lights, np.uint64)
     rows_to_words(rows, words)
-    expected = [sum(1 << k for k in np.flatnonzero(of_light).tolist()) for of_light in seen.T]
+    expected = [sum(1 << k for k in np.flatnonzero(of_light).tolist()) for of_light in visible.T]
     assert words.tolist() == expected
     back = np.empty_like(rows)
     words_to_rows(words, back)
@@ -47,20 +47,20 @@ def test_a_group_is_as_bright_as_its_lights_from_every_side(lights):
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     alone = luminance(lights.irradiance)[groups.light_index] * (normals @ lights.direction[groups.light_index].T)
     expected = np.add.reduceat(alone, groups.first[:-1], axis=1)
-    found = luminance(groups.lights.irradiance) * (normals @ groups.lights.direction.T)
-    np.testing.assert_allclose(found, expected, atol=1e-5 * np.abs(expected).max())
+    brightness = luminance(groups.lights.irradiance) * (normals @ groups.lights.direction.T)
+    np.testing.assert_allclose(brightness, expected, atol=1e-5 * np.abs(expected).max())
 
 
 def test_lights_of_groups_that_are_wholly_seen_are_taken(lights):
     groups, rng = lights.groups, np.random.default_rng(3)
-    seen = rng.random((lights.num_lights, 48)) < 0.8
-    words = (seen * (np.uint64(1) << np.arange(48, dtype=np.uint64))).sum(axis=1, dtype=np.uint64)
+    visible = rng.random((lights.num_lights, 48)) < 0.8
+    words = (visible * (np.uint64(1) << np.arange(48, dtype=np.uint64))).sum(axis=1, dtype=np.uint64)
     whole = np.empty(groups.lights.num_lights, np.uint64)
     select_groups(words, groups.first, groups.light_index, whole)
     for g, (first, end) in enumerate(zip(groups.first[:-1], groups.first[1:], strict=True)):
         parts = groups.light_index[first:end]
-        is_whole = seen[parts].all(axis=0)
+        is_whole = visible[parts].all(axis=0)
         assert [bool(int(whole[g]) >> k & 1) for k in range(48)] == is_whole.tolist()
-        seen[parts] &= ~is_whole
-    assert [[bool(int(word) >> k & 1) for k in range(48)] for word in words] == seen.tolist()
+        visible[parts] &= ~is_whole
+    assert [[bool(int(word) >> k & 1) for k in range(48)] for word in words] == visible.tolist()
     assert whole.any()

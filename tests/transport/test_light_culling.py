@@ -66,18 +66,18 @@ def test_list_holds_the_seen_lights_in_order(support):
         np.array([int(Angle.THETA_H)]), np.array([support], np.float32), 0, 9, first, light, wi, wo,
     )  # fmt: skip
     assert num == first[-1]
-    seen = ref.visible_lights(receivers, lights.num_lights)
+    visible = ref.visible_lights(receivers, lights.num_lights)
     corners = lights.nodes[:, :3].transpose(2, 1, 0).astype(float)
     for row, frame in enumerate(ref.frames(receivers)):
         listed = light[first[row] : first[row + 1]]
         local_wo = frame @ receivers.wo[row].astype(float)
-        assert set(listed) <= set(np.nonzero(seen[row])[0])
+        assert set(listed) <= set(np.nonzero(visible[row])[0])
         assert list(listed) == sorted(listed)
         np.testing.assert_allclose(wi[:, first[row] : first[row + 1]].T, lights.direction[listed] @ frame.T, atol=1e-6)
         np.testing.assert_allclose(wo[:, first[row] : first[row + 1]].T - local_wo, 0, atol=1e-6)
         nearest = angles_numpy(Angle.THETA_H, corners @ frame.T, local_wo).min(axis=1)
-        assert set(np.nonzero(seen[row] & (nearest <= support))[0]) <= set(listed)
-    assert (num == seen.sum()) == np.isinf(support)
+        assert set(np.nonzero(visible[row] & (nearest <= support))[0]) <= set(listed)
+    assert (num == visible.sum()) == np.isinf(support)
 
 
 @pytest.mark.parametrize("pair", [(Angle.ALPHA, Angle.BETA), (Angle.TILT_X, Angle.TILT_Y)])
@@ -86,11 +86,11 @@ def test_two_angles_of_the_half_vector_bound_the_third(pair):
         ref.unit(RNG.normal((0, 0, 1), 1, size=(20_000, 3))),
         ref.unit(np.array([0.3, -0.4, 0.8])),
     )
-    one, other, half = (angles_numpy(angle, wi, wo) for angle in (*pair, Angle.THETA_H))
+    first, second, half = (angles_numpy(angle, wi, wo) for angle in (*pair, Angle.THETA_H))
     given = np.array([Angle.THETA_D, *pair], np.int64)
     kinds, support = with_half_angle(given, np.array([1.6, 0.5, 0.2], np.float32))
     assert list(kinds) == [*given, Angle.THETA_H]
-    reached = half[(one <= 0.5) & (other <= 0.2)]
+    reached = half[(first <= 0.5) & (second <= 0.2)]
     assert reached.max() <= support[-1] + 1e-3
     assert reached.max() > 0.9 * support[-1]  # no closer bound is wanted
     kinds, _ = with_half_angle(given, np.array([1.6, np.inf, 0.2], np.float32))

@@ -39,8 +39,8 @@ def test_chrome_in_even_light_is_even(roughness, lights):
     tilt = any_tangent(normal) * np.tan(np.radians(rng.uniform(0, 60, (600, 1)))).astype(np.float32)
     wo = (normal + tilt) / np.linalg.norm(normal + tilt, axis=1, keepdims=True)
     chrome = {"model": "ggx", "params": {"roughness": roughness, "f0": 1.0}}
-    found = shown(chrome, lights, normal, np.ascontiguousarray(wo, np.float32))
-    assert 0.94 < found.mean() < 1.01
-    assert found.std() < 0.04
-    assert found.min() > 0.75
-    assert found.max() < 1.25
+    radiance = shown(chrome, lights, normal, np.ascontiguousarray(wo, np.float32))
+    assert 0.94 < radiance.mean() < 1.01
+    assert radiance.std() < 0.04
+    assert radiance.min() > 0.75
+    assert radiance.max() < 1.25

@@ -48,15 +48,15 @@ def test_what_a_term_sends_on_is_its_double_integral(model, params, sides):
     document = {**PLAIN, "model": model, "params": params}
     wi, wo, h_i, h_o = sides
     value = np.ascontiguousarray(np.pi**2 * eval_brdf(document, wi, wo)[:, 0])
-    found, rungs = reflectance_matrix(document), recurrence(OUTGOING_DEGREE)
+    matrix, table = reflectance_matrix(document), recurrence(OUTGOING_DEGREE)
     for pair, (j, k) in enumerate(PAIRS):
-        drawn = value * h_i[rungs.cosine[k]] * h_o[rungs.cosine[j]]
-        if rungs.order[j]:  # the same of cosine and sine parts; where a term is not isotropic, their mean
-            drawn = (drawn + value * h_i[rungs.sine[k]] * h_o[rungs.sine[j]]) / 2
+        drawn = value * h_i[table.cosine[k]] * h_o[table.cosine[j]]
+        if table.order[j]:  # the same of cosine and sine parts; where a term is not isotropic, their mean
+            drawn = (drawn + value * h_i[table.sine[k]] * h_o[table.sine[j]]) / 2
         deviation = drawn.std() / np.sqrt(1_000_000)
-        assert found[0, pair] == pytest.approx(drawn.mean(), abs=5 * deviation + 2e-3)
-    np.testing.assert_allclose(found[1], found[0] / 2, rtol=1e-6)
-    assert not found[2].any()
+        assert matrix[0, pair] == pytest.approx(drawn.mean(), abs=5 * deviation + 2e-3)
+    np.testing.assert_allclose(matrix[1], matrix[0] / 2, rtol=1e-6)
+    assert not matrix[2].any()
 
 
 def test_a_table_holds_what_its_functions_send():
@@ -70,9 +70,9 @@ def test_a_table_holds_what_its_functions_send():
     wo = over_hemisphere(4_000, 3)
     for row, cell in enumerate((0, 2, 3)):
         exact = even[cell] + project(wo)[:, :NUM_OUTGOING] @ vectors[row].T
-        found = np.array([ref.evaluate_outgoing(sent, cell, w) for w in wo])
-        assert np.linalg.norm(found - exact) < 0.12 * np.linalg.norm(exact - even[cell])
-        assert np.abs(found.mean(axis=0) - exact.mean(axis=0)).max() < 0.01
+        radiance = np.array([ref.evaluate_outgoing(sent, cell, w) for w in wo])
+        assert np.linalg.norm(radiance - exact) < 0.12 * np.linalg.norm(exact - even[cell])
+        assert np.abs(radiance.mean(axis=0) - exact.mean(axis=0)).max() < 0.01
     np.testing.assert_array_equal(ref.evaluate_outgoing(sent, 1, wo[0]), even[1])
 
 
@@ -94,14 +94,16 @@ def test_narrow_lobes_see_fewer_rings_about_what_metals_send_and_no_sharper_ones
         light = sent.isotropic[:50, None, 0] + sent.scale[:, :1] * table[..., 0]
         return light.min(axis=1) / light.max(axis=1)
 
-    known = {roughness: sent_of_one_direction(roughness) for roughness in (0.01, 0.1, 0.3, 0.6)}
-    for sent, _ in known.values():
+    outgoing = {roughness: sent_of_one_direction(roughness) for roughness in (0.01, 0.1, 0.3, 0.6)}
+    for sent, _ in outgoing.values():
         assert np.all(lowest(sent, sent.smooth) > lowest(sent, sent.table))
-    sharp, rough = known[0.01][0], known[0.3][0]
+    sharp, rough = outgoing[0.01][0], outgoing[0.3][0]
     assert np.median(lowest(sharp, sharp.table)) < np.median(lowest(rough, rough.table)) - 0.1
     assert np.median(lowest(sharp, sharp.smooth)) > np.median(lowest(rough, rough.smooth)) - 0.02
-    np.testing.assert_allclose(known[0.3][1], WINDOW_DECAY, rtol=0.04)  # from there on all is as the highlight has it
-    np.testing.assert_allclose(known[0.6][1], WINDOW_DECAY, rtol=1e-6)
+    np.testing.assert_allclose(
+        outgoing[0.3][1], WINDOW_DECAY, rtol=0.04
+    )  # from there on all is as the highlight has it
+    np.testing.assert_allclose(outgoing[0.6][1], WINDOW_DECAY, rtol=1e-6)
 
 
 def test_even_light_is_sent_evenly():

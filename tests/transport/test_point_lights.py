@@ -32,9 +32,9 @@ BANDS = {curve.name: curve_bands(DOCUMENT, curve) for curve in TERM.curves}
 
 def sky_with_sun(height):
     d = texel_directions(height, 2 * height).astype(float)
-    sky = 0.6 + 0.4 * d[..., 1:2] * [0.5, 0.8, 1.0] + 0.1 * np.sin(3 * d[..., :1])
+    radiance = 0.6 + 0.4 * d[..., 1:2] * [0.5, 0.8, 1.0] + 0.1 * np.sin(3 * d[..., :1])
     towards = ref.unit(np.float64([-1, 1.5, 1.5]))
-    return (sky + 3000 * np.exp((d @ towards - 1) / 0.03**2)[..., None] * [1, 0.9, 0.7]).astype(np.float32)
+    return (radiance + 3000 * np.exp((d @ towards - 1) / 0.03**2)[..., None] * [1, 0.9, 0.7]).astype(np.float32)
 
 
 def ball(size=16):
@@ -52,18 +52,18 @@ def truth():
     return ref.integrate_texels(DOCUMENT, sky_with_sun(128), ball())
 
 
-def errors(truth, num_lights):
+def errors(reference, num_lights):
     """Error of triangles and of points, relative to each pixel."""
     lights = tessellate_environment(sky_with_sun(256), num_lights)
     receivers = ref.only_above(ball(), lights)
     projector = Projector(TERM, contract(TERM, BANDS, None), lights, receivers)
     triangles = projector.project(0, len(receivers.normal))[:, 0]
     points = ref.project_point_lights(TERM, BANDS, lights, receivers)
-    return [float(np.sqrt(np.mean((image / truth - 1) ** 2))) for image in (triangles, points)]
+    return [float(np.sqrt(np.mean((image / reference - 1) ** 2))) for image in (triangles, points)]
 
 
-def test_triangles_are_right_where_points_break_into_dots(truth):
-    few, many = errors(truth, 500), errors(truth, 1000)
+def test_triangles_are_right_where_points_break_into_dots(reference):
+    few, many = errors(reference, 500), errors(reference, 1000)
     for num_lights, (triangles, points) in ((500, few), (1000, many)):
         print(f"{num_lights} lights: triangles {triangles:.3f}, points {points:.3f}")  # noqa: T201
         assert points > 8 * triangles

@@ -63,9 +63,9 @@ def image(model, bands, active, lights, receivers):
     return transport[:, 0] if active is None else np.einsum("njc,cj->nc", transport, bands[active])
 
 
-def relative(found, expected):
+def relative(actual, expected):
     """Largest difference in units of the largest value."""
-    return np.abs(found - expected).max() / np.abs(expected).max()
+    return np.abs(actual - expected).max() / np.abs(expected).max()
 
 
 @pytest.mark.parametrize(("model", "curve"), CURVES)
@@ -81,19 +81,22 @@ def test_any_curve_may_be_the_free_one(model, curve, bands_of, lights, receivers
 
 @pytest.mark.parametrize(("model", "curve"), CURVES)
 def test_transport_is_linear_in_each_dormant_curve(model, curve, lights, receivers):
-    one, two = coloured_bands(model, 1), coloured_bands(model, 2)
-    for dormant in {c.name for c in TERMS[model].curves if not c.depends_on_view} - {curve}:
-        parts = [project(model, {**one, dormant: of[dormant]}, curve, lights, receivers) for of in (one, two)]
-        both = {**one, dormant: 2 * one[dormant] + 3 * two[dormant]}
+    first, second = coloured_bands(model, 1), coloured_bands(model, 2)
+    for fixed in {c.name for c in TERMS[model].curves if not c.depends_on_view} - {curve}:
+        parts = [
+            project(model, {**first, fixed: curve_set[fixed]}, curve, lights, receivers)
+            for curve_set in (first, second)
+        ]
+        combined = {**first, fixed: 2 * first[fixed] + 3 * second[fixed]}
         # thousands of leaves about a pole, each rounded to float32
-        assert relative(project(model, both, curve, lights, receivers), 2 * parts[0] + 3 * parts[1]) < 6e-6
+        assert relative(project(model, combined, curve, lights, receivers), 2 * parts[0] + 3 * parts[1]) < 6e-6
 
 
 @pytest.mark.parametrize(("model", "curve"), CURVES)
 def test_transport_of_a_curve_does_not_depend_on_its_own_bands(model, curve, lights, receivers):
-    one, two = coloured_bands(model, 1), coloured_bands(model, 2)
-    first = project(model, one, curve, lights, receivers)
-    np.testing.assert_array_equal(first, project(model, {**one, curve: two[curve]}, curve, lights, receivers))
+    bands_a, bands_b = coloured_bands(model, 1), coloured_bands(model, 2)
+    first = project(model, bands_a, curve, lights, receivers)
+    np.testing.assert_array_equal(first, project(model, {**bands_a, curve: bands_b[curve]}, curve, lights, receivers))
 
 
 @pytest.mark.parametrize("curve", CURVES)
@@ -102,11 +105,13 @@ def test_shares_of_every_triangle_sum_to_one(curve, lights):
     model, name = curve
     term = TERMS[model]
     ones = {c.name: np.ones((3, c.num_bands)) for c in term.curves}
-    base, chosen = (
+    base, light_indices = (
         ref.make_random_receivers(8, lights.num_lights, seed=3),
         np.arange(0, lights.num_lights, 7),
     )
-    point, light = (index.ravel() for index in np.meshgrid(np.arange(8), chosen, indexing="ij"))  # each pair alone
+    point, light = (
+        index.ravel() for index in np.meshgrid(np.arange(8), light_indices, indexing="ij")
+    )  # each pair alone
     only = np.arange(lights.num_lights) == light[:, None]
     visible = np.packbits(only, axis=1, bitorder="little")
     frame = base.wo[point], base.normal[point], base.tangent[point]
@@ -140,22 +145,22 @@ def test_a_curve_that_becomes_flat_changes_nothing_suddenly(lights, receivers):
             nearly = {**flat, name: flat[name] * (1 + 1e-9 * np.arange(flat[name].shape[1]))}
             expected = image(model, nearly, None, lights, receivers)
             for active in (None, *names):
-                found = image(model, flat, active, lights, receivers)
-                error = np.sqrt(np.mean((found - expected) ** 2) / np.mean(expected**2))
+                actual = image(model, flat, active, lights, receivers)
+                error = np.sqrt(np.mean((actual - expected) ** 2) / np.mean(expected**2))
                 assert error < 1e-5, (model, name, active)
 
 
 @pytest.mark.parametrize(("model", "curve"), CURVES)
 def test_leaving_out_lights_that_a_dormant_curve_never_sees_loses_nothing(model, curve, lights, receivers):
     """A curve that ends early against the same one kept alive far out by a tail too small to see."""
-    for dormant in {c.name for c in TERMS[model].curves if not c.depends_on_view} - {curve}:
+    for fixed in {c.name for c in TERMS[model].curves if not c.depends_on_view} - {curve}:
         bands = coloured_bands(model)
-        ends = bands[dormant].shape[1] // 6
-        bands[dormant][:, ends:] = 0
-        kept = {**bands, dormant: bands[dormant] + 1e-8 * bands[dormant].max()}
+        ends = bands[fixed].shape[1] // 6
+        bands[fixed][:, ends:] = 0
+        raised = {**bands, fixed: bands[fixed] + 1e-8 * bands[fixed].max()}
         for active in (curve, None):
             short = project(model, bands, active, lights, receivers)
-            whole = project(model, kept, active, lights, receivers)
+            whole = project(model, raised, active, lights, receivers)
             assert relative(short, whole) < 4e-6
             assert short.max() > 0
 
@@ -180,9 +185,9 @@ def test_hidden_lights_give_nothing_and_seen_ones_add_up(lights, receivers):
             bands,
             "theta_d",
             lights,
-            replace(receivers, visible=seen),
+            replace(receivers, visible=visible),
         )
-        for seen in (some, receivers.visible & ~some, receivers.visible, np.zeros_like(some))
+        for visible in (some, receivers.visible & ~some, receivers.visible, np.zeros_like(some))
     ]
     assert relative(parts[0] + parts[1], parts[2]) < 3e-6
     assert not parts[3].any()
@@ -192,10 +197,10 @@ def test_hidden_lights_give_nothing_and_seen_ones_add_up(lights, receivers):
 def test_against_the_twin_with_exact_angles(model, lights, receivers):
     receivers = receivers.subset(np.arange(0, NUM_POINTS, 2))
     for bands in (default_bands(model), coloured_bands(model)):
-        found = image(model, bands, None, lights, receivers)
+        actual = image(model, bands, None, lights, receivers)
         exact = ref.project(TERMS[model], bands, None, lights, receivers, depth=4)[:, 0]
-        assert relative(found, exact) < 0.01
-        assert np.sqrt(np.mean((found - exact) ** 2) / np.mean(exact**2)) < 0.01
+        assert relative(actual, exact) < 0.01
+        assert np.sqrt(np.mean((actual - exact) ** 2) / np.mean(exact**2)) < 0.01
 
 
 @pytest.fixture(scope="module")
@@ -208,7 +213,9 @@ FINE_CURVES = {TERMS[model].curve(name).angle: (model, name) for model, name in 
 CREASED = (Angle.ALPHA, Angle.BETA, Angle.TILT_X, Angle.TILT_Y)
 
 
-@pytest.mark.parametrize(("angle", "model", "name"), [(angle, *of) for angle, of in sorted(FINE_CURVES.items())])
+@pytest.mark.parametrize(
+    ("angle", "model", "name"), [(angle, *curve_keys) for angle, curve_keys in sorted(FINE_CURVES.items())]
+)
 def test_bands_hold_what_exact_angles_put_there_within_the_tolerance(angle, model, name, many_lights):
     """No light is moved along the curve by more than angles may bend and still count as linear.
 
@@ -219,11 +226,11 @@ def test_bands_hold_what_exact_angles_put_there_within_the_tolerance(angle, mode
     receivers = ref.only_above(ref.make_random_receivers(5, lights.num_lights, seed=2), lights)
     term, num_bands = TERMS[model], TERMS[model].curve(name).num_bands
     ones = {c.name: np.ones((3, c.num_bands)) for c in term.curves}
-    found = project(model, ones, name, lights, receivers)[..., 0]
+    transport = project(model, ones, name, lights, receivers)[..., 0]
     edges = np.arange(1, num_bands)
     tolerance = (TOLERANCE_BANDS + TOLERANCE_SHARE * edges) * (2 if angle in CREASED else 1)
     divided = ref.pieces(lights, 4)
-    for row in range(len(found)):
+    for row in range(len(transport)):
         power, shares, wi, wo = ref.shade_pieces(term, lights, receivers, row, divided)
         gamma = angles_numpy(angle, wi, np.broadcast_to(wo, wi.shape), term.curve(name).axes).ravel() * (
             num_bands / (np.pi / 2)
@@ -231,7 +238,7 @@ def test_bands_hold_what_exact_angles_put_there_within_the_tolerance(angle, mode
         order = np.argsort(gamma)
         below = np.concatenate([[0], np.cumsum((power[:, :1] * shares).ravel()[order])])
         below, total = below / below[-1], below[-1]
-        reached = np.cumsum(found[row])[:-1] / total
+        reached = np.cumsum(transport[row])[:-1] / total
         low, high = (below[np.searchsorted(gamma[order], edges + way * tolerance)] for way in (-1, 1))
         # of all light: pieces of the twin are of finite size, shares follow chords, and division ends at a pole
         slack = 6e-3 if angle in CREASED else 2e-3
@@ -270,9 +277,9 @@ def test_triangles_stand_for_all_texels(document, bound, of_texels):
     receivers = ref.only_above(ref.make_random_receivers(60, lights.num_lights, seed=4, horizon=0.3), lights)
     term = TERMS[document["model"]].normalized(document)
     bands = {curve.name: curve_bands(document, curve) for curve in term.curves}
-    found = Projector(term, contract(term, bands, None), lights, receivers).project(0, 60)[:, 0]
+    projected = Projector(term, contract(term, bands, None), lights, receivers).project(0, 60)[:, 0]
     exact = ref.integrate_texels(document, radiance, receivers)
-    assert np.sqrt(np.mean((found - exact) ** 2) / np.mean(exact**2)) < bound
+    assert np.sqrt(np.mean((projected - exact) ** 2) / np.mean(exact**2)) < bound
 
 
 def test_extreme_directions_stay_finite(lights):

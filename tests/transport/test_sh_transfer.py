@@ -27,8 +27,8 @@ from relume.transport.sh_transfer import F32, F64, ClusteredTransfer, transfer_m
 from relume.transport.shading_points import GatherRays
 
 DEGREE = 4
-SKY = np.ones((128, 256, 3), np.float32)
-TILES = choose_tiles(SKY, 300, True)
+WHITE = np.ones((128, 256, 3), np.float32)
+TILES = choose_tiles(WHITE, 300, True)
 NUM_LIGHTS = len(TILES.codes)
 BROUGHT = harmonics(TILES.centroids) * TILES.solid_angles[:, None]
 
@@ -80,44 +80,44 @@ def test_harmonics_are_orthonormal_over_the_sphere():
 
 def test_matrices_are_those_of_the_oracle():
     points, visible = points_on_a_ball(40)
-    found = matrices_of(points, visible)
+    actual = matrices_of(points, visible)
     exact = transfer_matrices_numpy(points, visible, TILES.centroids.astype(np.float32), TILES.solid_angles)
     exact = exact[:, : num_functions(DEGREE)]
-    assert np.abs(found - exact).max() < 1e-5 * np.abs(exact).max()
+    assert np.abs(actual - exact).max() < 1e-5 * np.abs(exact).max()
 
 
 def test_light_of_few_harmonics_arrives_as_from_all_triangles():
     points, visible = points_on_a_ball(40)
     smooth = np.random.default_rng(2).normal(size=(NUM_HARMONICS, 3))
-    lights = replace(lights_of(SKY), irradiance=(BROUGHT @ smooth).astype(np.float32))
+    lights = replace(lights_of(WHITE), irradiance=(BROUGHT @ smooth).astype(np.float32))
     exact = incident_coefficients(points, visible, lights, (), DEGREE)
-    found = np.einsum("nkl,lc->nck", matrices_of(points, visible), smooth)
-    assert relative_rmse(found, exact) < 1e-5
+    actual = np.einsum("nkl,lc->nck", matrices_of(points, visible), smooth)
+    assert relative_rmse(actual, exact) < 1e-5
 
 
-@pytest.mark.parametrize("lamp", [0.0, 300.0], ids=["overcast", "a lamp in it"])
-def test_light_that_is_divided_arrives_as_if_it_were_not(lamp):
-    sky = SKY * np.linspace(2, 0.5, 128, dtype=np.float32)[:, None, None]
-    sky[32:36, 56:60] += lamp
-    lights, (points, visible) = lights_of(sky), points_on_a_ball(200)
+@pytest.mark.parametrize("has_bright_light", [0.0, 300.0], ids=["overcast", "a lamp in it"])
+def test_light_that_is_divided_arrives_as_if_it_were_not(has_bright_light):
+    radiance = WHITE * np.linspace(2, 0.5, 128, dtype=np.float32)[:, None, None]
+    radiance[32:36, 56:60] += has_bright_light
+    lights, (points, visible) = lights_of(radiance), points_on_a_ball(200)
     divided = split_frequencies(lights, BROUGHT)
     assert len(divided.residual_triangles) < 0.1 * NUM_LIGHTS
     every = np.arange(points.num_points)
     beyond = incident_coefficients(
         points, select_visibility(visible, every, divided.residual_triangles), divided.residual, (), DEGREE
     )
-    found = beyond + np.einsum("nkl,lc->nck", matrices_of(points, visible), divided.low_frequency)
+    actual = beyond + np.einsum("nkl,lc->nck", matrices_of(points, visible), divided.low_frequency)
     exact = incident_coefficients(points, visible, lights, (), DEGREE)
-    assert relative_rmse(found, exact) < 0.03
+    assert relative_rmse(actual, exact) < 0.03
     harmonics_alone = np.einsum(
         "nkl,lc->nck", matrices_of(points, visible), harmonics(TILES.centroids).T @ lights.irradiance
     )
-    if lamp:
+    if has_bright_light:
         assert relative_rmse(harmonics_alone, exact) > 0.3
 
 
 def test_no_light_is_divided_into_nothing():
-    divided = split_frequencies(lights_of(0 * SKY), BROUGHT)
+    divided = split_frequencies(lights_of(0 * WHITE), BROUGHT)
     assert not divided.low_frequency.any()
     assert divided.residual.num_lights == len(divided.residual_triangles) == 0
 
@@ -126,14 +126,14 @@ def test_clusters_keep_matrices_of_points_that_they_were_not_found_from(monkeypa
     monkeypatch.setattr("relume.transport.sh_transfer._MAX_FITTED_POINTS", 1500)
     monkeypatch.setattr("relume.transport.sh_transfer._POINTS_PER_BATCH", 700)
     points, _ = points_on_a_ball(3000)
-    seen = TILES.centroids[:, 1] > 0.3 * points.normal[:, :1]  # shadows that change slowly from point to point
-    matrices = matrices_of(points, np.packbits(seen, axis=1, bitorder="little"))
-    kept = ClusteredTransfer.fit(len(matrices), lambda rows: matrices[rows], np.random.default_rng(1))
+    visible = TILES.centroids[:, 1] > 0.3 * points.normal[:, :1]  # shadows that change slowly from point to point
+    matrices = matrices_of(points, np.packbits(visible, axis=1, bitorder="little"))
+    clustered = ClusteredTransfer.fit(len(matrices), lambda rows: matrices[rows], np.random.default_rng(1))
     rows = np.arange(5, 3000, 7)
     smooth = np.random.default_rng(2).normal(size=(NUM_HARMONICS, 3)).astype(np.float32)
     exact = np.einsum("nkl,lc->nck", matrices[rows], smooth)
-    assert relative_rmse(kept.incident_coefficients(smooth, rows), exact) < 0.06
-    mean = kept._replace(weight=0 * kept.weight)
+    assert relative_rmse(clustered.incident_coefficients(smooth, rows), exact) < 0.06
+    mean = clustered._replace(weight=0 * clustered.weight)
     assert relative_rmse(mean.incident_coefficients(smooth, rows), exact) > 0.15
 
 
@@ -150,8 +150,8 @@ def test_chosen_lights_are_seen_as_among_all():
     visible = np.random.default_rng(6).integers(0, 256, (20, 9), dtype=np.uint8)
     rows, lights = np.array([3, 0, 19]), np.array([0, 7, 8, 22, 23, 40, 55, 56, 70])
     bits = np.unpackbits(visible, axis=1, bitorder="little")[rows][:, lights]
-    found = np.unpackbits(select_visibility(visible, rows, lights), axis=1, count=len(lights), bitorder="little")
-    np.testing.assert_array_equal(found, bits)
+    actual = np.unpackbits(select_visibility(visible, rows, lights), axis=1, count=len(lights), bitorder="little")
+    np.testing.assert_array_equal(actual, bits)
 
 
 def test_rays_that_go_alike_bring_what_listed_ones_do():
@@ -166,9 +166,9 @@ def test_rays_that_go_alike_bring_what_listed_ones_do():
     some = radiance_from_patch(even, lobed, frame[lobed], rng.normal(size=(4, 3, NUM_OUTGOING)).astype(np.float32))
     rows, squares = np.array([1, 4, 30, 49]), outgoing_bins(points, links, pattern, frame)
     for sent in (isotropic(even), some):
-        found = shared_direction_coefficients(links, squares, rows, weighted_basis(pattern, 0, DEGREE), sent)
+        actual = shared_direction_coefficients(links, squares, rows, weighted_basis(pattern, 0, DEGREE), sent)
         exact = ray_incident_coefficients(points, [GatherRays(links, pattern, sent)], DEGREE)[rows]
-        assert relative_rmse(found, exact) < 1e-5
+        assert relative_rmse(actual, exact) < 1e-5
 
 
 def test_glossy_rays_do_not_go_alike():

@@ -47,9 +47,9 @@ def shaded(term, bands, lights, receivers):
     return Shader(term, contract(term, bands, None), lights, receivers).project(0, len(receivers.normal))[:, 0]
 
 
-def error(found, expected):
+def error(actual, expected):
     """Relative RMSE."""
-    return np.sqrt(np.square(found - expected).mean() / np.square(expected).mean())
+    return np.sqrt(np.square(actual - expected).mean() / np.square(expected).mean())
 
 
 def everything_seen(receivers, lights):
@@ -60,9 +60,9 @@ def everything_seen(receivers, lights):
 def test_pictures_are_those_of_finely_divided_light(model, params, lights, receivers):
     term, bands = curves_of(model, params)
     expected = ref.project(term, bands, None, lights, receivers, depth=4)[:, 0]
-    found = shaded(term, bands, lights, receivers)
-    assert error(found, expected) < 3e-3
-    assert abs(found.sum() / expected.sum() - 1) < 2.5e-3
+    actual = shaded(term, bands, lights, receivers)
+    assert error(actual, expected) < 3e-3
+    assert abs(actual.sum() / expected.sum() - 1) < 2.5e-3
 
 
 @pytest.mark.parametrize(("model", "params"), CASES)
@@ -79,9 +79,9 @@ def test_operators_are_those_of_finely_divided_light(lights, receivers):
     """An angle bends over a leaf nearly always the same way: uncorrected, highlights were 1 to 2 % too dark."""
     term, bands = curves_of("ggx", {"roughness": 0.2})
     expected = ref.project(term, bands, None, lights, receivers, depth=4)[:, 0]
-    found = Projector(term, contract(term, bands, None), lights, receivers).project(0, NUM_POINTS)[:, 0]
-    assert error(found, expected) < 3e-3
-    assert abs(found.sum() / expected.sum() - 1) < 1.5e-3
+    actual = Projector(term, contract(term, bands, None), lights, receivers).project(0, NUM_POINTS)[:, 0]
+    assert error(actual, expected) < 3e-3
+    assert abs(actual.sum() / expected.sum() - 1) < 1.5e-3
 
 
 @pytest.mark.slow
@@ -107,18 +107,18 @@ def test_no_light_is_black_and_twice_the_light_twice_as_bright(lights, receivers
 
 def test_a_range_is_shaded_as_part_of_all(lights, receivers):
     term, bands = curves_of("cook_torrance", {})
-    part = Shader(term, contract(term, bands, None), lights, receivers).project(5, 9)[:, 0]
-    np.testing.assert_array_equal(part, shaded(term, bands, lights, receivers)[5:9])
+    subset = Shader(term, contract(term, bands, None), lights, receivers).project(5, 9)[:, 0]
+    np.testing.assert_array_equal(subset, shaded(term, bands, lights, receivers)[5:9])
 
 
 def test_light_that_scatters_evenly_is_its_sum(receivers, lights):
     """All lights at once, in double precision: those that are seen, by their cosine."""
     term, bands = curves_of("lambert", {})
     bands = {"theta_i": np.repeat([[0.5], [1.0], [2.0]], 64, axis=1)}
-    seen = np.unpackbits(receivers.visible, axis=1, count=lights.num_lights, bitorder="little")
+    visible = np.unpackbits(receivers.visible, axis=1, count=lights.num_lights, bitorder="little")
     cosine = np.maximum(receivers.normal.astype(float) @ lights.direction.T.astype(float), 0)
     is_up = np.einsum("nc,nc->n", receivers.normal, receivers.wo) > 0
-    expected = (is_up[:, None] * seen * cosine) @ lights.irradiance.astype(float) / np.pi * [0.5, 1, 2]
+    expected = (is_up[:, None] * visible * cosine) @ lights.irradiance.astype(float) / np.pi * [0.5, 1, 2]
     np.testing.assert_allclose(shaded(term, bands, lights, receivers), expected, rtol=2e-5)
 
 
@@ -136,9 +136,9 @@ def test_lobes_narrower_than_lights_are_apart_lose_no_light(model, params):
     means are nothing in float32, they were not looked for there."""
     few, (term, bands) = tessellate_environment(studio(), 200), curves_of(model, params)
     receivers = everything_seen(ref.make_random_receivers(100, few.num_lights, seed=4), few)
-    found, alone = (shaded(term, bands, lights, receivers) for lights in (few, replace(few, codes=None)))
-    assert found.min() >= 0
-    assert error(found, alone) < 1e-3
+    actual, alone = (shaded(term, bands, lights, receivers) for lights in (few, replace(few, codes=None)))
+    assert actual.min() >= 0
+    assert error(actual, alone) < 1e-3
 
 
 def test_a_narrow_lobe_is_found_within_wide_lights():

@@ -29,28 +29,28 @@ def modules() -> dict[str, Path]:
 
 def statements(outer: ast.AST) -> Iterator[ast.AST]:
     """All statements inside another, or a file; expressions, which are most of a tree, import nothing."""
-    for part in ("body", "handlers", "orelse", "finalbody", "cases"):
-        for inner in getattr(outer, part, ()):
+    for field in ("body", "handlers", "orelse", "finalbody", "cases"):
+        for inner in getattr(outer, field, ()):
             yield inner
             yield from statements(inner)
 
 
-def imported(path: Path, known: dict[str, Path]) -> Iterator[str]:
+def imported(path: Path, module_paths: dict[str, Path]) -> Iterator[str]:
     """Modules of ours that a file imports, anywhere in it."""
     for node in statements(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names if alias.name in known)
-        elif isinstance(node, ast.ImportFrom) and node.module in known:
+            yield from (alias.name for alias in node.names if alias.name in module_paths)
+        elif isinstance(node, ast.ImportFrom) and node.module in module_paths:
             for alias in node.names:
                 inner = f"{node.module}.{alias.name}"
-                yield inner if inner in known else node.module
+                yield inner if inner in module_paths else node.module
 
 
-def rooms_of(one: str, other: str) -> tuple[str, str] | None:
+def rooms_of(importer: str, imported_module: str) -> tuple[str, str] | None:
     """The rooms on both ends of an arrow; None where one module contains the other."""
-    ours, theirs = one.split("."), other.split(".")
-    for depth, (here, there) in enumerate(zip(ours, theirs, strict=False), start=1):
-        if here != there:
+    ours, theirs = importer.split("."), imported_module.split(".")
+    for depth, (ours_name, theirs_name) in enumerate(zip(ours, theirs, strict=False), start=1):
+        if ours_name != theirs_name:
             return ".".join(ours[:depth]), ".".join(theirs[:depth])
     return None
 
@@ -62,18 +62,18 @@ def arrows() -> Arrows:
 @cache
 def _all_arrows() -> Arrows:
     """They cost seconds to find."""
-    known, found = modules(), defaultdict(set)
-    for name, path in known.items():
-        for target in imported(path, known):
+    module_paths, graph = modules(), defaultdict(set)
+    for name, path in module_paths.items():
+        for target in imported(path, module_paths):
             if (pair := rooms_of(name, target)) is not None:
-                found[pair[0]].add(pair[1])
-    return dict(found)
+                graph[pair[0]].add(pair[1])
+    return dict(graph)
 
 
-def circle_in(found: Arrows) -> list[str] | None:
+def circle_in(graph: Arrows) -> list[str] | None:
     """Rooms of one circle, in order; None where there is none."""
     try:
-        TopologicalSorter(found).prepare()
+        TopologicalSorter(graph).prepare()
     except CycleError as error:
         circle: list[str] = error.args[1]
         return circle
@@ -91,9 +91,9 @@ def test_files_of_tests_have_names_of_their_own() -> None:
 
 
 def test_a_circle_would_be_found() -> None:
-    found = {"a": {"b"}, "b": {"c"}, "c": set[str]()}
-    assert circle_in(found) is None
-    found["c"].add("a")
-    assert circle_in(found) is not None
+    graph = {"a": {"b"}, "b": {"c"}, "c": set[str]()}
+    assert circle_in(graph) is None
+    graph["c"].add("a")
+    assert circle_in(graph) is not None
     assert {"relume", "relume_worker"} <= arrows()["relume_server"]
     assert "relume_server.schemas" in arrows()["relume_server.api"]

@@ -25,18 +25,18 @@ def returns_arrays(kernel: ast.FunctionDef) -> bool:
     for node in ast.walk(kernel):
         if not isinstance(node, ast.Return) or node.value is None:
             continue
-        for part in node.value.elts if isinstance(node.value, ast.Tuple) else [node.value]:
-            if isinstance(part, ast.Name) and part.id in indexed:
+        for value in node.value.elts if isinstance(node.value, ast.Tuple) else [node.value]:
+            if isinstance(value, ast.Name) and value.id in indexed:
                 return True
-            if isinstance(part, ast.Subscript) and any(isinstance(inner, ast.Slice) for inner in ast.walk(part)):
+            if isinstance(value, ast.Subscript) and any(isinstance(inner, ast.Slice) for inner in ast.walk(value)):
                 return True
     return False
 
 
 def test_kernels_without_references_return_no_arrays() -> None:
-    found = [(path, kernel) for path in RELUME.rglob("*.py") for kernel in kernels(path.read_text())]
-    assert len(found) > 100
-    assert [f"{path.name}: {kernel.name}" for path, kernel in found if returns_arrays(kernel)] == []
+    kernels_found = [(path, kernel) for path in RELUME.rglob("*.py") for kernel in kernels(path.read_text())]
+    assert len(kernels_found) > 100
+    assert [f"{path.name}: {kernel.name}" for path, kernel in kernels_found if returns_arrays(kernel)] == []
 
 
 def test_a_returned_array_is_seen() -> None:

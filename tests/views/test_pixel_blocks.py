@@ -9,24 +9,24 @@ from relume.views.pixel_blocks import nearest_chosen, one_per_block
 STEP, NUM, SOFT = 4, 3, 0.5
 
 
-def squared_distances(view, material, chosen):
+def squared_distances(view, material, selected):
     """From every sample to every chosen one; infinite beyond the squares that are looked in. (n, chosen)"""
     rows = view.rows(material)
     y, x = np.divmod(view.pixel[rows].astype(np.int64), view.width)
     normal = view.surface_points(material).normal.astype(np.float64)
-    squared = (10 * STEP) ** 2 * ((normal[:, None] - normal[chosen]) ** 2).sum(axis=2)
-    for place in (x, y):
-        squared += (place[:, None] - place[chosen]) ** 2
-        squared[abs(place[:, None] // STEP - place[chosen] // STEP) > 2] = np.inf
+    squared = (10 * STEP) ** 2 * ((normal[:, None] - normal[selected]) ** 2).sum(axis=2)
+    for coordinate in (x, y):
+        squared += (coordinate[:, None] - coordinate[selected]) ** 2
+        squared[abs(coordinate[:, None] // STEP - coordinate[selected] // STEP) > 2] = np.inf
     return squared
 
 
 def test_samples_take_the_nearest_about_them(transfer):
     view = transfer.views["front"]
     for material in range(len(transfer.material_names)):
-        chosen = one_per_block(view, material, STEP)
-        near, weight = nearest_chosen(view, material, chosen, STEP, NUM, SOFT)
-        squared = squared_distances(view, material, chosen)
+        selected = one_per_block(view, material, STEP)
+        near, weight = nearest_chosen(view, material, selected, STEP, NUM, SOFT)
+        squared = squared_distances(view, material, selected)
         expected = 1 / (np.sort(squared, axis=1)[:, : near.shape[1]] + SOFT)
         expected /= expected.sum(axis=1, keepdims=True)
         np.testing.assert_allclose(weight, expected, rtol=1e-3, atol=1e-6)

@@ -63,12 +63,12 @@ def test_tiles_come_one_after_another_row_major_and_clipped(view, radiance, coun
 def test_tiles_cover_the_picture_once():
     for width, height in [(64, 64), (65, 63), (16, 200), (130, 128)]:
         view = make_view(width, height)
-        seen = np.zeros((height, width), int)
+        coverage = np.zeros((height, width), int)
         for x, y, w, h in view.all_tiles:
             assert 0 < w <= 64
             assert 0 < h <= 64
-            seen[y : y + h, x : x + w] += 1
-        np.testing.assert_array_equal(seen, 1)
+            coverage[y : y + h, x : x + w] += 1
+        np.testing.assert_array_equal(coverage, 1)
 
 
 def test_no_tiles_are_no_bytes(view, radiance):

@@ -1,4 +1,4 @@
-"""A small synthetic BTF, made once, and where looks find it; nobody asks what bakes are off by."""
+"""A small synthetic BTF in the library, made once; bakes skip the measurement of their error."""
 
 import shutil
 from pathlib import Path
@@ -17,11 +17,11 @@ from relume.synthetic_btf.synthesize import MESH, SyntheticBtf, synthesize_btf
 __all__ = ["unmeasured"]  # a fixture
 
 SIZE, GRID, BOUND = 16, 1, 0.02
-STEPS = 24  # of the cords, along each side
+STEPS = 24  # subdivisions along each side of the cords
 
 
 class Cords(NamedTuple):
-    """folder: of the store. record: that it keeps. values: of it before compression."""
+    """The stored BTF. folder: the store. record: its record. values: the values before compression."""
 
     folder: Path
     record: BtfRecord
@@ -29,9 +29,13 @@ class Cords(NamedTuple):
 
 
 def cords(folder: Path) -> Path:
-    """Two cords of unlike colours a metre, one of them shining, their piles uneven; of few faces, as light between them
-    takes longest."""
-    glossy_material = "newmtl b\nKd 0.1 0.3 0.4\nKs 0.1 0.1 0.1\nNs 9\nillum 3\n"  # a mirror's Ks is read as it stands
+    """A tile of two cords per meter with different colors, one glossy, with uneven pile.
+
+    It has few faces, because the light between them takes longest to compute.
+    """
+    glossy_material = (
+        "newmtl b\nKd 0.1 0.3 0.4\nKs 0.1 0.1 0.1\nNs 9\nillum 3\n"  # the Ks of a mirror is read unchanged
+    )
     (folder / "m.mtl").write_text(f"newmtl a\nKd 0.6 0.4 0.2\nillum 1\n{glossy_material}")
     v, u = np.meshgrid(*[np.linspace(0, 1, STEPS + 1)] * 2, indexing="ij")
     height = 0.08 * np.sin(2 * np.pi * u) ** 2 + 0.02 * np.cos(2 * np.pi * (u + 2 * v))
@@ -52,7 +56,7 @@ def small_btf(tmp_path_factory):
     values = ValueFile(rendered, ubo_grid(), (SIZE, SIZE))
     small = TileGeometry(synthetic_btf.tile(), ubo_grid(), (SIZE, SIZE), GRID, 1)
     values.fill(small.get_view, lambda share: None, lambda: False)
-    partial_folder = folder / "begun"  # goes on where it was, at the end
+    partial_folder = folder / "begun"  # resumes near its end
     shutil.copytree(rendered, partial_folder)
     with STORE.with_search_folder(folder):
         yield Cords(

@@ -1,4 +1,4 @@
-"""Containers of the Bonn measurements: read as they are, and refused where they are not what they seem."""
+"""Containers of the Bonn BTF database: valid ones are read exactly, invalid ones are rejected."""
 
 import struct
 
@@ -11,62 +11,62 @@ from relume.assets.btf.matrix_btf import MatrixBtf
 from relume.core.errors import MaterialError
 from relume_cli.main import main
 
-LAST = len(ANGLES) - 1  # files have their directions from the last to the first
+LAST = len(ANGLES) - 1  # files list their directions in reverse order
 
 
 def images(path):
-    found = MatrixBtf(path)
-    return [found.get_view(view) for view in range(len(ANGLES))]
+    btf = MatrixBtf(path)
+    return [btf.get_view(view) for view in range(len(ANGLES))]
 
 
 @pytest.mark.parametrize(
     "changes",
     [{}, {"kind": "<f4", "version": 1}, {"is_transposed": True, "kind": "<f8", "rotations": 0, "version": 3}],
 )
-def test_values_come_in_the_order_of_the_rings_with_the_cosine(tmp_path, changes):
+def test_values_are_in_ring_order_and_include_the_cosine(tmp_path, changes):
     path, file = container(tmp_path / "a.btf", **changes)
-    found = MatrixBtf(path)
-    assert found.size == SIZE
+    btf = MatrixBtf(path)
+    assert btf.size == SIZE
     theta, phi = np.radians(ANGLES).T
     expected = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
-    np.testing.assert_allclose(directions(found.grid), expected, atol=1e-6)
+    np.testing.assert_allclose(directions(btf.grid), expected, atol=1e-6)
     for view in (0, 3, 9):
-        seen = found.get_view(view)
+        view_values = btf.get_view(view)
         for light in (0, 2, 7):
-            truth = values(file, LAST - view, LAST - light) * np.cos(theta[light])
-            np.testing.assert_allclose(seen[light], truth, rtol=2e-6)
+            file_values = values(file, LAST - view, LAST - light) * np.cos(theta[light])
+            np.testing.assert_allclose(view_values[light], file_values, rtol=2e-6)
 
 
-def test_a_cosine_that_is_in_the_values_is_not_put_there_again(tmp_path):
+def test_a_cosine_in_the_values_is_not_multiplied_again(tmp_path):
     path, file = container(tmp_path / "a.btf", cosine=1)
     np.testing.assert_allclose(MatrixBtf(path).get_view(4)[9], values(file, LAST - 4, LAST - 9), rtol=2e-6)
 
 
 @pytest.mark.parametrize("model", [0, 1, 9, 11, 12])
-def test_colours_are_told_by_their_model(tmp_path, model):
-    """What is encoded by the model's definition comes back."""
+def test_colors_are_decoded_by_their_color_model(tmp_path, model):
+    """Values encoded by the definition of the color model are decoded to the same values."""
     rgb = np.array([0.5, 0.25, 0.125])
     y, u, v = np.linalg.solve(YUV_TO_RGB, rgb)
-    told = {
+    encoded = {
         0: rgb, 1: (y, u, v), 9: (np.log(y + 1e-5), u, v), 12: np.log(rgb + 1e-5),
         11: (np.log(y + 1e-5), u / (y + 1e-5), v / (y + 1e-5)),
     }[model]  # fmt: skip
-    one = np.ones((SIZE[0] * SIZE[1], 1))
-    channels = [(np.full((len(ANGLES) ** 2, 1), number), one) for number in told]
+    ones = np.ones((SIZE[0] * SIZE[1], 1))
+    channels = [(np.full((len(ANGLES) ** 2, 1), number), ones) for number in encoded]
     path, _ = container(tmp_path / "a.btf", model=model, kind="<f8", channels=channels)
-    np.testing.assert_allclose(MatrixBtf(path).get_view(0)[0], np.tile(rgb, (len(one), 1)), rtol=1e-5)
+    np.testing.assert_allclose(MatrixBtf(path).get_view(0)[0], np.tile(rgb, (len(ones), 1)), rtol=1e-5)
 
 
-def test_what_a_product_has_below_zero_is_zero(tmp_path):
+def test_negative_products_are_clamped_to_zero(tmp_path):
     (u, v), *others = random_factors()
     path, _ = container(tmp_path / "a.btf", channels=[(-u, v), *others])
-    seen = MatrixBtf(path).get_view(0)
-    assert (seen[..., 0] == 0).all()
-    assert (seen[..., 1:] > 0).all()
+    view_values = MatrixBtf(path).get_view(0)
+    assert (view_values[..., 0] == 0).all()
+    assert (view_values[..., 1:] > 0).all()
 
 
-def spoilt(number):
-    """One number of a matrix is none."""
+def with_invalid_number(number):
+    """One number of a matrix is not finite."""
     (u, v), *others = random_factors()
     v = v.copy()
     v[7, 1] = number
@@ -83,7 +83,7 @@ SHORT = random_factors(99)
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({"signature": b"!BDIF06R2!"}, "!BDIF06R2!.*zip"),
         ({"signature": b"!FMF12FCER"}, "no decorrelated"),
@@ -93,9 +93,9 @@ SHORT = random_factors(99)
         ({"size": (0, 5)}, "0 rows of texels"),
         ({"size": (7, 5)}, "damaged"),
         ({"channels": SHORT}, "99 × 30 values"),
-        (spoilt(np.nan), "no numbers"),
-        (spoilt(np.inf), "no numbers"),
-        (spoilt(6e4) | {"model": 12}, "no numbers"),
+        (with_invalid_number(np.nan), "no numbers"),
+        (with_invalid_number(np.inf), "no numbers"),
+        (with_invalid_number(6e4) | {"model": 12}, "no numbers"),
         (turned(9, 90.0, 0.0), "below the horizon"),
         (turned(9, np.nan, 0.0), "below the horizon"),
         (turned(9, 70.5, np.inf), "below the horizon"),
@@ -105,13 +105,13 @@ SHORT = random_factors(99)
         ({"views": np.tile(ANGLES, (50, 1))}, "view directions"),
     ],
 )
-def test_bad_ones_are_refused_with_what_is_wrong(tmp_path, changes, said):
+def test_invalid_containers_are_rejected_with_the_reason(tmp_path, changes, message):
     path, _ = container(tmp_path / "bad.btf", **changes)
-    with pytest.raises(MaterialError, match=said):
+    with pytest.raises(MaterialError, match=message):
         images(path)
 
 
-def test_every_cut_is_refused(tmp_path):
+def test_every_truncated_file_is_rejected(tmp_path):
     path, file = container(tmp_path / "a.btf")
     whole = encode_container(file)
     for length in [1, 9, 12, 100, 250, 262, 300, 310, 400, 1500, *range(1600, len(whole), 997), len(whole) - 1]:
@@ -123,8 +123,8 @@ def test_every_cut_is_refused(tmp_path):
         images(path)
 
 
-def test_sizes_that_are_told_are_bounded_before_anything_is_allocated(tmp_path):
-    """Every aligned number of the first kilobytes, told as the largest there is."""
+def test_declared_sizes_are_checked_before_allocation(tmp_path):
+    """Every aligned number of the first kilobytes is replaced by the largest possible value."""
     path, file = container(tmp_path / "a.btf")
     whole = encode_container(file)
     refused = 0
@@ -137,9 +137,9 @@ def test_sizes_that_are_told_are_bounded_before_anything_is_allocated(tmp_path):
     assert refused >= 20
 
 
-def test_the_command_line_imports_one(tmp_path, capsys):
+def test_the_command_line_imports_a_container(tmp_path, capsys):
     path, _ = container(tmp_path / "cloth.btf")
     assert main(["material", "import", str(path), "--error", "0.3", "--data", str(tmp_path / "data")]) == 0
-    told = capsys.readouterr()
-    assert told.out.startswith("btf:")
-    assert "relative RMS" in told.err
+    output = capsys.readouterr()
+    assert output.out.startswith("btf:")
+    assert "relative RMS" in output.err

@@ -1,4 +1,4 @@
-"""Local PCA: what it keeps is what was there, to the error it says, in as little as it says."""
+"""Local PCA: it represents the original values within the error and the size that it reports."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ RINGS = ubo_grid()
 
 
 class Facets:
-    """Texels of few kinds, each a Lambertian facet that leans; `kinds` different ones."""
+    """Lambertian facets whose normals are tilted; `kinds` different ones over the texels."""
 
     grid = RINGS
 
@@ -26,91 +26,91 @@ class Facets:
 
     def get_view(self, view):
         lit = np.maximum(self._normals[self._kind] @ directions(RINGS).T, 0)
-        seen = np.maximum(self._normals[self._kind] @ directions(RINGS)[view], 0.1)
-        return ((lit * seen[:, None]).T[..., None] * self._gain).astype(np.float32)
+        cosines = np.maximum(self._normals[self._kind] @ directions(RINGS)[view], 0.1)
+        return ((lit * cosines[:, None]).T[..., None] * self._gain).astype(np.float32)
 
 
-def kept(images, bound=0.01, progress=lambda share: None, is_canceled=lambda: False, begun=None):
+def compressed(images, bound=0.01, progress=lambda share: None, is_canceled=lambda: False, begun=None):
     return compress(images, bound, progress, is_canceled, begun)
 
 
-def whole(images):
+def all_values(images):
     return np.stack([images.get_view(v) for v in range(81)]).transpose(2, 0, 1, 3).astype(np.float64)
 
 
-def test_the_error_it_says_is_that_of_what_it_kept():
+def test_the_reported_error_is_the_error_of_the_stored_values():
     images = Facets(kinds=9)
-    found, truth = kept(images), whole(images)
-    told = np.stack([found.texel_brdf(k) for k in range(len(truth))])
-    error = np.linalg.norm(told - truth) / np.linalg.norm(truth)
-    assert found.error[-1] == pytest.approx(error, rel=1e-3)
+    btf, original = compressed(images), all_values(images)
+    decoded = np.stack([btf.texel_brdf(k) for k in range(len(original))])
+    error = np.linalg.norm(decoded - original) / np.linalg.norm(original)
+    assert btf.error[-1] == pytest.approx(error, rel=1e-3)
     assert error <= 0.015  # the bound, and rounding to 256 steps
-    fewer = found.with_components(1)
-    one = np.stack([fewer.texel_brdf(k) for k in range(len(truth))])
-    assert found.error[1] == pytest.approx(np.linalg.norm(one - truth) / np.linalg.norm(truth), rel=1e-3)
-    assert list(found.error) == sorted(found.error, reverse=True)
+    fewer = btf.with_components(1)
+    coarse = np.stack([fewer.texel_brdf(k) for k in range(len(original))])
+    assert btf.error[1] == pytest.approx(np.linalg.norm(coarse - original) / np.linalg.norm(original), rel=1e-3)
+    assert list(btf.error) == sorted(btf.error, reverse=True)
 
 
-def test_a_looser_bound_keeps_less():
+def test_a_looser_bound_takes_less_memory():
     images = Facets(kinds=30)
-    tight, loose = kept(images, 0.01), kept(images, 0.2)
+    tight, loose = compressed(images, 0.01), compressed(images, 0.2)
     assert loose.num_bytes < tight.num_bytes
     assert loose.bits.max() < tight.bits.max()
     assert list(loose.bits) == sorted(loose.bits, reverse=True)  # the strongest components have the finest steps
-    for found in (loose, tight):
-        assert (np.abs(found.weight).max(axis=(0, 1)) == 2 ** (found.bits.astype(int) - 1) - 1).all()
+    for btf in (loose, tight):
+        assert (np.abs(btf.weight).max(axis=(0, 1)) == 2 ** (btf.bits.astype(int) - 1) - 1).all()
     assert loose.error[-1] <= 0.21
     assert tight.num_components <= MAX_COMPONENTS
 
 
 def test_the_average_is_the_mean_of_all_texels_and_coarser_levels_are_means():
     images = Facets(kinds=6, size=(8, 8))
-    found, truth = kept(images, 0.001), whole(images)
-    np.testing.assert_allclose(found.average, truth.mean(axis=0), atol=2e-3)
-    assert found.levels.tolist() == [[0, 8, 8], [64, 4, 4], [80, 2, 2], [84, 1, 1]]
-    of_four = truth.reshape(4, 2, 4, 2, 81, 81, 3).mean(axis=(1, 3)).reshape(16, 81, 81, 3)
-    coarser = np.stack([found.texel_brdf(64 + k) for k in range(16)])
+    btf, original = compressed(images, 0.001), all_values(images)
+    np.testing.assert_allclose(btf.average, original.mean(axis=0), atol=2e-3)
+    assert btf.levels.tolist() == [[0, 8, 8], [64, 4, 4], [80, 2, 2], [84, 1, 1]]
+    of_four = original.reshape(4, 2, 4, 2, 81, 81, 3).mean(axis=(1, 3)).reshape(16, 81, 81, 3)
+    coarser = np.stack([btf.texel_brdf(64 + k) for k in range(16)])
     assert np.linalg.norm(coarser - of_four) < 0.06 * np.linalg.norm(of_four)
 
 
 def test_progress_rises_to_the_end_and_a_cancelled_one_stops():
     shares = []
-    kept(Facets(kinds=3), progress=shares.append)
+    compressed(Facets(kinds=3), progress=shares.append)
     assert shares == sorted(shares)
     assert shares[-1] > 0.9
     with pytest.raises(CancelledError):
-        kept(Facets(kinds=3), is_canceled=lambda: len(shares) > 0)
+        compressed(Facets(kinds=3), is_canceled=lambda: len(shares) > 0)
 
 
 def counted(images):
-    """Count how often each view is read, in a list that is returned."""
-    read, seen_from = [], images.get_view
-    images.get_view = lambda view: read.append(view) or seen_from(view)
+    """Record each view that is read in the returned list."""
+    read, get_view = [], images.get_view
+    images.get_view = lambda view: read.append(view) or get_view(view)
     return read
 
 
-def test_one_that_was_stopped_goes_on_and_finds_the_same(tmp_path):
+def test_a_resumed_compression_gives_the_same_result(tmp_path):
     images, asked = Facets(kinds=9), []
-    expected = kept(images)
+    expected = compressed(images)
     with pytest.raises(CancelledError):
-        kept(
+        compressed(
             images,
             is_canceled=lambda: asked.append(0) or len(asked) > 40,
             begun=PartialCompression(tmp_path / "a", {"bound": 0.01}),
         )
     (tmp_path / "a" / "view-3.npz").write_bytes(b"PK\x03\x04 half written")
     read = counted(images)
-    found = kept(images, begun=PartialCompression(tmp_path / "a", {"bound": 0.01}))
-    assert read == [3, *range(35, 81)]  # five were read to choose by, then 35
+    btf = compressed(images, begun=PartialCompression(tmp_path / "a", {"bound": 0.01}))
+    assert read == [3, *range(35, 81)]  # five were read to select components, then 35
     for name in ("cluster", "weight", "bits", "mean", "eigen", "step", "average", "error"):
-        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+        np.testing.assert_array_equal(getattr(btf, name), getattr(expected, name))
     read.clear()
-    kept(images, 0.2, begun=PartialCompression(tmp_path / "a", {"bound": 0.2}))
-    assert len(read) == 5 + 81  # what was found for another bound does not count
+    compressed(images, 0.2, begun=PartialCompression(tmp_path / "a", {"bound": 0.2}))
+    assert len(read) == 5 + 81  # results for another bound are not reused
 
 
-@pytest.mark.parametrize(("value", "said"), [(np.nan, "no numbers"), (-1.0, "negative"), (np.inf, "no numbers")])
-def test_values_that_are_none_are_refused(value, said):
+@pytest.mark.parametrize(("value", "message"), [(np.nan, "no numbers"), (-1.0, "negative"), (np.inf, "no numbers")])
+def test_invalid_values_are_rejected(value, message):
     images = Facets(kinds=3)
     good = images.get_view
 
@@ -121,44 +121,44 @@ def test_values_that_are_none_are_refused(value, said):
         return values
 
     images.get_view = bad
-    with pytest.raises(MaterialError, match=said):
-        kept(images)
+    with pytest.raises(MaterialError, match=message):
+        compressed(images)
 
 
-def test_one_side_may_be_black():
+def test_one_half_may_be_black():
     images = Facets(kinds=3)
     good = images.get_view
     images.get_view = lambda view: good(view) * (view != 0)
-    found = kept(images)
-    assert found.error[-1] < 0.015
-    assert not found.texel_brdf(7)[0].any()
+    btf = compressed(images)
+    assert btf.error[-1] < 0.015
+    assert not btf.texel_brdf(7)[0].any()
 
 
-def test_what_is_no_smaller_is_not_kept_however_near():
-    """Noise has no components: a bound that cannot be met does not keep all of it."""
+def test_compression_that_saves_no_memory_is_rejected():
+    """Noise has no principal components: an unreachable bound does not store all of them."""
     images, rng = Facets(kinds=3, size=(16, 16)), np.random.default_rng(3)
     noise = rng.uniform(size=(81, 256, 3)).astype(np.float32)
     images.get_view = lambda view: noise
-    found = kept(images, 0.001)
-    assert found.num_bytes * 2.4 < found.measured_bytes
-    assert found.error[-1] > 0.1
+    btf = compressed(images, 0.001)
+    assert btf.num_bytes * 2.4 < btf.measured_bytes
+    assert btf.error[-1] > 0.1
 
 
-def test_a_black_btf_and_one_that_is_too_large_are_refused():
+def test_a_black_btf_and_one_that_is_too_large_are_rejected():
     images = Facets(kinds=3)
     images.get_view = lambda view: np.zeros((81, 120, 3), np.float32)
     with pytest.raises(MaterialError, match="black"):
-        kept(images)
+        compressed(images)
     images.size = (1 << 20, 1 << 20)
     with pytest.raises(MaterialError, match="texels"):
-        kept(images)
+        compressed(images)
 
 
-def test_more_texels_than_memory_is_meant_for_are_refused_before_any_is_read():
+def test_too_many_texels_for_the_memory_limit_are_rejected_before_reading():
     class Large:
-        # 81 directions may have as many
+        # the limit for 81 directions
         grid, size = make_direction_grid([(0.0, 1), (40.0, 199), (70.0, 200)]), (300, 300)
 
     assert max_texels(81) > 300 * 300
-    with pytest.raises(MaterialError, match="in 400 directions at most 83,886 can be kept, scale it down"):
-        kept(Large())
+    with pytest.raises(MaterialError, match="in 400 directions at most 83,886 can be compressed, scale it down"):
+        compressed(Large())

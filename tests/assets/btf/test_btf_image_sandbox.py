@@ -1,4 +1,4 @@
-"""Images of BTFs that were sent are read by a process of its own, which cannot do more than that."""
+"""Uploaded BTF images are read in a separate process without further rights."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LIMITS = (4 << 30, 60)
 
 
 @pytest.mark.parametrize("kind", ["zip", "container"])
-def test_they_are_what_is_in_the_file(tmp_path: Path, kind: str) -> None:
+def test_the_sandbox_returns_the_images_of_the_file(tmp_path: Path, kind: str) -> None:
     file = zipped(tmp_path / "a.zip") if kind == "zip" else container(tmp_path / "a.btf")[0]
     here = open_images(file)
     with closing(SandboxedViewArrays(file, *LIMITS)) as apart:
@@ -34,13 +34,13 @@ def test_they_are_what_is_in_the_file(tmp_path: Path, kind: str) -> None:
     assert list(tmp_path.iterdir()) == [file]
 
 
-def test_what_is_wrong_with_a_file_is_said(tmp_path: Path) -> None:
+def test_the_error_of_a_file_is_reported(tmp_path: Path) -> None:
     (tmp_path / "a.zip").write_bytes(b"PK, and no more")
     with pytest.raises(MaterialError, match="cut off or damaged"):
         SandboxedViewArrays(tmp_path / "a.zip", *LIMITS)
 
 
-def test_a_file_that_ends_its_reader_is_at_fault(tmp_path: Path) -> None:
+def test_a_file_that_kills_its_reader_is_rejected(tmp_path: Path) -> None:
     with closing(SandboxedViewArrays(zipped(tmp_path / "a.zip"), *LIMITS)) as apart:
         os.kill(apart._process.pid, signal.SIGKILL)
         apart._process.wait()
@@ -49,7 +49,7 @@ def test_a_file_that_ends_its_reader_is_at_fault(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(bool(missing_features()), reason=f"this machine has no {' and no '.join(missing_features())}")
-def test_who_reads_them_has_no_password_and_no_way_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_reader_has_no_password_and_no_network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RELUME_DATABASE", "secret")
     with closing(SandboxedViewArrays(zipped(tmp_path / "a.zip"), *LIMITS)) as apart:
         process = Path(f"/proc/{apart._process.pid}")

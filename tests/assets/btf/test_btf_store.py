@@ -1,4 +1,4 @@
-"""BTFs that are kept: made, resumed, damaged, deleted; by the command line and over HTTP."""
+"""Stored BTFs: created, resumed, damaged, deleted; on the command line and over HTTP."""
 
 import io
 import json
@@ -29,13 +29,13 @@ from relume_server.settings import Settings
 from relume_worker.lease import new_owner
 
 
-def test_what_is_kept_is_found_by_its_name(small_btf):
+def test_a_stored_btf_is_found_by_its_name(small_btf):
     record = small_btf.record
     assert record.synthetic == "mesh"
     assert record.size == (16, 16)
     assert record.error[-1] < 0.03
     assert records(small_btf.folder) == [record]
-    assert 0.02 < np.ptp(load_btf(record.data).height) < 0.12  # of cords, seen from above
+    assert 0.02 < np.ptp(load_btf(record.data).height) < 0.12  # of the cords
     assert load_btf(record.data).num_components == record.components
     term = complete_term(("terms", 0), record.terms()[0], None)
     assert term["params"] == {"scale": 1.0, "rotation": 0.0, "components": 16}
@@ -43,20 +43,20 @@ def test_what_is_kept_is_found_by_its_name(small_btf):
 
 
 @pytest.mark.parametrize("data", ["btf:0123456789abcdef", "merl:0123456789abcdef", "btf:../../x", 3, None])
-def test_a_look_that_names_another_is_refused(small_btf, data):
+def test_a_look_with_an_unknown_btf_is_rejected(small_btf, data):
     with pytest.raises(ParameterError, match="imported here"):
         complete_term(("terms", 0), {"model": "measured_btf", "data": data}, None)
 
 
 @pytest.mark.parametrize("array", ["packed", "mean", "eigen", "step", "average", "levels", "height"])
 @pytest.mark.parametrize("how", ["gone", "cut", "shape", "numbers"])
-def test_damaged_files_are_said_and_not_read(small_btf, tmp_path, array, how):
+def test_damaged_files_are_reported(small_btf, tmp_path, array, how):
     shutil.copytree(small_btf.folder / small_btf.record.id, tmp_path / small_btf.record.id)
     path = tmp_path / small_btf.record.id / f"{array}.npy"
     values = np.load(path)
     if how == "gone":
         path.unlink()
-        if array == "height":  # older ones have none
+        if array == "height":  # older stores have none
             assert btf_store._load(path.parent).height.tolist() == [[0.0]]
             return
     elif how == "cut":
@@ -78,12 +78,12 @@ def changed(path, **changes):
 
 
 @pytest.mark.parametrize("are_packed", [False, True])
-def test_clusters_and_weights_that_have_a_byte_each_are_read_as_before(small_btf, tmp_path, are_packed):
+def test_unpacked_clusters_and_weights_are_still_read(small_btf, tmp_path, are_packed):
     at = tmp_path / small_btf.record.id
     shutil.copytree(small_btf.folder / small_btf.record.id, at)
     expected = load_btf(small_btf.record.data)
     np.save(at / "cluster.npy", expected.cluster)
-    if are_packed:  # weights alone
+    if are_packed:  # only the weights
         np.save(at / "packed.npy", np.stack([pack(weight, expected.bits) for weight in expected.weight]))
     else:
         np.save(at / "weight.npy", expected.weight)
@@ -91,20 +91,20 @@ def test_clusters_and_weights_that_have_a_byte_each_are_read_as_before(small_btf
         changed(at / "btf.json", bits=None)
     changed(at / "btf.json", cluster_bits=None)
     assert get_record(tmp_path, small_btf.record.id).components == expected.num_components
-    found = btf_store._load(at)
-    np.testing.assert_array_equal(found.weight, expected.weight)
-    np.testing.assert_array_equal(found.cluster, expected.cluster)
-    assert found.bits.tolist() == (expected.bits.tolist() if are_packed else [8] * expected.num_components)
+    btf = btf_store._load(at)
+    np.testing.assert_array_equal(btf.weight, expected.weight)
+    np.testing.assert_array_equal(btf.cluster, expected.cluster)
+    assert btf.bits.tolist() == (expected.bits.tolist() if are_packed else [8] * expected.num_components)
 
 
-def test_what_is_told_of_its_bytes_is_what_lies_on_the_disk(small_btf):
-    """But for the coarser levels, headers of 128 bytes, and the average, which lists read."""
-    found, folder = load_btf(small_btf.record.data), small_btf.folder / small_btf.record.id
-    texels, all_texels = found.size[0] * found.size[1], found.cluster.shape[1]
+def test_the_reported_bytes_are_the_bytes_on_disk(small_btf):
+    """Except for the coarser levels, headers of 128 bytes, and the average, which lists read."""
+    btf, folder = load_btf(small_btf.record.data), small_btf.folder / small_btf.record.id
+    texels, all_texels = btf.size[0] * btf.size[1], btf.cluster.shape[1]
     on_disk = {path.stem: path.stat().st_size - 128 for path in folder.glob("*.npy")}
     assert on_disk["packed"] == pytest.approx(
-        (found.num_bytes - sum(on_disk[name] for name in ("mean", "eigen", "step", "height"))) * all_texels / texels,
-        abs=2 * len(found.cluster),
+        (btf.num_bytes - sum(on_disk[name] for name in ("mean", "eigen", "step", "height"))) * all_texels / texels,
+        abs=2 * len(btf.cluster),
     )
 
 
@@ -113,7 +113,7 @@ def test_what_is_told_of_its_bytes_is_what_lies_on_the_disk(small_btf):
     [*({"bits": bits} for bits in ([], [8] * 17, [9], [1], ["x"], [3], 7)),
      *({"cluster_bits": bits} for bits in (0, 3, 7, 300, "x"))],
 )  # fmt: skip
-def test_bits_that_do_not_fit_are_damage(small_btf, tmp_path, changes):
+def test_inconsistent_bit_widths_are_damage(small_btf, tmp_path, changes):
     at = tmp_path / small_btf.record.id
     shutil.copytree(small_btf.folder / small_btf.record.id, at)
     changed(at / "btf.json", **changes)
@@ -121,7 +121,7 @@ def test_bits_that_do_not_fit_are_damage(small_btf, tmp_path, changes):
         get_record(tmp_path, small_btf.record.id)
 
 
-def test_a_damaged_one_hides_no_others_from_lists(small_btf, tmp_path, caplog):
+def test_a_damaged_btf_does_not_hide_others_from_lists(small_btf, tmp_path, caplog):
     for name in (small_btf.record.id, "0123456789abcdef"):
         shutil.copytree(small_btf.folder / small_btf.record.id, tmp_path / name)
     (tmp_path / "0123456789abcdef" / "step.npy").unlink()
@@ -130,7 +130,7 @@ def test_a_damaged_one_hides_no_others_from_lists(small_btf, tmp_path, caplog):
 
 
 @pytest.mark.slow
-def test_making_goes_on_where_it_was_and_gives_the_same(tmp_path):
+def test_a_resumed_creation_gives_the_same_result(tmp_path):
     asked = []
 
     def after_some():
@@ -149,11 +149,11 @@ def test_making_goes_on_where_it_was_and_gives_the_same(tmp_path):
     assert shares[0] == pytest.approx(0.8 * done / 81)
     assert record.id == whole.id
     for array in [*btf_store._ARRAYS, "packed"]:
-        one, other = (np.load(folder / record.id / f"{array}.npy") for folder in (resumed, at_once))
-        np.testing.assert_array_equal(one, other)
+        resumed_array, complete_array = (np.load(folder / record.id / f"{array}.npy") for folder in (resumed, at_once))
+        np.testing.assert_array_equal(resumed_array, complete_array)
 
 
-def test_values_of_another_btf_are_not_taken(tmp_path):
+def test_values_of_another_btf_are_not_reused(tmp_path):
     ValueFile(tmp_path, ubo_grid(), (8, 8))
     with pytest.raises(MaterialError, match="another BTF"):
         ValueFile(tmp_path, ubo_grid(), (8, 9))
@@ -162,7 +162,7 @@ def test_values_of_another_btf_are_not_taken(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("wanted", "said"),
+    ("wanted", "message"),
     [
         (SyntheticBtf("wool", 16, 1, 0.1), "weave"),
         (SyntheticBtf("weave", 0, 1, 0.1), "texels"),
@@ -171,59 +171,59 @@ def test_values_of_another_btf_are_not_taken(tmp_path):
         (SyntheticBtf("weave", 16, 1, float("nan")), "0.5"),
     ],
 )
-def test_what_cannot_be_made_is_said(tmp_path, wanted, said):
-    with pytest.raises(ParameterError, match=said):
+def test_invalid_recipes_are_rejected(tmp_path, wanted, message):
+    with pytest.raises(ParameterError, match=message):
         synthesize_btf(tmp_path, wanted, "x", lambda share: None, lambda: False)
 
 
-def test_command_line_makes_and_rest_lists_shows_and_deletes(tmp_path, capsys):
+def test_command_line_creates_and_rest_lists_shows_and_deletes(tmp_path, capsys):
     data = tmp_path / "data"
     arguments = ["material", "make-btf", "pebbles", "--size", "8", "--grid", "1", "--data", str(data)]
     assert main(arguments) == 0
-    told = capsys.readouterr()
-    name, terms, words = told.out.strip(), *told.err.splitlines()[-2:]
+    output = capsys.readouterr()
+    name, terms, words = output.out.strip(), *output.err.splitlines()[-2:]
     assert json.loads(terms)["terms"][0] == {"model": "measured_btf", "data": name, "texture": None}
     assert "relative RMS" in words
     assert main(["material", "make-btf", "wool", "--data", str(data)]) == 1
     assert "weave, pebbles, corduroy" in capsys.readouterr().err
     settings = Settings(data=data, client=tmp_path / "client", allowed_hosts=["testserver"])
     with TestClient(create_app(settings)) as client:
-        (found,) = client.get("/api/materials/btf").json()
-        assert (found["data"], found["synthetic"], found["name"]) == (name, "pebbles", "Pebbles (synthetic)")
-        assert client.get(f"/api/materials/btf/{found['id']}").json() == found
-        ball = np.asarray(Image.open(io.BytesIO(client.get(found["thumbnail"]).content)), int)
+        (listed,) = client.get("/api/materials/btf").json()
+        assert (listed["data"], listed["synthetic"], listed["name"]) == (name, "pebbles", "Pebbles (synthetic)")
+        assert client.get(f"/api/materials/btf/{listed['id']}").json() == listed
+        ball = np.asarray(Image.open(io.BytesIO(client.get(listed["thumbnail"]).content)), int)
         assert ball[24:40, 24:40].mean() > 10
-        (model,) = [one for one in client.get("/api/models").json() if one["model"] == "measured_btf"]
+        (model,) = [entry for entry in client.get("/api/models").json() if entry["model"] == "measured_btf"]
         assert (model["needs_data"], model["data_prefix"], model["curves"]) == (True, "btf:", [])
         resumes, bake = client.app.state.services.live.resumes, "0123456789abcdef"
         shows = LookState({"materials": {"Ball": {"terms": []}}}, {"materials": {"Ball": json.loads(terms)}}, 0)
         token = resumes.open(bake, shows, VisibleViews(["front"], "front"))
-        refused = client.delete(f"/api/materials/btf/{found['id']}")
+        refused = client.delete(f"/api/materials/btf/{listed['id']}")
         assert refused.status_code == 409
         assert f"a session of bake {bake}" in refused.json()["detail"]
         resumes.close(token, time.monotonic())
         assert resumes.take(token, bake, time.monotonic()) is not None
         looks = [{"materials": {"Ball": json.loads(terms)}}]
         request = RenderRequest(bake=bake, view="front", looks=looks, format="png").model_dump_json()
-        of_another = {"owner": new_owner(), "heartbeat": time.time()}  # server, which is at work on it
+        of_another = {"owner": new_owner(), "heartbeat": time.time()}  # another server is working on it
         row = {"id": "f" * 16, "request": request, "state": "running", "done": 0, "created": 0.0, "client": ""}
         with client.app.state.services.bakes.ledger.sessions.begin() as rows:
             rows.add(RenderRow(**row, is_first=False, **of_another))
-        refused = client.delete(f"/api/materials/btf/{found['id']}")
+        refused = client.delete(f"/api/materials/btf/{listed['id']}")
         assert (refused.status_code, "by render ffff" in refused.json()["detail"]) == (409, True)
         client.delete(f"/api/renders/{row['id']}")
-        assert client.delete(f"/api/materials/btf/{found['id']}").status_code == 204
-        assert client.get(f"/api/materials/btf/{found['id']}").status_code == 404
+        assert client.delete(f"/api/materials/btf/{listed['id']}").status_code == 204
+        assert client.get(f"/api/materials/btf/{listed['id']}").status_code == 404
         assert client.get("/api/materials/btf").json() == []
     with pytest.raises(NotFoundError):
         STORE.resolve(name)
 
 
-def test_clusters_are_kept_whatever_their_number(small_btf, tmp_path):
+def test_clusters_are_stored_for_any_number_of_clusters(small_btf, tmp_path):
     (source := tmp_path / "five").write_text("5")
     few = load_btf(small_btf.record.data).with_components(2)
     five = replace(few, **{name: np.repeat(getattr(few, name)[:, :1], 5, axis=1) for name in ("mean", "eigen", "step")},
                    cluster=np.random.default_rng(0).integers(0, 5, few.cluster.shape).astype(np.uint8))  # fmt: skip
-    kept = btf_store._load(tmp_path / store_btf(tmp_path, source, "Five", None, lambda: five).id)
-    np.testing.assert_array_equal(kept.cluster, five.cluster)
-    np.testing.assert_array_equal(kept.weight, five.weight)
+    loaded = btf_store._load(tmp_path / store_btf(tmp_path, source, "Five", None, lambda: five).id)
+    np.testing.assert_array_equal(loaded.cluster, five.cluster)
+    np.testing.assert_array_equal(loaded.weight, five.weight)

@@ -1,4 +1,4 @@
-"""BTFs in hand at fixed views: texels are summed anew in light that is kept, and no picture is exact before it is."""
+"""Edits of BTFs in fixed views: texels are summed again with cached light, and no preview is reported as exact."""
 
 from dataclasses import replace
 
@@ -22,30 +22,30 @@ from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
 from relume.transport.texture_light import rotated_tables, texture_light_rows
 
-GREY = {"model": "lambert", "color": [0.5, 0.5, 0.5]}
+GRAY = {"model": "lambert", "color": [0.5, 0.5, 0.5]}
 
 
 @pytest.fixture(scope="module")
 def bake(tmp_path_factory):
-    """A floor under a studio."""
+    """A floor lit by the studio."""
     ground = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
     camera = make_camera("front", [0.3, 1.6, 1.9], [0, 0, 0], 0.5)
-    materials = [Material("Floor", (GREY,)), Material("Other", (GREY,))]
+    materials = [Material("Floor", (GRAY,)), Material("Other", (GRAY,))]
     wall = quad("wall", [[-1, 0, -1], [1, 0, -1], [1, 1, -1], [-1, 1, -1]], 1)
     scene = make_tiny_scene(ground, wall, camera=camera, environment=studio(32, 20.0), materials=materials)
     recipe, folder = Recipe("direct", ("front",), (64, 48), 300), tmp_path_factory.mktemp("floor")
     return open_bake(bake_in_process(METHODS["direct"], scene, recipe, folder / "direct.zarr"), Cache(1 << 30))
 
 
-def covered(bake, record, sky=0.0, **params):
+def covered(bake, record, environment=0.0, **params):
     term = {"model": "measured_btf", "data": record.data, "texture": None, "params": params}
-    look = {"materials": {"Floor": {"terms": [term]}}, "environment": {"rotation": sky}}
+    look = {"materials": {"Floor": {"terms": [term]}}, "environment": {"rotation": environment}}
     return validate(look, bake.default_look)
 
 
 @pytest.fixture
-def held(bake, small_btf):
-    """A picture whose floor is covered, and a hand on it; its first image may have come from the disk."""
+def active_picture(bake, small_btf):
+    """A picture with the BTF on the floor, which is being edited; its first image may have come from disk."""
     picture = Picture(bake, "front", Cache(1 << 28), is_watched=True)
     picture.set_look(covered(bake, small_btf.record, scale=2.0))
     run_until_exact(picture).prepare("/materials/Floor/terms/0/params/scale")
@@ -55,31 +55,31 @@ def held(bake, small_btf):
 
 
 @pytest.mark.parametrize("change", [{"scale": 3.0}, {"scale": 2.0, "components": 1}])
-def test_texels_follow_the_hand_exactly(bake, small_btf, held, change):
+def test_texel_sums_follow_an_active_edit_exactly(bake, small_btf, active_picture, change):
     for params in ({"scale": 2.5}, change):
         look = covered(bake, small_btf.record, **params)
-        held.set_look(look)
-        advance = held.advance(None)
+        active_picture.set_look(look)
+        advance = active_picture.advance(None)
         assert advance.exact
         assert advance.changed
-        assert held.next_job() is None
-        assert relative_rmse(held.image(), render_image(bake, "front", look)) < 1e-6
+        assert active_picture.next_job() is None
+        assert relative_rmse(active_picture.image(), render_image(bake, "front", look)) < 1e-6
 
 
-def test_a_texture_that_is_turned_follows_and_is_exact_at_rest(bake, small_btf, held):
-    before = held.image()
+def test_a_rotated_texture_is_followed_and_then_exact(bake, small_btf, active_picture):
+    before = active_picture.image()
     for degrees in (10.0, 40.0):
         look = covered(bake, small_btf.record, scale=2.0, rotation=degrees)
-        held.set_look(look)
-        assert held.advance(None).fidelity == "incremental"
+        active_picture.set_look(look)
+        assert active_picture.advance(None).fidelity == "incremental"
         expected = render_image(bake, "front", look)
-        assert 1e-4 < relative_rmse(held.image(), expected) < 0.2 * relative_rmse(before, expected)
-        assert held.next_job().is_refinement
-    assert relative_rmse(run_until_exact(held).image(), expected) < 1e-6
+        assert 1e-4 < relative_rmse(active_picture.image(), expected) < 0.2 * relative_rmse(before, expected)
+        assert active_picture.next_job().is_refinement
+    assert relative_rmse(run_until_exact(active_picture).image(), expected) < 1e-6
 
 
-def test_what_the_memory_lacks_is_glimpsed_and_never_called_exact(bake, small_btf, monkeypatch):
-    """As in a look that was opened with images from the disk."""
+def test_light_missing_from_the_cache_gives_a_preview_that_is_not_exact(bake, small_btf, monkeypatch):
+    """As in a look that was opened with images from disk."""
     monkeypatch.setattr("relume.live.fixed_camera.texel_light_cache._BUDGET_DIVISOR", 1 << 20)
     picture = Picture(bake, "front", Cache(1 << 28), is_watched=True)
     picture.set_look(covered(bake, small_btf.record, scale=2.0))
@@ -96,31 +96,31 @@ def test_what_the_memory_lacks_is_glimpsed_and_never_called_exact(bake, small_bt
     assert relative_rmse(run_until_exact(picture).image(), expected) < 1e-6
 
 
-def test_no_frame_waits_for_many_texels(bake, small_btf, held, monkeypatch):
-    """They are glimpsed, and summed in kept light beside the frames."""
+def test_frames_do_not_wait_for_many_texels(bake, small_btf, active_picture, monkeypatch):
+    """They are previewed, and summed with cached light in the background."""
     monkeypatch.setattr("relume.operators.texel_light._MAX_TABLE_ROWS", 0)
     look = covered(bake, small_btf.record, scale=2.9)
-    held.set_look(look)
-    assert held.advance(None).fidelity == "approximate"
-    assert isinstance(run_next_job(held), SparsePreview)
-    assert held.advance(None).fidelity == "preview"
-    assert relative_rmse(run_until_exact(held).image(), render_image(bake, "front", look)) < 1e-6
+    active_picture.set_look(look)
+    assert active_picture.advance(None).fidelity == "approximate"
+    assert isinstance(run_next_job(active_picture), SparsePreview)
+    assert active_picture.advance(None).fidelity == "preview"
+    assert relative_rmse(run_until_exact(active_picture).image(), render_image(bake, "front", look)) < 1e-6
 
 
-def test_its_light_is_kept_when_a_hand_takes_hold_of_it(bake, small_btf, held):
-    """The memory has dropped it."""
-    look = covered(bake, small_btf.record, scale=2.0, sky=30.0)
-    held.set_look(look)
-    run_until_exact(held)
-    held._images.cache.trim(0, ())
-    held.prepare("/materials/Floor/terms/0/params/scale")
-    assert isinstance(run_next_job(held), SumTexels)
-    assert held.next_job() is None
-    held.set_look(covered(bake, small_btf.record, scale=3.0, sky=30.0))
-    assert held.advance(None).exact
+def test_preparing_an_edit_caches_the_light(bake, small_btf, active_picture):
+    """The cache had evicted it."""
+    look = covered(bake, small_btf.record, scale=2.0, environment=30.0)
+    active_picture.set_look(look)
+    run_until_exact(active_picture)
+    active_picture._images.cache.trim(0, ())
+    active_picture.prepare("/materials/Floor/terms/0/params/scale")
+    assert isinstance(run_next_job(active_picture), SumTexels)
+    assert active_picture.next_job() is None
+    active_picture.set_look(covered(bake, small_btf.record, scale=3.0, environment=30.0))
+    assert active_picture.advance(None).exact
 
 
-def test_other_fixed_parameters_are_glimpsed_too(bake):
+def test_other_fixed_parameters_are_previewed(bake):
     def look(sigma):
         term = {"model": "oren_nayar", "params": {"sigma": sigma}}
         return validate({"materials": {"Floor": {"terms": [term]}}}, bake.default_look)
@@ -137,16 +137,16 @@ def test_other_fixed_parameters_are_glimpsed_too(bake):
     assert picture.next_job().is_refinement
 
 
-def test_light_is_turned_with_the_rings(bake, small_btf):
-    """By half a turn every direction of these rings takes another's place."""
+def test_light_is_rotated_with_the_rings(bake, small_btf):
+    """A rotation by 180° permutes the directions of these rings."""
     texels = TERMS["measured_btf"].normalized({"model": "measured_btf", "data": small_btf.record.data}).texels
     light = illumination_from_look(covered(bake, small_btf.record), bake.material_names, has_bounces=False)
-    arriving = bake.incident_light(bake.views["front"], 0, light, bake.cache)
+    incident = bake.incident_light(bake.views["front"], 0, light, bake.cache)
     half = replace(texels, rotation=np.pi)
     rings = texels.btf.grid
-    before, after = (texture_light_rows(one, *arriving, 0, 40) for one in (texels, half))
+    before, after = (texture_light_rows(level_texels, *incident, 0, 40) for level_texels in (texels, half))
     tables = np.random.default_rng(3).random((5, rings.num_directions), np.float32)
     turned = np.einsum("tl,ncl->nct", rotated_tables(rings, tables, np.pi), before)
     np.testing.assert_allclose(turned, np.einsum("tl,ncl->nct", tables, after), rtol=1e-4)
     between = rotated_tables(rings, tables, 0.3)
-    np.testing.assert_allclose(between @ np.ones(81), tables.sum(axis=1), rtol=1e-4)  # none of the light is lost
+    np.testing.assert_allclose(between @ np.ones(81), tables.sum(axis=1), rtol=1e-4)  # energy is preserved

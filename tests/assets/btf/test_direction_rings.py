@@ -1,4 +1,4 @@
-"""Directions between those that a BTF was measured in."""
+"""Interpolation between the measured directions of a BTF."""
 
 import numpy as np
 import pytest
@@ -35,42 +35,44 @@ def dense(index, weight, count):
     return out
 
 
-TURNED = ((0.0, 1), (30.0, 4), (80.0, 7)), (0.0, 0.25, 0.9)  # rings that do not begin at φ = 0
+TURNED = ((0.0, 1), (30.0, 4), (80.0, 7)), (0.0, 0.25, 0.9)  # rings that start at φ ≠ 0
 
 
 @pytest.mark.parametrize(("described", "shift"), [(UBO_81, ()), TURNED])
-def test_the_kernel_finds_what_plain_numpy_does(described, shift):
+def test_the_kernel_equals_plain_numpy(described, shift):
     rings, w = make_direction_grid(described, shift), random_directions(500)
     index, weight, left = of_kernel(rings, w)
     expected, of_expected, expected_left = interpolation_weights_numpy(rings, w)
-    found = dense(index, weight, rings.num_directions)
-    np.testing.assert_allclose(found, dense(expected, of_expected, rings.num_directions), atol=2e-5)
+    actual = dense(index, weight, rings.num_directions)
+    np.testing.assert_allclose(actual, dense(expected, of_expected, rings.num_directions), atol=2e-5)
     np.testing.assert_allclose(left, expected_left, atol=1e-5)
 
 
 @pytest.mark.parametrize("rings", [ubo_grid(), make_direction_grid(*TURNED)])
-def test_a_measured_direction_is_itself_alone(rings):
-    found = dense(*interpolation_weights_numpy(rings, directions(rings))[:2], rings.num_directions)
-    np.testing.assert_allclose(found, np.eye(rings.num_directions), atol=1e-6)
+def test_a_measured_direction_has_weight_one(rings):
+    actual = dense(*interpolation_weights_numpy(rings, directions(rings))[:2], rings.num_directions)
+    np.testing.assert_allclose(actual, np.eye(rings.num_directions), atol=1e-6)
 
 
 @pytest.mark.parametrize("rings", [ubo_grid(), make_direction_grid(*TURNED)])
-def test_weights_sum_to_one_and_have_no_seams(rings):
+def test_weights_sum_to_one_and_are_continuous(rings):
     theta = np.radians(np.linspace(1, 89, 60))
     for first, second in ((np.pi - 1e-7, -np.pi + 1e-7), (-1e-7, 1e-7)):
         sides = [
             np.stack([np.sin(theta) * np.cos(p), np.sin(theta) * np.sin(p), np.cos(theta)], 1) for p in (first, second)
         ]
-        one, other = (dense(*interpolation_weights_numpy(rings, side)[:2], rings.num_directions) for side in sides)
-        np.testing.assert_allclose(one, other, atol=1e-5)
-        np.testing.assert_allclose(one.sum(axis=1), 1, atol=1e-9)
+        left_weights, right_weights = (
+            dense(*interpolation_weights_numpy(rings, side)[:2], rings.num_directions) for side in sides
+        )
+        np.testing.assert_allclose(left_weights, right_weights, atol=1e-5)
+        np.testing.assert_allclose(left_weights.sum(axis=1), 1, atol=1e-9)
     pole = np.array([[1e-7, 0, 1.0], [0, -1e-7, 1.0], [-1e-7, 1e-7, 1.0]])
     np.testing.assert_allclose(
         dense(*interpolation_weights_numpy(rings, pole)[:2], rings.num_directions)[:, 0], 1, atol=1e-5
     )
 
 
-def test_below_the_last_ring_the_cosine_goes_on():
+def test_values_fall_with_the_cosine_below_the_last_ring():
     rings = ubo_grid()
     theta = np.radians([75.0, 85.0, 90.0])
     w = np.stack([np.sin(theta), 0 * theta, np.cos(theta)], axis=1)
@@ -84,17 +86,17 @@ def test_below_the_last_ring_the_cosine_goes_on():
     [((0.0, 1),), ((5.0, 1), (30.0, 6)), ((0.0, 2), (30.0, 6)), ((0.0, 1), (30.0, 3)), ((0.0, 1), (90.0, 8)),
      ((0.0, 1), (40.0, 8), (30.0, 8)), ((0.0, 1), (30.0, 500))],
 )  # fmt: skip
-def test_what_is_no_rings_is_refused(described):
+def test_invalid_rings_are_rejected(described):
     with pytest.raises(MaterialError, match="rings"):
         make_direction_grid(described)
 
 
 @pytest.mark.parametrize("shift", [(0.0,), (0.0, 1.0), (0.0, -0.1), (0.0, np.nan)])
-def test_turns_that_are_no_shares_of_a_step_are_refused(shift):
+def test_rotations_that_are_no_fraction_of_a_step_are_rejected(shift):
     with pytest.raises(MaterialError, match="turned"):
         make_direction_grid(((0.0, 1), (30.0, 6)), shift)
 
 
-def test_rings_know_their_number():
+def test_rings_have_a_number_of_directions():
     assert isinstance(ubo_grid(), DirectionGrid)
     assert ubo_grid().num_directions == 81

@@ -1,4 +1,4 @@
-"""Pictures of BTFs: texel by texel as the oracle has them, and as the values before compression are."""
+"""Images of BTFs: texel by texel against NumPy, and against the values before compression."""
 
 from dataclasses import replace
 
@@ -28,21 +28,21 @@ from relume.store.bake_protocol import Recipe
 from relume.transport.btf_kernel import _MAX_FOOTPRINT_SAMPLES, _MAX_SPACING, F64, texel_rows
 
 CAMERA = make_camera("front", [0.3, 1.6, 1.9], [0, 0, 0], 0.5)
-GREY = {"model": "lambert", "color": [0.5, 0.5, 0.5]}
+GRAY = {"model": "lambert", "color": [0.5, 0.5, 0.5]}
 SIZE = (48, 36)
 
 
 def texel_numpy(
     btf_ref: BtfRef, directions: F64, irradiance: F64, wo: F64, texel_position: F64, footprint: float = 0.0
 ) -> F64:
-    """Do as `texel_rows` for one point under given lights, in plain NumPy: its oracle.
+    """Reference of `texel_rows` for one point under given lights, in plain NumPy.
 
     Args:
-        btf_ref: how it is covered. directions: to lights, in the texture's frame, unit. (m, 3)
-        irradiance: of each light, across its direction. (m, 3)
-        wo: to the eye, in the texture's frame. (3,)
-        texel_position: column and row, in texels of the finest level, from the middle of the first.
-        footprint: side of the square of its area, in texels; no wider than two of them, seen from a slant.
+        btf_ref: the BTF with its mapping. directions: to lights, in the texture's frame, unit. (m, 3)
+        irradiance: of each light, perpendicular to its direction. (m, 3)
+        wo: view direction, in the texture's frame. (3,)
+        texel_position: column and row, in texels of the finest level, from the center of the first.
+        footprint: side of a square of the pixel's area, in texels; at most two texels wide at grazing angles.
     Returns:
         (3,) float64
     """
@@ -57,7 +57,7 @@ def texel_numpy(
 
 def floor():
     ground = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
-    return make_tiny_scene(ground, camera=CAMERA, environment=studio(32, 20.0), materials=[Material("Floor", (GREY,))])
+    return make_tiny_scene(ground, camera=CAMERA, environment=studio(32, 20.0), materials=[Material("Floor", (GRAY,))])
 
 
 def opened(scene, folder, method="direct"):
@@ -80,8 +80,8 @@ def settled(record, **params):
     return TERMS["measured_btf"].normalized(document)
 
 
-def arriving(bake, look, footprint=0.0):
-    """What arrives at the floor, and where it does, in the finest level."""
+def incident_light(bake, look, footprint=0.0):
+    """Incident light at the floor and its position in texels of the finest level."""
     light = illumination_from_look(look, bake.material_names, has_bounces=False)
     lights, receivers = bake.incident_light(bake.views["front"], 0, light, bake.cache)
     uv = np.array(receivers.uv)
@@ -90,64 +90,64 @@ def arriving(bake, look, footprint=0.0):
 
 
 @pytest.mark.parametrize(("rotation", "footprint"), [(0.0, 0.0), (50.0, 0.0), (50.0, 2.0)])
-def test_the_kernel_is_the_oracle(bake, small_btf, rotation, footprint):
-    """The floor's texture: x to the right, y away from the eye, v = 0 where z is −1."""
+def test_the_fixed_camera_kernel_equals_the_reference(bake, small_btf, rotation, footprint):
+    """The floor's texture: x to the right, y away from the camera, v = 0 at z = −1."""
     look = covered(bake, small_btf.record, scale=3.0, rotation=rotation)
     texels = settled(small_btf.record, scale=3.0, rotation=rotation).texels
-    lights, receivers = arriving(bake, look, footprint / (3 * texels.btf.size[0]))
+    lights, receivers = incident_light(bake, look, footprint / (3 * texels.btf.size[0]))
     rows = texel_rows(texels, lights, receivers, 0, len(receivers.uv))
     turn, (height, width) = np.radians(rotation), texels.btf.size
     x, y = np.array([1.0, 0, 0]), np.array([0, 0, -1.0])
     across, up = np.cos(turn) * x + np.sin(turn) * y, np.cos(turn) * y - np.sin(turn) * x
     axes = np.array([across, up, [0, 1, 0]])
     for point in range(0, len(rows), 97):
-        seen = np.unpackbits(receivers.visible[point], count=lights.num_lights, bitorder="little").astype(bool)
+        visible = np.unpackbits(receivers.visible[point], count=lights.num_lights, bitorder="little").astype(bool)
         from_corner = (receivers.points.position[point].astype(np.float64) + np.array([1, 0, 1])) / 2
-        place = 3 * np.array([width * across @ from_corner, -height * up @ from_corner]) - 0.5
+        texel_position = 3 * np.array([width * across @ from_corner, -height * up @ from_corner]) - 0.5
         expected = texel_numpy(
             texels,
-            lights.direction[seen] @ axes.T,
-            lights.irradiance[seen],
+            lights.direction[visible] @ axes.T,
+            lights.irradiance[visible],
             axes @ receivers.wo[point],
-            place,
+            texel_position,
             footprint,
         )
         np.testing.assert_allclose(rows[point], expected, rtol=2e-3, atol=1e-4)
 
 
-def test_a_picture_is_that_of_the_values_before_compression(bake, small_btf):
-    """The same places and lights, each texel's own values instead of the clusters'."""
+def test_an_image_equals_that_of_the_values_before_compression(bake, small_btf):
+    """The same positions and lights, with each texel's own values instead of its cluster's."""
     look = covered(bake, small_btf.record, scale=1.0)
-    lights, receivers = arriving(bake, look)
+    lights, receivers = incident_light(bake, look)
     uv = np.array(receivers.uv)
     (height, width), texels = small_btf.values.size, settled(small_btf.record, scale=1.0).texels
-    flat = replace(texels.btf, height=np.zeros((1, 1), np.float32))  # nothing is looked up beside its place
+    flat = replace(texels.btf, height=np.zeros((1, 1), np.float32))  # no parallax
     texels = replace(texels, btf=flat)
-    # in the middles of texels, so that no mean over texels is in it
+    # at texel centers, so that no filter is included
     uv[:, 0] = (np.floor(uv[:, 0] * width) + 0.5) / width
     uv[:, 1] = (np.floor(uv[:, 1] * height) + 0.5) / height
     rows = texel_rows(texels, lights, replace(receivers, uv=uv), 0, len(uv))
     axes = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1, 0]])
     light, of_light, left = interpolation_weights_numpy(small_btf.values.grid, lights.direction @ axes.T)
     view, of_view, _ = interpolation_weights_numpy(small_btf.values.grid, receivers.wo.astype(np.float64) @ axes.T)
-    seen = np.unpackbits(receivers.visible, axis=1, count=lights.num_lights, bitorder="little")
+    visible = np.unpackbits(receivers.visible, axis=1, count=lights.num_lights, bitorder="little")
     values = [small_btf.values.get_view(v).astype(np.float64) for v in range(81)]
     texel = (np.floor(uv[:, 1] * height) % height * width + np.floor(uv[:, 0] * width) % width).astype(int)
     expected = np.zeros_like(rows, dtype=np.float64)
     for point in range(len(rows)):
         of_texel = sum(w * values[v][:, texel[point]] for v, w in zip(view[point], of_view[point], strict=True))
         for_lights = np.einsum("mk,mkc->mc", of_light, of_texel[light]) * left[:, None]
-        expected[point] = (seen[point, :, None] * for_lights * lights.irradiance).sum(axis=0)
+        expected[point] = (visible[point, :, None] * for_lights * lights.irradiance).sum(axis=0)
     assert np.linalg.norm(rows - expected) < 0.025 * np.linalg.norm(expected)
 
 
-def test_the_mean_of_its_texels_is_a_brdf(small_btf):
-    """What a picture from far away shows, and what the surface sends to others."""
+def test_the_mean_of_the_texels_is_a_brdf(small_btf):
+    """Distant images and indirect light use it."""
     document = {"model": "measured_btf", "data": small_btf.record.data, "color": [1, 1, 1], "params": {}}
     rng = np.random.default_rng(4)
     wi, wo = (np.abs(rng.normal(size=(50, 3))) + np.array([0, 0, 0.4]) for _ in range(2))
     wi, wo = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in (wi, wo))
-    found = eval_brdf(document, wi, wo)
+    actual = eval_brdf(document, wi, wo)
     average = sum(
         small_btf.values.get_view(v).mean(axis=1)[None] * (np.arange(81) == v)[:, None, None] for v in range(81)
     )
@@ -155,20 +155,20 @@ def test_the_mean_of_its_texels_is_a_brdf(small_btf):
     view, of_view, _ = interpolation_weights_numpy(small_btf.values.grid, wo)
     expected = np.einsum("na,nb,nabc->nc", of_view, of_light, average[view[:, :, None], light[:, None]])
     expected *= (left / wi[:, 2])[:, None]
-    np.testing.assert_allclose(found, expected, rtol=0.03, atol=1e-3)
+    np.testing.assert_allclose(actual, expected, rtol=0.03, atol=1e-3)
     assert not eval_brdf(document, wi * [1, 1, -1], wo).any()
 
 
-def test_from_far_away_it_is_the_mean_of_its_texels(bake, small_btf):
-    """A footprint of many repeats: the coarsest level, which no place matters to."""
-    lights, receivers = arriving(bake, covered(bake, small_btf.record))
+def test_a_distant_btf_is_the_mean_of_its_texels(bake, small_btf):
+    """A footprint of many repeats selects the coarsest level, which does not depend on the position."""
+    lights, receivers = incident_light(bake, covered(bake, small_btf.record))
     uv = np.array(receivers.uv)
     uv[:, 2] = 5
     texels = settled(small_btf.record).texels
-    one = texel_rows(texels, lights, replace(receivers, uv=uv), 0, len(uv))
+    rows = texel_rows(texels, lights, replace(receivers, uv=uv), 0, len(uv))
     uv[:, :2] += 0.37
     other = texel_rows(texels, lights, replace(receivers, uv=uv), 0, len(uv))
-    np.testing.assert_allclose(one, other, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(rows, other, rtol=1e-4, atol=1e-6)
 
 
 def test_quality_scale_and_rotation_change_the_picture_and_tint_is_a_factor(bake, small_btf):
@@ -189,13 +189,13 @@ def test_quality_scale_and_rotation_change_the_picture_and_tint_is_a_factor(bake
     np.testing.assert_allclose(np.median(ratio, axis=0), [2, 1, 0.5], rtol=0.01)
 
 
-def test_surfaces_without_places_in_textures_take_a_projection(small_btf, tmp_path):
-    """A ball of no texture coordinates is covered all round, in metres."""
+def test_surfaces_without_uv_coordinates_use_triplanar_mapping(small_btf, tmp_path):
+    """A ball without UV coordinates is mapped on all sides, in meters."""
     ball = sphere("ball", [0, 0, 0], 0.6, 0, 16)
     bare = type(ball)(**{**vars(ball), "uvs": np.zeros_like(ball.uvs)})
-    scene = make_tiny_scene(bare, camera=CAMERA, environment=studio(32, 20.0), materials=[Material("Floor", (GREY,))])
+    scene = make_tiny_scene(bare, camera=CAMERA, environment=studio(32, 20.0), materials=[Material("Floor", (GRAY,))])
     bake = opened(scene, tmp_path)
-    _, receivers = arriving(bake, covered(bake, small_btf.record))
+    _, receivers = incident_light(bake, covered(bake, small_btf.record))
     position = receivers.points.position
     near = np.linalg.norm(position[1:] - position[:-1], axis=1)
     apart = np.linalg.norm(receivers.uv[1:, :2] - receivers.uv[:-1, :2], axis=1)
@@ -205,7 +205,7 @@ def test_surfaces_without_places_in_textures_take_a_projection(small_btf, tmp_pa
 
 
 @pytest.mark.parametrize("method", ["gather", "probes"])
-def test_other_methods_show_it_too_and_follow_a_hand(small_btf, tmp_path, method):
+def test_other_methods_show_btfs_and_follow_edits(small_btf, tmp_path, method):
     bake = opened(floor(), tmp_path, method)
     picture = render_image(bake, "front", covered(bake, small_btf.record, scale=3.0))
     assert np.isfinite(picture).all()
@@ -215,7 +215,7 @@ def test_other_methods_show_it_too_and_follow_a_hand(small_btf, tmp_path, method
     live = Picture(bake, "front", bake.cache)
     live.set_look(covered(bake, small_btf.record, scale=3.0))
     run_until_exact(live)
-    for red in (0.8, 0.4):  # its light follows by rows, of a term without curves
+    for red in (0.8, 0.4):  # indirect light is updated by transport rows of a term without curves
         look = covered(bake, small_btf.record, (red, 1, 1), scale=3.0)
         live.set_look(look, active_pointer="/materials/Floor/terms/0/color")
         while (job := live.next_job()) is not None:
@@ -228,20 +228,20 @@ def test_other_methods_show_it_too_and_follow_a_hand(small_btf, tmp_path, method
         )
 
 
-def test_brute_force_looks_up_places_within_what_pixels_cover(bake, small_btf):
-    """Its direct picture is the method's, but for what means over texels leave out."""
+def test_the_reference_samples_positions_within_the_pixel_footprint(bake, small_btf):
+    """Its direct image equals the method's, except for detail that filtering removes."""
     look = covered(bake, small_btf.record, (1.0, 0.8, 0.6), scale=3.0, rotation=20.0)
     ours = render_image(bake, "front", look)[..., :3]
-    truth = reference_image(floor(), "front", look, SIZE, 0)
-    on_floor = truth.min(axis=2) > 0.01
-    assert np.linalg.norm(ours - truth) < 0.06 * np.linalg.norm(truth)
-    assert np.linalg.norm((ours - truth)[on_floor]) < 0.3 * np.linalg.norm(
-        (truth - truth[on_floor].mean(axis=0))[on_floor]
+    reference = reference_image(floor(), "front", look, SIZE, 0)
+    on_floor = reference.min(axis=2) > 0.01
+    assert np.linalg.norm(ours - reference) < 0.06 * np.linalg.norm(reference)
+    assert np.linalg.norm((ours - reference)[on_floor]) < 0.3 * np.linalg.norm(
+        (reference - reference[on_floor].mean(axis=0))[on_floor]
     )
 
 
-def test_paths_of_brute_force_begin_at_those_places(bake, small_btf):
-    """Drawn directions, each over its density, are on the average what the hemisphere makes of even light."""
+def test_reference_paths_start_at_sampled_positions(bake, small_btf):
+    """Sampled directions over their density average to the hemispherical integral of uniform light."""
     (term,) = covered(bake, small_btf.record, (1.0, 0.8, 0.6)).materials["Floor"].terms
     kinds, num = RoughnessClasses([[term]], [[np.zeros(3)]], [0], [()]), 400
     rows = np.ones((num, 1), np.float32)
@@ -250,9 +250,9 @@ def test_paths_of_brute_force_begin_at_those_places(bake, small_btf):
     points = ReferencePoints(
         0 * rows * [1, 1, 1], rows * [0, 0, 1], rows * [1, 0, 0], rows * wo, {}, rows[:, 0], (rows * places).astype("f")
     )
-    of, rng = np.zeros(num, np.int64), np.random.default_rng(5)
-    covers = _sample_btf_surfaces(kinds, points, of, 1)
-    _, share, _ = _sample_directions(kinds, [[cosine_lobe()]], points, of, covers, rng)
+    materials, rng = np.zeros(num, np.int64), np.random.default_rng(5)
+    covers = _sample_btf_surfaces(kinds, points, materials, 1)
+    _, share, _ = _sample_directions(kinds, [[cosine_lobe()]], points, materials, covers, rng)
     z, turn = (np.arange(40) + 0.5) / 40, (np.arange(80) + 0.5) * np.pi / 40
     flat = np.sqrt(1 - z**2)[:, None]
     wi = np.stack([flat * np.cos(turn), flat * np.sin(turn), np.broadcast_to(z[:, None], (40, 80))], axis=-1)
@@ -260,5 +260,5 @@ def test_paths_of_brute_force_begin_at_those_places(bake, small_btf):
     error = share.std(axis=0) / np.sqrt(num)
     assert (np.abs(share.mean(axis=0) - expected) < 4 * error).all()
     assert (error < 0.04 * expected).all()
-    mean = _sample_directions(kinds, [[cosine_lobe()]], points, of, {}, rng)[1].mean(axis=0)
-    assert np.linalg.norm(mean - expected) > 8 * np.linalg.norm(error)  # what all texels make of it is something else
+    mean = _sample_directions(kinds, [[cosine_lobe()]], points, materials, {}, rng)[1].mean(axis=0)
+    assert np.linalg.norm(mean - expected) > 8 * np.linalg.norm(error)  # the mean over all texels is different

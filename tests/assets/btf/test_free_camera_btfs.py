@@ -1,11 +1,11 @@
-"""BTFs while the eye moves: texel by texel as the oracle has them, and near what a fixed view shows."""
+"""BTFs with a free camera: texel by texel against NumPy, and near fixed views."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from test_fixed_camera_btfs import CAMERA, GREY, SIZE, covered, floor, opened
+from test_fixed_camera_btfs import CAMERA, GRAY, SIZE, covered, floor, opened
 
 from relume.assets.btf.btf_store import load_btf
 from relume.assets.btf.direction_rings import directions, interpolation_weights_numpy, ubo_grid
@@ -34,12 +34,12 @@ CONSTANT = int(np.flatnonzero(FUNCTIONS == 0)[0])
 def node_light_numpy(
     lattice_nodes: LatticeNodes, tangents: F32, vectors: F32, lattice_node: int
 ) -> tuple[NDArray[np.float64], F32]:
-    """Do as `TexelLight.about` for one vertex, in plain NumPy: its oracle.
+    """Reference of `TexelLight.around_nodes` for one node, in plain NumPy.
 
     Args:
-        lattice_nodes: all. tangents, vectors: of points, (points, 3), (points, 3, K). lattice_node: number of it.
+        lattice_nodes: all. tangents, vectors: of probes, (probes, 3), (probes, 3, K). lattice_node: its index.
     Returns:
-        Its light vector by functions, (3, K), its tangent (3,).
+        Its incident radiance coefficients (3, K), its tangent (3,).
     """
     recurrence_table, weights, probes = (
         recurrence(),
@@ -64,12 +64,14 @@ def moving(tmp_path_factory):
 
 
 def sight(moving, pixel_angle=0.0):
-    eye = CAMERA.to_world[:3, 3].astype(np.float32)
-    return TextureFootprint(eye, pixel_angle, trace_primary(moving.stored_scene, moving.embree, CAMERA, SIZE))
+    camera_position = CAMERA.to_world[:3, 3].astype(np.float32)
+    return TextureFootprint(
+        camera_position, pixel_angle, trace_primary(moving.stored_scene, moving.embree, CAMERA, SIZE)
+    )
 
 
 def vectors_of(surface, to_light):
-    """Light vectors of all points in light from one side: of its functions, in the frame of each."""
+    """Incident radiance coefficients of all probes for light from one direction, in the frame of each probe."""
     n, t = (getattr(surface.probes, name).astype(np.float64) for name in ("normal", "tangent"))
     local = np.stack([t @ to_light, np.cross(n, t) @ to_light, n @ to_light], axis=1)
     return np.repeat(project(local)[:, None], 3, axis=1).astype(np.float32)
@@ -79,58 +81,58 @@ def terms_of(look_of):
     return [[dict(term) for term in look_of.materials["Floor"].terms]]
 
 
-def arrived(surface):
+def arrived_light(surface):
     return IncidentTexelLight(vectors_of(surface, TO_LIGHT), TexelLight())
 
 
 def factors(numbers, axes):
-    """Out-factors, in lanes, that numbers stand for. (…, 24) to (…, 3, F)"""
+    """Outgoing coefficients, in lanes, of compressed numbers. (…, 24) to (…, 3, F)"""
     out = np.zeros((*numbers.shape[:-1], 3, 16))
     for number, (axis, lane) in enumerate(zip(COEFFICIENT_AXIS, COEFFICIENT_LANE, strict=True)):
         out[..., lane] += numbers[..., number, None] * axes[:, axis]
     return out
 
 
-def oracle(cover, d, place):
-    """What a ray on the floor shows more than the mean, in plain NumPy; its texture's x is to the right, y away."""
-    turn, found = np.radians(ROTATION), cover.tables
+def shade_ray_numpy(cover, d, position):
+    """Reference of a ray on the floor, minus the mean, in plain NumPy; its texture's x is to the right, y away."""
+    turn, tables = np.radians(ROTATION), cover.tables
     x, y = np.array([1.0, 0, 0]), np.array([0, 0, -1.0])
     across, up = np.cos(turn) * x + np.sin(turn) * y, np.cos(turn) * y - np.sin(turn) * x
     axes, (height, width) = np.array([across, up, [0, 1, 0]]), cover.texels.btf.size
-    column, row = SCALE * np.array([width * across @ place, -height * up @ place]) - 0.5
-    numbers = np.zeros(found.step.shape)
+    column, row = SCALE * np.array([width * across @ position, -height * up @ position]) - 0.5
+    numbers = np.zeros(tables.step.shape)
     for down, beside in ((0, 0), (0, 1), (1, 0), (1, 1)):
         share = abs(1 - beside - column % 1) * abs(1 - down - row % 1)
         number = int((np.floor(row) + down) % height * width + (np.floor(column) + beside) % width)
-        numbers += share * found.step * found.weight[:, number].astype(float)
+        numbers += share * tables.step * tables.weight[:, number].astype(float)
     light = pack_lanes(project(axes @ TO_LIGHT))
     view, of_view, _ = interpolation_weights_numpy(cover.texels.btf.grid, -(axes @ d)[None])
 
-    return np.einsum("a,ack,k->c", of_view[0], factors(numbers, found.axes)[view[0]], light)
+    return np.einsum("a,ack,k->c", of_view[0], factors(numbers, tables.axes)[view[0]], light)
 
 
-def test_the_kernel_is_the_oracle(moving, small_btf):
+def test_the_free_camera_kernel_equals_the_reference(moving, small_btf):
     look_of = covered(moving, small_btf.record, (0.5, 1.0, 2.0), scale=SCALE, rotation=ROTATION)
-    covers, seen_by, surface = find_btf_materials(terms_of(look_of)).available, sight(moving), moving.stored_scene
-    seen, out = seen_by.gbuffer, np.full((len(seen_by.gbuffer.directions), 3), MEAN, np.float32)
-    shade_texels(covers, surface, moving.positions, seen_by, arrived(surface), out)
-    rays = np.flatnonzero(seen.hits.face >= 0)
-    num_pixels = len(seen.directions) - len(seen.owner)
-    assert len(seen.owner)
+    covers, view, surface = find_btf_materials(terms_of(look_of)).available, sight(moving), moving.stored_scene
+    gbuffer, out = view.gbuffer, np.full((len(view.gbuffer.directions), 3), MEAN, np.float32)
+    shade_texels(covers, surface, moving.positions, view, arrived_light(surface), out)
+    rays = np.flatnonzero(gbuffer.hits.face >= 0)
+    num_pixels = len(gbuffer.directions) - len(gbuffer.owner)
+    assert len(gbuffer.owner)
     for ray in rays[::61]:
-        middle = ray if ray < num_pixels else seen.owner[ray - num_pixels]
-        texel_of = middle if seen.hits.face[middle] >= 0 else ray  # across an edge as in the middle of the pixel
-        d = seen.directions[texel_of].astype(np.float64)
-        place = (seen_by.camera_position + seen.hits.distance[texel_of] * d + [1, 0, 1]) / 2
-        more = [0.5, 1.0, 2.0] * oracle(covers[0], d, place)
+        middle = ray if ray < num_pixels else gbuffer.owner[ray - num_pixels]
+        texel_of = middle if gbuffer.hits.face[middle] >= 0 else ray  # across an edge: as at the pixel center
+        d = gbuffer.directions[texel_of].astype(np.float64)
+        position = (view.camera_position + gbuffer.hits.distance[texel_of] * d + [1, 0, 1]) / 2
+        more = [0.5, 1.0, 2.0] * shade_ray_numpy(covers[0], d, position)
         np.testing.assert_allclose(out[ray], np.maximum(MEAN + more, 0), rtol=5e-3, atol=2e-4)
-    assert (out[seen.hits.face < 0] == MEAN).all()
+    assert (out[gbuffer.hits.face < 0] == MEAN).all()
     assert (out[rays] == 0).any()
     assert out.max() > 2 * MEAN
 
 
-def test_light_about_a_vertex_is_the_oracles(moving):
-    """Of points whose tangents go any way about the normal."""
+def test_light_around_a_node_equals_the_reference(moving):
+    """For probes whose tangents have any azimuth."""
     rng, surface = np.random.default_rng(2), moving.stored_scene
     turn = rng.uniform(0, 2 * np.pi, len(surface.probes.normal))
     n, t = surface.probes.normal, surface.probes.tangent
@@ -139,20 +141,20 @@ def test_light_about_a_vertex_is_the_oracles(moving):
     vectors = rng.normal(size=moving.vectors_shape).astype(np.float32)
     light, num = TexelLight(), len(surface.lattice_nodes.normal)
     light.around_nodes(surface, vectors, np.arange(num, dtype=np.uint8) % 2)
-    found = light.around_nodes(surface, vectors, np.ones(num, np.uint8))
-    for vertex in range(0, len(found.tangent), 37):
+    actual = light.around_nodes(surface, vectors, np.ones(num, np.uint8))
+    for vertex in range(0, len(actual.tangent), 37):
         expected, along = node_light_numpy(surface.lattice_nodes, tangent, vectors, vertex)
         np.testing.assert_allclose(
-            found.vectors[vertex].reshape(2, 3, 8).swapaxes(0, 1).reshape(3, 16),
+            actual.vectors[vertex].reshape(2, 3, 8).swapaxes(0, 1).reshape(3, 16),
             pack_lanes(expected),
             rtol=1e-4,
             atol=1e-5,
         )
-        np.testing.assert_allclose(found.tangent[vertex], along)
+        np.testing.assert_allclose(actual.tangent[vertex], along)
 
 
-def test_another_light_is_another(moving):
-    """What was kept of the light before is not shown."""
+def test_changed_light_is_not_taken_from_the_cache(moving):
+    """Cached light of the previous look is not shown."""
     surface, light, every = (
         moving.stored_scene,
         TexelLight(),
@@ -163,66 +165,71 @@ def test_another_light_is_another(moving):
     assert not light.around_nodes(surface, dark, every).vectors.any()
 
 
-def test_few_numbers_tell_out_factors(moving, small_btf):
-    """Of each texel, from all sides, as its own values have them, but for rounding and colours of what is narrow."""
+def test_compressed_outgoing_coefficients_are_accurate(moving, small_btf):
+    """For each texel and direction, except for rounding and for colors of narrow lobes."""
     cover = find_btf_materials(terms_of(covered(moving, small_btf.record))).available[0]
-    whole, found, squares = cover.texels.btf, cover.tables, np.zeros(2)
+    whole, tables, squares = cover.texels.btf, cover.tables, np.zeros(2)
     integrals = filtered_factors(whole.grid)
     mean = np.einsum("vlc,lk->vck", whole.average, integrals)
-    for texel in range(0, found.weight.shape[1], 29):
+    for texel in range(0, tables.weight.shape[1], 29):
         expected = np.einsum("vlc,lk->vck", whole.texel_brdf(texel), integrals)
-        told = mean + factors(found.step * found.weight[:, texel], found.axes)
-        squares += np.sum((told - expected) ** 2), np.sum(expected**2)
+        represented = mean + factors(tables.step * tables.weight[:, texel], tables.axes)
+        squares += np.sum((represented - expected) ** 2), np.sum(expected**2)
     assert squares[0] < 0.05**2 * squares[1]
 
 
-def test_the_finest_texels_of_large_tables_are_left_out(small_btf, monkeypatch):
+def test_large_tables_omit_the_finest_level(small_btf, monkeypatch):
     whole = load_btf(small_btf.record.data)
     monkeypatch.setattr(texel_tables, "_MAX_TABLE_BYTES", 81 * 24 * 100)
-    found = texel_tables.compute_texel_tables(whole)
-    assert found.levels[0].tolist() == [0, 8, 8]
-    assert found.weight.shape[1] == 64 + 16 + 4 + 1
+    tables = texel_tables.compute_texel_tables(whole)
+    assert tables.levels[0].tolist() == [0, 8, 8]
+    assert tables.weight.shape[1] == 64 + 16 + 4 + 1
     monkeypatch.undo()
     complete = texel_tables.compute_texel_tables(whole)
-    one, other = (t.step[:, None] * t.weight for t in (found, complete))
-    np.testing.assert_allclose(one, other[:, 256:], atol=float((found.step + complete.step).max()))
+    actual, expected = (t.step[:, None] * t.weight for t in (tables, complete))
+    np.testing.assert_allclose(actual, expected[:, 256:], atol=float((tables.step + complete.step).max()))
 
 
-def test_a_matt_surface_has_a_single_factor():
-    """Its values are the cosine, ∫ cos θ h_k dω = √π for the first function and nothing for the others."""
+def test_a_diffuse_surface_has_a_single_coefficient():
+    """Its values are the cosine: ∫ cos θ h_k dω = √π for the first function and 0 for the others."""
     rings = ubo_grid()
-    found = directions(rings)[:, 2] @ filtered_factors(rings)
-    assert found[CONSTANT] == pytest.approx(np.sqrt(np.pi), rel=0.02)
-    assert np.abs(np.delete(found, CONSTANT)).max() < 0.02 * found[CONSTANT]
+    coefficients = directions(rings)[:, 2] @ filtered_factors(rings)
+    assert coefficients[CONSTANT] == pytest.approx(np.sqrt(np.pi), rel=0.02)
+    assert np.abs(np.delete(coefficients, CONSTANT)).max() < 0.02 * coefficients[CONSTANT]
 
 
-def test_a_moving_view_shows_what_a_fixed_one_does(moving, small_btf, tmp_path, monkeypatch):
+def test_a_free_camera_equals_a_fixed_view(moving, small_btf, tmp_path, monkeypatch):
     look_of = covered(moving, small_btf.record, scale=SCALE)
     expected = render_image(opened(floor(), tmp_path), "front", look_of)
-    found = render_image(moving, "front", look_of)
+    actual = render_image(moving, "front", look_of)
     monkeypatch.setattr(frame, "find_btf_materials", lambda *_, **__: BtfMaterials([], []))
     mean = render_image(moving, "front", look_of)
     size = np.linalg.norm(expected)
-    assert np.linalg.norm(found - expected) < 0.03 * size < 0.1 * size < np.linalg.norm(mean - expected)
+    assert np.linalg.norm(actual - expected) < 0.03 * size < 0.1 * size < np.linalg.norm(mean - expected)
 
 
-def test_beside_other_terms_a_btf_counts_for_its_share(moving, small_btf, tmp_path):
-    terms = [*terms_of(covered(moving, small_btf.record, color=(0.6, 0.3, 0.2), scale=SCALE))[0], GREY]
+def test_a_btf_is_weighted_next_to_other_terms(moving, small_btf, tmp_path):
+    terms = [*terms_of(covered(moving, small_btf.record, color=(0.6, 0.3, 0.2), scale=SCALE))[0], GRAY]
     document = {"materials": {"Floor": {"terms": terms}}}
     fixed = opened(floor(), tmp_path)
     expected = render_image(fixed, "front", validate(document, fixed.default_look))
-    found = render_image(moving, "front", validate(document, moving.default_look))
-    assert np.linalg.norm(found - expected) < 0.04 * np.linalg.norm(expected)
+    actual = render_image(moving, "front", validate(document, moving.default_look))
+    assert np.linalg.norm(actual - expected) < 0.04 * np.linalg.norm(expected)
 
 
 def test_two_textures_on_one_material_are_summed(moving, small_btf):
     terms = terms_of(covered(moving, small_btf.record, scale=SCALE))
-    seen_by, surface = sight(moving), moving.stored_scene
-    found = []
+    view, surface = sight(moving), moving.stored_scene
+    images = []
     for times in (1, 2):
-        out = np.full((len(seen_by.gbuffer.directions), 3), 10.0, np.float32)
+        out = np.full((len(view.gbuffer.directions), 3), 10.0, np.float32)
         shade_texels(
-            find_btf_materials([terms[0] * times]).available, surface, moving.positions, seen_by, arrived(surface), out
+            find_btf_materials([terms[0] * times]).available,
+            surface,
+            moving.positions,
+            view,
+            arrived_light(surface),
+            out,
         )
-        found.append(out - 10)
-    np.testing.assert_allclose(found[1], 2 * found[0], atol=1e-5)
+        images.append(out - 10)
+    np.testing.assert_allclose(images[1], 2 * images[0], atol=1e-5)

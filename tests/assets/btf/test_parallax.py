@@ -1,4 +1,4 @@
-"""Where relief is seen from one side and from another."""
+"""Parallax of a relief for view directions from several sides."""
 
 import numpy as np
 import pytest
@@ -13,41 +13,39 @@ SLANTS = [(0.0, 0.0), (0.4, -0.2), (-2.5, 1.5)]
 
 
 def waves():
-    """Over a texture of 24 × 32 texels, 0.07 high."""
+    """A texture of 24 × 32 texels, 0.07 high."""
     v, u = np.meshgrid((np.arange(24) + 0.5) / 24, (np.arange(32) + 0.5) / 32, indexing="ij")
     return (0.04 + 0.03 * np.sin(2 * np.pi * (u + v)) * np.cos(2 * np.pi * 2 * v)).astype(np.float32)
 
 
-def seen(relief, place, slant):
+def intersect_relief(relief, uv, slant):
     slant = np.asarray(slant, np.float32)
-    return float(
-        parallax_intersection(relief, relief.min(), relief.max(), np.float32(place[0]), np.float32(place[1]), slant)
-    )
+    return float(parallax_intersection(relief, relief.min(), relief.max(), np.float32(uv[0]), np.float32(uv[1]), slant))
 
 
 @pytest.mark.parametrize("slant", SLANTS)
-def test_the_kernel_is_the_oracle_and_both_are_where_a_ray_meets_the_relief(slant):
+def test_the_kernel_equals_the_reference_and_the_ray_relief_intersection(slant):
     relief, rng = waves(), np.random.default_rng(3)
-    for place in rng.uniform(-2, 2, (40, 2)):
-        found, exact = seen(relief, place, slant), parallax_intersection_numpy(relief, place, np.array(slant))
-        assert abs(found - exact) < 1e-5
-        # by brute force: relief between texels, in ten thousand steps
+    for uv in rng.uniform(-2, 2, (40, 2)):
+        actual, exact = intersect_relief(relief, uv, slant), parallax_intersection_numpy(relief, uv, np.array(slant))
+        assert abs(actual - exact) < 1e-5
+        # by brute force: the interpolated relief in ten thousand steps
         z = np.linspace(relief.max(), relief.min(), 10_001)
-        at = (place + z[:, None] * slant * np.array([1, -1])) * [32, 24] - 0.5
+        at = (uv + z[:, None] * slant * np.array([1, -1])) * [32, 24] - 0.5
         first = np.floor(at).astype(int)
-        part, here = at - first, np.zeros(len(z))
+        fraction, surface_height = at - first, np.zeros(len(z))
         for right, down in ((0, 0), (1, 0), (0, 1), (1, 1)):
-            share = np.abs(1 - right - part[:, 0]) * np.abs(1 - down - part[:, 1])
-            here += share * relief[(first[:, 1] + down) % 24, (first[:, 0] + right) % 32]
-        assert abs(found - z[np.flatnonzero(z <= here)[0]]) < 4e-4
+            share = np.abs(1 - right - fraction[:, 0]) * np.abs(1 - down - fraction[:, 1])
+            surface_height += share * relief[(first[:, 1] + down) % 24, (first[:, 0] + right) % 32]
+        assert abs(actual - z[np.flatnonzero(z <= surface_height)[0]]) < 4e-4
 
 
-def test_an_even_height_is_seen_at_that_height():
-    assert seen(np.full((3, 5), 0.25, np.float32), (0.3, 7.9), (3.0, -1.0)) == 0.25
-    assert seen(np.zeros((1, 1), np.float32), (0.3, 0.9), (3.0, -1.0)) == 0
+def test_a_constant_height_gives_that_height():
+    assert intersect_relief(np.full((3, 5), 0.25, np.float32), (0.3, 7.9), (3.0, -1.0)) == 0.25
+    assert intersect_relief(np.zeros((1, 1), np.float32), (0.3, 0.9), (3.0, -1.0)) == 0
 
 
-def test_slants_end_with_the_last_ring():
+def test_shears_are_limited_by_the_last_ring():
     rings = ubo_grid()
     for w, slant in zip(directions(rings)[::9], compute_shears(rings)[::9], strict=True):
         np.testing.assert_allclose(compute_shear(rings, *w), slant, rtol=1e-5, atol=1e-6)
@@ -59,4 +57,4 @@ def test_the_height_of_a_small_geometry_lies_between_its_lowest_and_its_highest(
     height, z = small.height(), small._positions[:, 2]
     assert height.shape == (8, 8)
     assert z.min() <= height.min() < height.max() <= z.max()
-    assert height.mean() > z.mean()  # it is seen from above
+    assert height.mean() > z.mean()  # the upper side is visible

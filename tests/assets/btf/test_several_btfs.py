@@ -1,4 +1,4 @@
-"""Several BTFs at once: their tables are made once, beside the frames, in the one budgeted memory."""
+"""Several BTFs at once: their tables are computed once, in the background, in the one cache."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from test_fixed_camera_btfs import CAMERA, GREY, SIZE
+from test_fixed_camera_btfs import CAMERA, GRAY, SIZE
 from tiny_scenes import make_tiny_scene, quad, studio
 
 from relume.assets.btf.btf_store import load_btf, store_btf
@@ -32,44 +32,44 @@ NAMES = [f"Strip {k}" for k in range(NUM)]
 @pytest.fixture(scope="module")
 def records(small_btf, tmp_path_factory):
     whole, folder = load_btf(small_btf.record.data), tmp_path_factory.mktemp("sources")
-    found = []
+    stored = []
     for number in range(NUM):
         source = folder / f"{number}.txt"
         source.write_text(str(number))
         dimmed = replace(whole, mean=(whole.mean * (1 - 0.1 * number)).astype(np.float16))
-        found.append(store_btf(small_btf.folder, source, f"Cords {number}", None, lambda made=dimmed: made))
-    return found
+        stored.append(store_btf(small_btf.folder, source, f"Cords {number}", None, lambda made=dimmed: made))
+    return stored
 
 
 @pytest.fixture(scope="module")
 def strips():
-    """Five strips of a floor, and one beside them."""
+    """Five strips of a floor, and a sixth strip."""
     edges = np.linspace(-1, 1, NUM + 2)
     floor = [
         quad(f"strip {k}", [[a, 0, 1], [b, 0, 1], [b, 0, -1], [a, 0, -1]], k)
         for k, (a, b) in enumerate(pairwise(edges))
     ]
-    materials = [Material(name, (GREY,)) for name in (*NAMES, "Other")]
+    materials = [Material(name, (GRAY,)) for name in (*NAMES, "Other")]
     return make_tiny_scene(*floor, camera=CAMERA, environment=studio(32, 20.0), materials=materials)
 
 
 @pytest.fixture(params=["direct", "probes"])
 def opened(request, strips, tmp_path, monkeypatch):
-    """A bake, in a memory that has nothing yet."""
+    """A bake with an empty cache."""
     memory = Cache(1 << 30)
     monkeypatch.setattr(memories._AssetCache, "cache", memory)
     recipe = Recipe(request.param, ("front",), SIZE, 100, num_probes=800)
     return open_bake(bake_in_process(METHODS[request.param], strips, recipe, tmp_path / "s.zarr"), memory)
 
 
-def look_of(bake, records, grey=0.5):
-    """Every strip covered, and the one beside them in a shade of grey."""
+def look_of(bake, records, gray=0.5):
+    """BTFs on all strips, and a gray material on the sixth."""
     covered = {name: {"terms": record.terms()} for name, record in zip(NAMES, records, strict=True)}
-    other = {"terms": [{"model": "lambert", "color": [grey] * 3}]}
+    other = {"terms": [{"model": "lambert", "color": [gray] * 3}]}
     return validate({"materials": {**covered, "Other": other}}, bake.default_look)
 
 
-def settle(picture):
+def run_to_the_end(picture):
     for _ in range(100):
         picture.advance(None)
         if (job := picture.next_job()) is None:
@@ -89,7 +89,7 @@ def count(monkeypatch, module, name):
     return made
 
 
-def test_edits_of_another_material_make_no_tables_anew(opened, records, monkeypatch):
+def test_edits_of_another_material_do_not_rebuild_tables(opened, records, monkeypatch):
     is_moving = opened.camera_mode.name == "FREE"
     made = (
         count(monkeypatch, texel_tables, "compute_texel_tables")
@@ -101,7 +101,7 @@ def test_edits_of_another_material_make_no_tables_anew(opened, records, monkeypa
     )
     for number in range(4):
         picture.set_look(look_of(opened, records, 0.2 + 0.1 * number))
-        settle(picture)
+        run_to_the_end(picture)
     assert len(made) == NUM
     assert set(made.values()) == {1}
     assert (
@@ -111,7 +111,7 @@ def test_edits_of_another_material_make_no_tables_anew(opened, records, monkeypa
 
 
 @pytest.mark.parametrize("opened", ["probes"], indirect=True)
-def test_frames_show_the_mean_until_the_tables_are_there(opened, records, monkeypatch):
+def test_frames_show_the_mean_until_the_tables_are_ready(opened, records, monkeypatch):
     picture = FreeCameraPicture(opened, "front", is_watched=True)
     picture.set_look(look_of(opened, records))
     with monkeypatch.context() as during:
@@ -122,23 +122,23 @@ def test_frames_show_the_mean_until_the_tables_are_there(opened, records, monkey
             picture.install(job, job.run(lambda share: None, lambda: False))
             picture.advance(None)
             mean = picture.image()
-    found = settle(picture).image()
+    image = run_to_the_end(picture).image()
     alone = FreeCameraPicture(opened, "front")
     alone.set_look(look_of(opened, records))
     alone.advance(None)
     wanted = alone.image()
     size = np.linalg.norm(wanted)
-    assert np.linalg.norm(found - wanted) < 0.02 * size < 0.05 * size < np.linalg.norm(mean - wanted)
+    assert np.linalg.norm(image - wanted) < 0.02 * size < 0.05 * size < np.linalg.norm(mean - wanted)
 
 
 @pytest.mark.parametrize("opened", ["probes"], indirect=True)
-def test_an_edit_beside_btfs_changes_what_it_changes_and_nothing_else(opened, records):
+def test_an_edit_of_another_material_does_not_change_btfs(opened, records):
     picture = FreeCameraPicture(opened, "front", is_watched=True)
     picture.set_look(look_of(opened, records, 0.2))
-    settle(picture)
+    run_to_the_end(picture)
     picture.set_look(look_of(opened, records, 0.7))
     picture.advance(None)
     anew = FreeCameraPicture(opened, "front", is_watched=True)
     anew.set_look(look_of(opened, records, 0.7))
-    settle(anew)
+    run_to_the_end(anew)
     np.testing.assert_allclose(picture.image(), anew.image(), rtol=1e-3, atol=1e-4)

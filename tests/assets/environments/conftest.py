@@ -1,4 +1,4 @@
-"""A shelf with one environment; its file."""
+"""A library with one environment, and its file."""
 
 import pytest
 from environment_files import dusk, write_map
@@ -12,8 +12,8 @@ def dusk_file(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def shelf(dusk_file, tmp_path_factory):
-    """A folder with one imported environment, in use."""
+def library(dusk_file, tmp_path_factory):
+    """A library folder with one imported environment, in use."""
     with STORE.with_search_folder(tmp_path_factory.mktemp("shelf") / "environments") as folder:
         store_environment(folder, dusk_file, "Dusk")
         yield folder

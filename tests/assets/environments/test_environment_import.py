@@ -1,4 +1,4 @@
-"""Environments by the command line and over HTTP, and a baked scene shown in one."""
+"""Environments on the command line and over HTTP, and a baked scene lit by one."""
 
 import json
 import re
@@ -58,7 +58,7 @@ def wait(is_done):
     raise AssertionError("it takes too long")
 
 
-def test_rest_lists_built_in_ones_first_and_shows_each(client, imported):
+def test_rest_lists_built_in_environments_first_and_shows_each(client, imported):
     listed = client.get(URL).json()
     assert [entry["map"] for entry in listed] == ["studio", "clear_sky", "sunset", "overcast", imported["map"]]
     assert (imported["name"], imported["map"]) == ("dusk", f"env:{imported['id']}")
@@ -70,7 +70,7 @@ def test_rest_lists_built_in_ones_first_and_shows_each(client, imported):
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "message"),
     [
         (b"\x89PNG\r\n\x1a\n" + b"0" * 100, "neither Radiance .hdr nor OpenEXR"),
         (b"#?RADIANCE\n\n-Y 100000 +X 200000\n", "at most 16384×8192"),
@@ -78,14 +78,14 @@ def test_rest_lists_built_in_ones_first_and_shows_each(client, imported):
         (b"", "empty: 0 bytes"),
     ],
 )
-def test_hostile_files_are_refused_in_words(tmp_path, content, said):
+def test_hostile_files_are_rejected_with_a_message(tmp_path, content, message):
     path = tmp_path / "x.hdr"
     path.write_bytes(content)
-    with pytest.raises(SceneError, match=re.escape(said)):
+    with pytest.raises(SceneError, match=re.escape(message)):
         read_environment(path, "x")
 
 
-def test_a_hostile_file_that_is_sent_leaves_nothing(client, imported):
+def test_a_hostile_upload_leaves_no_files(client, imported):
     response = client.post(URL, files={"environment": ("x.hdr", b"#?RADIANCE\n\n-Y 4096 +X 8192\n")})
     assert response.status_code == 422
     assert response.json()["type"] == "urn:relume:problem:scene"
@@ -104,7 +104,7 @@ def test_names_are_checked(client, dusk_file):
 
 
 @pytest.mark.slow
-def test_a_session_shows_what_a_batch_renders_in_an_imported_light(client, imported, bake, tmp_path):
+def test_a_session_equals_a_render_in_an_imported_environment(client, imported, bake, tmp_path):
     look = {"environment": {"map": imported["map"]}}
     with open_session(client, bake) as session:
         session.exact(0)
@@ -131,16 +131,16 @@ def render(client, bake, look, path):
     return OpenImageIO.ImageBuf(str(path)).get_pixels(OpenImageIO.FLOAT)
 
 
-def test_a_frame_in_another_light_is_judged_in_that_light(client, imported, bake):
+def test_a_comparison_uses_the_environment_of_the_look(client, imported, bake):
     request = {"bake": bake, "view": "front", "look": {"environment": {"map": imported["map"]}}, "passes": 2}
     url = client.post("/api/comparisons", json=request).headers["location"]
     wait(lambda: client.get(url).json()["state"] == "ready")
     assert (
         client.get(url).json()["error_method_paths"]["error_upper_bound"] < 0.25
-    )  # in the studio's light it would be above 1
+    )  # in the studio environment it would be above 1
 
 
-def test_what_was_deleted_is_known_no_more(client, bake):
+def test_a_deleted_environment_is_unknown(client, bake):
     bright = np.ascontiguousarray(dusk()[::-1])
     path = write_map(client.app.state.services.settings.data / "bright.hdr", bright)
     made = client.post(URL, files={"environment": ("bright.hdr", path.read_bytes())}, data={"name": "Bright"}).json()
@@ -150,7 +150,7 @@ def test_what_was_deleted_is_known_no_more(client, bake):
     assert made["map"] not in [entry["map"] for entry in client.get(URL).json()]
 
 
-def test_the_scene_s_own_light_has_a_thumbnail(client, bake):
+def test_the_scenes_own_environment_has_a_thumbnail(client, bake):
     picture = client.get(f"/api/bakes/{bake}/environment.png")
     assert picture.headers["content-type"] == "image/png"
     assert picture.content.startswith(b"\x89PNG")
@@ -165,11 +165,11 @@ def test_command_line_imports_lists_and_renders(tmp_path, dusk_file, capsys):
     assert main(["list", "environments", *home]) == 0
     listed = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in listed] == ["studio", "clear_sky", "sunset", "overcast", name]
-    for path, said in ((tmp_path / "none.hdr", "file that exists"), (tmp_path / "bad.hdr", "neither Radiance")):
+    for path, message in ((tmp_path / "none.hdr", "file that exists"), (tmp_path / "bad.hdr", "neither Radiance")):
         if "bad" in path.name:
             path.write_bytes(b"bad")
         assert main(["environment", "import", str(path), *home]) == 1
-        assert said in capsys.readouterr().err
+        assert message in capsys.readouterr().err
 
 
 def test_a_look_from_a_file_names_the_map_on_the_command_line(tmp_path, dusk_file, capsys):

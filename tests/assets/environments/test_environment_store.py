@@ -1,4 +1,4 @@
-"""Imported and built-in environments: what is kept, what it is called, what damaged files do."""
+"""Imported and built-in environments: storage, names, damaged files."""
 
 import io
 import json
@@ -20,20 +20,20 @@ from relume.core.errors import NotFoundError, SceneError
 from relume_server.io.import_request import remove_strays
 
 
-def test_an_import_is_listed_and_found_by_its_name(shelf):
-    (record,) = records(shelf)
+def test_an_import_is_listed_and_found_by_its_name(library):
+    (record,) = records(library)
     assert (record.name, record.map, record.warnings) == ("Dusk", f"env:{record.id}", ())
-    found = environments.load_environment(record.map)
-    assert found.name == "Dusk"
-    np.testing.assert_array_equal(found.radiance, dusk())
-    assert not found.radiance.flags.writeable
+    environment = environments.load_environment(record.map)
+    assert environment.name == "Dusk"
+    np.testing.assert_array_equal(environment.radiance, dusk())
+    assert not environment.radiance.flags.writeable
     assert environments.environment_exists(record.map)
     assert environments.environment_names() == [*BUILT_IN, record.map]
-    with Image.open(thumbnail_path(shelf, record.id)) as picture:
+    with Image.open(thumbnail_path(library, record.id)) as picture:
         assert (picture.size, picture.mode) == ((192, 96), "RGB")
 
 
-def test_the_same_file_again_takes_the_new_name(dusk_file, tmp_path):
+def test_importing_the_same_file_again_takes_the_new_name(dusk_file, tmp_path):
     first = store_environment(tmp_path / "shelf", dusk_file, "One")
     again = store_environment(tmp_path / "shelf", dusk_file, "Two")
     assert (again.id, again.name, again.created) == (first.id, "Two", first.created)
@@ -47,7 +47,7 @@ def test_a_bad_file_leaves_nothing_behind(tmp_path):
     assert not (tmp_path / "shelf").exists()
 
 
-def test_what_a_killed_import_left_is_found_by_its_name(tmp_path):
+def test_leftovers_of_a_killed_import_are_overwritten(tmp_path):
     def killed(made):
         (stray,) = (tmp_path / "shelf").iterdir()
         shutil.copytree(stray, tmp_path / "left" / stray.name)
@@ -60,19 +60,19 @@ def test_what_a_killed_import_left_is_found_by_its_name(tmp_path):
     assert not list((tmp_path / "left").iterdir())
 
 
-def test_large_maps_are_kept_smaller_and_as_bright(tmp_path, monkeypatch):
+def test_large_maps_are_downsampled_and_keep_their_brightness(tmp_path, monkeypatch):
     monkeypatch.setattr(environment_store, "MAX_WIDTH", 32)
     pixels = np.random.default_rng(1).uniform(0, 4, (48, 96, 3)).astype(np.float32)
     path = write_map(tmp_path / "large.exr", pixels)
     with STORE.with_search_folder(tmp_path / "shelf") as folder:
         record = store_environment(folder, path, "Large")
         assert record.warnings == ("environment 'Large' is 96×48; it is kept as 32×16",)
-        found = environments.load_environment(record.map).radiance
-    np.testing.assert_allclose(found, pixels.reshape(16, 3, 32, 3, 3).mean(axis=(1, 3)), rtol=1e-5)
+        radiance = environments.load_environment(record.map).radiance
+    np.testing.assert_allclose(radiance, pixels.reshape(16, 3, 32, 3, 3).mean(axis=(1, 3)), rtol=1e-5)
 
 
 @pytest.mark.parametrize("name", ["", "env:", "env:../../etc", "env:0123456789abcdef", "Studio", "0123456789abcdef"])
-def test_other_names_are_unknown(shelf, name):
+def test_other_names_are_unknown(library, name):
     assert not environments.environment_exists(name)
     with pytest.raises(NotFoundError, match="import its file again"):
         environments.load_environment(name)
@@ -87,23 +87,23 @@ def test_other_names_are_unknown(shelf, name):
         ("radiance.npy", b"\x93NUMPY\x01\x00"),
     ],
 )
-def test_damaged_files_are_named(shelf, tmp_path, file, content):
-    shutil.copytree(shelf / records(shelf)[0].id, tmp_path / "fedcba9876543210")
+def test_errors_name_damaged_environment_files(library, tmp_path, file, content):
+    shutil.copytree(library / records(library)[0].id, tmp_path / "fedcba9876543210")
     (tmp_path / "fedcba9876543210" / file).write_bytes(content)
     with STORE.with_search_folder(tmp_path), pytest.raises(SceneError, match="import it again"):
         environments.load_environment("env:fedcba9876543210")
 
 
-def test_arrays_of_other_shapes_are_damage(shelf, tmp_path):
-    shutil.copytree(shelf / records(shelf)[0].id, tmp_path / "fedcba9876543210")
+def test_arrays_of_other_shapes_are_damage(library, tmp_path):
+    shutil.copytree(library / records(library)[0].id, tmp_path / "fedcba9876543210")
     for shape in ((4, 4, 3), (4, 8), (4, 8, 4), (0, 0, 3)):
         np.save(tmp_path / "fedcba9876543210" / "radiance.npy", np.ones(shape, np.float32))
         with STORE.with_search_folder(tmp_path), pytest.raises(SceneError, match="damaged"):
             environments.load_environment("env:fedcba9876543210")
 
 
-def test_a_record_without_warnings_is_damage(shelf, tmp_path):
-    shutil.copytree(shelf / records(shelf)[0].id, tmp_path / "fedcba9876543210")
+def test_a_record_without_warnings_is_damage(library, tmp_path):
+    shutil.copytree(library / records(library)[0].id, tmp_path / "fedcba9876543210")
     (tmp_path / "fedcba9876543210" / "environment.json").write_text('{"format": 1, "name": "x", "created": 1.0}')
     with pytest.raises(SceneError, match="damaged"):
         get_record(tmp_path, "fedcba9876543210")
@@ -115,7 +115,7 @@ def mean_luminance(radiance):
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_built_in_ones_are_sound_and_as_bright_as_the_studio(name):
+def test_built_in_environments_are_valid_and_as_bright_as_the_studio(name):
     radiance = load_built_in(name).radiance
     assert radiance.dtype == np.float32
     assert radiance.shape == (256, 512, 3)
@@ -131,15 +131,15 @@ def test_overcast_zenith_is_three_times_the_horizon():
 
 
 @pytest.mark.parametrize(("name", "elevation"), [("clear_sky", 48.0), ("sunset", 5.0)])
-def test_the_sun_stands_where_it_is_said_to(name, elevation):
+def test_the_sun_is_at_its_stated_elevation(name, elevation):
     light = luminance(load_built_in(name).radiance)
     y = texel_directions(256, 512)[..., 1]
     assert np.degrees(np.arcsin(y.ravel()[light.argmax()])) == pytest.approx(elevation, abs=0.7)
 
 
-def test_a_thumbnail_shows_a_dim_map_as_a_bright_one():
-    one = np.random.default_rng(2).uniform(0.5, 1.0, (32, 64, 3)).astype(np.float32)
-    pictures = [np.asarray(Image.open(io.BytesIO(thumbnail(one * scale))), int) for scale in (1e-3, 1.0, 1e3)]
+def test_thumbnails_are_exposed_automatically():
+    radiance = np.random.default_rng(2).uniform(0.5, 1.0, (32, 64, 3)).astype(np.float32)
+    pictures = [np.asarray(Image.open(io.BytesIO(thumbnail(radiance * scale))), int) for scale in (1e-3, 1.0, 1e3)]
     for picture in pictures:
         assert np.abs(picture - pictures[1]).max() <= 1
 

@@ -1,4 +1,4 @@
-"""Equirectangular maps: which way is up, how large a texel is, what is read and what is repaired."""
+"""Equirectangular maps: orientation, solid angles, reading and repair."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_solid_angles_cover_the_sphere_and_integrate_cosines() -> None:
 
 
 @pytest.mark.parametrize("suffix", [".hdr", ".exr"])
-def test_reads_what_was_written(tmp_path: Path, suffix: str) -> None:
+def test_written_maps_are_read_back(tmp_path: Path, suffix: str) -> None:
     pixels = np.random.default_rng(2).uniform(0.5, 1, (16, 32, 3)).astype(np.float32)
     pixels[3, 7] = (100, 50, 25)
     path = written(tmp_path / f"sky{suffix}", pixels)
@@ -60,9 +60,9 @@ def test_reads_what_was_written(tmp_path: Path, suffix: str) -> None:
         assert environment.warnings == ()
 
 
-def test_grey_and_alpha_are_understood(tmp_path: Path) -> None:
-    grey = read_environment(written(tmp_path / "grey.exr", np.full((2, 4, 1), 0.5)), "grey")
-    np.testing.assert_array_equal(grey.radiance, np.full((2, 4, 3), 0.5, np.float32))
+def test_gray_and_alpha_channels_are_read(tmp_path: Path) -> None:
+    gray = read_environment(written(tmp_path / "grey.exr", np.full((2, 4, 1), 0.5)), "grey")
+    np.testing.assert_array_equal(gray.radiance, np.full((2, 4, 3), 0.5, np.float32))
     colour = np.broadcast_to(np.array([1.0, 2.0, 3.0, 0.25]), (2, 4, 4))
     alpha = read_environment(written(tmp_path / "alpha.exr", colour), "alpha")
     np.testing.assert_array_equal(alpha.radiance[0, 0], [1, 2, 3])
@@ -79,7 +79,7 @@ def test_rgb_is_found_among_other_channels(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_environment(tmp_path / "layers.exr", "layers").radiance[1, 2], [1, 2, 3])
 
 
-def test_texels_that_are_no_light_are_repaired_with_a_warning_each(tmp_path: Path) -> None:
+def test_invalid_texels_are_repaired_with_one_warning_each(tmp_path: Path) -> None:
     pixels = np.ones((4, 8, 3), np.float32)
     pixels[0, 0, 1], pixels[1, 1, 0], pixels[2, 2, 2], pixels[3, 3] = np.nan, np.inf, -3.0, 1e30
     environment = read_environment(written(tmp_path / "broken.exr", pixels), "broken")
@@ -92,12 +92,12 @@ def test_texels_that_are_no_light_are_repaired_with_a_warning_each(tmp_path: Pat
 
 
 @pytest.mark.parametrize("shape", [(4, 4, 3), (8, 4, 3), (4, 7, 3)])
-def test_other_aspects_than_two_to_one_are_refused(tmp_path: Path, shape: tuple[int, int, int]) -> None:
+def test_aspect_ratios_other_than_two_to_one_are_rejected(tmp_path: Path, shape: tuple[int, int, int]) -> None:
     with pytest.raises(SceneError, match="twice as wide as high"):
         read_environment(written(tmp_path / "odd.exr", np.ones(shape)), "odd")
 
 
-def test_darkness_is_refused(tmp_path: Path) -> None:
+def test_black_maps_are_rejected(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="black everywhere"):
         read_environment(written(tmp_path / "black.exr", np.zeros((2, 4, 3))), "black")
 
@@ -107,7 +107,7 @@ def test_a_map_without_any_finite_number_is_not_called_black(tmp_path: Path) -> 
         read_environment(written(tmp_path / "lost.exr", np.full((2, 4, 3), np.nan)), "lost")
 
 
-def test_truncated_pixels_are_refused(tmp_path: Path) -> None:
+def test_truncated_pixels_are_rejected(tmp_path: Path) -> None:
     noise = np.random.default_rng(1).random((64, 128, 3))
     for suffix in (".hdr", ".exr"):
         data = written(tmp_path / f"cut{suffix}", noise).read_bytes()
@@ -124,8 +124,8 @@ def test_real_environments_are_read(shared_data: Path) -> None:
         assert environment.radiance.mean() > 0.01
 
 
-def test_maps_wider_than_asked_for_are_means_and_say_so(tmp_path: Path) -> None:
-    """They are read in strips, and what is repaired in one is counted with all."""
+def test_maps_wider_than_requested_are_downsampled_with_a_warning(tmp_path: Path) -> None:
+    """They are read in strips; repaired texels are counted over all strips."""
     pixels = np.random.default_rng(3).uniform(0, 9, (192, 384, 3)).astype(np.float32)
     pixels[[3, 150], 7], pixels[[4, 70, 190], 9] = np.nan, -1
     path = written(tmp_path / "sky.exr", pixels)

@@ -1,4 +1,4 @@
-"""Maps in other primaries: published matrices, what is the same colour stays it, and primaries that are none."""
+"""Maps in other primaries: published matrices, invariance of color, invalid primaries."""
 
 import numpy as np
 import pytest
@@ -12,13 +12,13 @@ D65 = (0.3127, 0.3290)
 REC_2020 = (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, *D65)
 ACES = (0.7347, 0.2653, 0.0, 1.0, 0.0001, -0.0770, 0.32168, 0.33767)
 
-# ITU-R BT.2087, table 4's inverse; and ACES 2065-1 by Bradford's rule, as OpenColorIO's configurations have it
+# ITU-R BT.2087, table 4's inverse; and ACES 2065-1 by Bradford's rule, as in OpenColorIO's configurations
 OF_2020 = [[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]]
 OF_ACES = [[2.5217, -1.1341, -0.3876], [-0.2765, 1.3727, -0.0962], [-0.0154, -0.1530, 1.1684]]
 
 
 @pytest.mark.parametrize(("primaries", "published"), [(REC_2020, OF_2020), (ACES, OF_ACES)])
-def test_matrices_are_those_that_are_published(primaries, published):
+def test_matrices_equal_the_published_ones(primaries, published):
     np.testing.assert_allclose(to_rec_709(primaries), published, atol=3e-4)
 
 
@@ -27,36 +27,36 @@ def test_white_stays_white(primaries):
     np.testing.assert_allclose(to_rec_709(primaries).sum(axis=1), 1, atol=1e-9)
 
 
-def test_our_own_primaries_change_nothing():
+def test_rec_709_primaries_change_nothing():
     assert to_rec_709(REC_709) is None
     assert to_rec_709((0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.313, 0.329)) is None
 
 
-def test_a_map_in_other_primaries_is_the_same_light(tmp_path):
-    """Written by the inverse of what it is read by, but for texels that are no numbers, which are black as before."""
+def test_a_map_in_other_primaries_has_the_same_radiance(tmp_path):
+    """Written with the inverse matrix; texels that are not numbers are black as before."""
     wanted = dusk()
     other = wanted @ np.linalg.inv(np.array(OF_2020)).T
     other[3, 4] = np.nan
     other[5, 6] = [np.inf, 1, -np.inf]
-    found = read_environment(write_map(tmp_path / "a.exr", other, REC_2020), "dusk")
+    actual = read_environment(write_map(tmp_path / "a.exr", other, REC_2020), "dusk")
     wanted[3, 4] = wanted[5, 6] = 0
-    np.testing.assert_allclose(found.radiance, wanted, atol=2e-3 * wanted.max(), rtol=2e-3)
-    assert [warning.severity for warning in found.warnings] == ["unsupported"]
+    np.testing.assert_allclose(actual.radiance, wanted, atol=2e-3 * wanted.max(), rtol=2e-3)
+    assert [warning.severity for warning in actual.warnings] == ["unsupported"]
     plain = read_environment(write_map(tmp_path / "b.exr", wanted, REC_709), "dusk")
     np.testing.assert_array_equal(plain.radiance, wanted)
 
 
-def test_a_grey_map_stays_what_it_is(tmp_path):
-    grey = dusk()[..., :1]
-    found = read_environment(write_map(tmp_path / "a.exr", grey, ACES), "dusk")
-    np.testing.assert_array_equal(found.radiance, np.repeat(grey, 3, axis=2))
+def test_a_gray_map_is_unchanged(tmp_path):
+    gray = dusk()[..., :1]
+    actual = read_environment(write_map(tmp_path / "a.exr", gray, ACES), "dusk")
+    np.testing.assert_array_equal(actual.radiance, np.repeat(gray, 3, axis=2))
 
 
-def test_a_colour_outside_of_ours_is_held_to_it_and_said(tmp_path):
+def test_colors_outside_the_gamut_are_clamped_with_a_warning(tmp_path):
     green = np.tile(np.array([0, 1, 0], np.float32), (4, 8, 1))
-    found = read_environment(write_map(tmp_path / "a.exr", green, ACES), "green")
-    assert "negative" in found.warnings[0]
-    np.testing.assert_allclose(found.radiance[0, 0], [0, 1.3727, 0], atol=1e-3)
+    actual = read_environment(write_map(tmp_path / "a.exr", green, ACES), "green")
+    assert "negative" in actual.warnings[0]
+    np.testing.assert_allclose(actual.radiance[0, 0], [0, 1.3727, 0], atol=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -73,12 +73,12 @@ def test_a_colour_outside_of_ours_is_held_to_it_and_said(tmp_path):
         (*REC_709[:6], 0.3, -0.3),
     ],
 )
-def test_primaries_that_tell_no_colours_are_refused_in_words(tmp_path, primaries):
+def test_degenerate_primaries_are_rejected_with_a_message(tmp_path, primaries):
     with pytest.raises(SceneError, match=r"odd primaries .* Rec\. 709"):
         read_environment(write_map(tmp_path / "a.exr", dusk(), primaries), "dusk")
 
 
-def test_an_attribute_that_is_no_eight_numbers_is_refused(tmp_path):
+def test_an_attribute_without_eight_numbers_is_rejected(tmp_path):
     data = write_map(tmp_path / "a.exr", dusk(), REC_2020).read_bytes()
     assert b"chromaticities\0chromaticities\0" in data
     words = data.replace(b"chromaticities\0chromaticities\0\x20\0\0\0", b"chromaticities\0string\0\x20\0\0\0")
@@ -87,22 +87,22 @@ def test_an_attribute_that_is_no_eight_numbers_is_refused(tmp_path):
 
 
 def with_primaries(path, words):
-    """The dusk as an .hdr whose header has one more line."""
+    """The dusk map as an .hdr whose header has one more line."""
     write_map(path, dusk())
     head, rest = path.read_bytes().split(b"\n", 1)
     path.write_bytes(head + b"\nPRIMARIES=" + words + b"\n" + rest)
     return path
 
 
-def test_a_radiance_header_tells_primaries_too(tmp_path):
-    """Zeros are written by who does not know them; the last line counts."""
+def test_primaries_of_a_radiance_header_are_used(tmp_path):
+    """Some writers write zeros; the last line counts."""
     plain = read_environment(write_map(tmp_path / "plain.hdr", dusk()), "dusk").radiance
     wide = " ".join(map(str, REC_2020)).encode()
-    found = read_environment(with_primaries(tmp_path / "wide.hdr", wide), "dusk")
+    actual = read_environment(with_primaries(tmp_path / "wide.hdr", wide), "dusk")
     np.testing.assert_allclose(
-        found.radiance, np.maximum(plain @ np.array(OF_2020, np.float32).T, 0), rtol=2e-3, atol=1e-3
+        actual.radiance, np.maximum(plain @ np.array(OF_2020, np.float32).T, 0), rtol=2e-3, atol=1e-3
     )
-    assert np.abs(found.radiance - plain).max() > 0.1
+    assert np.abs(actual.radiance - plain).max() > 0.1
     for words in (b"", b" 0 0 0 0 0 0 0 0", wide + b"\nPRIMARIES= " + " ".join(map(str, REC_709)).encode()):
         same = read_environment(with_primaries(tmp_path / "same.hdr", words), "dusk")
         np.testing.assert_array_equal(same.radiance, plain)
@@ -110,7 +110,9 @@ def test_a_radiance_header_tells_primaries_too(tmp_path):
 
 
 @pytest.mark.parametrize("words", [b"1 2 3", b"a b c d e f g h", b"nan " * 8, b"1e999 " * 8, b"0.3 0.3 " * 4])
-def test_radiance_primaries_that_are_none_are_said(tmp_path, words):
-    found = read_environment(with_primaries(tmp_path / "a.hdr", words), "dusk")
-    assert "primaries that are no colours" in found.warnings[0]
-    np.testing.assert_array_equal(found.radiance, read_environment(write_map(tmp_path / "b.hdr", dusk()), "b").radiance)
+def test_invalid_radiance_primaries_give_a_warning(tmp_path, words):
+    actual = read_environment(with_primaries(tmp_path / "a.hdr", words), "dusk")
+    assert "primaries that are no colours" in actual.warnings[0]
+    np.testing.assert_array_equal(
+        actual.radiance, read_environment(write_map(tmp_path / "b.hdr", dusk()), "b").radiance
+    )

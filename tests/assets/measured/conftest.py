@@ -1,4 +1,4 @@
-"""One measured material for all tests here; making it takes a second."""
+"""One measured material for all tests in this folder; making it takes a second."""
 
 import pytest
 from merl_files import make_planes
@@ -27,8 +27,8 @@ def table(planes):
 
 
 @pytest.fixture(scope="session")
-def shelf(planes, tmp_path_factory):
-    """A folder with one imported material, in use."""
+def library(planes, tmp_path_factory):
+    """A library folder with one imported material, in use."""
     folder = tmp_path_factory.mktemp("measured")
     write_merl(folder / "plastic.binary", planes)
     with STORE.with_search_folder(folder / "materials") as materials:
@@ -37,6 +37,6 @@ def shelf(planes, tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def data(shelf):
-    """How look documents name it."""
-    return records(shelf)[0].data
+def data(library):
+    """The name of the material in look documents."""
+    return records(library)[0].data

@@ -1,4 +1,4 @@
-"""Measured materials by the command line and over HTTP."""
+"""Measured materials on the command line and over HTTP."""
 
 import io
 import json
@@ -27,27 +27,27 @@ def red(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def home(tmp_path_factory):
-    """A data folder for all tests here: a material that one imports is there for the next."""
+    """A data folder for all tests here: a material that one test imports is available to the next."""
     return tmp_path_factory.mktemp("home")
 
 
-def test_command_line_takes_a_file_in_and_gives_the_edited_one_out(home, red, tmp_path, capsys):
+def test_command_line_imports_a_file_and_exports_the_edited_one(home, red, tmp_path, capsys):
     assert main(["material", "import", str(red), "--name", "Red paint", "--data", str(home)]) == 0
-    told = capsys.readouterr()
+    printed = capsys.readouterr()
     (record,) = records(home / "materials")
-    assert (told.out, record.name) == (f"{record.data}\n", "Red paint")
-    terms = json.loads(told.err.splitlines()[0])["terms"]
+    assert (printed.out, record.name) == (f"{record.data}\n", "Red paint")
+    terms = json.loads(printed.err.splitlines()[0])["terms"]
     terms[0]["color"] = [0.5, 2.0, 1.0]
     look, output = tmp_path / "look.json", tmp_path / "edited.binary"
     look.write_text(json.dumps({"materials": {"Wall": {"terms": terms}}}))
     assert main(["material", "export", str(look), "Wall", "--output", str(output), "--data", str(home)]) == 0
     before, after = read_merl(red), read_merl(output)
-    kept = is_measured(before)
+    was_measured = is_measured(before)
     for channel, scale in enumerate((0.5, 2.0, 1.0)):
-        np.testing.assert_allclose(after[channel, kept], scale * before[channel, kept], rtol=1e-6)
+        np.testing.assert_allclose(after[channel, was_measured], scale * before[channel, was_measured], rtol=1e-6)
 
 
-def test_command_line_says_in_one_line_what_is_wrong(home, tmp_path, capsys):
+def test_command_line_reports_errors_in_one_line(home, tmp_path, capsys):
     (tmp_path / "bad.binary").write_bytes(b"bad")
     (tmp_path / "look.json").write_text(json.dumps({"materials": {"Wall": {"terms": [{"model": "measured_lv"}]}}}))
     look, data = str(tmp_path / "look.json"), ["--data", str(home)]

@@ -1,4 +1,4 @@
-"""The interpolated measured BRDF and its quotients, against plain NumPy and the terms they were made from."""
+"""The interpolated measured BRDF and its quotients, against plain NumPy and the source terms."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from relume.brdf.evaluate import eval_brdf
 
 
 def directions(rng, num, lowest=0.0):
-    """Above the horizon, cosines above `lowest`."""
+    """Directions above the horizon with cosines above `lowest`."""
     v = rng.normal(size=(num, 3))
     v /= np.linalg.norm(v, axis=1, keepdims=True)
     z = lowest + (1 - lowest) * np.abs(v[:, 2])
@@ -36,17 +36,17 @@ def rotated(v, axis, angle):
     return c * v + s * np.cross(e, v) + (1 - c) * (v @ e)[..., None] * e
 
 
-def twin_positions(wi, wo):
-    """Positions in nodes along θh, θd and φd: Rusinkiewicz' own way, the half vector rotated to the pole."""
+def positions_numpy(wi, wo):
+    """Positions in nodes along θh, θd and φd by Rusinkiewicz: the half vector rotated to the pole."""
     half = (wi + wo) / np.linalg.norm(wi + wo, axis=-1, keepdims=True)
     theta_h, phi_h = spherical(half)
     theta_d, phi_d = spherical(rotated(rotated(wi, 2, -phi_h), 1, -theta_h))
     return np.sqrt(theta_h / (np.pi / 2)) * 90, theta_d / (np.pi / 2) * 90, np.mod(phi_d, np.pi) / np.pi * 180
 
 
-def twin_measured(table, wi, wo):
-    """Trilinear, one corner after another."""
-    h, d, p = twin_positions(wi, wo)
+def measured_numpy(table, wi, wo):
+    """Trilinear interpolation, one corner after another."""
+    h, d, p = positions_numpy(wi, wo)
     h, d = np.minimum(h, 89), np.minimum(d, 89)
     h0, d0, p0 = np.minimum(h.astype(int), 88), np.minimum(d.astype(int), 88), p.astype(int)
     total = 0
@@ -58,23 +58,23 @@ def twin_measured(table, wi, wo):
     return total
 
 
-def twin_curve(knots, position):
+def curve_numpy(knots, position):
     return np.stack([np.interp(position, np.arange(NUM_KNOTS), channel) for channel in knots])
 
 
-def twin_quotient(part, table, curves, wi, wo):
-    value, (h, d, _) = twin_measured(table, wi, wo).T, twin_positions(wi, wo)
+def quotient_numpy(lobe, table, curves, wi, wo):
+    value, (h, d, _) = measured_numpy(table, wi, wo).T, positions_numpy(wi, wo)
     i, o = (np.arccos(v[:, 2]) / (np.pi / 2) * 90 for v in (wi, wo))
-    product = twin_curve(curves[0], i) * twin_curve(curves[3], o)
-    match part:
+    product = curve_numpy(curves[0], i) * curve_numpy(curves[3], o)
+    match lobe:
         case QuotientKind.WHOLE:
             return value
         case QuotientKind.DIFFUSE:
             return np.minimum(value, product) / product
         case QuotientKind.SPECULAR:
-            return np.maximum(value - product, 0) / (twin_curve(curves[1], h) * twin_curve(curves[2], d))
+            return np.maximum(value - product, 0) / (curve_numpy(curves[1], h) * curve_numpy(curves[2], d))
         case QuotientKind.HOMOMORPHIC:
-            return value / (product * twin_curve(curves[1], h))
+            return value / (product * curve_numpy(curves[1], h))
 
 
 @pytest.fixture(scope="module")
@@ -89,17 +89,17 @@ def test_nodes_have_the_stored_values(planes, table):
     np.testing.assert_allclose(evaluate_measured(table, wi[nodes], wo[nodes]), expected, rtol=2e-6, atol=1e-9)
 
 
-def test_between_the_nodes_it_is_near_what_was_sampled(table):
+def test_interpolated_values_are_near_the_source_terms(table):
     rng = np.random.default_rng(1)
     wi, wo = directions(rng, 20_000, 0.3), directions(rng, 20_000, 0.3)
     expected = sum(eval_brdf(document, wi, wo) for document in PLASTIC)
-    found = evaluate_measured(table, wi, wo)
-    # linear over at most 2°, Δ²/8 · f''/f with a lobe that changes e-fold within about 10°: half a per cent
-    assert np.abs(found - expected).max() < 0.02 * expected.max()
-    assert np.sqrt(np.mean((found - expected) ** 2)) < 5e-3 * np.sqrt(np.mean(expected**2))
+    actual = evaluate_measured(table, wi, wo)
+    # linear over at most 2°, Δ²/8 · f''/f with a lobe that changes by a factor of e within about 10°: 0.5 %
+    assert np.abs(actual - expected).max() < 0.02 * expected.max()
+    assert np.sqrt(np.mean((actual - expected) ** 2)) < 5e-3 * np.sqrt(np.mean(expected**2))
 
 
-def test_it_is_reciprocal_and_turns_with_the_surface(table):
+def test_the_brdf_is_reciprocal_and_isotropic(table):
     rng = np.random.default_rng(2)
     wi, wo = directions(rng, 2000, 1e-3), directions(rng, 2000, 1e-3)
     value = evaluate_measured(table, wi, wo)
@@ -110,30 +110,30 @@ def test_it_is_reciprocal_and_turns_with_the_surface(table):
     )
 
 
-@pytest.mark.parametrize("part", list(QuotientKind))
-def test_quotients_equal_their_twin(table, factors, part):
+@pytest.mark.parametrize("lobe", list(QuotientKind))
+def test_quotients_equal_their_reference(table, factors, lobe):
     rng = np.random.default_rng(3)
     wi, wo = directions(rng, 5000, 1e-3), directions(rng, 5000, 1e-3)
-    curves = factors.homomorphic if part is QuotientKind.HOMOMORPHIC else factors.lobes
-    found = measured_over_model(part, table, curves, *wi.T, *wo.T)
-    expected = twin_quotient(part, table, curves, wi, wo)
-    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-7 * expected.max())
+    curves = factors.homomorphic if lobe is QuotientKind.HOMOMORPHIC else factors.lobes
+    actual = measured_over_model(lobe, table, curves, *wi.T, *wo.T)
+    expected = quotient_numpy(lobe, table, curves, wi, wo)
+    np.testing.assert_allclose(actual, expected, rtol=1e-6, atol=1e-7 * expected.max())
 
 
-@pytest.mark.parametrize("part", list(QuotientKind))
-def test_quotients_are_bounded_and_zero_below_the_horizon(table, factors, part):
-    curves = factors.homomorphic if part is QuotientKind.HOMOMORPHIC else factors.lobes
+@pytest.mark.parametrize("lobe", list(QuotientKind))
+def test_quotients_are_bounded_and_zero_below_the_horizon(table, factors, lobe):
+    curves = factors.homomorphic if lobe is QuotientKind.HOMOMORPHIC else factors.lobes
     rng = np.random.default_rng(4)
     for dtype in (np.float32, np.float64):
         wi, wo = directions(rng, 3000).astype(dtype).T, directions(rng, 3000).astype(dtype).T
         wi[2, :500] = np.geomspace(1e-30, 1e-3, 500)
-        value = measured_over_model(part, table, curves, *wi, *wo)
+        value = measured_over_model(lobe, table, curves, *wi, *wo)
         assert value.dtype == dtype
         assert np.isfinite(value).all()
         assert (value >= 0).all()
         down = wi * np.array([[1], [1], [-1]], dtype)
         for a, b in ((down, wo), (wo, down), (down, down)):
-            assert not measured_over_model(part, table, curves, *a, *b).any()
+            assert not measured_over_model(lobe, table, curves, *a, *b).any()
 
 
 def test_curves_can_be_divided_by(factors):
@@ -143,21 +143,21 @@ def test_curves_can_be_divided_by(factors):
         assert (curves >= 0.999 * FLOOR * np.maximum(curves.max(axis=2, keepdims=True), 1)).all()
 
 
-def test_a_separable_material_is_factorised_without_rest():
-    """Lambert, and a lobe that is a product of θh and θd by construction."""
+def test_a_separable_material_is_factorized_without_residual():
+    """Lambert, and a lobe that is a product of functions of θh and θd by construction."""
     planes = make_planes(({"model": "blinn_phong", "color": [3.0, 2.0, 1.0], "params": {"exponent": 20.0}},))
     table = build_table(planes)
-    found = factorize(planes, table)
-    np.testing.assert_allclose(found.homomorphic_error, 0, atol=0.02)
+    factorized = factorize(planes, table)
+    np.testing.assert_allclose(factorized.homomorphic_error, 0, atol=0.02)
     lambert = make_planes(({"model": "lambert", "color": [0.5, 0.2, 0.0]},))
-    found = factorize(lambert, build_table(lambert))
-    np.testing.assert_allclose(found.lobes_error, 0, atol=2e-3)
-    np.testing.assert_allclose(found.homomorphic_error[:2], 0, atol=1e-3)
-    np.testing.assert_allclose(found.lobes[0, 0] * found.lobes[3, 0], 0.5 / np.pi, rtol=2e-3)
-    np.testing.assert_allclose(found.lobes[0, 2] * found.lobes[3, 2], 0, atol=2e-6)  # blue is black
+    factorized = factorize(lambert, build_table(lambert))
+    np.testing.assert_allclose(factorized.lobes_error, 0, atol=2e-3)
+    np.testing.assert_allclose(factorized.homomorphic_error[:2], 0, atol=1e-3)
+    np.testing.assert_allclose(factorized.lobes[0, 0] * factorized.lobes[3, 0], 0.5 / np.pi, rtol=2e-3)
+    np.testing.assert_allclose(factorized.lobes[0, 2] * factorized.lobes[3, 2], 0, atol=2e-6)  # blue is black
 
 
-def test_both_lobes_are_told_apart(planes, table, factors):
+def test_both_lobes_are_separated(planes, table, factors):
     diffuse = factors.lobes[0] * factors.lobes[3]
     np.testing.assert_allclose(diffuse[:, 20:60], np.array([[0.5, 0.2, 0.05]]).T / np.pi * np.ones(40), rtol=0.2)
     highlight = factors.lobes[1, 0]
@@ -165,7 +165,7 @@ def test_both_lobes_are_told_apart(planes, table, factors):
     assert max(factors.lobes_error) < 0.2
 
 
-def test_rank_one_finds_the_factors_and_leaves_a_quotient_of_one():
+def test_rank_one_recovers_the_factors_with_a_quotient_of_one():
     rng = np.random.default_rng(5)
     u, v, weight = rng.uniform(0.1, 9, 30), rng.uniform(0.1, 1, 20), rng.uniform(0.5, 1, (30, 20))
     v /= v.max()

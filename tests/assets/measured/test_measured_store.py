@@ -1,4 +1,4 @@
-"""Imported materials: kept whole or not at all, named by content, found by name only."""
+"""Imported materials: stored completely or not at all, identified by content, found by name."""
 
 import json
 import shutil
@@ -15,15 +15,15 @@ from relume.core.errors import MaterialError, NotFoundError, ParameterError
 
 
 @pytest.fixture
-def copied(shelf, data, tmp_path):
-    """Another folder with the same material, its files free to be damaged; its path and the material's id."""
+def copied(library, data, tmp_path):
+    """Another folder with the same material whose files tests may damage; its path and the material's id."""
     identity = data.removeprefix("merl:")
-    shutil.copytree(shelf / identity, tmp_path / "materials" / identity)
+    shutil.copytree(library / identity, tmp_path / "materials" / identity)
     return tmp_path / "materials", identity
 
 
-def test_an_import_is_listed_and_can_be_used(shelf, data, table, planes):
-    (record,) = records(shelf)
+def test_an_import_is_listed_and_can_be_used(library, data, table, planes):
+    (record,) = records(library)
     assert (record.name, record.data) == ("Plastic", data)
     assert len(record.id) == 16
     assert max(record.lobes_error) < 0.2
@@ -31,15 +31,15 @@ def test_an_import_is_listed_and_can_be_used(shelf, data, table, planes):
     assert models == [("measured_lv", data, None), ("measured_hd", data, None)]
     np.testing.assert_array_equal(load_material(data).table, table)
     assert not load_material(data).table.flags.writeable
-    assert sorted(path.name for path in shelf.iterdir()) == [record.id]
+    assert sorted(path.name for path in library.iterdir()) == [record.id]
 
 
-def test_the_source_is_kept_bit_for_bit(shelf, data, planes, tmp_path):
+def test_the_source_is_stored_bit_for_bit(library, data, planes, tmp_path):
     write_merl(tmp_path / "again.binary", planes)
     assert shelves.source_path(data).read_bytes() == (tmp_path / "again.binary").read_bytes()
 
 
-def test_the_same_file_again_is_the_same_material_under_its_newest_name(copied):
+def test_importing_the_same_file_again_only_renames_the_material(copied):
     folder, identity = copied
     created = get_record(folder, identity).created
     store_material(folder, folder / identity / "measured.binary", "Renamed")
@@ -47,18 +47,18 @@ def test_the_same_file_again_is_the_same_material_under_its_newest_name(copied):
     assert (record.id, record.name, record.created) == (identity, "Renamed", created)
 
 
-def test_another_file_of_the_same_id_is_not_taken_for_it(copied, planes, tmp_path):
+def test_another_file_with_the_same_id_is_detected(copied, planes, tmp_path):
     folder, identity = copied
     record = folder / identity / STORE.record
-    kept = json.loads(record.read_text())
+    document = json.loads(record.read_text())
     write_merl(tmp_path / "a.binary", planes)
-    assert kept["sha256"][:16] == identity
-    record.write_text(json.dumps({**kept, "sha256": identity + "0" * 48}))
+    assert document["sha256"][:16] == identity
+    record.write_text(json.dumps({**document, "sha256": identity + "0" * 48}))
     with pytest.raises(MaterialError, match=f"another file is the measured material {identity}; delete that one first"):
         store_material(folder, tmp_path / "a.binary", "Mine")
-    assert get_record(folder, identity).name == kept["name"]
-    del kept["sha256"]  # as it was kept before
-    record.write_text(json.dumps(kept))
+    assert get_record(folder, identity).name == document["name"]
+    del document["sha256"]  # as older stores have it
+    record.write_text(json.dumps(document))
     store_material(folder, tmp_path / "a.binary", "Mine")
 
 
@@ -69,16 +69,16 @@ def test_a_bad_file_leaves_nothing_behind(tmp_path):
     assert not (tmp_path / "materials").exists()
 
 
-def test_a_full_shelf_says_so(shelf, tmp_path, planes, monkeypatch):
+def test_a_full_library_rejects_imports(library, tmp_path, planes, monkeypatch):
     monkeypatch.setattr(shelves, "STORE", replace(STORE, max_entries=1))
     other = planes.copy()
     other[0, 0, 0, 0] += 1
     write_merl(tmp_path / "other.binary", other)
     with pytest.raises(MaterialError, match="delete one first"):
-        store_material(shelf, tmp_path / "other.binary", "Other")
+        store_material(library, tmp_path / "other.binary", "Other")
 
 
-def test_what_is_removed_is_known_no_more(copied):
+def test_a_removed_material_is_unknown(copied):
     folder, identity = copied
     with pytest.raises(NotFoundError):
         STORE.remove(folder, "0" * 16)
@@ -91,13 +91,13 @@ def test_what_is_removed_is_known_no_more(copied):
 @pytest.mark.parametrize(
     "name", ["", "merl:", "merl:../../../etc/passwd", "merl:0000000000000000", "0000000000000000", "merl:" + "G" * 16]
 )
-def test_only_names_of_imported_materials_are_known(shelf, name):
+def test_only_names_of_imported_materials_are_known(library, name):
     assert not STORE.exists(name)
     with pytest.raises(NotFoundError):
         load_material(name)
 
 
-def test_names_are_known_while_their_folder_is_in_use(shelf, data, copied):
+def test_names_are_known_while_their_folder_is_in_use(library, data, copied):
     folder, identity = copied
     (folder / identity).rename(folder / "fedcba9876543210")
     name = "merl:fedcba9876543210"
@@ -125,7 +125,7 @@ def change(document, key, value):
         ("table.npy", lambda document: b"\x93NUMPY\x01\x00"),
     ],
 )
-def test_damaged_files_are_named(copied, file, content):
+def test_errors_name_damaged_measured_files(copied, file, content):
     folder, identity = copied
     path = folder / identity / file
     path.write_bytes(content(json.loads((folder / identity / "material.json").read_text())))
@@ -134,7 +134,7 @@ def test_damaged_files_are_named(copied, file, content):
         load_material("merl:fedcba9876543210")
 
 
-def test_a_look_names_known_data_for_measured_terms_and_no_other(data):
+def test_a_look_accepts_only_known_measured_data(data):
     term = complete_term(("terms", 0), {"model": "measured_hd", "data": data}, None)
     assert (term["data"], term["texture"], term["params"]) == (data, "specular", {})
     for bad in (None, 7, "merl:0000000000000000", "../x", ["merl:"], data + " "):

@@ -1,4 +1,4 @@
-"""The measured terms: exact where unedited, edited as their curves are, in frames as by brute force."""
+"""The measured terms: exact without edits, edited by their curves, against the reference."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def total(documents, wi, wo):
     return sum(eval_brdf(document, wi, wo) for document in documents)
 
 
-def settled_curve(document, name):
+def measured_curve(document, name):
     return TERMS[document["model"]].normalized(document).curve(name)
 
 
@@ -46,14 +46,14 @@ def test_unedited_terms_add_up_to_the_measurement(data, table, models):
     rng = np.random.default_rng(1)
     wi, wo = directions(rng, 20_000), directions(rng, 20_000)
     wi[:5] = wo[:5] = np.array([0.0, 0.0, 1.0])
-    found = total(material_of(models, data), wi, wo)
+    actual = total(material_of(models, data), wi, wo)
     expected = evaluate_measured(table, wi, wo)
-    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12 * expected.max())
+    np.testing.assert_allclose(actual, expected, rtol=1e-9, atol=1e-12 * expected.max())
 
 
-def test_drawn_bands_that_equal_the_measured_curve_hardly_change_it(data, table):
+def test_drawn_bands_equal_to_the_measured_curve_hardly_change_the_term(data, table):
     document = material_of(LOBES, data)[1]
-    bands = curve_bands(document, settled_curve(document, "theta_h"))
+    bands = curve_bands(document, measured_curve(document, "theta_h"))
     drawn = {**document, "curves": {"theta_h": {"bands": bands.tolist()}}}
     rng = np.random.default_rng(2)
     wi, wo = directions(rng, 5000, 0.1), directions(rng, 5000, 0.1)
@@ -63,7 +63,7 @@ def test_drawn_bands_that_equal_the_measured_curve_hardly_change_it(data, table)
 @pytest.mark.parametrize("name", ["theta_h", "theta_d"])
 def test_a_doubled_curve_doubles_its_lobe_and_leaves_the_other(data, name):
     diffuse, specular = material_of(LOBES, data)
-    bands = curve_bands(specular, settled_curve(specular, name))
+    bands = curve_bands(specular, measured_curve(specular, name))
     once = {**specular, "curves": {name: {"bands": bands.tolist()}}}
     twice = {**specular, "curves": {name: {"bands": (2 * bands).tolist()}}}
     rng = np.random.default_rng(3)
@@ -73,17 +73,17 @@ def test_a_doubled_curve_doubles_its_lobe_and_leaves_the_other(data, name):
     np.testing.assert_allclose(lobe, eval_brdf(once, wi, wo), rtol=1e-6, atol=1e-9)
 
 
-def test_curves_that_look_out_and_in_begin_alike(data):
+def test_incident_and_outgoing_curves_start_equal(data):
     (document,) = material_of(HOMOMORPHIC, data)
     gamma = np.linspace(0, np.pi / 2, 50)
-    values = [curve_values(document, settled_curve(document, name), gamma) for name in ("theta_i", "theta_o")]
+    values = [curve_values(document, measured_curve(document, name), gamma) for name in ("theta_i", "theta_o")]
     np.testing.assert_array_equal(*values)
     assert values[0].shape == (3, 50)
 
 
-def test_curves_of_channels_differ_and_only_the_named_channel_is_edited(data):
+def test_an_edit_of_one_channel_leaves_the_others(data):
     document = material_of(LOBES, data)[0]
-    curve = settled_curve(document, "theta_i")
+    curve = measured_curve(document, "theta_i")
     untouched = curve_bands(document, curve)
     assert not np.allclose(untouched[0], untouched[2], rtol=0.1)
     drawn = {**document, "curves": {"theta_i": {"points": [[0, 1], [90, 1]], "channels": "g"}}}
@@ -92,12 +92,12 @@ def test_curves_of_channels_differ_and_only_the_named_channel_is_edited(data):
     np.testing.assert_array_equal(edited[[0, 2]], untouched[[0, 2]])
 
 
-def test_a_sessions_pointer_finds_the_measured_curve(data):
+def test_an_edit_pointer_resolves_to_the_measured_curve(data):
     document = {"materials": {"Ball": {"terms": material_of(LOBES, data)}}}
     term, curve = find_curve("/materials/Ball/terms/1/curves/theta_h", document)
-    found = curve_bands(term, curve)
-    np.testing.assert_array_equal(found, curve_bands(term, settled_curve(term, "theta_h")))
-    assert np.ptp(found) > 1
+    bands = curve_bands(term, curve)
+    np.testing.assert_array_equal(bands, curve_bands(term, measured_curve(term, "theta_h")))
+    assert np.ptp(bands) > 1
 
 
 @pytest.fixture(scope="module")
@@ -129,15 +129,15 @@ EDITED = {
     [(LOBES, {}), (LOBES, EDITED), (HOMOMORPHIC, {})],
     ids=["lobes", "edited lobes", "homomorphic"],
 )
-def test_frame_agrees_with_brute_force(scene, transfer, data, models, changes):
+def test_a_frame_equals_the_reference(scene, transfer, data, models, changes):
     look = look_with(transfer, material_of(models, data, **changes))
     frame = render_image(transfer, "front", look)
-    truth = reference_image(scene, "front", look, (48, 36), 0)
-    assert relative_rmse(frame, truth) < 0.01  # as in test_reflection_integral.py
+    reference = reference_image(scene, "front", look, (48, 36), 0)
+    assert relative_rmse(frame, reference) < 0.01  # as in test_reflection_integral.py
 
 
-def test_brute_force_of_the_unedited_material_is_that_of_what_was_measured(scene, data):
-    """The sum over texels of the very terms that the file was sampled from, but for the grid's own interpolation."""
+def test_the_reference_of_the_unedited_material_equals_its_source(scene, data):
+    """The sum over texels of the terms that the file was sampled from, except for the interpolation of the grid."""
     default = default_look(scene.materials)
     looks = [
         validate({"materials": {"Ball": {"terms": list(terms)}}}, default)
@@ -147,7 +147,7 @@ def test_brute_force_of_the_unedited_material_is_that_of_what_was_measured(scene
     assert relative_rmse(measured, sampled) < 0.005
 
 
-def test_a_live_edit_of_a_measured_curve_ends_where_a_fresh_picture_begins(transfer, data):
+def test_a_live_edit_of_a_measured_curve_ends_at_the_fresh_picture(transfer, data):
     pointer = "/materials/Ball/terms/1/curves/theta_h"
     picture = Picture(transfer, "front", Cache(1 << 30))
     picture.set_look(look_with(transfer, material_of(LOBES, data)))
@@ -167,9 +167,9 @@ def test_a_live_edit_of_a_measured_curve_ends_where_a_fresh_picture_begins(trans
     np.testing.assert_allclose(after - before, before - diffuse, rtol=2e-3, atol=1e-4 * after.max())
 
 
-def test_another_material_is_another_operator(transfer, shelf, data, tmp_path):
+def test_another_material_has_another_operator(transfer, library, data, tmp_path):
     write_merl(tmp_path / "red.binary", make_planes(({"model": "lambert", "color": [0.9, 0.0, 0.0]},)))
-    red = store_material(shelf, tmp_path / "red.binary", "Red")
+    red = store_material(library, tmp_path / "red.binary", "Red")
     try:
         picture = Picture(transfer, "front", Cache(1 << 30))
         picture.set_look(look_with(transfer, material_of(LOBES, data)))
@@ -182,4 +182,4 @@ def test_another_material_is_another_operator(transfer, shelf, data, tmp_path):
         assert picture.image()[inside, 0].all()
         assert not picture.image()[inside, 1:].any()
     finally:
-        STORE.remove(shelf, red.id)
+        STORE.remove(library, red.id)

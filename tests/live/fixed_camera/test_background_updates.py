@@ -22,10 +22,10 @@ COLOURS = np.eye(3)
 def maps(tmp_path_factory):
     """A red environment, a green one and a blue one: a picture of one light has one colour."""
     folder = tmp_path_factory.mktemp("maps")
-    with STORE.with_search_folder(tmp_path_factory.mktemp("shelf")) as shelf:
+    with STORE.with_search_folder(tmp_path_factory.mktemp("shelf")) as library:
         white = dusk() / [1.0, 0.4, 0.2]
         paths = [write_map(folder / f"{name}.exr", white * c) for name, c in zip("rgb", COLOURS, strict=True)]
-        yield [store_environment(shelf, path, path.stem).map for path in paths]
+        yield [store_environment(library, path, path.stem).map for path in paths]
 
 
 @pytest.fixture(params=["transfer", "gathered"])
@@ -40,14 +40,14 @@ def few(monkeypatch):
     monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 300)
 
 
-def lit_by(maps, number, *, lamp=None, sigma=None, **environment):
+def lit_by(maps, number, *, light_position=None, sigma=None, **environment):
     """A change of the look: one of the maps, a lamp of the same colour somewhere, a curve."""
 
     def change(document):
         document["environment"].update(map=maps[number], **environment)
-        if lamp is not None:
+        if light_position is not None:
             emission = (3 * COLOURS[number]).tolist()
-            document["lights"]["Lamp"] = {"kind": "point", "position": [lamp, 1.2, 0.9], "emission": emission}
+            document["lights"]["Lamp"] = {"kind": "point", "position": [light_position, 1.2, 0.9], "emission": emission}
         if sigma is not None:
             terms = [term for material in document["materials"].values() for term in material["terms"]]
             next(term for term in terms if "sigma" in term["params"])["params"]["sigma"] = sigma
@@ -114,7 +114,7 @@ def test_environment_s_gain_comes_with_its_light(transfer, maps):
     """Beside a lamp the gain is part of the light, without one it multiplies the picture."""
     picture = run_until_exact(start(transfer, make_look(transfer, lit_by(maps, 0, scale=4.0))))
     before = picture.image()
-    picture.set_look(make_look(transfer, lit_by(maps, 0, lamp=0.6, scale=4.0)))
+    picture.set_look(make_look(transfer, lit_by(maps, 0, light_position=0.6, scale=4.0)))
     picture.advance(None)
     np.testing.assert_array_equal(picture.image(), before)
 
@@ -125,10 +125,12 @@ def test_hand_that_never_waits_sees_one_light_at_a_time(opened, maps, seed):
     rng = np.random.default_rng(seed)
 
     def any_look():
-        number, lamp = int(rng.integers(3)), rng.uniform(-0.6, 0.6) if rng.random() < 0.6 else None
+        number, light_position = int(rng.integers(3)), rng.uniform(-0.6, 0.6) if rng.random() < 0.6 else None
         sigma = rng.uniform(0.1, 0.4) if rng.random() < 0.3 else None
         turned, scale = float(rng.choice([0.0, 0.0, 40.0])), float(rng.choice([1.0, 1.0, 0.5]))
-        return make_look(opened, lit_by(maps, number, lamp=lamp, sigma=sigma, rotation=turned, scale=scale))
+        return make_look(
+            opened, lit_by(maps, number, light_position=light_position, sigma=sigma, rotation=turned, scale=scale)
+        )
 
     looks = [any_look()]
     picture, changes = run_until_exact(start(opened, looks[0])), 0
@@ -215,13 +217,13 @@ def test_picture_whose_images_were_kept_is_opened_without_a_preview(transfer, ma
 
 
 def test_surfaces_are_told_what_they_send_out_when_light_changes_and_not_else(transfer, maps, monkeypatch):
-    picture, told = run_until_exact(start(transfer, make_look(transfer, lit_by(maps, 0)))), []
+    picture, calls = run_until_exact(start(transfer, make_look(transfer, lit_by(maps, 0)))), []
     shine = ViewImages.set_emission
-    monkeypatch.setattr(ViewImages, "set_emission", lambda *given: told.append(given) or shine(*given))
-    for sigma, lamp in ((0.2, None), (0.3, None), (0.3, 0.4)):
-        picture.set_look(make_look(transfer, lit_by(maps, 0, sigma=sigma, lamp=lamp)))
+    monkeypatch.setattr(ViewImages, "set_emission", lambda *given: calls.append(given) or shine(*given))
+    for sigma, light_position in ((0.2, None), (0.3, None), (0.3, 0.4)):
+        picture.set_look(make_look(transfer, lit_by(maps, 0, sigma=sigma, light_position=light_position)))
         run_until_exact(picture)
-        assert len(told) == (lamp is not None)
+        assert len(calls) == (light_position is not None)
 
 
 def test_an_old_preview_s_gain_does_not_come_back(transfer):

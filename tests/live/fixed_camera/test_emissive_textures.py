@@ -56,23 +56,23 @@ def transfer(scene, tmp_path_factory):
 @pytest.fixture(scope="module")
 def pictures(scene, transfer):
     look = make_look(transfer)
-    found = run_until_exact(Picture(transfer, "front", Cache(BUDGET))).image()
-    return found, reference_image(scene, "front", look, SIZE, 512), transfer.views["front"].material_ids()
+    image = run_until_exact(Picture(transfer, "front", Cache(BUDGET))).image()
+    return image, reference_image(scene, "front", look, SIZE, 512), transfer.views["front"].material_ids()
 
 
 def test_the_image_is_seen(pictures) -> None:
-    found, truth, ids = pictures
+    actual, reference, ids = pictures
     wall = ids == 1
-    assert truth[wall].max() > 20 * np.median(truth[wall])
-    np.testing.assert_allclose(found[wall], truth[wall], rtol=0.05, atol=0.01 * truth.max())
+    assert reference[wall].max() > 20 * np.median(reference[wall])
+    np.testing.assert_allclose(actual[wall], reference[wall], rtol=0.05, atol=0.01 * reference.max())
 
 
 def test_others_are_lit_from_where_it_is_bright(pictures) -> None:
     """Triangle by triangle, by brightness: the floor has the colours' mean; brute force has each texel's."""
-    found, truth, ids = pictures
-    brightness, expected = luminance(found[ids == 0]), luminance(truth[ids == 0])
+    actual, reference, ids = pictures
+    brightness, expected = luminance(actual[ids == 0]), luminance(reference[ids == 0])
     assert relative_rmse(brightness, expected) < 0.05
-    np.testing.assert_allclose(found[ids == 0].sum(axis=0), truth[ids == 0].sum(axis=0), rtol=0.1)
+    np.testing.assert_allclose(actual[ids == 0].sum(axis=0), reference[ids == 0].sum(axis=0), rtol=0.1)
 
 
 def test_brightness_and_colour_of_the_light_multiply_the_image(transfer, pictures) -> None:
@@ -82,10 +82,10 @@ def test_brightness_and_colour_of_the_light_multiply_the_image(transfer, picture
 
     picture = run_until_exact(Picture(transfer, "front", Cache(BUDGET)))
     picture.set_look(make_look(transfer, brighter))
-    found, before, wall = run_until_exact(picture).image(), pictures[0], pictures[2] == 1
+    actual, before, wall = run_until_exact(picture).image(), pictures[0], pictures[2] == 1
     inner = wall & np.roll(wall, 1, 0) & np.roll(wall, -1, 0) & np.roll(wall, 1, 1) & np.roll(wall, -1, 1)
-    np.testing.assert_allclose(found[inner][:, :2], before[inner][:, :2] * [3, 1], rtol=2e-2, atol=2e-2)
-    assert found[inner][:, 2].max() < 0.05 * before[inner][:, 2].max()
+    np.testing.assert_allclose(actual[inner][:, :2], before[inner][:, :2] * [3, 1], rtol=2e-2, atol=2e-2)
+    assert actual[inner][:, 2].max() < 0.05 * before[inner][:, 2].max()
 
 
 def test_picture_is_what_the_twin_gives(transfer, pictures) -> None:
@@ -95,9 +95,9 @@ def test_picture_is_what_the_twin_gives(transfer, pictures) -> None:
 def test_a_moving_eye_sees_the_image(scene, tmp_path, pictures) -> None:
     recipe = Recipe("probes", ("front",), SIZE, 400, num_probes=2000)
     moving = open_bake(bake_in_process(METHODS["probes"], scene, recipe, tmp_path / "probes.zarr"), Cache(1 << 30))
-    found, (_, truth, ids) = render_image(moving, "front", make_look(moving)), pictures
+    actual, (_, reference, ids) = render_image(moving, "front", make_look(moving)), pictures
     inner = (ids == 1) & np.roll(ids == 1, 1, 0) & np.roll(ids == 1, -1, 0) & np.roll(ids == 1, 1, 1)
     inner &= np.roll(ids == 1, -1, 1)
-    off = np.abs(found - truth)[inner] / truth.max()
+    off = np.abs(actual - reference)[inner] / reference.max()
     assert np.median(off) < 0.01  # one ray a pixel, in the middle of it: rims of fields differ
-    assert np.corrcoef(found[inner].ravel(), truth[inner].ravel())[0, 1] > 0.97
+    assert np.corrcoef(actual[inner].ravel(), reference[inner].ravel())[0, 1] > 0.97

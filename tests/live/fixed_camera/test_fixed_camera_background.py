@@ -63,9 +63,9 @@ def directions(transfer):
 def ground_points(transfer):
     """Where the camera meets the ground, in its inner pixels. (n, 3)"""
     towards = directions(transfer)[inner(transfer, "Ground")].astype(float)
-    eye = CAMERA.to_world[:3, 3]
-    height = eye[1] - (CENTRE[1] - RADIUS)
-    return eye + towards * (height / -towards[:, 1])[:, None]
+    camera_position = CAMERA.to_world[:3, 3]
+    height = camera_position[1] - (CENTRE[1] - RADIUS)
+    return camera_position + towards * (height / -towards[:, 1])[:, None]
 
 
 def free_share(points, environment, degrees=0.0):
@@ -95,10 +95,10 @@ def test_ground_alone_is_not_seen(tmp_path):
         image = rendered(transfer)
         expected = lookup(around, directions(transfer).reshape(-1, 3)).reshape(image.shape)
         np.testing.assert_allclose(image[is_inner], expected[is_inner], rtol=2e-5)
-        lamps = rendered(
+        lit = rendered(
             transfer, lambda d: d["lights"].update(Lamp=POINT_LIGHT), background(kind="color", color=[1, 2, 3])
         )
-        np.testing.assert_allclose(lamps, np.broadcast_to([1, 2, 3], lamps.shape), rtol=2e-5)
+        np.testing.assert_allclose(lit, np.broadcast_to([1, 2, 3], lit.shape), rtol=2e-5)
 
 
 @pytest.mark.parametrize("degrees", [0.0, 70.0])
@@ -112,8 +112,8 @@ def test_shadows_are_those_of_brute_force(standing, degrees):
 
 def miss_of(points):
     """How far from the middle of the ball the way from points to the lamp passes. (n,)"""
-    lamp = np.array(POINT_LIGHT["position"])
-    towards = (lamp - points) / np.linalg.norm(lamp - points, axis=1, keepdims=True)
+    light_position = np.array(POINT_LIGHT["position"])
+    towards = (light_position - points) / np.linalg.norm(light_position - points, axis=1, keepdims=True)
     along = np.einsum("nc,nc->n", towards, CENTRE - points)
     return np.sqrt(np.sum((CENTRE - points) ** 2, axis=1) - along**2)
 
@@ -179,18 +179,18 @@ def test_there_is_no_seam_where_the_ground_ends():
 def test_reflected_light_colours_the_ground(reflecting, standing):
     """What is shown is the light that a white ground has, over that without the ball, in front of what is behind."""
     white = background(kind="color", color=[1.0, 1.0, 1.0])
-    caught, ground = rendered(reflecting, white), inner(reflecting, "Ground")
+    catcher, ground = rendered(reflecting, white), inner(reflecting, "Ground")
     plain = rendered(reflecting, plain_ground)
     level = texel_directions(128, 256).reshape(-1, 3).astype(float)
     weights = np.maximum(level[:, 1], 0) * np.repeat(texel_solid_angles(128, 256), 256)
-    unhidden = weights @ lookup(studio(), level.astype(np.float32))
-    expected = plain[ground] / (0.5 / np.pi * unhidden)
-    np.testing.assert_allclose(caught[ground], expected, rtol=0.01)
-    gained = caught[ground] / rendered(standing, white)[ground]
+    unoccluded = weights @ lookup(studio(), level.astype(np.float32))
+    expected = plain[ground] / (0.5 / np.pi * unoccluded)
+    np.testing.assert_allclose(catcher[ground], expected, rtol=0.01)
+    gained = catcher[ground] / rendered(standing, white)[ground]
     assert gained[:, 0].max() > 1.05
     assert gained[:, 1].max() < 0.5 * (gained[:, 0].max() - 1) + 1
     parts = [rendered(reflecting, white, set_paths(paths)) for paths in ("direct", "first_bounce", "further_bounces")]
-    np.testing.assert_allclose(np.sum(parts, axis=0), caught, rtol=1e-3, atol=1e-4)
+    np.testing.assert_allclose(np.sum(parts, axis=0), catcher, rtol=1e-3, atol=1e-4)
 
 
 def test_background_is_the_map_or_a_colour_or_blurred(standing):
@@ -285,9 +285,16 @@ def test_coverage_follows_the_ground_alone(standing, monkeypatch):
     ask = Background._shadow_opacity
     transparent = background(kind="transparent")
     ball = [lambda d, c=c: d["materials"]["Ball"]["terms"][0].update(color=[c, 0.1, 0.1]) for c in (0.3, 0.6)]
-    lamp = changes(ball[1], set_only_area_light)
-    steps = [(transparent, 1), (ball[0], 0), (ball[1], 0), (lamp, 1), (changes(lamp, plain_ground), 0), (lamp, 1)]
-    for change, most in steps:
+    area_light = changes(ball[1], set_only_area_light)
+    steps = [
+        (transparent, 1),
+        (ball[0], 0),
+        (ball[1], 0),
+        (area_light, 1),
+        (changes(area_light, plain_ground), 0),
+        (area_light, 1),
+    ]
+    for change, max_error in steps:
         look = make_look(standing, changes(transparent, change))
         expected = render_image(standing, "front", look, for_display=True)[..., 3]
         picture.set_look(look)
@@ -296,8 +303,8 @@ def test_coverage_follows_the_ground_alone(standing, monkeypatch):
             patched.setattr(Background, "_shadow_opacity", lambda *given: asked.append(given) or ask(*given))
             asked.clear()
             tiles = picture.encode_alpha([(0, 0, 40, 10), (0, 10, 15, 20), (15, 10, 25, 20)])
-        assert len(asked) == most
+        assert len(asked) == max_error
         alpha = picture.alpha(for_display=True)
         np.testing.assert_allclose(alpha, expected, atol=1e-6)  # lamps are mixed in, which rounds otherwise
         shown = to_bytes(alpha)
-        assert tiles == b"".join(part.tobytes() for part in (shown[:10], shown[10:, :15], shown[10:, 15:]))
+        assert tiles == b"".join(tile.tobytes() for tile in (shown[:10], shown[10:, :15], shown[10:, 15:]))

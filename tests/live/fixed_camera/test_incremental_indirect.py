@@ -142,8 +142,8 @@ def lamp_at(transfer, x, **others):
     """The look with a lamp above the floor."""
 
     def change(document):
-        lamp = {"kind": "point", "position": [x, 0.8, 0.2], "emission": [3.0, 2.5, 2.0], **others}
-        document["lights"] = {"Lamp": lamp}
+        light = {"kind": "point", "position": [x, 0.8, 0.2], "emission": [3.0, 2.5, 2.0], **others}
+        document["lights"] = {"Lamp": light}
 
     return make_look(transfer, change)
 
@@ -236,8 +236,8 @@ def test_a_lamp_just_added_is_exact_before_anything_is_made_for_moving_it(gather
 
 def test_only_the_part_of_light_that_an_edit_changes_is_shaded(gathered, monkeypatch):
     def shown(x=0.43, **transport):  # no other test has shown it: images of looks stay beside a bake
-        lamp = {"kind": "point", "position": [x, 0.8, 0.2], "emission": [3.0, 2.5, 2.0]}
-        return make_look(gathered, lambda d: (d["lights"].update(Lamp=lamp), d["transport"].update(transport)))
+        light = {"kind": "point", "position": [x, 0.8, 0.2], "emission": [3.0, 2.5, 2.0]}
+        return make_look(gathered, lambda d: (d["lights"].update(Lamp=light), d["transport"].update(transport)))
 
     def shaded(look):
         """What has been shaded when the picture rests in a look: whether of the environment, and kinds of rays."""

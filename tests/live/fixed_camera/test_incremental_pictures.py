@@ -130,11 +130,11 @@ def test_what_moves_the_picture_most_goes_first(monkeypatch):
     """A small change of a coefficient that much light falls on before a large one that lights nothing."""
     monkeypatch.setattr("relume.operators.edit_basis.analysis", identity_basis.analysis)
     frozen = one_pixel([0.01, 100, 2])
-    shown, target, seen = start(frozen), target_of(50, 1, 10), []
+    shown, target, order = start(frozen), target_of(50, 1, 10), []
     while shown.changed_curves(target):
         shown = advance(shown, target, frozen, 1)
-        seen.append(float(shown.image[0, 0, 0]))
-    assert seen == pytest.approx([100, 120, 120.5])
+        order.append(float(shown.image[0, 0, 0]))
+    assert order == pytest.approx([100, 120, 120.5])
 
 
 def test_didactic_example_of_table_2(monkeypatch):
@@ -217,6 +217,6 @@ def test_local_edit_of_a_peaked_curve_is_exact_where_non_linear_approximation_is
     bands = {curve.name: curve_bands(document, curve) for curve in term.curves}
     operator = precompute(term, bands, "theta_h", transfer.lights, view.receivers(2), lambda s: None, lambda: False)
     perfect = analysis(drawn(6.0))
-    kept = np.where(np.abs(perfect) >= np.sort(np.abs(perfect))[-20], perfect, 0)
-    exact, approximate = (ref.stream(operator.transport, np.tile(c, (3, 1)), 0) for c in (perfect, kept))
+    largest = np.where(np.abs(perfect) >= np.sort(np.abs(perfect))[-20], perfect, 0)
+    exact, approximate = (ref.stream(operator.transport, np.tile(c, (3, 1)), 0) for c in (perfect, largest))
     assert relative_rmse(approximate, exact) > 0.02

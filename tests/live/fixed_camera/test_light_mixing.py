@@ -11,13 +11,13 @@ from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
 
-LAMP = {"kind": "point", "position": [0.9, 1.4, 1.2], "emission": [2.0, 2.0, 2.0]}
+POINT_LIGHT = {"kind": "point", "position": [0.9, 1.4, 1.2], "emission": [2.0, 2.0, 2.0]}
 PANEL = {
     "kind": "rectangle", "position": [-1.0, 1.5, 1.0], "direction": [1, -1, -1], "size": [0.6, 0.4],
     "emission": [5.0, 4.0, 3.0],
 }  # fmt: skip
 SUN = {"kind": "directional", "direction": [-1, -2, -1], "emission": [0.5, 0.5, 0.6]}
-ALL = {"Lamp": LAMP, "Panel": PANEL, "Sun": SUN}
+ALL = {"Lamp": POINT_LIGHT, "Panel": PANEL, "Sun": SUN}
 
 
 def look_with(transfer, lights, environment=None):

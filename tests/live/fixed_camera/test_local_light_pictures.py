@@ -19,7 +19,7 @@ from relume.scene.scene_folder import make_scene
 from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
 
-LAMP = {"kind": "point", "position": [0.9, 1.4, 1.2], "emission": [2.0, 2.0, 2.0]}
+POINT_LIGHT = {"kind": "point", "position": [0.9, 1.4, 1.2], "emission": [2.0, 2.0, 2.0]}
 PANEL = {
     "kind": "rectangle",
     "position": [-1.0, 1.5, 1.0],
@@ -41,7 +41,7 @@ def rendered(transfer, lights, environment=None, change=lambda document: None, v
     return render_uncached(transfer, make_look(transfer, edit), view)
 
 
-@pytest.mark.parametrize("light", [LAMP, PANEL, SPOT, SUN], ids=lambda light: light["kind"])
+@pytest.mark.parametrize("light", [POINT_LIGHT, PANEL, SPOT, SUN], ids=lambda light: light["kind"])
 def test_light_adds_to_that_of_the_environment(transfer, light):
     alone = rendered(transfer, {"A": light}, ENVIRONMENT_OFF)
     beside = rendered(transfer, {"A": light}, {"intensity": 0.5, "color": [1.0, 0.5, 0.2]})
@@ -51,21 +51,24 @@ def test_light_adds_to_that_of_the_environment(transfer, light):
 
 
 def test_picture_is_linear_in_the_gains_of_lights(transfer):
-    apart = [rendered(transfer, {"A": light}, ENVIRONMENT_OFF) for light in (LAMP, PANEL)]
-    dimmed = {"A": LAMP | {"intensity": 3.0, "color": [1.0, 0.5, 0.0]}, "B": PANEL | {"emission": [10.0, 5.0, 5.0]}}
+    apart = [rendered(transfer, {"A": light}, ENVIRONMENT_OFF) for light in (POINT_LIGHT, PANEL)]
+    dimmed = {
+        "A": POINT_LIGHT | {"intensity": 3.0, "color": [1.0, 0.5, 0.0]},
+        "B": PANEL | {"emission": [10.0, 5.0, 5.0]},
+    }
     together = rendered(transfer, dimmed, ENVIRONMENT_OFF)
     expected = apart[0] * np.array([3.0, 1.5, 0.0]) + apart[1] * np.array([2.0, 1.0, 1.0])
     np.testing.assert_allclose(together, expected, rtol=1e-3, atol=1e-5)
 
 
 def test_lights_that_are_off_leave_the_picture_as_it_is_without_them(transfer):
-    off = {"A": LAMP | {"enabled": False}, "B": SUN | {"intensity": 0.0}, "C": SPOT | {"color": [0, 0, 0]}}
+    off = {"A": POINT_LIGHT | {"enabled": False}, "B": SUN | {"intensity": 0.0}, "C": SPOT | {"color": [0, 0, 0]}}
     np.testing.assert_array_equal(rendered(transfer, off), rendered(transfer, {}))
 
 
 def test_curves_are_edited_under_local_lights_and_stay_exact(transfer):
     """A highlight frozen, dragged, and then compared with a picture that starts from its curve."""
-    lights = {"A": LAMP, "B": PANEL}
+    lights = {"A": POINT_LIGHT, "B": PANEL}
 
     def steeper(document):
         document["lights"].update(lights)
@@ -77,16 +80,16 @@ def test_curves_are_edited_under_local_lights_and_stay_exact(transfer):
     picture.prepare("/materials/Wall/terms/1/params/exponent")
     run_until_exact(picture)
     picture.set_look(make_look(transfer, steeper))
-    found = run_until_exact(picture).image()
-    np.testing.assert_allclose(found, exact_image(transfer, make_look(transfer, steeper)), rtol=2e-3, atol=1e-4)
+    image = run_until_exact(picture).image()
+    np.testing.assert_allclose(image, exact_image(transfer, make_look(transfer, steeper)), rtol=2e-3, atol=1e-4)
 
 
 def test_moving_light_is_followed_and_then_exact(transfer):
     def moved(document):
-        document["lights"]["A"] = LAMP | {"position": [-0.9, 1.2, 1.0]}
+        document["lights"]["A"] = POINT_LIGHT | {"position": [-0.9, 1.2, 1.0]}
 
     picture = Picture(transfer, "front", Cache(BUDGET))
-    picture.set_look(make_look(transfer, lambda document: document["lights"].update(A=LAMP)))
+    picture.set_look(make_look(transfer, lambda document: document["lights"].update(A=POINT_LIGHT)))
     before = run_until_exact(picture).image()
     picture.set_look(make_look(transfer, moved))
     assert not picture.advance(None).exact
@@ -100,18 +103,18 @@ def showing(show):
     return lambda document: document.update(transport={"show": show, "bounces": 24})
 
 
-def room(*, lamp_sides=True, lights=(), lamp=None):
+def room(*, has_sides=True, lights=(), emitter=None):
     """A floor below a lamp that faces down, seen from the side."""
     floor = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
-    lamp = lamp or quad("lamp", [[-0.3, 1, -0.3], [0.3, 1, -0.3], [0.3, 1, 0.3], [-0.3, 1, 0.3]], 1)
+    emitter = emitter or quad("lamp", [[-0.3, 1, -0.3], [0.3, 1, -0.3], [0.3, 1, 0.3], [-0.3, 1, 0.3]], 1)
     grey = ({"model": "lambert", "color": [0.5, 0.5, 0.5]},)
-    materials = [Material("Floor", grey), Material("Lamp", grey, double_sided=lamp_sides)]
+    materials = [Material("Floor", grey), Material("Lamp", grey, double_sided=has_sides)]
     cameras = [
         make_camera("below", [0, 0.3, 3], [0, 0.55, 0], 0.8),
         make_camera("above", [0, 2.0, 3], [0, 0.55, 0], 0.8),
     ]
-    sky = Environment("dim", np.full((4, 8, 3), 1e-3, np.float32))
-    return make_scene("room", [floor, lamp], materials, cameras, sky, lights=lights)
+    environment = Environment("dim", np.full((4, 8, 3), 1e-3, np.float32))
+    return make_scene("room", [floor, emitter], materials, cameras, environment, lights=lights)
 
 
 SHINING = Light("Lamp", {"kind": "mesh", "material": "Lamp", "emission": [4.0, 2.0, 1.0]})
@@ -128,36 +131,36 @@ def baked(scene, folder, method="direct"):
 
 @pytest.mark.parametrize("is_two_sided", [True, False])
 def test_shining_surface_is_seen_and_lights_the_floor(tmp_path, is_two_sided):
-    transfer = baked(room(lamp_sides=is_two_sided, lights=[SHINING]), tmp_path)
+    transfer = baked(room(has_sides=is_two_sided, lights=[SHINING]), tmp_path)
     assert [transfer.local.num_samples(LightGeometry(kind)) for kind in ("mesh", "rectangle")] == [256, 64]
     assert transfer.local.num_samples(LightGeometry("mesh"), SAMPLES_PER_PATCH_POINT) == 4 * SAMPLES_PER_PATCH_POINT
     below, above = (rendered(transfer, {}, view=view) for view in ("below", "above"))
-    lamp = transfer.views["above"].material_ids() == 1
+    is_emitter = transfer.views["above"].material_ids() == 1
     assert np.all(np.abs(below.max(axis=(0, 1)) - [4, 2, 1]) < 0.1), "its lower side shines"
-    seen_from_above = above[lamp][len(above[lamp]) // 2]
-    assert np.allclose(seen_from_above, [4, 2, 1], rtol=0.05) == is_two_sided
+    emitter_radiance = above[is_emitter][len(above[is_emitter]) // 2]
+    assert np.allclose(emitter_radiance, [4, 2, 1], rtol=0.05) == is_two_sided
     floor = transfer.views["above"].material_ids() == 0
     assert above[floor].mean() > 20 * rendered(transfer, OFF, view="above")[floor].mean()
-    for show, is_seen in (("direct", True), ("first_bounce", False)):
+    for show, is_visible in (("direct", True), ("first_bounce", False)):
         picture = rendered(transfer, {}, None, showing(show), "below")
-        np.testing.assert_array_equal(picture, below if is_seen else 0 * below)
+        np.testing.assert_array_equal(picture, below if is_visible else 0 * below)
 
 
 def test_emitter_without_area_or_pixels_changes_nothing(tmp_path):
     nowhere = mesh("lamp", [[5, 1, 5]] * 3, [[0, 1, 2]], 1, np.tile([0.0, 1.0, 0.0], (3, 1)))
-    transfer = baked(room(lights=[SHINING], lamp=nowhere), tmp_path)
+    transfer = baked(room(lights=[SHINING], emitter=nowhere), tmp_path)
     shining, off = (rendered(transfer, lights, view="above") for lights in ({}, OFF))
     np.testing.assert_allclose(shining, off, rtol=1e-5)
 
 
 def test_cells_reflect_local_light(tmp_path):
     """A spot below the lamp's underside lights that by reflection alone; on cells it is what the formula says."""
-    transfer = baked(room(lamp_sides=False), tmp_path, "gather")
-    lamp = {"A": {"kind": "spot", "position": [0, 0.9, 0], "cone": [10, 40], "emission": [5.0, 5.0, 5.0]}}
+    transfer = baked(room(has_sides=False), tmp_path, "gather")
+    lights = {"A": {"kind": "spot", "position": [0, 0.9, 0], "cone": [10, 40], "emission": [5.0, 5.0, 5.0]}}
     shown = {
         show: rendered(
             transfer,
-            lamp,
+            lights,
             ENVIRONMENT_OFF,
             lambda d, show=show: d.update(transport={"show": show, "bounces": 24}),
             "below",
@@ -171,14 +174,14 @@ def test_cells_reflect_local_light(tmp_path):
     np.testing.assert_allclose(shown["all"], parts, rtol=1e-3, atol=1e-5)
     cells = transfer.patches
     on_cells = LocalPatchLight(transfer.local, cells, transfer.cache, transfer.key, ())
-    arriving = on_cells.irradiance(LightGeometry("spot", (0, 0.9, 0), (0, -1, 0), (10, 40)))
+    irradiance = on_cells.irradiance(LightGeometry("spot", (0, 0.9, 0), (0, -1, 0), (10, 40)))
     on_floor = cells.material == 0
     position = transfer.store.read("patches/position").mean(axis=1)[on_floor]
     away = np.linalg.norm(position - [0, 0.9, 0], axis=1)
     cosine = 0.9 / away
     falloff = np.clip((cosine - np.cos(np.radians(40))) / (np.cos(np.radians(10)) - np.cos(np.radians(40))), 0, 1)
     expected = falloff**2 * cosine / away**2
-    assert np.abs(arriving[on_floor] - expected).mean() < 0.05 * expected.mean()
+    assert np.abs(irradiance[on_floor] - expected).mean() < 0.05 * expected.mean()
 
 
 def test_closed_box_has_the_light_inside_it_and_none_from_outside(tmp_path):
@@ -192,7 +195,7 @@ def test_closed_box_has_the_light_inside_it_and_none_from_outside(tmp_path):
     box = make_scene("box", meshes, white, [camera], Environment("sky", np.ones((4, 8, 3), np.float32)))
     transfer = baked(box, tmp_path, "gather")
     assert not rendered(transfer, {}, view="inside").any()
-    outside = {"A": LAMP | {"position": [0, 3, 0]}}
+    outside = {"A": POINT_LIGHT | {"position": [0, 3, 0]}}
     assert not rendered(transfer, outside, view="inside").any()
-    inside = rendered(transfer, {"A": LAMP | {"position": [0, 1.5, 0]}}, view="inside")
+    inside = rendered(transfer, {"A": POINT_LIGHT | {"position": [0, 1.5, 0]}}, view="inside")
     assert inside.min() > 0.01

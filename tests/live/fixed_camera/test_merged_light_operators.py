@@ -84,16 +84,16 @@ def test_those_that_a_coarser_division_would_have_are_merged(transfer):
 def test_points_see_the_share_of_the_parts_that_they_see(transfer):
     merged = cluster_lights(transfer.lights, transfer.tiles, 100)
     visible = transfer.views["front"].receivers(0).visible
-    seen = np.full((merged.num_lights, len(visible)), np.nan, np.float32)
-    visible_fraction(visible, *merged.parts, 0, len(visible), seen)
-    np.testing.assert_allclose(seen.T, visible_fraction_numpy(visible, merged.parts, merged.num_lights), atol=1e-6)
+    fractions = np.full((merged.num_lights, len(visible)), np.nan, np.float32)
+    visible_fraction(visible, *merged.parts, 0, len(visible), fractions)
+    np.testing.assert_allclose(fractions.T, visible_fraction_numpy(visible, merged.parts, merged.num_lights), atol=1e-6)
 
 
 @pytest.mark.parametrize(
     ("held", "drags"),
     [("curves/theta_h", [bent(3), bent(5)]), ("params/roughness", [roughened(0.35), roughened(0.25)])],
 )
-def test_a_hand_goes_on_by_the_rough_one_until_the_exact_one_is_there(transfer, patience, held, drags):
+def test_a_hand_goes_on_by_the_rough_one_until_the_exact_one_is_there(transfer, wait_limit, held, drags):
     memory = Cache(1 << 30)
     picture = open_exact_picture(transfer, cache=memory)
     before = picture.image()
@@ -118,7 +118,7 @@ def test_a_hand_goes_on_by_the_rough_one_until_the_exact_one_is_there(transfer, 
     assert relative_rmse(run_until_exact(picture).image(), before) < 1e-6
 
 
-def test_where_it_is_there_or_nothing_is_shown_yet_the_exact_one_is_made(transfer, patience):
+def test_where_it_is_there_or_nothing_is_shown_yet_the_exact_one_is_made(transfer, wait_limit):
     memory = Cache(1 << 30)
     open_exact_picture(transfer, FLOOR + "curves/theta_h", cache=memory)
     again = open_exact_picture(transfer, cache=memory)

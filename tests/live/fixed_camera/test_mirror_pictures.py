@@ -84,9 +84,9 @@ def test_a_mirror_shows_what_is_seen_from_behind_it(tmp_path):
     light[texel_directions(64, 128)[..., 2] < 0] = 0  # light that the wall would hide from the things before it
     scene = room(metal(), light)
     transfer = baked(scene, tmp_path / "mirror")
-    seen = shown(baked(through_the_mirror(scene), tmp_path / "behind"))[:, ::-1]
+    expected = shown(baked(through_the_mirror(scene), tmp_path / "behind"))[:, ::-1]
     _, cosine = angles(scene)
-    wanted = seen * np.stack([schlick(cosine, f0) for f0 in F0], axis=-1)
+    wanted = expected * np.stack([schlick(cosine, f0) for f0 in F0], axis=-1)
     is_mirror = transfer.views["front"].material_ids() == 0
     away = np.abs(shown(transfer) - wanted)[is_mirror]
     assert (wanted[is_mirror] > 0.01).mean() > 0.5
@@ -100,11 +100,11 @@ def test_a_ball_of_chrome_shows_the_light_around(tmp_path):
     )
     picture = shown(baked(scene, tmp_path))
     rays, _ = angles(scene)
-    eye = scene.cameras[0].to_world[:3, 3]
-    along = rays.astype(float) @ eye
-    root = along**2 - (eye @ eye - 0.64)
+    camera_position = scene.cameras[0].to_world[:3, 3]
+    along = rays.astype(float) @ camera_position
+    root = along**2 - (camera_position @ camera_position - 0.64)
     on = root > 0.03
-    normal = (eye + (-along - np.sqrt(np.maximum(root, 0)))[:, None] * rays) / 0.8
+    normal = (camera_position + (-along - np.sqrt(np.maximum(root, 0)))[:, None] * rays) / 0.8
     cosine = -np.einsum("nc,nc->n", normal, rays)
     turned = rays + 2 * cosine[:, None] * normal
     wanted = lookup(scene.environment.radiance, unit(turned).astype(np.float32)) * np.stack(
@@ -262,11 +262,11 @@ def test_a_rectangle_that_shines_is_seen_in_a_mirror_where_it_hangs(hung):
 
     scene = room(metal())
     rays, cosine = angles(scene)
-    eye = scene.cameras[0].to_world[:3, 3] * [1, 1, -1] + [0, 0, -2]  # behind the mirror
-    way = rays * [1, 1, -1]
-    place = eye + way * ((centre[2] - eye[2]) / way[:, 2:]) - centre
-    is_in = (np.abs(place[:, :2]) < side / 2 - 0.05).all(axis=1).reshape(cosine.shape)
-    is_out = (np.abs(place[:, :2]) > side / 2 + 0.05).any(axis=1).reshape(cosine.shape)
+    camera_position = scene.cameras[0].to_world[:3, 3] * [1, 1, -1] + [0, 0, -2]  # behind the mirror
+    directions = rays * [1, 1, -1]
+    offset = camera_position + directions * ((centre[2] - camera_position[2]) / directions[:, 2:]) - centre
+    is_in = (np.abs(offset[:, :2]) < side / 2 - 0.05).all(axis=1).reshape(cosine.shape)
+    is_out = (np.abs(offset[:, :2]) > side / 2 + 0.05).any(axis=1).reshape(cosine.shape)
     is_mirror = hung.views["front"].material_ids() == 0
     assert is_in.sum() > 20
     picture = shown(hung, lamp(-1))

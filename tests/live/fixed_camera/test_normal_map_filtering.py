@@ -36,10 +36,12 @@ def scene():
     """A polished floor of small bumps, in the light of a lamp that it mirrors."""
     shiny = {"model": "ggx", "texture": None, "params": {"roughness": 0.3, "f0": 0.9}, "roughness_map": "roughness"}
     floor = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
-    sky = np.full((32, 64, 3), 0.05, np.float32)
-    sky[5:9, 14:19] = 20
+    radiance = np.full((32, 64, 3), 0.05, np.float32)
+    radiance[5:9, 14:19] = 20
     camera = make_camera("front", (0, 1.6, 1.6), (0, 0, 0), 0.3)
-    return make_tiny_scene(floor, camera=camera, environment=sky, materials=[Material("Floor", (shiny,), {}, bumps())])
+    return make_tiny_scene(
+        floor, camera=camera, environment=radiance, materials=[Material("Floor", (shiny,), {}, bumps())]
+    )
 
 
 def followed(scene, follows):
@@ -77,8 +79,8 @@ def test_the_widening_adds_the_variance_of_slopes():
     slopes = rng.normal(0, 0.05, (200_000, 2))
     normals = np.concatenate([-slopes, np.ones((len(slopes), 1))], axis=1)
     length = np.linalg.norm((normals / np.linalg.norm(normals, axis=1, keepdims=True)).mean(axis=0))
-    found = rougher(np.ones(1, np.float32), np.array([length], np.float32), 0.3)[0] * 0.3
-    assert found**4 == pytest.approx(0.3**4 + 2 * 0.05**2, rel=0.02)
+    width = rougher(np.ones(1, np.float32), np.array([length], np.float32), 0.3)[0] * 0.3
+    assert width**4 == pytest.approx(0.3**4 + 2 * 0.05**2, rel=0.02)
 
 
 def test_levels_reach_as_far_as_bumps_widen(scene):

@@ -203,6 +203,6 @@ def test_light_between_surfaces_is_in_it_as_well(gathered, monkeypatch):
 
 def with_room(images):
     """The same images with another memory."""
-    found = copy.copy(images)
-    found.cache = Cache(1 << 28)
-    return found
+    copied = copy.copy(images)
+    copied.cache = Cache(1 << 28)
+    return copied

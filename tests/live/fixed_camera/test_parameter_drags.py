@@ -29,9 +29,9 @@ def shiny(roughness=0.4, curves=None, **more):
 
 @pytest.fixture
 def picture(transfer):
-    found = Picture(transfer, "front", Cache(BUDGET))
-    found.set_look(make_look(transfer, shiny()))
-    return run_until_exact(found)
+    live = Picture(transfer, "front", Cache(BUDGET))
+    live.set_look(make_look(transfer, shiny()))
+    return run_until_exact(live)
 
 
 def exact(transfer, change):

@@ -42,10 +42,10 @@ def test_probe_of_each_band_is_what_that_band_alone_gives(transfer):
         return make_look(transfer, change)
 
     whole = open_exact_picture(transfer, pointer, look=only(0, 256))
-    part = open_exact_picture(transfer, pointer, look=only(40, 90)).image()
+    image = open_exact_picture(transfer, pointer, look=only(40, 90)).image()
     y, x = (int(v) for v in np.argwhere(find_pure_ball_pixels(transfer))[150])
     bands = whole.inspect(x, y)["bands"]
-    np.testing.assert_allclose(bands[:, 40:90].sum(axis=1), part[y, x], rtol=1e-3, atol=1e-5)
+    np.testing.assert_allclose(bands[:, 40:90].sum(axis=1), image[y, x], rtol=1e-3, atol=1e-5)
 
 
 def test_probe_finds_the_surface_that_the_camera_sees_there(transfer):
@@ -55,9 +55,9 @@ def test_probe_finds_the_surface_that_the_camera_sees_there(transfer):
     y, x = np.nonzero(find_pure_ball_pixels(transfer))
     for k in range(0, len(y), 37):
         probe = picture.inspect(int(x[k]), int(y[k]))
-        seen = (to_camera @ [*probe["position"], 1.0])[:3]
-        column = view.width / 2 + seen[0] / -seen[2] / height * view.height
-        row = view.height / 2 - seen[1] / -seen[2] / height * view.height
+        position = (to_camera @ [*probe["position"], 1.0])[:3]
+        column = view.width / 2 + position[0] / -position[2] / height * view.height
+        row = view.height / 2 - position[1] / -position[2] / height * view.height
         assert 0 <= column - x[k] <= 1
         assert 0 <= row - y[k] <= 1
         assert np.linalg.norm(probe["normal"]) == pytest.approx(1, rel=1e-5)
@@ -81,17 +81,17 @@ def test_scaled_and_coloured_light_changes_probe_and_picture_alike_without_freez
     def brighten(document):
         document["environment"] |= {"intensity": scale, "color": color}
 
-    one = open_exact_picture(transfer, BALL + "theta_h")
-    two = open_exact_picture(transfer, BALL + "theta_h")
-    two.set_look(make_look(transfer, brighten))
-    assert two.next_job() is None
-    assert two.advance(None).tiles == two.all_tiles()
+    fresh = open_exact_picture(transfer, BALL + "theta_h")
+    scaled = open_exact_picture(transfer, BALL + "theta_h")
+    scaled.set_look(make_look(transfer, brighten))
+    assert scaled.next_job() is None
+    assert scaled.advance(None).tiles == scaled.all_tiles()
     gain = scale * np.array(color)
-    np.testing.assert_allclose(two.image(), gain * one.image(), rtol=1e-6)
+    np.testing.assert_allclose(scaled.image(), gain * fresh.image(), rtol=1e-6)
     y, x = (int(v) for v in np.argwhere(find_pure_ball_pixels(transfer))[100])
     for key in ("radiance", "bands"):
-        found, expected = np.asarray(two.inspect(x, y)[key]), np.asarray(one.inspect(x, y)[key])
-        np.testing.assert_allclose(found.T, gain * expected.T, rtol=1e-6)
+        actual, expected = np.asarray(scaled.inspect(x, y)[key]), np.asarray(fresh.inspect(x, y)[key])
+        np.testing.assert_allclose(actual.T, gain * expected.T, rtol=1e-6)
 
 
 def test_brush_over_everything_is_the_material_and_stretches_add_up(transfer):
@@ -106,7 +106,7 @@ def test_brush_over_everything_is_the_material_and_stretches_add_up(transfer):
     cuts = [0, 3.3, 7, 20, 61.7, 90]
     parts = [picture.highlight_pixels(pointer, a, b) for a, b in pairwise(cuts)]
     np.testing.assert_allclose(np.sum(parts, axis=0)[lit], whole[lit], atol=2e-4)
-    assert all(part.max() > 0.01 for part in parts[:3])
+    assert all(stretch.max() > 0.01 for stretch in parts[:3])
     assert not picture.highlight_pixels(pointer, 50, 50).any()
     assert whole.dtype == np.float32
     assert whole.shape == (48, 64)

@@ -89,7 +89,9 @@ def test_what_is_stopped_goes_on_from_there(transfer, monkeypatch):
     while isinstance(job := picture.next_job(), SparsePreview) or job.target.material.num_samples < 100:
         run_next_job(picture)
     shaded, asked = [], []
-    monkeypatch.setattr("relume.operators.shade.shade_rows", lambda *of: shaded.append(of[4:6]) or shade_rows(*of))
+    monkeypatch.setattr(
+        "relume.operators.shade.shade_rows", lambda *arguments: shaded.append(arguments[4:6]) or shade_rows(*arguments)
+    )
     with pytest.raises(CancelledError):
         job.run(lambda share: None, lambda: asked.append(1) or len(asked) > 2)
     assert isinstance(job, Shade)

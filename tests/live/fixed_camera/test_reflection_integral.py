@@ -64,9 +64,9 @@ def visible_texels(scene, origins, normals, directions):
     geometry, embreex = build_scene_buffers(scene), rtcore_scene.EmbreeScene()
     TriangleMesh(embreex, geometry.positions[geometry.faces])
     point, texel = np.nonzero(normals @ directions.T > 0)
-    seen = np.zeros((len(origins), len(directions)), bool)
-    seen[point, texel] = embreex.run(origins[point], directions[texel], query="OCCLUDED") < 0
-    return seen
+    visible = np.zeros((len(origins), len(directions)), bool)
+    visible[point, texel] = embreex.run(origins[point], directions[texel], query="OCCLUDED") < 0
+    return visible
 
 
 def truth_of(scene, transfer, material, rows, look):
@@ -77,10 +77,10 @@ def truth_of(scene, transfer, material, rows, look):
     some = replace(receivers.without_light(rows), visible=receivers.visible[rows])
     position = transfer.store.read("views/0/position")[first + rows]
     directions = texel_directions(*scene.environment.radiance.shape[:2]).reshape(-1, 3)
-    seen = visible_texels(scene, position, some.normal, directions)
+    visible = visible_texels(scene, position, some.normal, directions)
     total = np.zeros((len(rows), 3))
     for document in look.materials[transfer.material_names[material]].terms:
-        image = ref.integrate_texels(document, scene.environment.radiance, some, seen) * document["color"]
+        image = ref.integrate_texels(document, scene.environment.radiance, some, visible) * document["color"]
         image *= transfer.store.read(f"views/0/{document['texture']}")[first + rows]
         for curve in TERMS[document["model"]].curves:
             if curve.depends_on_view:
@@ -98,17 +98,17 @@ def test_frame_is_the_reflection_integral(scene, transfer, edit, bound):
     num_samples = np.bincount(view.pixel, minlength=48 * 36)
     weight = np.empty_like(view.throughput)
     weight[view.order] = view.throughput
-    found, expected = [], []
+    actual, expected = [], []
     for material in range(3):
         own = view.rows(material)
         is_whole = np.bincount(view.pixel[own], minlength=48 * 36) == num_samples
-        chosen = np.unique(view.pixel[own][is_whole[view.pixel[own]]])[::11]
-        assert len(chosen) > 5
-        rows = np.nonzero(np.isin(view.pixel[own], chosen))[0]
+        sample_pixels = np.unique(view.pixel[own][is_whole[view.pixel[own]]])[::11]
+        assert len(sample_pixels) > 5
+        rows = np.nonzero(np.isin(view.pixel[own], sample_pixels))[0]
         shares = weight[own][rows] * truth_of(scene, transfer, material, rows, look)
         pixels = np.zeros_like(image, np.float64)
         np.add.at(pixels, view.pixel[own][rows], shares)
-        found.append(image[chosen])
-        expected.append(pixels[chosen])
-        assert relative_rmse(found[-1], expected[-1]) < 3 * bound
-    assert relative_rmse(np.concatenate(found), np.concatenate(expected)) < bound
+        actual.append(image[sample_pixels])
+        expected.append(pixels[sample_pixels])
+        assert relative_rmse(actual[-1], expected[-1]) < 3 * bound
+    assert relative_rmse(np.concatenate(actual), np.concatenate(expected)) < bound

@@ -59,13 +59,15 @@ def test_curves_follow_under_turned_light(transfer):
 def test_turning_a_relightable_bake_is_near_a_fresh_bake_of_the_turned_map(tmp_path):
     scene = still_life()
     radiance = scene.environment.radiance
-    sky = replace(scene.environment, radiance=np.roll(radiance, -radiance.shape[1] // 4, axis=1))
-    other = make_scene("turned", scene.meshes, scene.materials, scene.cameras, sky)
+    environment = replace(scene.environment, radiance=np.roll(radiance, -radiance.shape[1] // 4, axis=1))
+    other = make_scene("turned", scene.meshes, scene.materials, scene.cameras, environment)
     recipe = Recipe("direct", ("front",), (48, 36), 1000)
     relightable = bake_in_process(METHODS["direct"], scene, replace(recipe, relightable=True), tmp_path / "one.zarr")
-    one = open_transfer(relightable, Cache(1 << 30))
+    rotated = open_transfer(relightable, Cache(1 << 30))
     two = open_transfer(bake_in_process(METHODS["direct"], other, recipe, tmp_path / "two.zarr"), Cache(1 << 30))
-    images = [render_image(one, "front", make_look(one, rotate_environment(degrees))) for degrees in (90.0, 0.0)]
+    images = [
+        render_image(rotated, "front", make_look(rotated, rotate_environment(degrees))) for degrees in (90.0, 0.0)
+    ]
     expected = render_image(two, "front", make_look(two))
     # docs/direct-light.md#environment-triangles: half a per cent to some per cent, by the lobe
     assert relative_rmse(images[0], expected) < 0.03

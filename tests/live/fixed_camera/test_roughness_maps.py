@@ -28,8 +28,8 @@ def roughness_map(size=64):
     """Four smooth and four rough squares, the smooth ones rougher from left to right; its mean stands for one."""
     y, x = np.mgrid[0:size, 0:size] * 4 // size
     pixels = np.where((x + y) % 2, 60 + np.mgrid[0:size, 0:size][1], 230).astype(np.uint8)[..., None]
-    most = 255 / float(pixels.mean())
-    return Texture(pixels, encoding=TextureEncoding("share", (most, most, most)))
+    max_value = 255 / float(pixels.mean())
+    return Texture(pixels, encoding=TextureEncoding("share", (max_value, max_value, max_value)))
 
 
 @pytest.fixture(scope="module")
@@ -54,15 +54,15 @@ def gather(scene, tmp_path_factory):
     return bake_corner_scene(scene, "gather", tmp_path_factory.mktemp("rough"))
 
 
-def changed(transfer, curves=None, lamp=None, turn=0.0, follows="roughness", **params):
+def changed(transfer, curves=None, light=None, turn=0.0, follows="roughness", **params):
     def change(document):
         term = document["materials"]["Floor"]["terms"][1]
         term["roughness_map"] = follows
         term["params"].update(params)
         term["curves"].update(curves or {})
         document["environment"]["rotation"] = turn
-        if lamp is not None:
-            document["lights"]["lamp"] = {"kind": "point", "position": lamp, "emission": [3.0, 3.0, 3.0]}
+        if light is not None:
+            document["lights"]["lamp"] = {"kind": "point", "position": light, "emission": [3.0, 3.0, 3.0]}
 
     return make_look(transfer, change)
 
@@ -83,12 +83,12 @@ def test_picture_is_brute_force_and_the_mean_is_not(scene, tmp_path) -> None:
     recipe = Recipe("direct", ("front",), (48, 36), 1500)
     transfer = open_transfer(bake_in_process(METHODS["direct"], scene, recipe, tmp_path / "s.zarr"), Cache(1 << 30))
     look = changed(transfer, roughness=0.8)  # of smoother texels highlights are narrower than the triangles of light
-    truth, found = reference_image(scene, "front", look, (48, 36), 0), shown(transfer, look).image()
-    assert relative_rmse(found, truth) < 0.04
-    assert np.median(np.abs(found - truth) / truth) < 1e-3
+    reference, actual = reference_image(scene, "front", look, (48, 36), 0), shown(transfer, look).image()
+    assert relative_rmse(actual, reference) < 0.04
+    assert np.median(np.abs(actual - reference) / reference) < 1e-3
     mean = shown(transfer, changed(transfer, roughness=0.8, follows=None)).image()
-    assert relative_rmse(mean, truth) > 0.08
-    assert np.median((np.abs(mean - truth) / truth)[of_the_floor(transfer)]) > 0.05
+    assert relative_rmse(mean, reference) > 0.08
+    assert np.median((np.abs(mean - reference) / reference)[of_the_floor(transfer)]) > 0.05
 
 
 def test_samples_are_of_the_levels_that_the_map_says(direct) -> None:
@@ -103,8 +103,8 @@ def test_samples_are_of_the_levels_that_the_map_says(direct) -> None:
 @pytest.mark.parametrize("name", ["direct", pytest.param("gather", marks=pytest.mark.slow)])
 def test_picture_is_what_the_projector_gives_level_by_level(name, request) -> None:
     transfer = request.getfixturevalue(name)
-    found = shown(transfer).image()
-    assert relative_rmse(found, ref.full_evaluation(transfer, "front", make_look(transfer))) < 1e-5
+    actual = shown(transfer).image()
+    assert relative_rmse(actual, ref.full_evaluation(transfer, "front", make_look(transfer))) < 1e-5
 
 
 def test_roughness_slider_scales_the_map(direct) -> None:
@@ -156,8 +156,8 @@ def test_drawn_curves_replace_the_map(direct) -> None:
     def plain(document):
         document["materials"]["Floor"]["terms"][1] = {**term, "roughness_map": None}
 
-    found = shown(direct, changed(direct, curves=drawn)).image()
-    assert relative_rmse(found, shown(direct, make_look(direct, plain)).image()) < 1e-5
+    actual = shown(direct, changed(direct, curves=drawn)).image()
+    assert relative_rmse(actual, shown(direct, make_look(direct, plain)).image()) < 1e-5
 
 
 def test_a_material_without_a_map_has_none_to_follow(direct) -> None:
@@ -179,13 +179,13 @@ def test_turned_light_is_previewed_and_exact_at_rest(direct) -> None:
 
 @pytest.mark.slow
 def test_moved_lamp_is_followed(gather) -> None:
-    picture = shown(gather, changed(gather, lamp=[0.3, 0.9, 0.3]))
+    picture = shown(gather, changed(gather, light=[0.3, 0.9, 0.3]))
     picture.prepare("/lights/lamp")
     made = []
     while picture.next_job() is not None:
         made.append(run_next_job(picture))
     assert any(isinstance(job, PrecomputeRows) for job in made)
-    look = changed(gather, lamp=[0.0, 0.9, 0.5])
+    look = changed(gather, light=[0.0, 0.9, 0.5])
     picture.set_look(look, active_pointer="/lights/lamp")
     assert not picture.advance(8).exact
     exact = exact_image(gather, look)
@@ -204,10 +204,10 @@ def test_probe_and_brush_know_the_level_of_a_pixel(direct) -> None:
     inside = of_the_floor(direct)
     y, x = np.nonzero(inside & np.roll(inside, 1, 0) & np.roll(inside, -1, 0) & np.roll(inside, 1, 1))
     assert len(y) > 50
-    found = [picture.inspect(int(x[k]), int(y[k])) for k in range(0, len(y), 19)]
-    radiance = np.array([probe["radiance"] for probe in found])
+    probes = [picture.inspect(int(x[k]), int(y[k])) for k in range(0, len(y), 19)]
+    radiance = np.array([probe["radiance"] for probe in probes])
     np.testing.assert_allclose(radiance, image[y[::19], x[::19]], rtol=1e-5)
-    summed = np.array([np.sum(probe["bands"], axis=1) for probe in found])
+    summed = np.array([np.sum(probe["bands"], axis=1) for probe in probes])
     assert np.median(np.abs(summed - radiance) / radiance) < 1e-4  # pixels of edges see other surfaces as well
     share = picture.highlight_pixels(pointer, 0, 90)
     assert np.median(share[y, x]) == pytest.approx(1, abs=1e-3)
@@ -219,10 +219,10 @@ def test_levels_that_do_not_fit_are_damage(direct, damage) -> None:
         attributes, shape = direct.store.attributes, direct.store.shape
 
         def read(self, path, *rows):
-            found = direct.store.read(path, *rows)
+            levels = direct.store.read(path, *rows)
             if path.endswith("/level"):
-                found = found[::-1].copy() if damage == "not sorted" else found + np.uint8(200)
-            return found
+                levels = levels[::-1].copy() if damage == "not sorted" else levels + np.uint8(200)
+            return levels
 
     with pytest.raises(ChunkDamagedError, match="levels of roughness"):
         open_view(Damaged(), 0, Cache(BUDGET), "damaged")

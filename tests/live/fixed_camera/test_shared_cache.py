@@ -13,7 +13,7 @@ from relume.core.memory_usage import live_bytes
 from relume.methods.registry import open_transfer
 from relume.output.render_image import render_image
 
-LAMP = {"kind": "point", "position": [0.3, 1.0, 0.4]}
+POINT_LIGHT = {"kind": "point", "position": [0.3, 1.0, 0.4]}
 CURVE = "/materials/Floor/terms/1/curves/theta_h"
 
 
@@ -23,7 +23,7 @@ def lit(number):
     def change(document):
         document["environment"].update(rotation=10.0 * number, map=("sunset", "overcast")[number % 2])
         document["background"] = {"kind": "blurred", "blur": 5.0 + number}
-        document["lights"] = {"lamp": {**LAMP, "position": [0.3, 1.0, 0.1 * number]}}
+        document["lights"] = {"lamp": {**POINT_LIGHT, "position": [0.3, 1.0, 0.1 * number]}}
         document["materials"]["Red"]["terms"][0]["color"] = [0.1 * number, 0.2, 0.2]
 
     return change
@@ -42,8 +42,8 @@ def test_nothing_that_grows_is_outside(gathered):
     lights = {"lights", "environment on patches", "light on patches", "local light", "indirect light", "reflectance"}
     assert lights | {"shaded term", "shadow cache", "neighbor filter", "background", "blurred environment"} <= kinds
     entries = [*memory._state.persistent.values(), *memory._state.transient.values()]
-    told = [entry.num_bytes for entry in entries]  # lights find out later how wide they are, a number each
-    assert [live_bytes(getattr(entry, "value", entry)) for entry in entries] == pytest.approx(told, rel=0.05)
+    sizes = [entry.num_bytes for entry in entries]  # lights find out later how wide they are, a number each
+    assert [live_bytes(getattr(entry, "value", entry)) for entry in entries] == pytest.approx(sizes, rel=0.05)
     assert {holder.bake for holder in memory.bytes_by_owner()} == {Path(gathered.key).stem, ""}
 
 

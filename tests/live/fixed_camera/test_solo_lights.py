@@ -9,19 +9,21 @@ from relume.look import Look, default_look, validate
 from relume.scene.model import Material
 
 WHITE = Material("White", ({"model": "lambert", "color": [1.0, 1.0, 1.0]},))
-LAMP = {"kind": "point", "position": [0.0, 1.0, 0.0], "intensity": 2.0}
+POINT_LIGHT = {"kind": "point", "position": [0.0, 1.0, 0.0], "intensity": 2.0}
 ENVIRONMENT = {"intensity": 0.5, "color": [1.0, 0.5, 0.25], "rotation": 20.0}
 
 
-def look(lamp: bool = True, spot: bool = False, **environment: object) -> Look:
+def look(has_point: bool = True, spot: bool = False, **environment: object) -> Look:
     """A lamp that is on, a spot that is off, and the light around, each as it is asked for."""
-    lights = {"Lamp": {**LAMP, "enabled": lamp}, "Spot": {"kind": "spot", "enabled": spot}}
+    lights = {"Lamp": {**POINT_LIGHT, "enabled": has_point}, "Spot": {"kind": "spot", "enabled": spot}}
     return validate({"lights": lights, "environment": {**ENVIRONMENT, **environment}}, default_look([WHITE]))
 
 
-def shown(of: Look, *solo: str) -> tuple[object, object]:
+def shown(look_document: Look, *solo: str) -> tuple[object, object]:
     alone = frozenset(solo) or None
-    return illumination_from_look(of, ["White"], has_bounces=True, solo=alone), picture_gain(of, alone)
+    return illumination_from_look(look_document, ["White"], has_bounces=True, solo=alone), picture_gain(
+        look_document, alone
+    )
 
 
 @pytest.mark.parametrize(
@@ -29,9 +31,9 @@ def shown(of: Look, *solo: str) -> tuple[object, object]:
     [
         ((), look()),
         (("Lamp",), look(intensity=0.0)),
-        (("Spot",), look(lamp=False, spot=True, intensity=0.0)),
-        (("environment",), look(lamp=False)),
-        (("environment", "Spot"), look(lamp=False, spot=True)),
+        (("Spot",), look(has_point=False, spot=True, intensity=0.0)),
+        (("environment",), look(has_point=False)),
+        (("environment", "Spot"), look(has_point=False, spot=True)),
         (("Lamp", "Nobody"), look(intensity=0.0)),
         (("Nobody",), look()),
     ],
@@ -41,7 +43,7 @@ def test_light_is_that_of_the_look_with_the_others_off(solo: tuple[str, ...], sw
 
 
 def test_a_light_without_emission_is_as_dark_alone_as_it_is() -> None:
-    dark = validate({"lights": {"Lamp": {**LAMP, "intensity": 0.0}}}, default_look([WHITE]))
+    dark = validate({"lights": {"Lamp": {**POINT_LIGHT, "intensity": 0.0}}}, default_look([WHITE]))
     light, gain = shown(dark, "Lamp")
     assert gain == (0.0, 0.0, 0.0)
     assert light == illumination_from_look(dark, ["White"], has_bounces=True)

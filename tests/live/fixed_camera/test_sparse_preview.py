@@ -46,9 +46,9 @@ def test_a_turned_light_is_glimpsed_at_once_and_shaded_at_rest(transfer, picture
     assert advance.changed
     assert not advance.exact
     expected = ref.full_evaluation(transfer, "front", make_look(transfer, turned(70)))
-    glimpse_error = relative_rmse(picture.image(), expected)
-    assert glimpse_error < 0.5 * relative_rmse(still, expected)
-    assert glimpse_error > 1e-3
+    preview_error = relative_rmse(picture.image(), expected)
+    assert preview_error < 0.5 * relative_rmse(still, expected)
+    assert preview_error > 1e-3
     assert picture.next_job().is_refinement
     assert relative_rmse(run_until_exact(picture).image(), expected) < 1e-6
     assert picture.next_job() is None

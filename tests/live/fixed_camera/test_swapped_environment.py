@@ -42,14 +42,14 @@ def plain(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def shelf(tmp_path_factory):
+def library(tmp_path_factory):
     with STORE.with_search_folder(tmp_path_factory.mktemp("shelf")) as folder:
         yield folder
 
 
 @pytest.fixture(scope="module")
-def map_name(shelf, tmp_path_factory):
-    return store_environment(shelf, write_map(tmp_path_factory.mktemp("maps") / "dusk.exr", dusk()), "Dusk").map
+def map_name(library, tmp_path_factory):
+    return store_environment(library, write_map(tmp_path_factory.mktemp("maps") / "dusk.exr", dusk()), "Dusk").map
 
 
 def under(name, **more):
@@ -86,8 +86,8 @@ def test_curves_follow_in_swapped_light(plain, map_name):
     assert relative_rmse(picture.image(), ref.full_evaluation(plain, "front", make_look(plain, edit))) < 1e-5
 
 
-def test_the_scene_s_own_map_from_the_shelf_changes_nothing(plain, shelf, tmp_path):
-    own = store_environment(shelf, write_map(tmp_path / "own.exr", still_life().environment.radiance), "Own")
+def test_the_scenes_own_map_from_the_library_changes_nothing(plain, library, tmp_path):
+    own = store_environment(library, write_map(tmp_path / "own.exr", still_life().environment.radiance), "Own")
     images = [render_image(plain, "front", make_look(plain, under(name))) for name in (None, own.map)]
     assert relative_rmse(images[1], images[0]) < 1e-5
 

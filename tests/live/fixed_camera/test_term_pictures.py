@@ -64,5 +64,5 @@ def test_picture_of_a_term_is_brute_force(model, scene, picture) -> None:
     term = {"model": model, "color": [0.8, 0.5, 0.3], "params": params, "texture": None, "curves": curves}
     look = validate({"materials": {m.name: {"terms": [term]} for m in scene.materials}}, transfer.default_look)
     live.set_look(look)
-    found = run_until_exact(live).image()
-    assert relative_rmse(found, reference_image(scene, "front", look, SIZE, 0)) < bound
+    image = run_until_exact(live).image()
+    assert relative_rmse(image, reference_image(scene, "front", look, SIZE, 0)) < bound

@@ -50,25 +50,27 @@ def coverage(opened):
 
 
 def test_edges_are_the_means_of_what_their_pixels_see(opened):
-    found, truth = picture(opened, 1), picture(opened, FINER)
-    seen = trace_primary(opened.stored_scene, opened.embree, CAMERA, SIZE)
+    actual, reference = picture(opened, 1), picture(opened, FINER)
+    gbuffer = trace_primary(opened.stored_scene, opened.embree, CAMERA, SIZE)
     is_edge = np.zeros(SIZE[::-1], bool).ravel()
-    is_edge[seen.owner] = True
+    is_edge[gbuffer.owner] = True
     is_edge = is_edge.reshape(SIZE[::-1])
     assert 0.02 < is_edge.mean() < 0.2
     ball = coverage(opened)
     partly = (ball > 0.2) & (ball < 0.8)
     assert partly.sum() > 10
     assert is_edge[partly].all()
-    middles = np.where(ball < 0.5, truth.max(), 0)  # what one ray says
-    assert np.sqrt(np.mean((found - truth)[partly] ** 2)) < 0.6 * np.sqrt(np.mean((middles - truth)[partly] ** 2))
-    np.testing.assert_allclose(found[~is_edge], truth[~is_edge], atol=0.05 * truth.max())
+    middles = np.where(ball < 0.5, reference.max(), 0)  # what one ray says
+    assert np.sqrt(np.mean((actual - reference)[partly] ** 2)) < 0.6 * np.sqrt(
+        np.mean((middles - reference)[partly] ** 2)
+    )
+    np.testing.assert_allclose(actual[~is_edge], reference[~is_edge], atol=0.05 * reference.max())
 
 
 def test_pixels_within_one_surface_take_one_ray(opened):
-    seen = trace_primary(opened.stored_scene, opened.embree, make_camera("near", [2, 2, 1], [2, 2, -1], 0.3), SIZE)
-    assert len(seen.owner) == 0
-    assert len(seen.directions) == SIZE[0] * SIZE[1]
+    gbuffer = trace_primary(opened.stored_scene, opened.embree, make_camera("near", [2, 2, 1], [2, 2, -1], 0.3), SIZE)
+    assert len(gbuffer.owner) == 0
+    assert len(gbuffer.directions) == SIZE[0] * SIZE[1]
 
 
 def test_a_picture_of_edges_alone_takes_fewer_rays_for_each():
@@ -79,8 +81,8 @@ def test_a_picture_of_edges_alone_takes_fewer_rays_for_each():
 
 def test_pixels_without_more_rays_stay_what_they_were():
     values = np.arange(18, dtype=np.float32).reshape(6, 3)
-    found = resolve(values, np.array([1, 1], np.int32), 4)
-    np.testing.assert_array_equal(found[[0, 2, 3]], values[[0, 2, 3]])
-    np.testing.assert_allclose(found[1], values[[1, 4, 5]].mean(axis=0))
+    resolved = resolve(values, np.array([1, 1], np.int32), 4)
+    np.testing.assert_array_equal(resolved[[0, 2, 3]], values[[0, 2, 3]])
+    np.testing.assert_allclose(resolved[1], values[[1, 4, 5]].mean(axis=0))
     np.testing.assert_array_equal(resolve(values, np.empty(0, np.int32), 6), values)
     np.testing.assert_allclose(resolve(values[:, 0], np.array([3, 3], np.int32), 4)[3], (9 + 12 + 15) / 3)

@@ -40,14 +40,14 @@ def test_a_degree_below_the_bound_is_left_out() -> None:
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e9])
 @pytest.mark.parametrize("num", [1, 15, NUM_FUNCTIONS])
 def test_light_vectors_survive_half_precision_whatever_their_size(size: float, num: int) -> None:
-    truth = np.random.default_rng(SEED).normal(0, size, (50, 3, NUM_FUNCTIONS)).astype(np.float32)
-    sent = material_arrays._vector_arrays("vectors/4", truth, num)
-    scale, told = sent["vectors/4/scale"][0]
-    assert told == num
+    coefficients = np.random.default_rng(SEED).normal(0, size, (50, 3, NUM_FUNCTIONS)).astype(np.float32)
+    sent = material_arrays._vector_arrays("vectors/4", coefficients, num)
+    scale, factor = sent["vectors/4/scale"][0]
+    assert factor == num
     numbers = sent["vectors/4"].astype(np.float64).reshape(50, -1)
     assert numbers.shape[1] - 3 * num in range(4)  # whole texels
-    found = numbers[:, : 3 * num].reshape(50, 3, num) * float(scale)
-    assert np.abs(found - truth[:, :, :num]).max() <= 1e-3 * np.abs(truth).max()
+    decoded = numbers[:, : 3 * num].reshape(50, 3, num) * float(scale)
+    assert np.abs(decoded - coefficients[:, :, :num]).max() <= 1e-3 * np.abs(coefficients).max()
 
 
 def test_materials_get_the_functions_that_they_know() -> None:
@@ -96,8 +96,8 @@ def test_the_finest_level_of_the_largest_texture_goes_first(monkeypatch: pytest.
     textures = Textures(
         texels, np.array(levels), np.array(first), np.zeros((2, 2), np.int64), np.zeros((1, 3), np.int64)
     )
-    kept, begins = geometry_arrays._select_levels(textures)
-    assert kept.tolist() == [0, 1, 2, 3, 4, 5, 6]
+    selected, begins = geometry_arrays._select_levels(textures)
+    assert selected.tolist() == [0, 1, 2, 3, 4, 5, 6]
     monkeypatch.setattr(geometry_arrays, "MAX_TEXELS", 50)
-    kept, begins = geometry_arrays._select_levels(textures)
-    assert (kept.tolist(), begins.tolist()) == ([1, 2, 3, 4, 5, 6], [0, 3, 6])
+    selected, begins = geometry_arrays._select_levels(textures)
+    assert (selected.tolist(), begins.tolist()) == ([1, 2, 3, 4, 5, 6], [0, 3, 6])

@@ -10,23 +10,23 @@ from relume.raytrace.embree import EmbreeScene
 from relume.scene.model import Camera
 
 
-def camera(place, turn=0.0, yfov=0.7):
+def camera(position, turn=0.0, yfov=0.7):
     cosine, sine = np.cos(turn), np.sin(turn)
     to_world = np.eye(4)
     to_world[:3, :3] = [[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]]
-    to_world[:3, 3] = place
+    to_world[:3, 3] = position
     return Camera("front", to_world, yfov)
 
 
 def test_a_turntable_sees_the_middle_alike_from_all_sides_and_closes():
-    found = turntable(camera([1, 1.5, 9]), np.array([1.0, 1, 3]), 12)
-    np.testing.assert_array_equal(found[0].to_world, camera([1, 1.5, 9]).to_world)
+    cameras = turntable(camera([1, 1.5, 9]), np.array([1.0, 1, 3]), 12)
+    np.testing.assert_array_equal(cameras[0].to_world, camera([1, 1.5, 9]).to_world)
     middle = np.array([1.0, 1, 3, 1])
-    seen = np.array([np.linalg.inv(one.to_world) @ middle for one in found])
-    np.testing.assert_allclose(seen, np.tile(seen[0], (12, 1)), atol=1e-12)
-    steps = [np.linalg.norm(found[k].to_world - found[k - 1].to_world) for k in range(12)]
+    centers = np.array([np.linalg.inv(pose.to_world) @ middle for pose in cameras])
+    np.testing.assert_allclose(centers, np.tile(centers[0], (12, 1)), atol=1e-12)
+    steps = [np.linalg.norm(cameras[k].to_world - cameras[k - 1].to_world) for k in range(12)]
     np.testing.assert_allclose(steps, steps[0])
-    assert found[3].to_world[0, 3] > 3  # to the right first
+    assert cameras[3].to_world[0, 3] > 3  # to the right first
 
 
 def test_a_picture_is_about_what_its_middle_shows_or_is_as_deep_as_the_scene():
@@ -44,20 +44,20 @@ def test_a_picture_is_about_what_its_middle_shows_or_is_as_deep_as_the_scene():
 
 def test_a_way_goes_through_its_cameras_and_never_leaves_the_rotations():
     keys = [camera([0, 1, 5]), camera([4, 2, 3], 0.9, 0.5), camera([5, 1, -1], 2.0, 1.0)]
-    found = interpolate_cameras(keys, 9)
-    for key, frame in zip(keys, found[::4], strict=True):
+    cameras = interpolate_cameras(keys, 9)
+    for key, frame in zip(keys, cameras[::4], strict=True):
         np.testing.assert_allclose(frame.to_world, key.to_world, atol=1e-12)
         assert frame.yfov == pytest.approx(key.yfov)
-    for frame in found:
+    for frame in cameras:
         rotation = frame.to_world[:3, :3]
         np.testing.assert_allclose(rotation.T @ rotation, np.eye(3), atol=1e-12)
         assert np.linalg.det(rotation) > 0
-    assert all(0.5 <= frame.yfov <= 1.0 for frame in found)
+    assert all(0.5 <= frame.yfov <= 1.0 for frame in cameras)
 
 
 @pytest.mark.parametrize("num", [1, 2, 7])
 def test_one_camera_stays_where_it_is(num):
-    assert [one.to_world.tolist() for one in interpolate_cameras([camera([0, 1, 5])], num)] == [
+    assert [pose.to_world.tolist() for pose in interpolate_cameras([camera([0, 1, 5])], num)] == [
         camera([0, 1, 5]).to_world.tolist()
     ] * num
 

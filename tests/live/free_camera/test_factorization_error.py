@@ -12,19 +12,19 @@ from relume.math.zernike import NUM_FUNCTIONS, num_functions, project
 
 
 def test_one_function_is_enough_for_a_diffuse_surface():
-    told = factorization_error(document("lambert"))
-    assert (told.functions, told.required_functions, told.is_mirror) == (NUM_FUNCTIONS, 1, False)
-    assert told.residual < 1e-3
+    error = factorization_error(document("lambert"))
+    assert (error.functions, error.required_functions, error.is_mirror) == (NUM_FUNCTIONS, 1, False)
+    assert error.residual < 1e-3
 
 
 def test_sharper_highlights_need_more_until_they_are_mirrors():
-    told = [factorization_error(document("phong", params={"exponent": e})) for e in (4.0, 8.0, 10.0, 300.0)]
-    needed = [one.required_functions or 1000 for one in told]
+    errors = [factorization_error(document("phong", params={"exponent": e})) for e in (4.0, 8.0, 10.0, 300.0)]
+    needed = [error.required_functions or 1000 for error in errors]
     assert needed == sorted(needed)
     assert len(set(needed)) > 2
-    assert [one.is_mirror for one in told] == [False, False, False, True]
-    assert told[-1].required_functions is None
-    missed = [one.residual for one in told]
+    assert [error.is_mirror for error in errors] == [False, False, False, True]
+    assert errors[-1].required_functions is None
+    missed = [error.residual for error in errors]
     assert missed == sorted(missed)
 
 

@@ -64,34 +64,34 @@ def rendered(transfer, *several, **kwargs):
 )
 def test_grounds_are_as_dark_as_in_fixed_views(fixed, moving, several, at_most):
     """But for edges, which are not antialiased, and shadows as sharp as points are dense."""
-    expected, found = rendered(fixed, *several), rendered(moving, *several)
-    seen = inner(fixed, "Ground") | inner(fixed, None)
-    assert np.sqrt(np.mean((found - expected)[seen] ** 2) / np.mean(expected[seen] ** 2)) < at_most
+    expected, actual = rendered(fixed, *several), rendered(moving, *several)
+    is_compared = inner(fixed, "Ground") | inner(fixed, None)
+    assert np.sqrt(np.mean((actual - expected)[is_compared] ** 2) / np.mean(expected[is_compared] ** 2)) < at_most
 
 
 def test_where_nothing_hides_light_nothing_is_hidden(moving, fixed):
     """To rounding: both are sums of the same light."""
     lit = changes(WHITE, set_paths("direct"), lambda d: d["lights"].update(Lamp=POINT_LIGHT))
-    found = rendered(moving, lit)[inner(fixed, "Ground")]
-    assert (np.abs(found - 1) < 1e-3).all(axis=1).mean() > 0.25  # points lie where it is not so
-    assert found.min() < 0.5
+    ground = rendered(moving, lit)[inner(fixed, "Ground")]
+    assert (np.abs(ground - 1) < 1e-3).all(axis=1).mean() > 0.25  # points lie where it is not so
+    assert ground.min() < 0.5
 
 
 def test_light_between_surfaces_alone_has_no_background(moving, fixed):
-    found = rendered(moving, COLOUR, set_paths("first_bounce"))
-    assert not found[inner(fixed, None)].any()
-    assert found[inner(fixed, "Ground")].any()
+    image = rendered(moving, COLOUR, set_paths("first_bounce"))
+    assert not image[inner(fixed, None)].any()
+    assert image[inner(fixed, "Ground")].any()
 
 
 def test_transparent_pictures_hide_what_fixed_ones_hide(fixed, moving):
-    expected, found = rendered(fixed, TRANSPARENT), rendered(moving, TRANSPARENT)
-    assert found.shape == (*SIZE[::-1], 4)
-    seen = inner(fixed, "Ground")
-    assert np.sqrt(np.mean((found - expected)[seen, 3] ** 2)) < 0.05
-    assert (found[inner(fixed, None)] == 0).all()
-    assert (found[inner(fixed, "Ball")][:, 3] == 1).all()
+    expected, actual = rendered(fixed, TRANSPARENT), rendered(moving, TRANSPARENT)
+    assert actual.shape == (*SIZE[::-1], 4)
+    is_ground = inner(fixed, "Ground")
+    assert np.sqrt(np.mean((actual - expected)[is_ground, 3] ** 2)) < 0.05
+    assert (actual[inner(fixed, None)] == 0).all()
+    assert (actual[inner(fixed, "Ball")][:, 3] == 1).all()
     shown, shown_fixed = (rendered(t, TRANSPARENT, for_display=True) for t in (moving, fixed))
-    assert np.sqrt(np.mean((shown - shown_fixed)[seen, 3] ** 2)) < 0.05
+    assert np.sqrt(np.mean((shown - shown_fixed)[is_ground, 3] ** 2)) < 0.05
 
 
 def test_a_live_picture_becomes_transparent_and_opaque_again(moving):

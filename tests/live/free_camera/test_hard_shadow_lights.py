@@ -26,7 +26,7 @@ SUN = np.array([0.5, 1.0, 0.25]) / np.linalg.norm([0.5, 1.0, 0.25])
 FLOOR = quad("floor", [[-3, 0, 3], [3, 0, 3], [3, 0, -3], [-3, 0, -3]], 0)
 LAMBERT = {"model": "lambert", "color": [0.8, 0.7, 0.6]}
 GLOSSY = {"model": "blinn_phong", "color": [0.2, 0.2, 0.2], "params": {"exponent": 8.0}}
-LAMPS = {
+LIGHTS = {
     "point": {"kind": "point", "position": [0.8, 1.9, 0.4], "emission": [9.0, 8.0, 6.0]},
     "spot": {
         "kind": "spot", "position": [0.8, 1.9, 0.4], "direction": [-0.5, -1.0, -0.2], "emission": [9.0, 8.0, 6.0],
@@ -54,9 +54,9 @@ def scene(environment, terms=(LAMBERT,)):
     return make_tiny_scene(FLOOR, ball, wall, camera=CAMERA, environment=environment, materials=materials)
 
 
-def opened(of, method, folder, num_points=2000):
+def opened(scene_to_bake, method, folder, num_points=2000):
     recipe = Recipe(method, ("front",), SIZE, 200, num_probes=num_points)
-    return open_bake(bake_in_process(METHODS[method], of, recipe, folder / f"{method}.zarr"), Cache(1 << 30))
+    return open_bake(bake_in_process(METHODS[method], scene_to_bake, recipe, folder / f"{method}.zarr"), Cache(1 << 30))
 
 
 def look_of(bake, change=lambda document: None):
@@ -74,9 +74,9 @@ def picture_of(bake, look, *, draws=True):
     return picture
 
 
-def error(found, expected):
+def error(actual, expected):
     """Relative to what is expected, root mean square."""
-    return np.sqrt(np.mean((found - expected) ** 2) / np.mean(expected**2))
+    return np.sqrt(np.mean((actual - expected) ** 2) / np.mean(expected**2))
 
 
 @pytest.fixture(scope="module")
@@ -93,15 +93,15 @@ def test_shares_are_those_of_all_shadow_rays(sunlit):
     """Where all targets say the same about a pixel and its neighbours, so does what is predicted."""
     picture = picture_of(sunlit, look_of(sunlit))
     picture.image()
-    seen, solid = picture._current_gbuffer(), sunlit.occlusion_mesh
+    gbuffer, solid = picture._current_gbuffer(), sunlit.occlusion_mesh
     (beam,) = sunlit.hard_shadow_lights(picture._current_light(), None)
-    found = visible_fractions(solid, seen, CAMERA, SIZE, beam.targets)
-    face, place = seen.hits.face, CAMERA.to_world[:3, 3] + seen.hits.distance[:, None] * seen.directions
+    fractions = visible_fractions(solid, gbuffer, CAMERA, SIZE, beam.targets)
+    face, position = gbuffer.hits.face, CAMERA.to_world[:3, 3] + gbuffer.hits.distance[:, None] * gbuffer.directions
     normal = solid.stored_scene.face_normal[face] * -np.sign(
-        np.einsum("nc,nc->n", solid.stored_scene.face_normal[face], seen.directions)
+        np.einsum("nc,nc->n", solid.stored_scene.face_normal[face], gbuffer.directions)
     )[:, None].astype(np.float32)
     hits = np.flatnonzero(face >= 0)
-    origins = (place + solid.surface_offset * normal)[hits].astype(np.float32)
+    origins = (position + solid.surface_offset * normal)[hits].astype(np.float32)
     towards = np.ascontiguousarray(beam.targets.towards.reshape(-1, 3))
     bits = trace_visibility(sunlit.embree, origins, np.ascontiguousarray(normal[hits]), towards).visible
     expected = np.zeros(len(face))
@@ -112,19 +112,19 @@ def test_shares_are_those_of_all_shadow_rays(sunlit):
         for dx in (-1, 0, 1):
             around.append(np.roll(of_pixels, (dy, dx), axis=(0, 1)))
     is_even = (np.ptp(around, axis=0) == 0) & (np.arange(width) % (width - 1) > 0)
-    off = np.abs(found[: width * height].reshape(height, width) - of_pixels)
+    off = np.abs(fractions[: width * height].reshape(height, width) - of_pixels)
     assert 0.1 < of_pixels.mean() < 0.9
     assert is_even.mean() > 0.8
     assert (off[is_even] > 0).mean() < 1e-3
     assert off[~is_even].mean() < 0.15
     across = slice(width * height, None)
-    assert np.abs(found[across] - expected[across]).mean() < 0.1
+    assert np.abs(fractions[across] - expected[across]).mean() < 0.1
 
 
 @pytest.mark.parametrize("terms", [(LAMBERT,), (LAMBERT, GLOSSY)], ids=["diffuse", "glossy"])
 def test_a_hard_sun_casts_the_shadows_of_a_fixed_view(terms, tmp_path):
-    of = scene(hard_sky(), terms)
-    fixed, bake = (opened(of, method, tmp_path) for method in ("direct", "probes"))
+    sunlit_scene = scene(hard_sky(), terms)
+    fixed, bake = (opened(sunlit_scene, method, tmp_path) for method in ("direct", "probes"))
     expected = render_image(fixed, "front", look_of(fixed))
     by_pixels = error(picture_of(bake, look_of(bake)).image(), expected)
     by_points = error(picture_of(bake, look_of(bake), draws=False).image(), expected)
@@ -143,10 +143,10 @@ def test_a_turned_sun_casts_its_shadows_where_it_stands(sunlit, tmp_path):
     assert error(picture_of(sunlit, look, draws=False).image(), expected) > 2 * by_pixels
 
 
-@pytest.mark.parametrize("kind", LAMPS)
+@pytest.mark.parametrize("kind", LIGHTS)
 def test_small_lamps_cast_the_shadows_of_a_fixed_view(kind, sunlit, fixed):
     def lit(document):
-        document["lights"] = {"Lamp": copy.deepcopy(LAMPS[kind])}
+        document["lights"] = {"Lamp": copy.deepcopy(LIGHTS[kind])}
         document["environment"]["intensity"] = 0.0
 
     expected = render_image(fixed, "front", look_of(fixed, lit))

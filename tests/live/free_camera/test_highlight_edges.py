@@ -33,7 +33,7 @@ def test_rims_are_the_pixels_that_differ_most_from_one_beside_them(monkeypatch, 
     image = rng.exponential(size=(13, 17, 3)).astype(np.float32) ** 3
     is_asked = rng.random(13 * 17) > 0.2
     luminance = image.astype(np.float64) @ LUMINANCE
-    jump = [max(abs(luminance[y, x] - one) for one in beside(luminance, y, x)) for y, x in np.ndindex(13, 17)]
+    jump = [max(abs(luminance[y, x] - neighbor) for neighbor in beside(luminance, y, x)) for y, x in np.ndindex(13, 17)]
     jump = np.where(is_asked, jump, 0)
     expected = np.flatnonzero(jump > luminance.mean())
     assert 0 < len(expected) < is_asked.sum()
@@ -51,10 +51,10 @@ def test_rays_share_no_row_and_no_column():
 def shiny(tmp_path_factory):
     """A ball that is a highlight, seen across its horizon, where the sky that it shows is narrowest."""
     term = {"model": "ggx", "color": [1.0] * 3, "params": {"roughness": 0.25, "f0": 0.9}}
-    sky = np.full((32, 64, 3), 0.05, np.float32)
-    sky[12, ::8] = 60
+    radiance = np.full((32, 64, 3), 0.05, np.float32)
+    radiance[12, ::8] = 60
     ball = sphere("ball", (0, 0.5, 0), 0.5, 0, num_rings=24)
-    scene = make_tiny_scene(ball, camera=CAMERA, environment=sky, materials=[Material("B", (term,))])
+    scene = make_tiny_scene(ball, camera=CAMERA, environment=radiance, materials=[Material("B", (term,))])
     recipe = Recipe("probes", ("front",), SIZE, 60, num_probes=1500)
     folder = tmp_path_factory.mktemp("rims")
     return open_bake(bake_in_process(METHODS["probes"], scene, recipe, folder / "s.zarr"), Cache(1 << 30))
@@ -67,10 +67,10 @@ def shown(opened, scale):
 
 
 def test_rims_show_what_their_pixels_see(shiny, monkeypatch):
-    found = shown(shiny, 1)
+    actual = shown(shiny, 1)
     monkeypatch.setattr(highlight_edges, "_MAX_EDGE_FRACTION", 0.0)
-    without, truth = shown(shiny, 1), shown(shiny, FINER)
-    changed = (found != without).any(axis=2)
+    without, reference = shown(shiny, 1), shown(shiny, FINER)
+    changed = (actual != without).any(axis=2)
     assert 0 < changed.sum() <= 0.02 * changed.size
-    off, was_off = (np.sqrt(np.mean((image[changed] - truth[changed]) ** 2)) for image in (found, without))
+    off, was_off = (np.sqrt(np.mean((image[changed] - reference[changed]) ** 2)) for image in (actual, without))
     assert off < 0.3 * was_off

@@ -32,7 +32,7 @@ from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
 
 CAMERA = make_camera("front", [0, 0.5, 3], [0, 0, 0], 0.75)
-EYE = np.array([0.4, 1.5, 3.0], np.float32)
+CAMERA_POSITION = np.array([0.4, 1.5, 3.0], np.float32)
 
 
 def sum_lights_numpy(
@@ -106,7 +106,7 @@ def lights_of(rng, num, radius):
 
 def facing(surface, least):
     """Points that see the eye from not too aslant."""
-    towards = EYE - surface.probes.position
+    towards = CAMERA_POSITION - surface.probes.position
     cosine = np.einsum("pk,pk->p", surface.probes.normal, towards) / np.linalg.norm(towards, axis=1)
     return np.flatnonzero(cosine > least)
 
@@ -118,11 +118,11 @@ def test_the_kernel_does_what_its_twin_does(surface, term):
     lights = EnvironmentLights.from_lights(*lights_of(rng, 152, rng.uniform(0, 0.3, 152)))
     visible = rng.integers(0, 256, (num, 19)).astype(np.uint8)
     is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
-    found = sum_lights(surface, visible, lights, lobes, EYE, is_needed)
-    assert not found[is_needed == 0].any()
+    actual = sum_lights(surface, visible, lights, lobes, CAMERA_POSITION, is_needed)
+    assert not actual[is_needed == 0].any()
     for point in np.flatnonzero(is_needed)[::7]:
-        expected = sum_lights_numpy(surface, visible, lights, lobes, EYE, point)
-        np.testing.assert_allclose(found[point], expected, rtol=2e-3, atol=2e-3 * np.abs(found).max())
+        expected = sum_lights_numpy(surface, visible, lights, lobes, CAMERA_POSITION, point)
+        np.testing.assert_allclose(actual[point], expected, rtol=2e-3, atol=2e-3 * np.abs(actual).max())
 
 
 @pytest.mark.parametrize(
@@ -140,20 +140,25 @@ def test_wide_highlights_are_sums_of_the_brdf_over_lights(surface, term):
     assert not lobes.lobe_confidence[0, cosines() > 0.4].any()
     towards, light, radius = lights_of(rng, 400, 0.01)
     bits = rng.integers(0, 256, (num, 50)).astype(np.uint8)
-    found = sum_lights(
-        surface, bits, EnvironmentLights.from_lights(towards, light, radius), lobes, EYE, np.ones(num, np.uint8)
+    actual = sum_lights(
+        surface,
+        bits,
+        EnvironmentLights.from_lights(towards, light, radius),
+        lobes,
+        CAMERA_POSITION,
+        np.ones(num, np.uint8),
     )
     off, size = [], []
     for point in facing(surface, 0.4):
         n, t = surface.probes.normal[point], surface.probes.tangent[point, :3]
         to_local = np.stack([t, np.cross(n, t), n]).astype(np.float64)
-        wo = to_local @ (EYE - surface.probes.position[point])
+        wo = to_local @ (CAMERA_POSITION - surface.probes.position[point])
         wi = towards @ to_local.T
         sent = eval_brdf(term, wi, wo / np.linalg.norm(wo)) * np.maximum(wi[:, 2:], 0)
         expected = np.unpackbits(bits[point], bitorder="little") @ (sent * light)
-        place = np.sqrt(1 - wo[2] / np.linalg.norm(wo)) * (lobes.albedo.shape[1] - 1)
-        albedo = np.interp(place, np.arange(lobes.albedo.shape[1]), lobes.albedo[0, :, 0, 0])
-        off.append(albedo * found[point] - expected)
+        row = np.sqrt(1 - wo[2] / np.linalg.norm(wo)) * (lobes.albedo.shape[1] - 1)
+        albedo = np.interp(row, np.arange(lobes.albedo.shape[1]), lobes.albedo[0, :, 0, 0])
+        off.append(albedo * actual[point] - expected)
         size.append(expected)
     assert np.sqrt(np.mean(np.square(off)) / np.mean(np.square(size))) < 0.03
 
@@ -166,14 +171,14 @@ def test_under_a_white_sky_nothing_is_gained_or_lost(surface, roughness):
     light = np.broadcast_to(tiles.solid_angles[:, None], (2048, 3)).astype(np.float32)
     radius = np.linalg.norm(tiles.corners[:, 0] - tiles.centroids, axis=1)
     lights = EnvironmentLights.from_lights(tiles.centroids.astype(np.float32), light, radius.astype(np.float32))
-    summed = sum_lights(surface, np.full((num, 256), 255, np.uint8), lights, lobes, EYE, np.ones(num, np.uint8))
-    seen = []
+    summed = sum_lights(
+        surface, np.full((num, 256), 255, np.uint8), lights, lobes, CAMERA_POSITION, np.ones(num, np.uint8)
+    )
+    ratios = []
     for point in facing(surface, 0.4)[::3]:
-        wo = EYE - surface.probes.position[point]
-        place = np.sqrt(1 - surface.probes.normal[point] @ wo / np.linalg.norm(wo)) * (
-            lobes.lobe_confidence.shape[1] - 1
-        )
-        believed = np.interp(place, np.arange(lobes.lobe_confidence.shape[1]), lobes.lobe_confidence[0])
-        seen.append(believed + summed[point, 0])
-    np.testing.assert_allclose(seen, 1, atol=0.1)
-    assert np.sqrt(np.mean(np.square(np.subtract(seen, 1)))) < 0.05
+        wo = CAMERA_POSITION - surface.probes.position[point]
+        row = np.sqrt(1 - surface.probes.normal[point] @ wo / np.linalg.norm(wo)) * (lobes.lobe_confidence.shape[1] - 1)
+        believed = np.interp(row, np.arange(lobes.lobe_confidence.shape[1]), lobes.lobe_confidence[0])
+        ratios.append(believed + summed[point, 0])
+    np.testing.assert_allclose(ratios, 1, atol=0.1)
+    assert np.sqrt(np.mean(np.square(np.subtract(ratios, 1)))) < 0.05

@@ -44,7 +44,7 @@ from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
 
 GLOSSY = {"model": "blinn_phong", "color": [0.9, 0.6, 0.3], "params": {"exponent": 30.0}}
-TOLD = {"model": "ward_anisotropic", "color": [0.9, 0.6, 0.3], "params": {"alpha_x": 0.5, "alpha_y": 0.35}}
+BROAD_TERM = {"model": "ward_anisotropic", "color": [0.9, 0.6, 0.3], "params": {"alpha_x": 0.5, "alpha_y": 0.35}}
 SKIRTED = {"model": "ggx", "color": [0.9, 0.6, 0.3], "params": {"roughness": 0.6, "f0": 0.9}}
 NARROW = {"model": "blinn_phong", "color": [0.9, 0.6, 0.3], "params": {"exponent": 3000.0}}
 CAMERA = make_camera("front", [0, 0.5, 3], [0, 0, 0], 0.75)
@@ -93,126 +93,140 @@ def test_highlights_of_few_points_on_a_ball_are_those_of_a_fixed_view(shiny_ball
     moving, expected = shiny_ball
 
     def error():
-        found = picture_of(moving)
-        return np.sqrt(np.mean((found - expected) ** 2) / np.mean(expected**2))
+        actual = picture_of(moving)
+        return np.sqrt(np.mean((actual - expected) ** 2) / np.mean(expected**2))
 
-    kept = error()
-    monkeypatch.setattr(lobes_module, "_has_highlight", lambda known: False)
-    assert kept < 0.08
-    assert error() > 2.5 * kept
+    interpolated_error = error()
+    monkeypatch.setattr(lobes_module, "_has_highlight", lambda probes: False)
+    assert interpolated_error < 0.08
+    assert error() > 2.5 * interpolated_error
 
 
 def test_points_take_no_more_than_half_of_what_a_pixel_finds_in_its_lobe(shiny_ball, monkeypatch):
     def shown_beside(broad):
-        def changed(surface, seen, pixel_angle, sent, *others):
+        def changed(surface, gbuffer, pixel_angle, outgoing, *others):
             return shade_pixels(
-                surface, seen, pixel_angle, sent._replace(radiance=np.full_like(sent.radiance, broad)), *others
+                surface,
+                gbuffer,
+                pixel_angle,
+                outgoing._replace(radiance=np.full_like(outgoing.radiance, broad)),
+                *others,
             )
 
         monkeypatch.setattr(frame_module, "shade_pixels", changed)
         return picture_of(shiny_ball[0])[18:30, 26:38]  # the ball's middle, beside rims, which have rays of their own
 
-    alone, most = shown_beside(0.0), shown_beside(-1e4)
+    alone, limit = shown_beside(0.0), shown_beside(-1e4)
     assert alone.max() > 0.1
-    np.testing.assert_allclose(most, alone / 2, rtol=1e-5, atol=1e-7)
+    np.testing.assert_allclose(limit, alone / 2, rtol=1e-5, atol=1e-7)
 
 
-LAMPS = np.array([[0.0, 0.6, 0.8, 3.0, 2.0, 1.0, 3e-4], [1.0, 0.0, 0.0, 0.5, 1.0, 2.0, 1e-3]], np.float32)
+BRIGHT_LIGHTS = np.array([[0.0, 0.6, 0.8, 3.0, 2.0, 1.0, 3e-4], [1.0, 0.0, 0.0, 0.5, 1.0, 2.0, 1e-3]], np.float32)
 
 
-def sky_light(rotation=0.0, gain=(1.0, 0.5, 2.0), lamps=LAMPS):
+def sky_light(rotation=0.0, gain=(1.0, 0.5, 2.0), bright_lights=BRIGHT_LIGHTS):
     rng = np.random.default_rng(5)
-    sky = build_environment_lookup(
+    lookup_tables = build_environment_lookup(
         rng.random((16, 32, 3), np.float32), lambda degrees: rng.random((16, 32, 3), np.float32)
     )
-    return PrefilteredEnvironment(sky, lamps, rotation_of(rotation), np.array(gain, np.float32))
+    return PrefilteredEnvironment(lookup_tables, bright_lights, rotation_of(rotation), np.array(gain, np.float32))
 
 
-def seen_along(lobes, surface, eye, point):
+def seen_along(lobes, surface, camera_position, point):
     """Reads a lobe's tables for a point; its normal; where the eye's ray goes on along the surface. In plain NumPy."""
     lobe = lobes.lobe_index[surface.material[point]]
     n = surface.probes.normal[point].astype(np.float64)
-    wo = eye - surface.probes.position[point].astype(np.float64)
+    wo = camera_position - surface.probes.position[point].astype(np.float64)
     wo /= np.linalg.norm(wo)
-    place = np.sqrt(1 - np.clip(wo @ n, MIN_COSINE, 1)) * (NUM_ROWS - 1)
-    row = min(int(place), NUM_ROWS - 2)
+    row_position = np.sqrt(1 - np.clip(wo @ n, MIN_COSINE, 1)) * (NUM_ROWS - 1)
+    row = min(int(row_position), NUM_ROWS - 2)
     aside = (wo @ n) * n - wo
 
     def at(table):
-        return table[lobe, row] + (place - row) * (table[lobe, row + 1] - table[lobe, row])
+        return table[lobe, row] + (row_position - row) * (table[lobe, row + 1] - table[lobe, row])
 
     return at, n, aside / np.linalg.norm(aside)
 
 
-def two_numpy(lobes, surface, eye, point):
+def two_numpy(lobes, surface, camera_position, point):
     """Where both lobes of a point look, their shares, σ of both."""
-    at, n, aside = seen_along(lobes, surface, eye, point)
+    at, n, aside = seen_along(lobes, surface, camera_position, point)
     directions = [np.sqrt(1 - cosine**2) * aside + cosine * n for cosine in at(lobes.cosine)]
     return np.array(directions), np.array([at(lobes.first), 1 - at(lobes.first)]), at(lobes.sigma)
 
 
-def one_numpy(lobes, surface, eye, point):
+def one_numpy(lobes, surface, camera_position, point):
     """Where the lobe of a pixel at a point looks, its share, and its width."""
-    at, n, aside = seen_along(lobes, surface, eye, point)
+    at, n, aside = seen_along(lobes, surface, camera_position, point)
     return (np.sqrt(1 - at(lobes.mean) ** 2) * aside + at(lobes.mean) * n)[None], np.ones(1), at(lobes.single_sigma)
 
 
-def sky_numpy(directions, shares, sigma, light, glance):
+def sky_numpy(directions, shares, sigma, light, visibility):
     """What lobes show of the sky, in plain NumPy: the oracle. (3,)"""
     every = zip(directions, shares, np.broadcast_to(sigma, shares.shape), strict=True)
-    return sum(share * one_sky_numpy(direction, width, light, glance) for direction, share, width in every)
+    return sum(share * one_sky_numpy(direction, width, light, visibility) for direction, share, width in every)
 
 
-def one_sky_numpy(direction, sigma, light, glance):
+def one_sky_numpy(direction, sigma, light, visibility):
     """What one lobe shows of it."""
     level = np.clip(2 * np.log2(np.degrees(sigma) / 2) + 1, 0, len(light.environment.levels) - 1)
     rotated = rotate_about_y(direction[None], 360 * (0.5 - float(light.rotation)))
-    found = np.zeros(3)
+    total = np.zeros(3)
     for k, share in ((int(level), 1 - level % 1), (int(np.ceil(level)), level % 1)):
         first, height, width = light.environment.levels[k]
         radiance = light.environment.texels[first : first + height * width].reshape(height, width, 3)
-        found += share * lookup(radiance, rotated.astype(np.float32))[0]
-    shown = glance[0] * found
-    for k, lamp in enumerate(light.bright_lights.astype(np.float64)):
-        towards, power, per = lamp[:3], lamp[3:6], 1 / (sigma**2 + lamp[6])
+        total += share * lookup(radiance, rotated.astype(np.float32))[0]
+    shown = visibility[0] * total
+    for k, bright_light in enumerate(light.bright_lights.astype(np.float64)):
+        towards, power, per = bright_light[:3], bright_light[3:6], 1 / (sigma**2 + bright_light[6])
         density = np.exp(per * (direction @ towards - 1)) * per / (2 * np.pi) / (1 - np.exp(-2 * per))
-        shown = shown + glance[1 + k] * min(level, 1) * density * power
+        shown = shown + visibility[1 + k] * min(level, 1) * density * power
     return shown * light.gain
 
 
-@pytest.mark.parametrize("term", [TOLD, GLOSSY, SKIRTED])
+@pytest.mark.parametrize("term", [BROAD_TERM, GLOSSY, SKIRTED])
 @pytest.mark.parametrize(("rotation", "is_fine"), [(0.0, False), (123.0, False), (123.0, True)])
 def test_points_add_of_the_sky_what_two_lobes_allow_of_the_in_basis_or_what_lights_say_less_what_pixels_find(
     shiny_ball, term, rotation, is_fine
 ):
     moving, _ = shiny_ball
     surface, rng, light = moving.stored_scene, np.random.default_rng(7), sky_light(rotation)
-    num, eye = surface.probes.num_points, np.array([0.4, 1.5, 3.0], np.float32)
-    glances = rng.random((num, 3), np.float32)
+    num, camera_position = surface.probes.num_points, np.array([0.4, 1.5, 3.0], np.float32)
+    visibility = rng.random((num, 3), np.float32)
     lobes = build_lobes([[{**term, "texture": "diffuse"}]])
     assert (lobes.max_ratio[0] > 1) == (lobes.lobe_confidence == 1).all() == (term is not SKIRTED)
     lit = rng.random((num, 3), np.float32)
-    sky = rng.normal(1, 2, size=(num, 3, 3)).astype(np.float32)
+    environment_light = rng.normal(1, 2, size=(num, 3, 3)).astype(np.float32)
     sent = np.zeros((num, 3, 3), np.float32)
     is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
     add_environment_highlights(
-        surface, lobes, light, eye, glances, lit, is_needed, ProbeRadiance(sent, sky), is_fine=is_fine
+        surface,
+        lobes,
+        light,
+        camera_position,
+        visibility,
+        lit,
+        is_needed,
+        ProbeRadiance(sent, environment_light),
+        is_fine=is_fine,
     )
     assert not sent[is_needed == 0].any()
-    held, most = 0, float(lobes.max_ratio[0])
+    held, max_ratio = 0, float(lobes.max_ratio[0])
     for point in np.flatnonzero(is_needed)[::17]:
-        at, _, _ = seen_along(lobes, surface, eye.astype(np.float64), point)
-        both, shown = (
-            sky_numpy(*lobe(lobes, surface, eye.astype(np.float64), point), light, glances[point])
+        at, _, _ = seen_along(lobes, surface, camera_position.astype(np.float64), point)
+        with_lights, shown = (
+            sky_numpy(*lobe(lobes, surface, camera_position.astype(np.float64), point), light, visibility[point])
             for lobe in (two_numpy, two_numpy if is_fine or lobes.is_two[0] else one_numpy)
         )
-        said, found = (
-            at(lobes.albedo) * (at(lobes.lobe_confidence) * both + lit[point] * light.gain),
+        reference, actual = (
+            at(lobes.albedo) * (at(lobes.lobe_confidence) * with_lights + lit[point] * light.gain),
             at(lobes.albedo) * shown,
         )
-        expected = np.clip(sky[point], said / most, said * most)
-        held += int((expected != sky[point]).sum()) if term is not SKIRTED else 9
-        np.testing.assert_allclose(sent[point], expected - found, rtol=2e-3, atol=3e-4 * max(1, np.abs(said).max()))
+        expected = np.clip(environment_light[point], reference / max_ratio, reference * max_ratio)
+        held += int((expected != environment_light[point]).sum()) if term is not SKIRTED else 9
+        np.testing.assert_allclose(
+            sent[point], expected - actual, rtol=2e-3, atol=3e-4 * max(1, np.abs(reference).max())
+        )
     assert held > 3
     assert sent[:, 1].any()
     assert not sent[:, [0, 2]].any()
@@ -226,11 +240,19 @@ def test_what_is_narrower_than_lights_is_a_lobe_alone(shiny_ball):
     np.testing.assert_allclose(lobes.lobe_confidence, 1, atol=1e-5)
     num = surface.probes.num_points
     sent, everywhere = np.zeros((num, 3, 3), np.float32), np.ones(num, np.uint8)
-    sky = rng.normal(size=(num, 3, 3)).astype(np.float32)
-    eye, glances = CAMERA.to_world[:3, 3], np.ones((num, 3), np.float32)
+    environment_light = rng.normal(size=(num, 3, 3)).astype(np.float32)
+    camera_position, visibility = CAMERA.to_world[:3, 3], np.ones((num, 3), np.float32)
     nothing, light = np.zeros((num, 3), np.float32), sky_light()
     add_environment_highlights(
-        surface, lobes, light, eye, glances, nothing, everywhere, ProbeRadiance(sent, sky), is_fine=True
+        surface,
+        lobes,
+        light,
+        camera_position,
+        visibility,
+        nothing,
+        everywhere,
+        ProbeRadiance(sent, environment_light),
+        is_fine=True,
     )
     assert np.abs(sent).max() < 1e-4 * lobes.albedo.max()
 
@@ -240,23 +262,25 @@ def test_points_see_of_the_sky_in_their_lobes_what_their_bits_say(shiny_ball):
     num, num_lights, lobes = surface.probes.num_points, 20, build_lobes([[NARROW]])
     directions = rng.normal(size=(num_lights, 3)).astype(np.float32)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    of_lamps = np.zeros((2, num_lights), np.float32)
-    of_lamps[0, [2, 5]], of_lamps[1, 11] = (0.25, 0.75), 1
+    lobe_weights = np.zeros((2, num_lights), np.float32)
+    lobe_weights[0, [2, 5]], lobe_weights[1, 11] = (0.25, 0.75), 1
     radius, luminous = (rng.uniform(low, high, num_lights).astype(np.float32) for low, high in ((0.3, 0.8), (1, 9)))
-    listed = build_light_lists(directions, radius, luminous, of_lamps, lobe_widths(lobes))
+    listed = build_light_lists(directions, radius, luminous, lobe_weights, lobe_widths(lobes))
     bits = rng.integers(0, 2, (num, 8 * ((num_lights + 7) // 8)), np.uint8)
-    eye, is_needed = np.array([0.4, 1.5, 3.0], np.float32), (np.arange(num) % 3 > 0).astype(np.uint8)
-    found = trace_lobe_visibility(surface, np.packbits(bits, axis=1, bitorder="little"), listed, lobes, eye, is_needed)
-    assert not found[is_needed == 0].any()
+    camera_position, is_needed = np.array([0.4, 1.5, 3.0], np.float32), (np.arange(num) % 3 > 0).astype(np.uint8)
+    actual = trace_lobe_visibility(
+        surface, np.packbits(bits, axis=1, bitorder="little"), listed, lobes, camera_position, is_needed
+    )
+    assert not actual[is_needed == 0].any()
     for point in np.flatnonzero(is_needed)[::13]:
-        towards, shares, sigma = two_numpy(lobes, surface, eye.astype(np.float64), point)
+        towards, shares, sigma = two_numpy(lobes, surface, camera_position.astype(np.float64), point)
         middle = shares @ towards
         size = np.linalg.norm(middle)
         variance = shares @ sigma**2 + 1 - size + listed.lights[:, 3].astype(np.float64)
         weight = luminous / variance * np.maximum(1 - (1 - directions @ middle / size) / (8 * variance), 0) ** 8
         expected = weight @ bits[point, :num_lights] / weight.sum()
-        seen = [expected, *(of_lamps @ bits[point, :num_lights])]
-        np.testing.assert_allclose(found[point], seen, atol=2e-3)
+        fractions = [expected, *(lobe_weights @ bits[point, :num_lights])]
+        np.testing.assert_allclose(actual[point], fractions, atol=2e-3)
 
 
 @pytest.mark.parametrize("width", [0, 3, 9])
@@ -267,40 +291,40 @@ def test_lists_have_the_lights_that_weigh_most(width):
     radius, luminous = rng.uniform(0.02, 0.3, 300).astype(np.float32), rng.uniform(0, 9, 300).astype(np.float32)
     listed = build_light_lists(directions, radius, luminous, np.zeros((0, 300), np.float32), (width,))
     for square in range(0, SIDE * SIDE, 31):
-        found = listed.lists[listed.first[width] + square]
-        assert set(found[found >= 0]) == set(lists_numpy(listed, width, square))
+        light_list = listed.lists[listed.first[width] + square]
+        assert set(light_list[light_list >= 0]) == set(lists_numpy(listed, width, square))
 
 
 def test_lists_are_full_where_lights_weigh_alike():
     directions, radius = np.tile(np.array([0, 0.6, 0.8], np.float32), (100, 1)), np.full(100, 0.1, np.float32)
     luminous = np.where(np.arange(100) < 20, 2, 1).astype(np.float32)
     none = np.zeros((0, 100), np.float32)
-    for found in build_light_lists(directions, radius, luminous, none, (NUM_WIDTHS - 1,)).lists:
-        assert len(set(found)) == NUM_LISTED
-        assert set(range(20)) < set(found) <= set(range(100))
+    for light_list in build_light_lists(directions, radius, luminous, none, (NUM_WIDTHS - 1,)).lists:
+        assert len(set(light_list)) == NUM_LISTED
+        assert set(range(20)) < set(light_list) <= set(range(100))
     few = np.where(np.arange(100) < 90, 0, 1).astype(np.float32)
-    found = {tuple(each[each >= 0]) for each in build_light_lists(directions, radius, few, none, (0,)).lists}
-    assert found == {(), tuple(range(90, 100))}
+    light_list = {tuple(each[each >= 0]) for each in build_light_lists(directions, radius, few, none, (0,)).lists}
+    assert light_list == {(), tuple(range(90, 100))}
 
 
 @pytest.mark.parametrize("degrees", [4.0, 16.0])
 def test_a_blurred_sky_and_its_lamp_are_the_blurred_whole(degrees):
     """A lamp of two degrees, too wide for a sun whose shadows are traced."""
     towards, axis = texel_directions(256, 512), np.array([0.0, 0.6, 0.8])
-    sky = np.where((towards @ axis > np.cos(np.radians(2)))[..., None], 3000.0, 1 + towards[..., 1:2] ** 2)
-    whole = np.repeat(sky, 3, axis=2).astype(np.float32)
+    radiance = np.where((towards @ axis > np.cos(np.radians(2)))[..., None], 3000.0, 1 + towards[..., 1:2] ** 2)
+    whole = np.repeat(radiance, 3, axis=2).astype(np.float32)
     assert not remove_sun_disks(whole).sun_disks
-    (lamp,), beside = remove_sun_disks(whole, LAMPS_OF_SKIES)
-    spread = 1 - np.linalg.norm(lamp.mean)
+    (disk,), beside = remove_sun_disks(whole, LAMPS_OF_SKIES)
+    spread = 1 - np.linalg.norm(disk.mean)
     expected, rest, per = (
         prefiltered(whole, degrees),
         prefiltered(beside, degrees),
         1 / (np.radians(degrees) ** 2 + spread),
     )
-    cosine = texel_directions(*expected.shape[:2]) @ lamp.mean / np.linalg.norm(lamp.mean)
+    cosine = texel_directions(*expected.shape[:2]) @ disk.mean / np.linalg.norm(disk.mean)
     density = np.exp(per * (cosine - 1)) * per / (2 * np.pi) / (1 - np.exp(-2 * per))
-    found = rest + density[..., None] * lamp.irradiance
-    assert np.sqrt(np.mean((found - expected) ** 2) / np.mean(expected**2)) < 0.03
+    actual = rest + density[..., None] * disk.irradiance
+    assert np.sqrt(np.mean((actual - expected) ** 2) / np.mean(expected**2)) < 0.03
     assert np.sqrt(np.mean((rest - expected) ** 2) / np.mean(expected**2)) > 0.5
 
 
@@ -310,15 +334,17 @@ def test_a_surface_takes_from_its_own_points_and_not_from_what_lies_beside_it():
     ground = quad("ground", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 1)
     materials = [Material(name, ({"model": "lambert", "color": [1, 1, 1]},)) for name in ("Balls", "Ground")]
     scene = make_tiny_scene(*balls, ground, camera=make_camera("front", [0, 1, 3], [0, 0, 0], 0.5), materials=materials)
-    geometry, eyes = build_scene_buffers(scene), np.array([[0.0, 1.0, 3.0]])
+    geometry, camera_positions = build_scene_buffers(scene), np.array([[0.0, 1.0, 3.0]])
     is_open = visible_sides(geometry, scene.cameras, 1)
-    found = place_probes(geometry, is_open, density_from_distance(geometry, eyes, make_corner_grid(is_open)), 1500)
-    vertices, points = found.lattice_nodes, found.probes
-    of_ball = found.material[vertices.probe[:, 0]] == 0
-    place = np.einsum("vk,vkc->vc", vertices.weight, points.position[vertices.probe])
+    placed = place_probes(
+        geometry, is_open, density_from_distance(geometry, camera_positions, make_corner_grid(is_open)), 1500
+    )
+    vertices, points = placed.lattice_nodes, placed.probes
+    of_ball = placed.material[vertices.probe[:, 0]] == 0
+    position = np.einsum("vk,vkc->vc", vertices.weight, points.position[vertices.probe])
     for vertex in np.flatnonzero(of_ball):
         taken = points.position[vertices.probe[vertex][vertices.weight[vertex] > 0], 0]
-        assert len(np.unique(taken > 0.051)) == 1, place[vertex]
+        assert len(np.unique(taken > 0.051)) == 1, position[vertex]
 
 
 def test_faces_hang_together_by_places_of_corners():
@@ -328,5 +354,5 @@ def test_faces_hang_together_by_places_of_corners():
         mesh("b", [[1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2]], 0),
     ]
     far = mesh("c", [[5, 0, 0], [6, 0, 0], [5, 1, 0]], [[0, 1, 2]], 0)
-    found = mesh_components(build_scene_buffers(make_tiny_scene(*apart, far, camera=CAMERA)))
-    assert found[0] == found[1] != found[2]
+    components = mesh_components(build_scene_buffers(make_tiny_scene(*apart, far, camera=CAMERA)))
+    assert components[0] == components[1] != components[2]

@@ -53,13 +53,13 @@ def nodes(num, seed=3):
 def test_keys_are_those_of_numpy():
     some = nodes(3000)
     for together, alike in ((0.35, 4), (1e-3, 50)):
-        for found, expected in zip(_keys(some, together, alike), keys_numpy(some, together, alike), strict=True):
-            np.testing.assert_array_equal(found, expected)
+        for actual, expected in zip(_keys(some, together, alike), keys_numpy(some, together, alike), strict=True):
+            np.testing.assert_array_equal(actual, expected)
 
 
 def test_nodes_that_are_shared_are_counted_as_they_are_found():
     some = nodes(20_000)
     for alike in (1, 4):
-        found = len(representative_nodes(some, alike))
-        assert 100 < found < 20_000
-        assert num_representatives(some, alike) == found
+        count = len(representative_nodes(some, alike))
+        assert 100 < count < 20_000
+        assert num_representatives(some, alike) == count

@@ -28,7 +28,7 @@ from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
 
 CAMERA, SIZE = make_camera("front", [0, 0.5, 3], [0, 0, 0], 0.75), (64, 48)
-EYE = CAMERA.to_world[:3, 3].astype(np.float32)
+CAMERA_POSITION = CAMERA.to_world[:3, 3].astype(np.float32)
 WHITE = {"model": "ggx", "color": [1.0] * 3, "texture": None, "curves": {}}
 COAT = {**WHITE, "params": {"roughness": 0.3, "f0": 0.05}}
 METAL = {**WHITE, "color": [0.9, 0.6, 0.3], "params": {"roughness": 0.4, "f0": 0.9}}
@@ -104,58 +104,64 @@ def test_gradients_are_what_points_send_otherwise_aside(moving, terms):
     surface, tables, lobes = moving.stored_scene, build_tables([terms]), build_lobes([terms])
     others, num = from_afar(surface.probes), surface.probes.num_points
     is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
-    found = gradients_along_lobe(surface, others, tables, lobes, EYE, is_needed)
-    assert not found[is_needed == 0].any()
-    expected = np.array([gradients_along_lobe_numpy(surface, others, tables, lobes, EYE, p) for p in range(0, num, 5)])
+    actual = gradients_along_lobe(surface, others, tables, lobes, CAMERA_POSITION, is_needed)
+    assert not actual[is_needed == 0].any()
+    expected = np.array(
+        [gradients_along_lobe_numpy(surface, others, tables, lobes, CAMERA_POSITION, p) for p in range(0, num, 5)]
+    )
     is_asked = is_needed[::5] > 0
     largest = np.abs(expected[is_asked]).max()
     assert largest > 0.1
-    np.testing.assert_allclose(found[::5][is_asked], expected[is_asked], rtol=2e-3, atol=2e-3 * largest)
+    np.testing.assert_allclose(actual[::5][is_asked], expected[is_asked], rtol=2e-3, atol=2e-3 * largest)
 
 
 def test_what_has_no_highlight_or_no_other_light_turns_nothing(moving):
     surface, num = moving.stored_scene, moving.stored_scene.probes.num_points
     dull, everywhere = [{**METAL, "model": "lambert", "params": {}}], np.ones(num, np.uint8)
     others = from_afar(surface.probes)
-    assert not gradients_along_lobe(surface, others, build_tables([dull]), build_lobes([dull]), EYE, everywhere).any()
     assert not gradients_along_lobe(
-        surface, 0 * others, build_tables([[METAL]]), build_lobes([[METAL]]), EYE, everywhere
+        surface, others, build_tables([dull]), build_lobes([dull]), CAMERA_POSITION, everywhere
+    ).any()
+    assert not gradients_along_lobe(
+        surface, 0 * others, build_tables([[METAL]]), build_lobes([[METAL]]), CAMERA_POSITION, everywhere
     ).any()
 
 
 def pixels(moving, gain):
     """Pixels of a metal ball in that light, with gradients times a gain; and of points that lie where pixels look."""
     surface, tables, lobes = moving.stored_scene, build_tables([[METAL]]), build_lobes([[METAL]])
-    seen = trace_primary(surface, moving.embree, CAMERA, SIZE).pixel_centers(SIZE[0] * SIZE[1])
+    gbuffer = trace_primary(surface, moving.embree, CAMERA, SIZE).pixel_centers(SIZE[0] * SIZE[1])
     others, everywhere = from_afar(surface.probes), np.ones(surface.probes.num_points, np.uint8)
-    sent = shade_probes(surface, np.zeros_like(others), others, tables, EYE, everywhere).radiance
-    turns = np.float32(gain) * gradients_along_lobe(surface, others, tables, lobes, EYE, everywhere)
-    broad, turn = (interpolate_to_nodes(surface, seen.is_visible, of) for of in (sent, turns))
+    outgoing = shade_probes(surface, np.zeros_like(others), others, tables, CAMERA_POSITION, everywhere).radiance
+    gradients = np.float32(gain) * gradients_along_lobe(surface, others, tables, lobes, CAMERA_POSITION, everywhere)
+    broad, turn = (interpolate_to_nodes(surface, gbuffer.is_visible, values) for values in (outgoing, gradients))
     dark, nothing = np.zeros((1, 3), np.float32), np.empty((0, 3), np.float32)
-    no_sky = PrefilteredEnvironment(moving.prefiltered(None), np.empty((0, 7), np.float32), rotation_of(0.0), dark[0])
-    mirrored = MirrorData(lobes, no_sky, np.zeros((len(turn), 3), np.float32), turn, False)
+    no_environment = PrefilteredEnvironment(
+        moving.prefiltered(None), np.empty((0, 7), np.float32), rotation_of(0.0), dark[0]
+    )
+    mirrored = MirrorData(lobes, no_environment, np.zeros((len(turn), 3), np.float32), turn, False)
     shown = InterpolatedProbes(broad, np.ones((1, broad.shape[1]), bool), nothing)
-    found = shade_pixels(surface, seen, CAMERA.yfov / SIZE[1], shown, dark, mirrored)
+    radiance = shade_pixels(surface, gbuffer, CAMERA.yfov / SIZE[1], shown, dark, mirrored)
 
-    hit = np.flatnonzero(seen.hits.face >= 0)
-    position = EYE + seen.hits.distance[hit, None] * seen.directions[hit]
-    normal = np.einsum("nk,nkc->nc", seen.weight[hit], surface.lattice_nodes.normal[seen.lattice_node[hit]])
+    hit = np.flatnonzero(gbuffer.hits.face >= 0)
+    position = CAMERA_POSITION + gbuffer.hits.distance[hit, None] * gbuffer.directions[hit]
+    normal = np.einsum("nk,nkc->nc", gbuffer.weight[hit], surface.lattice_nodes.normal[gbuffer.lattice_node[hit]])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     tangent = np.cross(normal, [0.0, 0.0, 1.0])
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    fields = (np.ascontiguousarray(of, np.float32) for of in (position, normal, tangent))
+    fields = (np.ascontiguousarray(values, np.float32) for values in (position, normal, tangent))
     points = SurfacePoints(*fields, hit.astype(np.uint32))
     exactly = replace(surface, probes=points, material=np.zeros(len(hit), surface.material.dtype))
     light, every = from_afar(points), np.ones(len(hit), np.uint8)
-    expected = shade_probes(exactly, np.zeros_like(light), light, tables, EYE, every).radiance[:, 0]
-    inside = np.einsum("nc,nc->n", normal, -seen.directions[hit]) > 0.3
-    return found[hit][inside], expected[inside]
+    expected = shade_probes(exactly, np.zeros_like(light), light, tables, CAMERA_POSITION, every).radiance[:, 0]
+    inside = np.einsum("nc,nc->n", normal, -gbuffer.directions[hit]) > 0.3
+    return radiance[hit][inside], expected[inside]
 
 
 def test_half_gradients_meet_what_lies_between_points(moving):
     def error(gain):
-        found, expected = pixels(moving, gain)
-        return np.sqrt(np.mean((found - expected) ** 2) / np.mean(expected**2))
+        actual, expected = pixels(moving, gain)
+        return np.sqrt(np.mean((actual - expected) ** 2) / np.mean(expected**2))
 
     plain, half, whole = error(0), error(1), error(2)
     assert plain > 0.03

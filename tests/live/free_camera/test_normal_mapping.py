@@ -56,9 +56,9 @@ def picture_of(scene, method, folder):
     return render_image(opened, "front", validate(complete({}, opened.default_look), opened.default_look))
 
 
-def error(found, expected):
+def error(actual, expected):
     """Relative to what is expected, root mean square."""
-    return np.sqrt(np.mean((found - expected) ** 2) / np.mean(expected**2))
+    return np.sqrt(np.mean((actual - expected) ** 2) / np.mean(expected**2))
 
 
 @pytest.mark.parametrize(
@@ -69,10 +69,10 @@ def test_slopes_are_lit_as_in_fixed_views(terms, at_most, tmp_path):
     """And not as flat ones are: what the map does to the picture is several times what is left."""
     bumpy, flat = floor(terms, waves()), floor(terms, None)
     expected = picture_of(bumpy, "direct", tmp_path)
-    found = error(picture_of(bumpy, "probes", tmp_path), expected)
+    actual_error = error(picture_of(bumpy, "probes", tmp_path), expected)
     ignored = error(picture_of(flat, "probes", tmp_path / "flat"), expected)
-    assert found < at_most
-    assert ignored > 4 * found
+    assert actual_error < at_most
+    assert ignored > 4 * actual_error
 
 
 def test_light_of_a_few_directions_comes_from_their_mean(tmp_path):
@@ -93,9 +93,9 @@ def test_points_are_told_where_light_comes_from_as_in_numpy(tmp_path):
     num = surface.probes.num_points
     vectors = np.random.default_rng(1).normal(size=(num, 3, NUM_FUNCTIONS)).astype(np.float32)
     is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
-    found = light_gradient(surface, vectors, is_needed)
+    actual = light_gradient(surface, vectors, is_needed)
     expected = np.array([light_gradient_numpy(surface, vectors, point) for point in range(num)])
-    np.testing.assert_allclose(found, expected * is_needed[:, None], atol=1e-4)
+    np.testing.assert_allclose(actual, expected * is_needed[:, None], atol=1e-4)
 
 
 def test_scenes_without_normal_maps_keep_no_tangents(tmp_path):

@@ -28,8 +28,8 @@ def scene():
     box = [quad(f"side {k}", [BOX[i] for i in side], 1) for k, side in enumerate(sides)]
     radiance = np.where(texel_directions(16, 32)[..., 1:2] > 0, 1.0, 0.0) * np.ones(3)
     materials = [Material(name, ({"model": "lambert", "color": [0.7, 0.7, 0.7]},)) for name in ("Floor", "Box")]
-    sky = radiance.astype(np.float32)
-    return make_tiny_scene(floor, *box, camera=CAMERA, environment=sky, materials=materials)
+    environment_radiance = radiance.astype(np.float32)
+    return make_tiny_scene(floor, *box, camera=CAMERA, environment=environment_radiance, materials=materials)
 
 
 @pytest.fixture(scope="module")
@@ -41,28 +41,28 @@ def moving(tmp_path_factory):
     )
 
 
-def is_inside(place):
+def is_inside(position):
     """Whether places on the floor lie under the box."""
-    return (np.abs(place[:, [0, 2]]) < 0.33).all(axis=1)
+    return (np.abs(position[:, [0, 2]]) < 0.33).all(axis=1)
 
 
 def test_pixels_beside_a_box_do_without_what_lies_under_it(moving):
     """Of every pixel of the floor, the nodes under the box have no weight, unless all three lie there."""
-    seen = trace_primary(moving.stored_scene, moving.embree, CAMERA, SIZE)
-    before = seen.weight.copy()
-    reweight(seen, moving.has_occluded_neighbor, moving.occlusion_mesh)
+    gbuffer = trace_primary(moving.stored_scene, moving.embree, CAMERA, SIZE)
+    before = gbuffer.weight.copy()
+    reweight(gbuffer, moving.has_occluded_neighbor, moving.occlusion_mesh)
     surface = moving.stored_scene
-    place = surface.probes.position[surface.lattice_nodes.probe[:, 0]]
-    on_floor = (seen.hits.face >= 0) & (surface.face_material[seen.hits.face] == 0)
-    under = np.stack([is_inside(place[seen.lattice_node[:, k]]) for k in range(3)], axis=1)
+    position = surface.probes.position[surface.lattice_nodes.probe[:, 0]]
+    on_floor = (gbuffer.hits.face >= 0) & (surface.face_material[gbuffer.hits.face] == 0)
+    under = np.stack([is_inside(position[gbuffer.lattice_node[:, k]]) for k in range(3)], axis=1)
     is_mixed = on_floor & under.any(axis=1) & ~under.all(axis=1)
     assert is_mixed.sum() > 10
     assert (before[is_mixed][under[is_mixed]] > 0.1).any()
-    assert (seen.weight[is_mixed][under[is_mixed]] == 0).all()
-    np.testing.assert_allclose(seen.weight[on_floor].sum(axis=1), 1, atol=1e-5)
-    is_far = on_floor & ~(moving.has_occluded_neighbor[seen.lattice_node] > 0).any(axis=1)
-    np.testing.assert_array_equal(seen.weight[is_far], before[is_far])
-    changed = (seen.weight != before).any(axis=1)
+    assert (gbuffer.weight[is_mixed][under[is_mixed]] == 0).all()
+    np.testing.assert_allclose(gbuffer.weight[on_floor].sum(axis=1), 1, atol=1e-5)
+    is_far = on_floor & ~(moving.has_occluded_neighbor[gbuffer.lattice_node] > 0).any(axis=1)
+    np.testing.assert_array_equal(gbuffer.weight[is_far], before[is_far])
+    changed = (gbuffer.weight != before).any(axis=1)
     assert 0 < changed.mean() < 0.1
 
 
@@ -73,12 +73,12 @@ def test_the_line_where_it_stands_is_as_bright_as_in_a_fixed_view(moving, monkey
     expected = render_image(fixed, "front", plain)
 
     def error():
-        found = render_image(moving, "front", plain)
-        return np.sqrt(np.mean((found - expected) ** 2) / np.mean(expected**2))
+        actual = render_image(moving, "front", plain)
+        return np.sqrt(np.mean((actual - expected) ** 2) / np.mean(expected**2))
 
-    mended = error()
+    corrected = error()
     monkeypatch.setattr(picture_module, "reweight", lambda *args: None)
-    assert mended < 0.8 * error()
+    assert corrected < 0.8 * error()
 
 
 def test_faces_that_meet_do_not_part_each_other(tmp_path):
@@ -86,7 +86,7 @@ def test_faces_that_meet_do_not_part_each_other(tmp_path):
     corners = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [0, 0, 2], [0, 2, 2]]
     walls = mesh("walls", corners, [[0, 1, 2], [0, 2, 3], [4, 0, 3], [4, 3, 5]], 0)
     floor = quad("floor", [[0, 0, 2], [2, 0, 2], [2, 0, 0], [0, 0, 0]], 0)
-    of = make_tiny_scene(walls, floor, camera=make_camera("front", [3, 2, 4], [0, 0.5, 0], 0.6))
+    meeting_walls = make_tiny_scene(walls, floor, camera=make_camera("front", [3, 2, 4], [0, 0.5, 0], 0.6))
     recipe = Recipe("probes", ("front",), SIZE, 60, num_probes=800)
-    found = open_bake(bake_in_process(METHODS["probes"], of, recipe, tmp_path / "s.zarr"), Cache(1 << 30))
-    assert not found.has_occluded_neighbor.any()
+    bake = open_bake(bake_in_process(METHODS["probes"], meeting_walls, recipe, tmp_path / "s.zarr"), Cache(1 << 30))
+    assert not bake.has_occluded_neighbor.any()

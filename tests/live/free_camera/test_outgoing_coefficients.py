@@ -55,13 +55,13 @@ def document(model, **fields):
 
 
 def test_a_diffuse_surface_is_one_number():
-    found = outgoing_coefficients(document("lambert", color=[0.2, 0.4, 0.8]))
-    assert found.table.shape == (NUM_ROWS, 1, 3, NUM_FUNCTIONS)
+    coefficients = outgoing_coefficients(document("lambert", color=[0.2, 0.4, 0.8]))
+    assert coefficients.table.shape == (NUM_ROWS, 1, 3, NUM_FUNCTIONS)
     np.testing.assert_allclose(
-        found.table[:, 0, :, 0], np.tile(np.array([0.2, 0.4, 0.8]) / np.sqrt(np.pi), (32, 1)), rtol=1e-5
+        coefficients.table[:, 0, :, 0], np.tile(np.array([0.2, 0.4, 0.8]) / np.sqrt(np.pi), (32, 1)), rtol=1e-5
     )
-    assert np.abs(found.table[..., 1:]).max() < 1e-6
-    assert found.residual_energy < 1e-3
+    assert np.abs(coefficients.table[..., 1:]).max() < 1e-6
+    assert coefficients.residual_energy < 1e-3
 
 
 @pytest.mark.parametrize("around", [5, 13, 22, 30])  # in each quarter, of which one alone is integrated
@@ -70,30 +70,30 @@ def test_factors_are_the_integrals_of_the_term(model, around):
     """By another quadrature, finer than the one under test; highlights that no quadrature of it resolves are blurred by
     the same functions."""
     term = document(model)
-    found = outgoing_coefficients(term)
+    coefficients = outgoing_coefficients(term)
     wi, weight = hemisphere(96, 192)
     row = 18
     cosine = cosines()[row]
-    column = around if found.table.shape[1] > 1 else 0
-    phi = 2 * np.pi * column / found.table.shape[1]
+    column = around if coefficients.table.shape[1] > 1 else 0
+    phi = 2 * np.pi * column / coefficients.table.shape[1]
     sine = np.sqrt(1 - cosine**2)
     wo = np.array([sine * np.cos(phi), sine * np.sin(phi), cosine])
     value = eval_brdf(term, wi, wo)
     expected = np.einsum("nc,n,nk->ck", value, weight, project(wi))
     scale = np.sqrt((value**2 * weight[:, None]).sum(axis=0).max())
-    assert np.abs(found.table[row, column] - expected).max() < 0.05 * scale
+    assert np.abs(coefficients.table[row, column] - expected).max() < 0.05 * scale
 
 
 def test_factors_turn_with_the_eye():
     term, wi_weights = document("blinn_phong", params={"exponent": 20.0}), hemisphere(48, 96)
-    found, (wi, weight) = outgoing_coefficients(term), wi_weights
+    coefficients, (wi, weight) = outgoing_coefficients(term), wi_weights
     row, phi = 14, 1.1
     cosine = cosines()[row]
     sine = np.sqrt(1 - cosine**2)
     wo = np.array([sine * np.cos(phi), sine * np.sin(phi), cosine])
     expected = np.einsum("nc,n,nk->ck", eval_brdf(term, wi, wo), weight, project(wi))
     np.testing.assert_allclose(
-        rotate_coefficients(found.table[row, 0], phi), expected, atol=2e-3 * np.abs(expected).max()
+        rotate_coefficients(coefficients.table[row, 0], phi), expected, atol=2e-3 * np.abs(expected).max()
     )
 
 
@@ -122,8 +122,8 @@ def test_terms_of_one_texture_are_summed_and_others_kept_apart():
     ]
     assert not is_narrow(white_coefficients(terms[-1]))
     tables = build_tables([terms, []])
-    of = [[0, 0, -1, -1, -1, -1], [1, -1, -1, -1, -1, -1], [-1] * 6]
-    assert tables.table_index.tolist() == [of, [[-1] * 6] * 3]
+    texture_slots = [[0, 0, -1, -1, -1, -1], [1, -1, -1, -1, -1, -1], [-1] * 6]
+    assert tables.table_index.tolist() == [texture_slots, [[-1] * 6] * 3]
     np.testing.assert_allclose(tables.isotropic[1, 0, :, 0], np.array([1, 1, 2]) / np.sqrt(np.pi), rtol=1e-5)
 
 
@@ -153,12 +153,12 @@ def test_a_lobe_sends_what_the_term_does_under_a_white_sky(roughness):
 
 
 def test_a_sharp_lobe_looks_where_a_mirror_does_and_a_wider_one_is_wider():
-    found = [build_lobes([[document("ggx", params={"roughness": r, "f0": 0.5})]]) for r in (0.05, 0.2, 0.35)]
-    np.testing.assert_allclose(found[0].cosine[0, :24].mean(axis=1), cosines()[:24], atol=0.02)
-    widths = [lobe.single_sigma[0, 8] for lobe in found]
+    lobes = [build_lobes([[document("ggx", params={"roughness": r, "f0": 0.5})]]) for r in (0.05, 0.2, 0.35)]
+    np.testing.assert_allclose(lobes[0].cosine[0, :24].mean(axis=1), cosines()[:24], atol=0.02)
+    widths = [lobe.single_sigma[0, 8] for lobe in lobes]
     assert widths == sorted(widths)
-    assert all((lobe.sigma[0, :24, 1] > 2 * lobe.sigma[0, :24, 0]).all() for lobe in found)  # a core and its skirt
-    assert all(lobe.is_two.all() for lobe in found)
+    assert all((lobe.sigma[0, :24, 1] > 2 * lobe.sigma[0, :24, 0]).all() for lobe in lobes)  # a core and its skirt
+    assert all(lobe.is_two.all() for lobe in lobes)
 
 
 @pytest.mark.parametrize("row", [10, 16, 20])
@@ -169,12 +169,12 @@ def test_two_lobes_are_as_wide_as_the_highlight_along_it_and_across(row, exponen
     lobes = build_lobes([[term]])
     assert not lobes.is_two.any()
     cosine = cosines()[row]
-    eye = np.arccos(cosine)
+    theta_o = np.arccos(cosine)
     nodes, weights = np.polynomial.legendre.leggauss(600)
     cos_i, phi = np.repeat((nodes + 1) / 2, 360), np.tile((np.arange(360) + 0.5) * (2 * np.pi / 360), 600)
     sin_i = np.sqrt(1 - cos_i**2)
     wi = np.stack([sin_i * np.cos(phi), sin_i * np.sin(phi), cos_i], axis=-1)
-    weight = eval_brdf(term, wi, np.array([-np.sin(eye), 0, cosine]))[:, 0] * cos_i * np.repeat(weights, 360)
+    weight = eval_brdf(term, wi, np.array([-np.sin(theta_o), 0, cosine]))[:, 0] * cos_i * np.repeat(weights, 360)
     weight /= weight.sum()
     mean = weight @ wi
     angle, length = np.arctan2(mean[0], mean[2]), np.linalg.norm(mean)
@@ -196,10 +196,12 @@ def test_two_lobes_are_fitted_as_their_twin_does_and_better_than_one(model, para
     even = lobes_module._isotropic_grid()
     value = even.quadrature.values(document(model, params=params))
     sent = np.maximum(value.mean(axis=0) * even.z, 0).astype(np.float32)
-    found = fit_two_lobes(even.x, even.z, even.area, sent)
+    fits = fit_two_lobes(even.x, even.z, even.area, sent)
     for row in (12, 24):
-        x, z, area, of_row = (np.asarray(one, np.float64) for one in (even.x[row], even.z[row], even.area, sent[row]))
-        np.testing.assert_allclose(found[row], fit_two_lobes_numpy(x, z, area, of_row), rtol=2e-3, atol=2e-4)
+        x, z, area, of_row = (
+            np.asarray(core_weight, np.float64) for core_weight in (even.x[row], even.z[row], even.area, sent[row])
+        )
+        np.testing.assert_allclose(fits[row], fit_two_lobes_numpy(x, z, area, of_row), rtol=2e-3, atol=2e-4)
         weight = of_row * area / (of_row @ area)
         towards = np.array([weight @ x, weight @ z])
         length = np.linalg.norm(towards)
@@ -208,16 +210,16 @@ def test_two_lobes_are_fitted_as_their_twin_does_and_better_than_one(model, para
             off = 1 - np.sqrt(1 - cosine**2) * x - cosine * z
             return np.exp(-off / sigma**2) / (2 * np.pi * sigma**2 * (1 - np.exp(-2 / sigma**2)))
 
-        one, other, first, narrow, wide = map(float, found[row])
-        two = first * density(one, narrow) + (1 - first) * density(other, wide)
+        core_weight, tail_weight, first, narrow, wide = map(float, fits[row])
+        two = first * density(core_weight, narrow) + (1 - first) * density(tail_weight, wide)
         alone = density(towards[1] / length, np.sqrt(1 - length))
         assert weight @ np.log(two + 1e-30) > weight @ np.log(alone + 1e-30)
 
 
 def test_what_sends_nothing_has_lobes_that_do_no_harm():
     nothing = np.zeros((2, 8), np.float32)
-    found = fit_two_lobes(nothing, nothing + 1, nothing[0] + 1, nothing)
-    np.testing.assert_array_equal(found, [[1, 1, 0.5, 1, 1]] * 2)
+    fits = fit_two_lobes(nothing, nothing + 1, nothing[0] + 1, nothing)
+    np.testing.assert_array_equal(fits, [[1, 1, 0.5, 1, 1]] * 2)
 
 
 def test_terms_along_the_tangent_have_one_lobe_of_the_mean_width():
@@ -228,6 +230,8 @@ def test_terms_along_the_tangent_have_one_lobe_of_the_mean_width():
 
 
 def test_what_the_in_basis_cannot_tell_is_not_believed_and_what_it_tells_well_is():
-    most = [build_lobes([[document("blinn_phong", params={"exponent": e})]]).max_ratio[0] for e in (20.0, 30.0, 300.0)]
-    assert most[0] > most[1] > most[2] == 1
-    assert most[0] > 5
+    max_ratios = [
+        build_lobes([[document("blinn_phong", params={"exponent": e})]]).max_ratio[0] for e in (20.0, 30.0, 300.0)
+    ]
+    assert max_ratios[0] > max_ratios[1] > max_ratios[2] == 1
+    assert max_ratios[0] > 5

@@ -20,7 +20,7 @@ from relume.scene.model import Material
 from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
 
-EYE = np.array([[0.0, 3.0, 4.0]])
+CAMERA_POSITION = np.array([[0.0, 3.0, 4.0]])
 
 
 @pytest.fixture(scope="module")
@@ -29,27 +29,29 @@ def scene():
     floor = quad("floor", [[-4, 0, -4], [-4, 0, 4], [4, 0, 4], [4, 0, -4]], 0)
     card = quad("card", [[-0.3, 0, 0.1], [0.3, 0, 0.1], [0.3, 0.5, 0.1], [-0.3, 0.5, 0.1]], 1)
     grey = [Material(name, ({"model": "lambert", "color": [0.8, 0.8, 0.8]},)) for name in ("Floor", "Card")]
-    camera = make_camera("front", EYE[0], [0, 0, 0], 0.5)
+    camera = make_camera("front", CAMERA_POSITION[0], [0, 0, 0], 0.5)
     return make_tiny_scene(floor, card, camera=camera, environment=studio(32, 20.0), materials=grey)
 
 
 def first_placed(scene, num_points=1500):
     geometry = build_scene_buffers(scene)
     is_open = visible_sides(geometry, scene.cameras, 1)
-    density = density_from_distance(geometry, EYE, make_corner_grid(is_open))
+    density = density_from_distance(geometry, CAMERA_POSITION, make_corner_grid(is_open))
     return geometry, is_open, place_probes(geometry, is_open, density, num_points)
 
 
 def by_shadows_of(scene, geometry, placed):
-    return density_from_shadows(geometry, placed, EYE, tessellate_environment(scene.environment.radiance, 300))
+    return density_from_shadows(
+        geometry, placed, CAMERA_POSITION, tessellate_environment(scene.environment.radiance, 300)
+    )
 
 
 def test_far_from_the_eye_points_are_farther_apart(scene):
     geometry, _, placed = first_placed(scene)
-    eye, steps = np.array([0.0, 0.5, 2.0]), enumerate_nodes(placed.probe_grid.num_rows)
-    power = density_from_distance(geometry, eye[None], placed.probe_grid).power
+    camera_position, steps = np.array([0.0, 0.5, 2.0]), enumerate_nodes(placed.probe_grid.num_rows)
+    power = density_from_distance(geometry, camera_position[None], placed.probe_grid).power
     where = placed.probes.position[placed.lattice_nodes.probe[placed.probe_grid.node_index, 0]]
-    distance = np.linalg.norm(where - eye, axis=1)
+    distance = np.linalg.norm(where - camera_position, axis=1)
     is_floor = geometry.face_material[steps.grid // 2] == 0
     assert power[is_floor][distance[is_floor].argmax()] == 3 + power[is_floor][distance[is_floor].argmin()]
     assert set(power) <= set(range(-2, 3))
@@ -61,7 +63,7 @@ def test_both_halves_of_narrow_strips_have_grids_alike():
     corners = [[[w, 0, -4], [w, 0, 4], [w + 0.02, 0, 4], [w + 0.02, 0, -4]] for w in x]
     strips = [quad(f"strip {k}", corners[k], 0) for k in range(len(x))]
     grey = [Material("Strips", ({"model": "lambert", "color": [0.8, 0.8, 0.8]},))]
-    scene = make_tiny_scene(*strips, camera=make_camera("front", EYE[0], [0, 0, 0], 0.5), materials=grey)
+    scene = make_tiny_scene(*strips, camera=make_camera("front", CAMERA_POSITION[0], [0, 0, 0], 0.5), materials=grey)
     geometry = build_scene_buffers(scene)
     is_open = visible_sides(geometry, scene.cameras, 1)
     density = density_from_distance(geometry, np.array([[0.0, 1.0, 3.0]]), make_corner_grid(is_open))
@@ -93,8 +95,8 @@ def test_what_is_no_point_lies_on_straight_lines_between_points(scene):
     u, v = (steps.i / steps.rows)[:, None], (steps.j / steps.rows)[:, None]
     where = ((1 - u - v) * a + u * b + v * c)[is_floor]
     of_nodes = vertices.probe[lattice.node_index], vertices.weight[lattice.node_index]
-    found = np.einsum("npc,np->nc", placed.probes.position[of_nodes[0]], of_nodes[1])[is_floor]
-    off = np.linalg.norm((found - where)[:, [0, 2]], axis=1) / placed.spacing
+    interpolated = np.einsum("npc,np->nc", placed.probes.position[of_nodes[0]], of_nodes[1])[is_floor]
+    off = np.linalg.norm((interpolated - where)[:, [0, 2]], axis=1) / placed.spacing
     assert len(where) > 2 * len(placed.probes.position)
     assert np.quantile(off, 0.98) < 0.05
     assert off.max() < 1  # beside nodes that are one with others of another face
@@ -108,18 +110,22 @@ def test_shadows_are_nearer_to_the_truth_so(scene, tmp_path, monkeypatch):
         look = validate({"transport": {"bounces": 0}} if method == "probes" else {}, bake.default_look)
         return render_image(bake, "front", look)[..., :3]
 
-    truth, now = shown("direct", "truth"), shown("probes", "now")
-    alike = lambda geometry, placed, eyes, lights: density_from_distance(geometry, eyes, placed.probe_grid)  # noqa: E731
+    reference, now = shown("direct", "truth"), shown("probes", "now")
+    alike = lambda geometry, placed, cameras, lights: density_from_distance(geometry, cameras, placed.probe_grid)  # noqa: E731
     monkeypatch.setattr("relume.methods.probes.density_from_shadows", alike)
-    assert relative_rmse(now, truth) < 0.7 * relative_rmse(shown("probes", "before"), truth)
+    assert relative_rmse(now, reference) < 0.7 * relative_rmse(shown("probes", "before"), reference)
 
 
 def test_where_nothing_is_in_the_way_distance_counts_alone():
     ground = quad("ground", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
-    scene = make_tiny_scene(ground, camera=make_camera("front", EYE[0], [0, 0, 0], 0.8), environment=studio(32, 20.0))
+    scene = make_tiny_scene(
+        ground, camera=make_camera("front", CAMERA_POSITION[0], [0, 0, 0], 0.8), environment=studio(32, 20.0)
+    )
     geometry, _, placed = first_placed(scene)
     after = by_shadows_of(scene, geometry, placed)
-    np.testing.assert_array_equal(density_from_distance(geometry, EYE, placed.probe_grid).power, after.power)
+    np.testing.assert_array_equal(
+        density_from_distance(geometry, CAMERA_POSITION, placed.probe_grid).power, after.power
+    )
 
 
 def test_weights_meet_light_that_is_linear():
@@ -127,9 +133,9 @@ def test_weights_meet_light_that_is_linear():
     towards, normal = rng.normal(size=(200, 3, 4)), np.tile([0.0, 0, 1], (200, 1))
     weight = rng.random((200, 4))
     weight /= weight.sum(axis=1, keepdims=True)
-    found = make_weights_linear(weight, towards, normal)
-    off = [np.linalg.norm(np.einsum("vcp,vp->vc", towards[:, :2], w), axis=1) for w in (weight, found)]
+    weights = make_weights_linear(weight, towards, normal)
+    off = [np.linalg.norm(np.einsum("vcp,vp->vc", towards[:, :2], w), axis=1) for w in (weight, weights)]
     assert np.median(off[1] / off[0]) < 0.35
     assert (off[1] < 1.01 * off[0]).all()
-    assert found.min() >= 0
-    np.testing.assert_allclose(found.sum(axis=1), 1)
+    assert weights.min() >= 0
+    np.testing.assert_allclose(weights.sum(axis=1), 1)

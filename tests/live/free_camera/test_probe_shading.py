@@ -29,7 +29,7 @@ from relume.scene.model import Camera
 from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
 
-TOLD = {"alpha_x": 0.45, "alpha_y": 0.3}  # a highlight that the in-basis tells from around
+BROAD_WIDTHS = {"alpha_x": 0.45, "alpha_y": 0.3}  # a highlight that the in-basis tells from around
 
 
 @pytest.fixture(scope="module")
@@ -41,10 +41,10 @@ def moving(tmp_path_factory):
 
 def placed(scene, num_points=500):
     geometry = build_scene_buffers(scene)
-    eyes = np.array([camera.to_world[:3, 3] for camera in scene.cameras])
+    camera_positions = np.array([camera.to_world[:3, 3] for camera in scene.cameras])
     is_open = visible_sides(geometry, scene.cameras, 1)
     return geometry, place_probes(
-        geometry, is_open, density_from_distance(geometry, eyes, make_corner_grid(is_open)), num_points
+        geometry, is_open, density_from_distance(geometry, camera_positions, make_corner_grid(is_open)), num_points
     )
 
 
@@ -56,26 +56,26 @@ def test_nodes_are_numbered_once_each(rows):
 
 @pytest.mark.parametrize("num_points", [200, 500, 5000])
 def test_about_as_many_points_as_asked_for_and_none_twice(num_points):
-    _, found = placed(still_life(), num_points)
-    assert 0.5 * num_points < found.probes.num_points <= 1.05 * num_points + 1
-    together = np.column_stack([found.probes.position, found.probes.normal, found.material])
+    _, placed_probes = placed(still_life(), num_points)
+    assert 0.5 * num_points < placed_probes.probes.num_points <= 1.05 * num_points + 1
+    together = np.column_stack([placed_probes.probes.position, placed_probes.probes.normal, placed_probes.material])
     assert len(np.unique(together, axis=0)) == len(together)
 
 
 def test_what_vertices_take_is_from_about_them():
     """Of their own side, where points are what they take."""
-    geometry, found = placed(still_life(), 4000)
-    lattice, vertices, points = found.probe_grid, found.lattice_nodes, found.probes
+    geometry, placed_probes = placed(still_life(), 4000)
+    lattice, vertices, points = placed_probes.probe_grid, placed_probes.lattice_nodes, placed_probes.probes
     np.testing.assert_allclose(vertices.weight.sum(axis=1), 1, atol=1e-5)
     assert vertices.weight.min() >= 0
     for face, side in np.argwhere(lattice.num_rows > 0)[::37]:
         rows, first = int(lattice.num_rows[face, side]), int(lattice.first[face, side])
         a, b, c = geometry.positions[geometry.faces[face]]
         for i, j in ((0, 0), (rows, 0), (0, rows), (rows // 2, rows // 3 if rows > 2 else 0)):
-            place = a + (b - a) * (i / rows) + (c - a) * (j / rows)
+            node_position = a + (b - a) * (i / rows) + (c - a) * (j / rows)
             vertex = lattice.node_index[first + node_index(rows, i, j)]
             taken = vertices.weight[vertex] @ points.position[vertices.probe[vertex]]
-            assert np.linalg.norm(taken - place) < 2 * found.spacing
+            assert np.linalg.norm(taken - node_position) < 2 * placed_probes.spacing
             outward = np.cross(b - a, c - a) * (1 if side == 0 else -1)
             assert vertices.normal[vertex] @ outward > 0
 
@@ -86,15 +86,15 @@ def test_a_smooth_field_is_smooth_between_points():
     scene = make_tiny_scene(
         sphere("ball", (0, 0, 0), 1.0, 0, num_rings=96), camera=make_camera("front", (0, 0, 4), (0, 0, 0), 0.7)
     )
-    _, found = placed(scene, 600)
+    _, placed_probes = placed(scene, 600)
     slope = np.array([0.3, 0.5, -0.2], np.float32)
-    field = 1 + found.probes.position @ slope
-    shown = np.einsum("vk,vk->v", found.lattice_nodes.weight, field[found.lattice_nodes.probe])
-    over_a_spacing = float(np.linalg.norm(slope)) * found.spacing
+    field = 1 + placed_probes.probes.position @ slope
+    shown = np.einsum("vk,vk->v", placed_probes.lattice_nodes.weight, field[placed_probes.lattice_nodes.probe])
+    over_a_spacing = float(np.linalg.norm(slope)) * placed_probes.spacing
     assert len(shown) > 4 * 600
-    assert np.abs(shown - 1 - found.lattice_nodes.normal @ slope).max() < 1.5 * over_a_spacing
+    assert np.abs(shown - 1 - placed_probes.lattice_nodes.normal @ slope).max() < 1.5 * over_a_spacing
     # between corners of a face
-    assert np.ptp(shown[found.probe_grid.node_index.reshape(-1, 3)], axis=1).max() < over_a_spacing
+    assert np.ptp(shown[placed_probes.probe_grid.node_index.reshape(-1, 3)], axis=1).max() < over_a_spacing
 
 
 def test_a_solid_has_points_outside_and_a_room_that_is_seen_from_within_inside():
@@ -117,26 +117,26 @@ def test_a_scene_without_area_is_refused():
 
 def test_the_weights_of_a_pixel_put_it_where_it_is(moving):
     view = moving.views["front"]
-    seen = trace_primary(moving.stored_scene, moving.embree, view.camera, (96, 72))
-    hit = seen.hits.face >= 0
-    np.testing.assert_allclose(seen.weight[hit].sum(axis=1), 1, atol=1e-5)
-    assert seen.weight[hit].min() > -1e-5
-    of_vertices = interpolate_to_nodes(moving.stored_scene, seen.is_visible, moving.stored_scene.probes.position)
-    place = np.einsum("nk,nkc->nc", seen.weight, of_vertices[seen.lattice_node])
-    truth = view.camera.to_world[:3, 3] + seen.hits.distance[:, None] * seen.directions
-    apart = np.linalg.norm(place - truth, axis=1)[hit]
+    gbuffer = trace_primary(moving.stored_scene, moving.embree, view.camera, (96, 72))
+    hit = gbuffer.hits.face >= 0
+    np.testing.assert_allclose(gbuffer.weight[hit].sum(axis=1), 1, atol=1e-5)
+    assert gbuffer.weight[hit].min() > -1e-5
+    of_vertices = interpolate_to_nodes(moving.stored_scene, gbuffer.is_visible, moving.stored_scene.probes.position)
+    interpolated = np.einsum("nk,nkc->nc", gbuffer.weight, of_vertices[gbuffer.lattice_node])
+    expected = view.camera.to_world[:3, 3] + gbuffer.hits.distance[:, None] * gbuffer.directions
+    apart = np.linalg.norm(interpolated - expected, axis=1)[hit]
     assert np.median(apart) < 0.03
     vertices = moving.stored_scene.lattice_nodes
-    assert set(np.flatnonzero(seen.is_visible)) == set(seen.lattice_node[hit].ravel())
-    taken = vertices.probe[seen.is_visible > 0][vertices.weight[seen.is_visible > 0] > 0]
-    assert set(np.flatnonzero(seen.is_needed)) == set(taken)
+    assert set(np.flatnonzero(gbuffer.is_visible)) == set(gbuffer.lattice_node[hit].ravel())
+    taken = vertices.probe[gbuffer.is_visible > 0][vertices.weight[gbuffer.is_visible > 0] > 0]
+    assert set(np.flatnonzero(gbuffer.is_needed)) == set(taken)
 
 
 def test_what_points_send_is_that_of_the_oracle(moving):
     """Of terms without a highlight all light; of the others what is not the sky's, which does not ring below black."""
     materials = [
         [{"model": "lambert", "color": [0.5, 0.4, 0.3], "params": {}, "texture": "diffuse"}],
-        [{"model": "ward_anisotropic", "color": [0.9, 0.8, 0.7], "params": TOLD, "texture": None}],
+        [{"model": "ward_anisotropic", "color": [0.9, 0.8, 0.7], "params": BROAD_WIDTHS, "texture": None}],
         [{"model": "blinn_phong", "color": [0.2, 0.1, 0.3], "params": {"exponent": 20.0}, "texture": None}],
     ]
     names = len(moving.material_names)
@@ -144,27 +144,33 @@ def test_what_points_send_is_that_of_the_oracle(moving):
     rng = np.random.default_rng(9)
     num = moving.stored_scene.probes.num_points
     vectors, others = (rng.normal(size=(num, 3, 36)).astype(np.float32) for _ in range(2))
-    eye, everywhere = np.array([0.3, 1.2, 2.0], np.float32), np.ones(num, np.uint8)
-    found = shade_probes(moving.stored_scene, vectors, others, tables, eye, everywhere)
+    camera_position, everywhere = np.array([0.3, 1.2, 2.0], np.float32), np.ones(num, np.uint8)
+    actual = shade_probes(moving.stored_scene, vectors, others, tables, camera_position, everywhere)
     for point in range(0, num, num // 60):
-        for of, expected in zip(
-            found, shade_probes_numpy(moving.stored_scene, vectors, others, tables, eye, point), strict=True
+        for arrays, expected in zip(
+            actual,
+            shade_probes_numpy(moving.stored_scene, vectors, others, tables, camera_position, point),
+            strict=True,
         ):
-            np.testing.assert_allclose(of[point], expected, atol=1e-4 * max(1.0, np.abs(expected).max()))
-    assert found.environment.any()
-    none = shade_probes(moving.stored_scene, vectors, others, tables, eye, np.zeros(num, np.uint8))
+            np.testing.assert_allclose(arrays[point], expected, atol=1e-4 * max(1.0, np.abs(expected).max()))
+    assert actual.environment.any()
+    none = shade_probes(moving.stored_scene, vectors, others, tables, camera_position, np.zeros(num, np.uint8))
     assert not none.radiance.any()
     assert not none.environment.any()
-    has_highlight = (moving.stored_scene.material % 3 > 0) & (found.radiance[:, 0].max(axis=1) > 0)
+    has_highlight = (moving.stored_scene.material % 3 > 0) & (actual.radiance[:, 0].max(axis=1) > 0)
     assert has_highlight.any()
-    assert not shade_probes(moving.stored_scene, vectors, None, tables, eye, everywhere).radiance[has_highlight].any()
+    assert (
+        not shade_probes(moving.stored_scene, vectors, None, tables, camera_position, everywhere)
+        .radiance[has_highlight]
+        .any()
+    )
 
 
 def test_textures_of_pixels_are_those_of_the_bakes(moving):
     """White points under a texture show the texture; the same filter as view samples have."""
     scene, view, size = still_life(), moving.views["front"], (96, 72)
     surface = moving.stored_scene
-    seen = trace_primary(surface, moving.embree, view.camera, size)
+    gbuffer = trace_primary(surface, moving.embree, view.camera, size)
     sent = np.zeros((len(surface.lattice_nodes.normal), 3, 3), np.float32)
     sent[:, 1] = 1
     angle = view.camera.yfov / size[1]
@@ -182,24 +188,26 @@ def test_textures_of_pixels_are_those_of_the_bakes(moving):
         False,
     )
     all_groups = InterpolatedProbes(sent, np.ones((len(dark), 3), bool), np.empty((0, 3), np.float32))
-    found = shade_pixels(surface, seen, angle, all_groups, dark, mirrored)
+    image = shade_pixels(surface, gbuffer, angle, all_groups, dark, mirrored)
     textured = [k for k, material in enumerate(scene.materials) if "diffuse" in material.textures]
     assert textured
     for index in textured:
-        rows = np.flatnonzero((seen.hits.face >= 0) & (surface.face_material[np.maximum(seen.hits.face, 0)] == index))
-        corners = surface.faces[seen.hits.face[rows]]
-        b = np.column_stack([1 - seen.hits.uv[rows].sum(axis=1), seen.hits.uv[rows]])
+        rows = np.flatnonzero(
+            (gbuffer.hits.face >= 0) & (surface.face_material[np.maximum(gbuffer.hits.face, 0)] == index)
+        )
+        corners = surface.faces[gbuffer.hits.face[rows]]
+        b = np.column_stack([1 - gbuffer.hits.uv[rows].sum(axis=1), gbuffer.hits.uv[rows]])
         uv = np.einsum("nk,nkc->nc", b, surface.uvs[corners]).astype(np.float32)
         p, q = moving.light_transport.local.positions[corners], surface.uvs[corners]
         normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
         area = np.linalg.norm(normal, axis=1)
-        cosine = np.maximum(np.abs(np.einsum("nc,nc->n", normal, seen.directions[rows])) / area, 0.05)
+        cosine = np.maximum(np.abs(np.einsum("nc,nc->n", normal, gbuffer.directions[rows])) / area, 0.05)
         (du0, dv0), (du1, dv1) = (q[:, 1] - q[:, 0]).T, (q[:, 2] - q[:, 0]).T
-        footprint = seen.hits.distance[rows] * angle * np.sqrt(np.abs(du0 * dv1 - dv0 * du1) / area / cosine)
+        footprint = gbuffer.hits.distance[rows] * angle * np.sqrt(np.abs(du0 * dv1 - dv0 * du1) / area / cosine)
         expected = MipMap.for_texture(scene.materials[index].textures["diffuse"]).sample(
             uv, footprint.astype(np.float32)
         )
-        np.testing.assert_allclose(found[rows], expected, atol=2e-3)
+        np.testing.assert_allclose(image[rows], expected, atol=2e-3)
 
 
 @pytest.mark.parametrize("rotation", [0.0, 77.0, -130.0])
@@ -218,7 +226,7 @@ def test_the_sky_is_that_of_fixed_views(rotation):
 
 def test_rays_go_through_the_middles_of_pixels(moving):
     camera = Camera("level", np.eye(4), math.radians(90))
-    seen = trace_primary(moving.stored_scene, moving.embree, camera, (4, 2))
-    first, last = seen.directions[0], seen.directions[7]
+    gbuffer = trace_primary(moving.stored_scene, moving.embree, camera, (4, 2))
+    first, last = gbuffer.directions[0], gbuffer.directions[7]
     np.testing.assert_allclose(first * np.sign(first), np.abs(last), atol=1e-6)
     np.testing.assert_allclose(first / -first[2], [-1.5, 0.5, -1], atol=1e-5)

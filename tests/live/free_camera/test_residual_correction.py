@@ -43,25 +43,28 @@ def about(samples, q):
                 yield other, likeness(samples, q, samples, other) * (0.5 if dx and dy else 1)
 
 
-def expected(off, samples, pixels):
-    belief = np.zeros(len(off))
+def expected(difference, samples, pixels):
+    belief = np.zeros(len(difference))
     for material in (0, 1):
-        rows = [q for q in range(len(off)) if samples.material[q] == material]
-        said = {q: mean([(o, w) for o, w in about(samples, q) if w > 0], off) for q in rows}
-        both, size, whole = sum(np.array([said[q] @ off[q], said[q] @ said[q], off[q] @ off[q]]) for q in rows)
-        explained = max(both, 0) ** 2 / (size * whole)
-        belief[rows] = min(both / size, 1) if explained > 0.2 else 0
+        rows = [q for q in range(len(difference)) if samples.material[q] == material]
+        differences = {q: mean([(o, w) for o, w in about(samples, q) if w > 0], difference) for q in rows}
+        sums, size, whole = sum(
+            np.array([differences[q] @ difference[q], differences[q] @ differences[q], difference[q] @ difference[q]])
+            for q in rows
+        )
+        explained = max(sums, 0) ** 2 / (size * whole)
+        belief[rows] = min(sums / size, 1) if explained > 0.2 else 0
     out = np.zeros((len(pixels.material), 3))
     for p in range(len(out)):
         y, x = divmod(p, pixels.width)
         u, v = (x + 0.5) / STEP - 0.5, (y + 0.5) / STEP - 0.5
         weights = []
-        for q in range(len(off)):
+        for q in range(len(difference)):
             row, column = divmod(q, samples.width)
             tent = max(1 - abs(u - column), 0) * max(1 - abs(v - row), 0)
             if tent > 0:
                 weights.append((q, tent * likeness(pixels, p, samples, q)))
-        out[p] = mean(weights, belief[:, None] * off)
+        out[p] = mean(weights, belief[:, None] * difference)
     return out
 
 
@@ -112,5 +115,5 @@ def test_samples_beside_edges_say_nothing(both):
 
 
 def test_nothing_is_darker_than_black():
-    found = apply_residual(np.full((1, 2, 3), 0.5, np.float32), np.float32([[[-1, 0, 1], [0.25, -0.5, -0.25]]]))
-    np.testing.assert_array_equal(found, np.float32([[[0, 0.5, 1.5], [0.75, 0, 0.25]]]))
+    corrected = apply_residual(np.full((1, 2, 3), 0.5, np.float32), np.float32([[[-1, 0, 1], [0.25, -0.5, -0.25]]]))
+    np.testing.assert_array_equal(corrected, np.float32([[[0, 0.5, 1.5], [0.75, 0, 0.25]]]))
