@@ -1,4 +1,4 @@
-"""What the transfer kernels compute, in plain NumPy and float64: slow, exact where the kernels are not, and obvious."""
+"""The transfer kernels in plain NumPy and float64: slow, exact where the kernels approximate, and simple."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from relume.views.view import View
 
 
 def unit(v):
-    """Vectors of length one, along the last axis."""
+    """Normalize vectors along the last axis."""
     return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
 def make_random_receivers(count, num_lights, seed=0, horizon=0.15):
-    """Points with random frames and views that see every light above them."""
+    """Points with random frames and view directions, from which every light above the horizon is visible."""
     rng = np.random.default_rng(seed)
     normal = unit(rng.normal(size=(count, 3)))
     tangent = unit(np.cross(normal, rng.normal(size=(count, 3))))
@@ -41,7 +41,7 @@ def make_random_receivers(count, num_lights, seed=0, horizon=0.15):
 
 
 def make_receivers_at_origin(wo, normal, tangent, visible):
-    """Receivers with these frames, all in one place."""
+    """Receivers with these frames at one position."""
     wo, normal, tangent = (np.ascontiguousarray(a, np.float32) for a in (wo, normal, tangent))
     return ShadingPoints(
         SurfacePoints(np.zeros_like(normal), normal, tangent, np.arange(len(wo), dtype=np.uint32)), wo, visible
@@ -49,14 +49,14 @@ def make_receivers_at_origin(wo, normal, tangent, visible):
 
 
 def only_above(receivers, lights):
-    """The same receivers, lights below their horizon hidden."""
+    """The same receivers with lights below their horizon hidden."""
     above = receivers.normal @ lights.direction.T > 0
     visible = np.packbits(above, axis=1, bitorder="little")
     return replace(receivers, visible=visible)
 
 
 def frames(receivers):
-    """World to local: rows are tangent, bitangent, normal. (n, 3, 3)"""
+    """World-to-local matrices: rows are tangent, bitangent, normal. (n, 3, 3)"""
     normal, tangent = receivers.normal.astype(float), receivers.tangent.astype(float)
     return np.stack([tangent, np.cross(normal, tangent), normal], axis=1)
 
@@ -74,7 +74,7 @@ def spherical_area(a, b, c):
 
 
 def pieces(lights, depth):
-    """Each light triangle in 4^depth pieces: their middles (M, 4^depth, 3) and shares of its solid angle."""
+    """Subdivide each light triangle into 4^depth pieces: centers (M, 4^depth, 3) and fractions of its solid angle."""
     corners = unit(lights.nodes.astype(float).transpose(2, 1, 0))[:, None, :3]
     for _ in range(depth):
         a, b, c = np.moveaxis(corners, 2, 0)
@@ -86,9 +86,9 @@ def pieces(lights, depth):
 
 
 def shade_pieces(term, lights, receivers, row, light_pieces):
-    """The light one receiver gets, piece by piece: q cos θi · power (K, 3), shares (K, P), local wi (K, P, 3), wo.
+    """Light of one receiver by pieces: q cos θi · power (K, 3), fractions (K, P), local wi (K, P, 3), wo.
 
-    divided: the `pieces` of the lights.
+    light_pieces: from `pieces`.
     """
     visible = np.nonzero(visible_lights(receivers, lights.num_lights)[row])[0]
     frame = frames(receivers)[row]
@@ -100,7 +100,7 @@ def shade_pieces(term, lights, receivers, row, light_pieces):
 
 
 def project(term, bands, active, lights, receivers, depth=5):
-    """`Projector.project` of all receivers with the exact angle of every piece and the mean of curves' products.
+    """Reference of `Projector.project` with the exact angle of every piece and the mean of products of curves.
 
     Returns:
         (n, J, 3) float64
@@ -126,13 +126,13 @@ def project(term, bands, active, lights, receivers, depth=5):
 
 
 def find_bands(curve, wi, wo):
-    """The band that the exact angle of each pair of directions falls in."""
+    """Band of the exact angle of each pair of directions."""
     gamma = angles_numpy(curve.angle, wi, np.broadcast_to(wo, wi.shape), curve.axes)
     return np.minimum((gamma * curve.num_bands / (np.pi / 2)).astype(int), curve.num_bands - 1)
 
 
 def project_point_lights(term, bands, lights, receivers):
-    """The environment as points: all power of a light at its direction, in the band its angle falls in. (n, 3)"""
+    """The environment as points: all power of a light in its direction and in the band of its angle. (n, 3)"""
     out = np.zeros((len(receivers.normal), 3))
     whole = pieces(lights, 0)
     for row in range(len(out)):
@@ -147,7 +147,7 @@ def project_point_lights(term, bands, lights, receivers):
 
 
 def integrate_texels(document, radiance, receivers, visible=None):
-    """The reflection integral of one term over all texels at exact angles. seen: (n, texels) bool. (n, 3)"""
+    """The reflection integral of one term over all texels at exact angles. visible: (n, texels) bool. (n, 3)"""
     term = TERMS[document["model"]].normalized(document)
     height, width, _ = radiance.shape
     directions = texel_directions(height, width).reshape(-1, 3).astype(float)
@@ -174,10 +174,10 @@ def stream(transport, change, image):
 
 
 def gather_incident_light(transfer, view: View, index, look):
-    """All light of a look at a material's samples, every source summed in one go: its triangles, and its receivers."""
+    """All light of a look at a material's samples: triangles and receivers, all sources summed at once."""
     light = illumination_from_look(look, transfer.material_names, has_bounces=EditAxis.BOUNCES in transfer.axes)
     gain = np.array(look.environment.gain, np.float32)
-    if EditAxis.LIGHT not in transfer.axes:  # a method whose light is its own
+    if EditAxis.LIGHT not in transfer.axes:  # a method with its own light
         return transfer.incident_light(
             view, index, light._replace(environment_gain=look.environment.gain), transfer.cache
         )
@@ -210,7 +210,7 @@ def gather_incident_light(transfer, view: View, index, look):
 
 
 def evaluate_outgoing(outgoing, patch, direction, *, is_narrow=False):
-    """What a cell sends in a unit direction, world space; for narrow lobes, without rings. (3,)"""
+    """Outgoing radiance of a patch in a unit direction, world space; for narrow lobes without direction rings. (3,)"""
     radiance, row = outgoing.isotropic[patch].astype(float), outgoing.lobe[patch]
     if row >= 0:
         x, y = outgoing.frame[row].astype(float) @ direction
@@ -221,7 +221,7 @@ def evaluate_outgoing(outgoing, patch, direction, *, is_narrow=False):
 
 
 def shade_view(transfer, view: View, look):
-    """Radiance of every view sample under a look, straight from the projector with no curve free. (n, 3)"""
+    """Radiance of every view sample under a look, from the projector with no free curve. (n, 3)"""
     out = np.zeros((view.num_view_samples, 3))
     for index, name in enumerate(transfer.material_names):
         rows = view.rows(index)
@@ -248,9 +248,9 @@ def shade_view(transfer, view: View, look):
 
 
 def split_by_roughness_level(view: View, index, terms):
-    """Each term with the samples that it is of: of one that follows a map of roughness, a term for every level."""
+    """Terms with their samples: one that follows a roughness map gives a term for every level."""
     ratios, level = view.roughness_levels(index)
-    assert np.all(np.diff(level.astype(int)) >= 0)  # samples of a level are a slice
+    assert np.all(np.diff(level.astype(int)) >= 0)  # samples of a level are contiguous
     for term in terms:
         if not (ratios and term.get("roughness_map")):
             yield term, slice(0, len(level))
@@ -263,7 +263,7 @@ def split_by_roughness_level(view: View, index, terms):
 
 
 def evaluate_emission(transfer, view: View, index, look):
-    """What a material's samples send out themselves. (n, 3)"""
+    """Emission of a material's samples. (n, 3)"""
     name, position = transfer.material_names[index], view.surface_points(index).position
     emitters = [light for light in look.lights.values() if light.geometry.material == name]
     if not emitters or not look.transport.paths.direct:
@@ -278,7 +278,7 @@ def evaluate_emission(transfer, view: View, index, look):
 
 
 def resolve(view: View, radiance):
-    """Samples to pixels: the weighted sum of each pixel's. radiance (n, 3) -> (height, width, 3) float64"""
+    """Samples to pixels: the weighted sum of each pixel. radiance (n, 3) -> (height, width, 3) float64"""
     gains = np.empty((view.num_view_samples, view.throughput.shape[1]))
     gains[view.order] = view.throughput
     out = np.zeros((view.width * view.height, 3))
@@ -287,13 +287,13 @@ def resolve(view: View, radiance):
 
 
 def full_evaluation(transfer, view_name, look):
-    """The picture of a look, nothing incremental, frozen or cached. (height, width, 3) float64"""
+    """The picture of a look without incremental updates, operators or caches. (height, width, 3) float64"""
     view = transfer.views[view_name]
     return resolve(view, shade_view(transfer, view, look))
 
 
 def opacity_at(alpha, wrap, uv):
-    """Opacity between four texels of an image of bytes, at places (n, 2), v from the top. (n,)"""
+    """Bilinear opacity of an 8-bit image at UV coordinates (n, 2), v from the top. (n,)"""
 
     def wrapped(index, size, how):
         index = np.asarray(index, int)

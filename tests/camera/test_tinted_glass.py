@@ -76,7 +76,7 @@ def test_two_tints_side_by_side_each_show_in_a_polished_metal(tmp_path):
 
 
 def below_two_panes(position, radiance, degrees):
-    """Outgoing radiance of a diffuse floor at positions (n, 3): a sum over the texels of a rotated environment. (n, 3)"""
+    """Outgoing radiance of a diffuse floor at positions (n, 3): a sum over texels of a rotated environment. (n, 3)"""
     height, width, _ = radiance.shape
     directions = texel_directions(height, width).reshape(-1, 3)
     area = np.repeat(np.sin((np.arange(height) + 0.5) * np.pi / height), width) * 2 * np.pi**2 / (height * width)

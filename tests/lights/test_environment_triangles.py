@@ -1,4 +1,4 @@
-"""Light triangles: they tile the sphere, keep every texel's light, and are small where there is most of it."""
+"""Environment triangles: they tile the sphere, preserve the light of every texel, and are small at bright regions."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from relume.lights.spherical_triangles import RotatedEnvironment, integrate_envi
 
 
 def compute_moments_numpy(texels: LightTexels, mean: F64, frame: F64, tile: int) -> tuple[F64, F64]:
-    """Do as `compute_moments` for one tile, in plain NumPy: its oracle.
+    """Reference of `compute_moments` for one tile in plain NumPy.
 
     Args:
-        texels: of all tiles. mean: n of this one. (3,) frame: its t. (2, 3) tile: its number.
+        texels: of all tiles. mean: n of this tile. (3,) frame: its t. (2, 3) tile: its index.
     """
     _, luminous, directions, solid_angles = (each[texels.tile == tile] for each in texels)
     weight = luminous / luminous.sum()
@@ -29,7 +29,7 @@ def compute_moments_numpy(texels: LightTexels, mean: F64, frame: F64, tile: int)
 
 
 def solid_angles(corners):
-    """Of triangles (M, 3, 3), signed: positive counter-clockwise seen from outside (van Oosterom, Strackee 1983)."""
+    """Signed solid angles of triangles (M, 3, 3): positive if counter-clockwise from outside (van Oosterom, Strackee 1983)."""
     a, b, c = np.moveaxis(corners, 1, 0)
     volume = np.einsum("mc,mc->m", a, np.cross(b, c))
     dots = 1 + np.einsum("mc,mc->m", a, b) + np.einsum("mc,mc->m", b, c) + np.einsum("mc,mc->m", c, a)
@@ -37,7 +37,7 @@ def solid_angles(corners):
 
 
 def depth_inside(corners, directions):
-    """How deep each direction lies in each triangle: the sine of its distance to the nearest edge. (n, M)"""
+    """Depth of each direction in each triangle: the sine of its distance to the nearest edge. (n, M)"""
     edges = np.cross(corners, np.roll(corners, -1, axis=1))
     edges /= np.linalg.norm(edges, axis=2, keepdims=True)
     return np.einsum("mec,nc->nme", edges, directions).min(axis=2)
@@ -89,8 +89,8 @@ def test_nodes_are_unit_and_midpoints_of_their_edges(lights):
 
 
 @pytest.mark.parametrize("num_lights", [300, 1003])
-def test_triangles_have_the_moments_of_the_light_in_their_tiles(num_lights):
-    """Mean direction, and spread in the plane that touches the sphere there, of each triangle, its light uniform."""
+def test_triangles_have_the_moments_of_their_light(num_lights):
+    """Mean direction and spread in the tangent plane of each triangle, under uniform light."""
     radiance = studio(64)
     lights, (tiles, texels) = tessellate_environment(radiance, num_lights), tiles_of(radiance, num_lights)
     directions = texel_directions(64, 128).reshape(-1, 3).astype(float)
@@ -104,7 +104,7 @@ def test_triangles_have_the_moments_of_the_light_in_their_tiles(num_lights):
         mean /= np.linalg.norm(mean)
         np.testing.assert_allclose(lights.direction[m], mean, atol=1e-6)
         if (tiles[m] @ mean).min() < 0.85:
-            continue  # too large for a plane: the tile itself
+            continue  # too large for a tangent plane: the tile itself
         across = np.linalg.svd(mean[None])[2][1:]
         at, corner = (d @ across.T / (d @ mean)[:, None] for d in (directions[inside], corners))
         centre = weight[inside] @ at / weight[inside].sum()
@@ -119,14 +119,14 @@ def test_triangles_have_the_moments_of_the_light_in_their_tiles(num_lights):
     assert compared > 0.8 * num_lights
 
 
-def test_moments_of_texels_are_those_of_their_oracle():
+def test_moments_of_texels_equal_their_reference():
     rng = np.random.default_rng(2)
     axis = np.eye(3)[rng.integers(0, 3, 400)]
     directions = axis + 0.3 * rng.normal(size=(400, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     tile = (2 * axis.argmax(axis=1)).astype(np.int32)
     texels = LightTexels(tile, rng.uniform(0, 9, 400), directions, rng.uniform(0, 0.1, 400))
-    fitted = np.array([4, 0])  # of five tiles, of which two have no light and one is not asked about
+    fitted = np.array([4, 0])  # of five tiles: two have no light and one is not requested
     mean, total = np.eye(3)[[2, 0]], texels.sums(texels.luminous, 5)
     frames = np.array([[[1.0, 0, 0], [0, 1, 0]], [[0, 0.6, 0.8], [0, -0.8, 0.6]]])
     centre, spread = compute_moments(texels, total[fitted], mean, frames, fitted)
@@ -145,7 +145,7 @@ def test_where_light_is_uniform_triangles_are_their_tiles():
     assert np.linalg.norm(corners - tiles, axis=2).max() < 0.1 * np.sqrt(angles.max())
 
 
-def test_power_is_the_environments(lights):
+def test_power_equals_the_environments(lights):
     expected = texel_power(studio()).sum(axis=0)
     np.testing.assert_allclose(lights.irradiance.sum(axis=0, dtype=float), expected, rtol=1e-6)
     assert (lights.irradiance >= 0).all()
@@ -153,7 +153,7 @@ def test_power_is_the_environments(lights):
 
 @pytest.mark.parametrize("num_lights", [8, 100, 700])
 def test_each_texel_gives_its_light_to_the_one_triangle_it_lies_in(num_lights):
-    radiance = np.random.default_rng(2).random((38, 76, 3), np.float32)  # few texels lie on an edge
+    radiance = np.random.default_rng(2).random((38, 76, 3), np.float32)  # only a few texels lie on an edge
     lights = tessellate_environment(radiance, num_lights)
     depth = depth_inside(tiles_of(radiance, num_lights)[0], texel_directions(38, 76).reshape(-1, 3).astype(float))
     owner, power = depth.argmax(axis=1), texel_power(radiance)
@@ -168,7 +168,7 @@ def test_each_texel_gives_its_light_to_the_one_triangle_it_lies_in(num_lights):
     np.testing.assert_allclose((lights.irradiance - inside).sum(axis=0), power[on_edge].sum(axis=0), atol=1e-5)
 
 
-def test_shadow_rays_go_into_their_triangle_towards_its_light(lights):
+def test_shadow_ray_directions_lie_in_their_triangle(lights):
     np.testing.assert_allclose(np.linalg.norm(lights.direction, axis=1), 1, atol=1e-6)
     depth = np.diagonal(depth_inside(corners_of(lights), lights.direction.astype(float)))
     assert (depth > -1e-6).all()
@@ -185,10 +185,10 @@ def test_same_environment_gives_the_same_triangles_bit_for_bit():
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
 
 
-@pytest.mark.parametrize("asked", [8, 9, 10, 11, 100, 101, 102, 500])
-def test_as_many_as_asked_and_never_more(asked):
-    count = tessellate_environment(studio(), asked).num_lights
-    assert asked - 3 < count <= asked
+@pytest.mark.parametrize("requested", [8, 9, 10, 11, 100, 101, 102, 500])
+def test_the_number_of_triangles_is_the_requested_one_at_most(requested):
+    count = tessellate_environment(studio(), requested).num_lights
+    assert requested - 3 < count <= requested
     assert (count - 8) % 3 == 0
 
 
@@ -202,15 +202,15 @@ def test_small_triangles_lie_on_bright_spots(spot):
     bright = lights.irradiance.sum(axis=1) / angles > 100
     assert bright.sum() >= 15  # of its twenty texels
     assert angles[bright].mean() < mean / 10
-    assert angles.max() > mean  # where nothing happens they are large
+    assert angles.max() > mean  # large in uniform regions
 
 
 def test_uniform_light_is_divided_evenly():
     angles = solid_angles(tiles_of(np.ones((64, 128, 3), np.float32), 512)[0])
-    assert angles.max() / angles.min() < 12  # one level apart, and an octahedron's children are not alike
+    assert angles.max() / angles.min() < 12  # one level apart; children of an octahedron differ in size
 
 
-def test_black_environment_has_black_lights_all_over_the_sphere():
+def test_a_black_environment_has_black_lights_over_the_whole_sphere():
     lights = tessellate_environment(np.zeros((8, 16, 3), np.float32), 200)
     assert solid_angles(corners_of(lights)).sum() == pytest.approx(4 * np.pi, rel=1e-6)
     assert not lights.irradiance.any()
@@ -218,7 +218,7 @@ def test_black_environment_has_black_lights_all_over_the_sphere():
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 2), (2, 1), (2, 4), (3, 5)])
-def test_tiny_maps_end_when_there_is_nothing_left_to_split(shape):
+def test_subdivision_of_tiny_maps_terminates(shape):
     radiance = np.random.default_rng(3).random((*shape, 3), np.float32)
     lights = tessellate_environment(radiance, 4000)
     assert lights.num_lights <= 4000
@@ -239,19 +239,19 @@ def test_one_texel_of_light_is_kept_however_bright_or_dim(value):
     assert lights.direction[lit][0] @ texel_directions(16, 32)[4, 9] == pytest.approx(1, abs=1e-6)
 
 
-@pytest.mark.parametrize("asked", [-1, 0, 7, MAX_LIGHTS + 1])
-def test_absurd_counts_are_refused(asked):
+@pytest.mark.parametrize("requested", [-1, 0, 7, MAX_LIGHTS + 1])
+def test_invalid_counts_are_rejected(requested):
     with pytest.raises(PlanError, match="give 8 to"):
-        tessellate_environment(np.ones((2, 4, 3), np.float32), asked)
+        tessellate_environment(np.ones((2, 4, 3), np.float32), requested)
 
 
 @pytest.mark.parametrize("columns", [0, 3, 16, 40])
-def test_a_turned_environment_weighs_as_its_turned_image(columns):
+def test_a_rotated_environment_equals_its_rotated_image(columns):
     radiance = studio()  # 64 texels wide
     tiles = choose_tiles(radiance, 200)
     turned = integrate_environment(tiles, RotatedEnvironment.from_radiance(radiance), 360 * columns / 64)
     rolled = integrate_environment(tiles, RotatedEnvironment.from_radiance(np.roll(radiance, -columns, axis=1)))
-    # a texel's centre that rounding puts on the other side of an edge changes two tiles; most tiles have none there
+    # a texel center that rounding moves across an edge changes two tiles; most tiles have none there
     same = np.isclose(turned.irradiance, rolled.irradiance, rtol=1e-5, atol=1e-9).all(axis=1)
     assert same.mean() > 0.9
     np.testing.assert_allclose(turned.direction[same], rolled.direction[same], atol=1e-5)
@@ -260,7 +260,7 @@ def test_a_turned_environment_weighs_as_its_turned_image(columns):
     )
 
 
-def test_another_environment_keeps_all_its_light_in_the_tiles_it_lies_in():
+def test_another_environment_keeps_its_light_in_the_same_tiles():
     tiles = choose_tiles(studio(), 300)
     other = np.random.default_rng(4).random((38, 76, 3), np.float32)
     lights = integrate_environment(tiles, RotatedEnvironment.from_radiance(other))
@@ -281,7 +281,7 @@ def test_directions_are_located_in_the_tile_they_lie_in(relightable):
     np.testing.assert_array_equal(tiles.locate(tiles.corners.mean(axis=1)), np.arange(len(tiles.codes)))
 
 
-def test_relightable_tiles_are_the_same_however_the_environment_is_turned():
+def test_relightable_tiles_do_not_depend_on_the_rotation():
     radiance = studio()
     tiles = choose_tiles(radiance, 400, relightable=True)
     np.testing.assert_array_equal(tiles.codes, choose_tiles(np.roll(radiance, 9, axis=1), 400, relightable=True).codes)
@@ -303,16 +303,16 @@ def test_relightable_tiles_are_the_same_however_the_environment_is_turned():
         [*range(8, 15), 15 << (2 * MAX_DEPTH + 2)],
     ],
 )
-def test_codes_that_do_not_tile_the_sphere_are_told(codes):
+def test_codes_that_do_not_tile_the_sphere_are_rejected(codes):
     assert not Tiles(np.array(list(codes), np.uint64)).is_whole()
 
 
 @pytest.mark.parametrize("num_lights", [8, 11, 500])
-def test_chosen_tiles_are_whole(num_lights):
+def test_selected_tiles_are_complete(num_lights):
     assert choose_tiles(studio(), num_lights).is_whole()
 
 
-def test_a_shrunk_map_weighs_as_much():
+def test_a_downsampled_map_has_the_same_power():
     whole = studio().repeat(4, axis=0).repeat(4, axis=1)
     small = halve_to_width(whole, studio().shape[1])
     np.testing.assert_allclose(small, studio(), rtol=1e-6)

@@ -1,4 +1,4 @@
-"""Samples of local lights against plain NumPy, and their sums against irradiance that is known in closed form."""
+"""Samples of local lights against plain NumPy, and their sums against irradiance in closed form."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from relume.raytrace.light_visibility import compute_irradiance
 
 RNG = np.random.default_rng(11)
 PIECES = RNG.normal(size=(5, 3, 3))
-PIECES[3] = PIECES[3, 0]  # has no area
+PIECES[3] = PIECES[3, 0]  # zero area
 GEOMETRIES = {
     "point": LightGeometry("point", (0.3, 1.2, -0.4)),
     "spot": LightGeometry("spot", (0.3, 1.2, -0.4), (0.1, -2.0, 0.3), (15.0, 50.0)),
@@ -35,7 +35,7 @@ def unit(v):
 
 
 def sample_numpy(name, light, strata, k, shift, p):
-    """Direction and w, from the formulas that the module states."""
+    """Direction and w, by the formulas in the module."""
     geometry = GEOMETRIES[name]
     axis = unit(geometry.direction)
     if geometry.kind == "directional":
@@ -67,7 +67,7 @@ def sample_numpy(name, light, strata, k, shift, p):
 
 
 @pytest.mark.parametrize("name", GEOMETRIES)
-def test_samples_are_those_of_numpy(name):
+def test_samples_equal_numpy(name):
     light = light_of(name)
     strata = make_light_strata(light, 64)
     weights = []
@@ -94,7 +94,7 @@ def polygon_irradiance(corners, p, normal):
 
 @pytest.mark.parametrize("rotation", [0.0, 35.0])
 @pytest.mark.parametrize("direction", [(0.0, -1.0, 0.0), (0.3, -1.0, -0.2)])
-def test_rectangle_gives_what_lambert_s_formula_says(direction, rotation):
+def test_a_rectangle_equals_lamberts_formula(direction, rotation):
     geometry = LightGeometry("rectangle", (0.1, 1.1, 0.0), direction, rotation=rotation, size=(0.8, 0.5))
     corner, (e, f) = rectangle(geometry)
     points = RNG.uniform([-0.5, 0, -0.5], [0.5, 0.3, 0.5], (200, 3)).astype(np.float32)
@@ -109,7 +109,7 @@ def test_rectangle_gives_what_lambert_s_formula_says(direction, rotation):
     np.testing.assert_allclose(actual.mean(), np.mean(expected), rtol=1e-3)
 
 
-def test_unrotated_rectangle_stands_upright_and_its_edges_turn_about_its_direction():
+def test_an_unrotated_rectangle_is_upright_and_rotates_about_its_direction():
     corner, edges = rectangle(LightGeometry("rectangle", (1, 2, 3), (0, 0, -2), size=(4, 1)))
     np.testing.assert_allclose(edges, [[-4, 0, 0], [0, 1, 0]], atol=1e-12)
     np.testing.assert_allclose(corner + edges.sum(axis=0) / 2, [1, 2, 3])
@@ -121,7 +121,7 @@ def test_unrotated_rectangle_stands_upright_and_its_edges_turn_about_its_directi
     np.testing.assert_allclose(np.cross(*lying), [0, -2, 0], atol=1e-12)
 
 
-def test_two_triangles_shine_as_the_rectangle_they_make():
+def test_two_triangles_emit_like_their_rectangle():
     geometry = GEOMETRIES["rectangle"]
     corner, (e, f) = rectangle(geometry)
     a, b, c, d = corner, corner + e, corner + e + f, corner + f

@@ -1,4 +1,4 @@
-"""Neighbours of lights on the sphere, against what triangulations of a sphere must be."""
+"""Neighbors of lights on the sphere, against properties of triangulations of a sphere."""
 
 from __future__ import annotations
 
@@ -23,32 +23,34 @@ def random_directions(count):
 
 def test_neighbourhood_is_mutual_and_a_triangulation_of_the_sphere():
     directions = tessellate_environment(studio(), 300).direction
-    beside = sets_of(find_neighbors(directions))
-    assert len(beside) == len(directions)
-    assert all(m not in near for m, near in enumerate(beside))
-    assert all(m in beside[other] for m, near in enumerate(beside) for other in near)
-    assert sum(map(len, beside)) == 6 * len(directions) - 12  # Euler: a triangulation of a sphere has 3n - 6 edges
+    neighbor_sets = sets_of(find_neighbors(directions))
+    assert len(neighbor_sets) == len(directions)
+    assert all(m not in near for m, near in enumerate(neighbor_sets))
+    assert all(m in neighbor_sets[other] for m, near in enumerate(neighbor_sets) for other in near)
+    assert (
+        sum(map(len, neighbor_sets)) == 6 * len(directions) - 12
+    )  # Euler: a triangulation of a sphere has 3n - 6 edges
 
 
-def test_the_nearest_direction_is_a_neighbour():
+def test_the_nearest_direction_is_a_neighbor():
     directions = random_directions(200)
     cosine = directions @ directions.T
     np.fill_diagonal(cosine, -1)
-    beside = sets_of(find_neighbors(directions))
-    assert all(int(near) in beside[m] for m, near in enumerate(cosine.argmax(axis=1)))
+    neighbor_sets = sets_of(find_neighbors(directions))
+    assert all(int(near) in neighbor_sets[m] for m, near in enumerate(cosine.argmax(axis=1)))
 
 
-def test_a_direction_twice_is_its_twins_neighbour():
+def test_equal_directions_are_neighbors():
     directions = random_directions(40)
     directions[17] = directions[4]
-    beside = sets_of(find_neighbors(directions))
-    assert 4 in beside[17]
-    assert 17 in beside[4]
-    assert all(beside)
+    neighbor_sets = sets_of(find_neighbors(directions))
+    assert 4 in neighbor_sets[17]
+    assert 17 in neighbor_sets[4]
+    assert all(neighbor_sets)
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 8])
-def test_of_a_few_lights_all_are_neighbours(count):
-    beside = sets_of(find_neighbors(random_directions(count))) if count else []
-    assert beside == [set(range(count)) - {m} for m in range(count)]
+def test_all_of_a_few_lights_are_neighbors(count):
+    neighbor_sets = sets_of(find_neighbors(random_directions(count))) if count else []
+    assert neighbor_sets == [set(range(count)) - {m} for m in range(count)]
     assert find_neighbors(random_directions(count)).first.tolist() == [max(0, count - 1) * m for m in range(count + 1)]

@@ -1,4 +1,4 @@
-"""The look that tests of looks change."""
+"""The look that tests edit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The materials and lights that tests of looks begin with."""
+"""Materials and lights of the looks in tests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The library's materials: valid terms, the published formulas again, and Sun's map between them."""
+"""The material library: valid terms, the published formulas, and the map of Sun et al. between them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from relume.look.library import navigation_map, presets
 from relume.look.library.materials import DATA, read_presets
 from relume.look.library.merl_fits import CONVERSIONS, GROUPS, convert_all, fit_conductor
 
-# rows as the published tables have them, so that something is compared where the tables are not at hand
+# rows of the published tables, for comparisons without the tables
 EXAMPLES = {
     "low_cooktorrance_E2": {
         "Lambertian": {"albedo": [0.0031, 0.0044, 0.0024]},
@@ -67,7 +67,7 @@ def pairs(num=400):
 
 
 def published(table, fit, wi, wo, cook_torrance_fresnel=None):
-    """The formulas of Ngan 2005 and Low 2012 as their tables are to be read. (n, 3)"""
+    """The formulas of Ngan 2005 and Low 2012 for a row of their tables. (n, 3)"""
     lambertian, p = fit.values()
     h = (wi + wo) / np.linalg.norm(wi + wo, axis=1, keepdims=True)
     ni, no, nh, vh = wi[:, 2], wo[:, 2], h[:, 2], np.sum(wo * h, axis=1)
@@ -108,7 +108,7 @@ def assert_is_the_fit(preset, fit):
     table = preset.id.split("/")[0]
     wi, wo = pairs()
     expected = published(table, fit, wi, wo, exact_fresnel)
-    # five digits are kept; an exponent's last digit, at its peak's flank, moves the value by some more
+    # five digits are stored; the last digit of an exponent changes the flank of its peak by more
     np.testing.assert_allclose(evaluated(preset.terms, wi, wo), expected, rtol=2e-3, atol=2e-4 * expected.max())
 
 
@@ -121,8 +121,8 @@ def test_a_converted_fit_evaluates_like_its_own_formula(table):
 
 
 @pytest.mark.parametrize("f0", [0.02, 0.05, 0.2, 0.4, 0.6, 0.8, 0.95, 0.999])
-def test_exact_fresnel_follows_the_approximation_that_was_fitted(f0):
-    """Within a tenth of full reflectance up to 80°: physics has no curve with that f0 that is Schlick's."""
+def test_exact_fresnel_is_near_the_fitted_approximation(f0):
+    """Within 0.1 up to 80°: no physical curve with this f0 equals Schlick's."""
     cosine = np.cos(np.radians(np.linspace(0, 80, 100)))
     np.testing.assert_allclose(exact_fresnel(cosine, f0), schlick(cosine, f0), atol=0.1)
     assert exact_fresnel(np.array([1.0]), f0)[0] == pytest.approx(f0, rel=1e-9)
@@ -136,7 +136,7 @@ def fits(shared_data):
     return json.loads(path.read_text(encoding="utf-8"))
 
 
-def test_the_data_file_is_what_the_published_tables_convert_to(fits):
+def test_the_data_file_equals_the_converted_tables(fits):
     assert convert_all(fits) == json.loads(DATA.read_text(encoding="utf-8"))
 
 
@@ -158,7 +158,7 @@ def test_every_preset_is_a_valid_part_of_a_look():
         assert preset.source
 
 
-def test_every_table_and_group_has_its_share():
+def test_every_table_and_group_has_presets():
     by_table = Counter(preset.id.split("/")[0] for preset in presets())
     assert set(by_table) == set(CONVERSIONS)
     assert min(by_table.values()) >= 86
@@ -169,7 +169,7 @@ def test_every_table_and_group_has_its_share():
     assert groups["white-marble"] == "stone"
 
 
-def test_a_point_of_the_map_is_the_material_there():
+def test_a_map_point_at_a_material_is_that_material():
     plane = navigation_map()
     for k in range(0, len(plane.presets), 7):
         expected = plane.presets[k].terms
@@ -179,7 +179,7 @@ def test_a_point_of_the_map_is_the_material_there():
                 assert actual["params"][name] == pytest.approx(value, rel=1e-6)
 
 
-def test_between_materials_colours_and_parameters_are_barycentric():
+def test_colors_and_parameters_between_materials_are_barycentric():
     plane = navigation_map()
     for triangle in plane.triangles[::9]:
         weights = np.array([0.5, 0.3, 0.2])
@@ -194,7 +194,7 @@ def test_between_materials_colours_and_parameters_are_barycentric():
         assert ((ior - 1) / (ior + 1)) ** 2 == pytest.approx(f0, rel=1e-9)
 
 
-def test_the_map_covers_its_hull_once_and_turns_one_way():
+def test_the_map_triangulates_its_hull_with_one_orientation():
     plane = navigation_map()
     corners = np.column_stack([plane.f0, np.log(plane.sigma)])[plane.triangles]
     doubled = np.linalg.det(corners[:, 1:] - corners[:, :1])
@@ -203,7 +203,7 @@ def test_the_map_covers_its_hull_once_and_turns_one_way():
 
 
 @pytest.mark.parametrize(("f0", "sigma"), [(2.0, 1e-9), (-1.0, 5.0), (0.3, 1e3), (0.0, 1e-30)])
-def test_outside_the_map_the_nearest_material_is_taken_and_is_valid(f0, sigma):
+def test_points_outside_the_map_use_the_nearest_material(f0, sigma):
     plane = navigation_map()
     terms = plane.at(f0, sigma)
     for term in terms:
@@ -213,12 +213,12 @@ def test_outside_the_map_the_nearest_material_is_taken_and_is_valid(f0, sigma):
 
 
 @pytest.mark.parametrize(("f0", "sigma"), [(np.nan, 0.1), (0.1, 0.0), (0.1, -1.0), (np.inf, 0.1)])
-def test_a_point_that_is_none_is_refused(f0, sigma):
+def test_invalid_map_points_are_rejected(f0, sigma):
     with pytest.raises(ParameterError):
         navigation_map().at(f0, sigma)
 
 
-def test_parameters_stay_within_the_terms_range_over_the_whole_map():
+def test_parameters_stay_in_range_over_the_whole_map():
     plane = navigation_map()
     term = TERMS["cook_torrance"]
     for f0 in np.linspace(0, 0.7, 15):

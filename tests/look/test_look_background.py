@@ -1,4 +1,4 @@
-"""The background of a look, and the ground that catches shadows: checked, completed, kept out of brute force."""
+"""The background of a look and shadow catchers: checked, completed, ignored by the reference."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ GROUND = Material("Ground", ({"model": "lambert"},), shadow_catcher=True)
 DEFAULT = default_look([PLAIN, GROUND])
 
 
-def test_default_shows_the_map_and_a_ground_catches():
+def test_the_default_shows_the_map_and_the_ground_is_a_shadow_catcher():
     assert DEFAULT["background"]["kind"] == "map"
     assert DEFAULT["materials"]["Ground"]["shadow_catcher"] is True
     assert "shadow_catcher" not in DEFAULT["materials"]["Ball"]
 
 
-def test_looks_and_stores_of_before_have_one_too():
+def test_older_looks_and_stores_get_a_background():
     old = {name: value for name, value in DEFAULT.items() if name != "background"}
     assert complete({"background": {"kind": "color"}}, complete({}, old))["background"]["kind"] == "color"
     assert validate(old, DEFAULT).background.kind == "map"
@@ -39,12 +39,12 @@ def test_looks_and_stores_of_before_have_one_too():
         ("radius", 1),
     ],
 )
-def test_what_is_no_background_is_refused(field, value):
+def test_invalid_backgrounds_are_rejected(field, value):
     with pytest.raises(ParameterError, match=f"/background/{field}"):
         complete({"background": {field: value}}, DEFAULT)
 
 
-def test_only_a_ground_may_catch():
+def test_only_a_ground_can_be_a_shadow_catcher():
     patch = [{"op": "replace", "path": "/materials/Ground/shadow_catcher", "value": False}]
     changed = apply_patch(DEFAULT, patch, DEFAULT)
     assert validate(changed, DEFAULT).materials["Ground"].shadow_catcher is False
@@ -55,7 +55,7 @@ def test_only_a_ground_may_catch():
         complete({"materials": {"Ground": {"shadow_catcher": 1}}}, DEFAULT)
 
 
-def test_brute_force_is_asked_for_what_is_there():
+def test_the_reference_ignores_background_and_catcher():
     look = validate({"background": {"kind": "transparent"}}, DEFAULT).without_compositing()
     assert look.background.kind == "map"
     assert not look.materials["Ground"].shadow_catcher

@@ -1,4 +1,4 @@
-"""What has become of a look, path by path."""
+"""Differences of looks as JSON Patches."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ DOCUMENTS = st.dictionaries(st.sampled_from(["materials", "lights", "display"]),
 
 
 @given(DOCUMENTS, DOCUMENTS)
-def test_it_leads_from_one_look_to_another(before: dict[str, Any], after: dict[str, Any]) -> None:
+def test_a_difference_turns_one_look_into_another(before: dict[str, Any], after: dict[str, Any]) -> None:
     originals = copy.deepcopy((before, after))
     assert jsonpatch.apply_patch(before, diff_looks(before, after)) == after
     assert (before, after) == originals
 
 
 @given(DOCUMENTS)
-def test_of_one_look_there_is_none(document: dict[str, Any]) -> None:
+def test_equal_looks_have_no_difference(document: dict[str, Any]) -> None:
     assert diff_looks(document, copy.deepcopy(document)) == []
 
 
-def test_places_are_as_near_as_they_can_be_and_curves_are_whole() -> None:
+def test_paths_are_as_deep_as_possible_and_curves_are_replaced_whole() -> None:
     points = {"theta_h": {"points": [[0, 1], [90, 0]]}}
     term: dict[str, Any] = {"params": {"sigma": 0.2, "ior": 1.5}, "color": [1, 1, 1], "curves": points}
     before = {"materials": {"a/b": {"terms": [term, term]}}, "display": {"exposure": 0}}

@@ -1,4 +1,4 @@
-"""Completing looks, and what a complete one says."""
+"""Completion of looks, and fields of complete looks."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_partial_look_keeps_what_it_does_not_name(default):
     assert complete({}, default) == default
 
 
-def test_the_contract_s_example_is_valid(default):
+def test_the_example_of_the_contract_is_valid(default):
     example = {
         "materials": {
             "Teapot": {
@@ -82,7 +82,7 @@ def test_look_does_not_follow_later_changes_of_its_document(default):
     assert look.materials["Teapot"].terms[1]["params"]["sigma"] == 0.2
 
 
-def test_lights_are_added_completed_and_taken_away(default):
+def test_lights_are_added_completed_and_removed(default):
     addition = {"op": "add", "path": "/lights/Lamp", "value": {"kind": "rectangle", "size": [1, 2]}}
     added = apply_patch(default, [addition], default)
     assert added["lights"]["Lamp"] == {
@@ -95,7 +95,7 @@ def test_lights_are_added_completed_and_taken_away(default):
     assert apply_patch(moved, [{"op": "remove", "path": "/lights/Lamp"}], default) == default
 
 
-def test_light_of_the_scene_may_change_its_kind_and_comes_back_when_removed(default):
+def test_a_light_of_the_scene_can_change_its_kind_and_returns_when_removed(default):
     edited = apply_patch(default, replace("/lights/Key", {"kind": "point"}), default)
     assert edited["lights"]["Key"]["position"] == [0.0, 1.0, 0.0], "another kind starts from its own defaults"
     edited = apply_patch(edited, [{"op": "remove", "path": "/lights/Key"}], default)
@@ -104,7 +104,7 @@ def test_light_of_the_scene_may_change_its_kind_and_comes_back_when_removed(defa
     assert validate(dark, default).lights["Panel"].gain == (0.0, 0.0, 0.0)
 
 
-def test_light_s_gain_and_geometry_say_all_of_it(default):
+def test_gain_and_geometry_determine_a_light(default):
     edited = apply_patch(
         default,
         replace("/lights/Key", {"intensity": 2, "color": [1, 0.5, 0], "emission": [3, 3, 3]}),
@@ -133,10 +133,10 @@ def test_light_s_gain_and_geometry_say_all_of_it(default):
         ({"show": "further_bounces", "bounces": 1}, (False, 1, 0)),
     ],
 )
-def test_shown_paths_are_equal_where_the_picture_is(default, transport, paths):
+def test_displayed_light_paths_are_equal_for_equal_pictures(default, transport, paths):
     assert validate({"transport": transport}, default).transport.paths == paths
 
 
-def test_a_store_that_knows_no_transport_shows_all_of_it(default):
+def test_stores_without_transport_show_all_light(default):
     older = {name: value for name, value in default.items() if name != "transport"}
     assert complete({}, older)["transport"] == default["transport"]

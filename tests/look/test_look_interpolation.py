@@ -1,4 +1,4 @@
-"""Looks between looks."""
+"""Interpolation between looks."""
 
 import copy
 import math
@@ -24,7 +24,7 @@ def ball(document):
     return document["materials"]["Ball"]["terms"]
 
 
-def test_keyframes_are_themselves_and_numbers_between_go_evenly():
+def test_keyframes_are_exact_and_numbers_between_are_linear():
     first, last = look(), look(environment={"rotation": 90.0, "intensity": 3.0})
     assert interpolate_looks([first, last], 0.0) == first
     assert interpolate_looks([first, last], 1.0) == last
@@ -34,7 +34,7 @@ def test_keyframes_are_themselves_and_numbers_between_go_evenly():
     assert complete(between, DEFAULT) == between
 
 
-def test_what_sliders_move_by_its_logarithm_goes_so():
+def test_logarithmic_parameters_are_interpolated_logarithmically():
     last = look()
     last = copy.deepcopy(last)
     ball(last)[1]["params"]["exponent"] = 1000.0
@@ -43,7 +43,7 @@ def test_what_sliders_move_by_its_logarithm_goes_so():
     assert ball(interpolate_looks([look(), last], 0.5))[1]["params"]["exponent"] == pytest.approx([100.0, 10.0, 20.0])
 
 
-def test_what_has_nothing_between_changes_half_way_and_stays_valid():
+def test_discrete_values_switch_halfway_and_stay_valid():
     last = copy.deepcopy(look())
     ball(last)[1] = {"model": "phong", "color": [1.0, 1.0, 1.0], "params": {"exponent": 20.0}}
     ball(last)[0]["color"] = [0.4, 0.4, 0.4]
@@ -58,7 +58,7 @@ def test_what_has_nothing_between_changes_half_way_and_stays_valid():
         assert complete(between, DEFAULT) == between
 
 
-def test_many_keyframes_share_the_way_and_whole_numbers_stay_whole():
+def test_keyframes_are_equally_spaced_and_integers_stay_integers():
     keys = [look(transport={"bounces": k}) for k in (0, 8, 2)]
     assert [interpolate_looks(keys, share)["transport"]["bounces"] for share in (0.0, 0.25, 0.5, 0.75, 1.0)] == [
         0,
@@ -70,7 +70,7 @@ def test_many_keyframes_share_the_way_and_whole_numbers_stay_whole():
     assert interpolate_looks(keys[:1], 0.7) == keys[0]
 
 
-def test_drawn_curves_of_as_many_points_go_point_by_point():
+def test_drawn_curves_of_equal_length_are_interpolated_by_points():
     first, last = copy.deepcopy(look()), copy.deepcopy(look())
     ball(first)[1]["curves"] = {"theta_h": {"points": [[0.0, 1.0], [30.0, 0.0]]}}
     ball(last)[1]["curves"] = {"theta_h": {"points": [[0.0, 3.0], [50.0, 0.0]]}}
@@ -81,7 +81,7 @@ def test_drawn_curves_of_as_many_points_go_point_by_point():
 
 
 def of_map(color, f0, sigma):
-    """Terms of the map's kind."""
+    """Terms of a material of the map."""
     root = math.sqrt(f0)
     params = {"sigma": sigma, "ior": (1 + root) / (1 - root)}
     return [
@@ -90,8 +90,8 @@ def of_map(color, f0, sigma):
     ]
 
 
-def test_a_way_across_the_map_goes_through_what_lies_between():
-    """Straight in reflectance and in the logarithm of roughness, from and to materials that are not of the map."""
+def test_a_path_across_the_map_passes_through_its_materials():
+    """Linear in reflectance and in the logarithm of roughness, also from and to materials off the map."""
     ends = [look(materials={"Ball": {"terms": of_map(*end)}}) for end in ((0.9, 0.02, 0.05), (0.1, 0.5, 0.45))]
     for share, end in ((0.0, ends[0]), (1.0, ends[1])):
         assert ball(interpolate_looks(ends, share, "map"))[1]["params"] == ball(end)[1]["params"]
@@ -112,7 +112,7 @@ def test_a_way_across_the_map_goes_through_what_lies_between():
     np.testing.assert_allclose([t["color"] for t in ball(between)], np.maximum(expected, 0), atol=1e-6)
 
 
-def test_what_is_not_of_the_map_goes_from_parameter_to_parameter():
+def test_other_materials_are_interpolated_by_parameters():
     last = copy.deepcopy(look())
     ball(last)[1]["params"]["exponent"] = 1000.0
     assert interpolate_looks([look(), last], 0.3, "map") == interpolate_looks([look(), last], 0.3)

@@ -1,4 +1,4 @@
-"""Patches of looks: all of one or nothing, whoever sends it."""
+"""Patches of looks: applied completely or not at all."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def nested(depth):
         replace(SIGMA, 0.3) * 257,
     ],
 )
-def test_patch_that_does_not_fit_is_refused_and_nothing_changes(default, patch):
+def test_an_invalid_patch_is_rejected_and_nothing_changes(default, patch):
     before = copy.deepcopy(default)
     with pytest.raises(EditError) as raised:
         apply_patch(default, patch, default)
@@ -71,7 +71,7 @@ def test_patch_with_one_bad_operation_changes_nothing(default):
     assert default == before
 
 
-def test_patch_shares_what_it_does_not_touch(default):
+def test_a_patch_shares_unchanged_parts(default):
     edited = apply_patch(default, replace(SIGMA, 0.31), default)
     assert edited["materials"]["Teapot"]["terms"][1]["params"]["sigma"] == 0.31
     assert default["materials"]["Teapot"]["terms"][1]["params"]["sigma"] == 0.2
@@ -93,7 +93,7 @@ def test_patch_may_build_on_its_own_operations_without_touching_its_values(defau
     assert patch == sent
 
 
-def test_what_a_patch_removes_is_the_default_again(default):
+def test_removed_values_return_to_the_default(default):
     edited = apply_patch(default, [*replace(SIGMA, 0.7), *replace("/display/exposure", 3)], default)
     assert edited != default
     for path in (SIGMA, "/display", "/materials/Teapot"):
@@ -118,7 +118,7 @@ def test_term_may_be_added_moved_down_and_changed_in_model(default):
     assert blinn["materials"]["Teapot"]["terms"][2]["params"] == {"exponent": 50.0}
 
 
-def test_curves_of_one_model_are_not_taken_on_trust_for_another(default):
+def test_curves_are_checked_again_for_another_model(default):
     bands = replace("/materials/a~1b~0c/terms/0/curves", {"theta_i": {"bands": [1.0] * 64}})
     edited = apply_patch(default, bands, default)
     with pytest.raises(ParameterError, match="theta_i"):

@@ -1,4 +1,4 @@
-"""Values of looks as they come from anybody: refused with a pointer and what is allowed."""
+"""Values of looks from any source: invalid ones are rejected with a pointer and the allowed range."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ from relume.scene.model import Light, Material
         ("/display/tone_map", {"display": "\ud800", "view": "b"}, "/display/tone_map", "view of an OpenColorIO"),
     ],
 )
-def test_bad_value_is_refused_with_its_pointer_and_what_is_allowed(default, path, value, pointer, allowed):
+def test_an_invalid_value_is_rejected_with_its_pointer_and_range(default, path, value, pointer, allowed):
     before = copy.deepcopy(default)
     with pytest.raises(ParameterError) as raised:
         apply_patch(default, [{"op": "add", "path": path, "value": value}], default)
@@ -147,14 +147,14 @@ def test_bad_value_is_refused_with_its_pointer_and_what_is_allowed(default, path
     assert len(str(raised.value)) < 600
     assert "\n" not in str(raised.value)
     assert default == before
-    # the same document whole, as a file or a PUT would bring it, is refused likewise
+    # the whole document, as from a file or a PUT, is rejected, too
     document = jsonpatch.apply_patch(default, [{"op": "add", "path": path, "value": value}])
     with pytest.raises(ParameterError) as raised:
         validate(document, default)
     assert raised.value.name == pointer
 
 
-def test_scene_with_a_bad_term_is_refused_with_its_pointer():
+def test_a_scene_with_an_invalid_term_is_rejected_with_its_pointer():
     with pytest.raises(ParameterError) as raised:
         default_look([Material("Cup", ({"model": "ggx", "params": {"roughness": 0.0}},))])
     assert raised.value.name == "/materials/Cup/terms/0/params/roughness"
@@ -169,7 +169,7 @@ def test_scene_with_a_bad_term_is_refused_with_its_pointer():
         ({"kind": "spot", "size": [1, 1]}, "/lights/A/size"),
     ],
 )
-def test_scene_with_a_bad_light_is_refused_with_its_pointer(fields, pointer):
+def test_a_scene_with_an_invalid_light_is_rejected_with_its_pointer(fields, pointer):
     with pytest.raises(ParameterError) as raised:
         default_look(MATERIALS, [Light("A", fields)])
     assert raised.value.name == pointer

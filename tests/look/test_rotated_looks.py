@@ -1,4 +1,4 @@
-"""Looks under light that is turned about an upright line, against the geometry of their lamps."""
+"""Looks with lights rotated about a vertical axis, against the geometry of their lights."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ PANEL = {"kind": "rectangle", "position": [2.0, 3.0, 1.0], "rotation": 25.0, "si
 
 @pytest.mark.parametrize("direction", [[0.3, -1.0, 0.2], [0.0, -1.0, 0.0], [0.0, 2.0, 0.0], [1.0, 0.0, 0.0]], ids=str)
 @pytest.mark.parametrize("degrees", [70.0, 500.0, -30.0])
-def test_a_panel_turns_as_a_whole(default, direction, degrees):
+def test_an_area_light_is_rotated_rigidly(default, direction, degrees):
     document = complete({"lights": {"Sheet": {**PANEL, "direction": direction}}}, default)
     lit, turned = (
         validate(look_document, default) for look_document in (document, rotated_lights(document, degrees, MIDDLE))
@@ -27,7 +27,7 @@ def test_a_panel_turns_as_a_whole(default, direction, degrees):
     assert turned.environment.key.rotation == pytest.approx(degrees % 360)
 
 
-def test_a_sky_alone_turns_further_than_it_was(default):
+def test_an_environment_rotation_is_added(default):
     document = complete({"environment": {"rotation": 350.0}}, default)
     turned = validate(rotated_environment(document, 30.0), default)
     assert turned.environment.rotation == pytest.approx(20)

@@ -1,4 +1,4 @@
-"""Daubechies-4 on bands: PyWavelets' definition, orthonormality, and what keeping few coefficients costs."""
+"""Daubechies-4 on bands: PyWavelets' definition, orthonormality, and the error of few coefficients."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def rng():
 
 
 @pytest.mark.parametrize("num_bands", SIZES)
-def test_order_of_coefficients_is_that_of_wavedec(num_bands, rng):
+def test_the_order_of_coefficients_equals_wavedec(num_bands, rng):
     x = rng.normal(size=(3, num_bands))
     level = pywt.dwt_max_level(num_bands, pywt.Wavelet("db2").dec_len)
     expected = np.concatenate(pywt.wavedec(x, "db2", mode="periodization", level=level, axis=-1), axis=-1)
@@ -64,7 +64,7 @@ def test_transport_and_curve_may_both_be_transformed(rng):
     ("model", "params"),
     [("cook_torrance", {"sigma": 0.2}), ("blinn_phong", {"exponent": 100}), ("ggx", {"roughness": 0.5})],
 )
-def test_error_falls_with_kept_coefficients_and_is_small_at_thirty(model, params):
+def test_the_error_falls_with_coefficients_and_is_small_at_thirty(model, params):
     curve = generated_bands({"model": model, "params": params}, TERMS[model].curve("theta_h"))[0]
     coefficients = daubechies.analysis(curve)
     order = np.argsort(-np.abs(coefficients))
@@ -79,7 +79,7 @@ def test_error_falls_with_kept_coefficients_and_is_small_at_thirty(model, params
 
 
 @pytest.mark.parametrize("num_bands", [0, 1, 2, 3, 6, 100])
-def test_bands_that_cannot_be_halved_are_refused(num_bands):
+def test_numbers_of_bands_that_cannot_be_halved_are_rejected(num_bands):
     for transform in (daubechies.analysis, daubechies.synthesis):
         with pytest.raises(ShapeMismatchError, match="power of two"):
             transform(np.zeros(num_bands))

@@ -1,4 +1,4 @@
-"""The Haar transform over cells against its matrix."""
+"""The Haar transform against its matrix."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from relume.math.haar import coefficient_levels, haar, padded_length
 
 
 def matrix(length):
-    """Row j: level l and place in the numbering of `haar`, written out."""
+    """Row j: level l and position in the numbering of `haar`, written out."""
     rows = np.zeros((length, length))
     rows[0] = length**-0.5
     for j in range(1, length):

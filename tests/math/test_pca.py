@@ -22,10 +22,10 @@ def lobes(values):
     return np.array([curve_at_value(BLINN_PHONG, curve, {"exponent": value}) for value in values])
 
 
-def test_vectors_are_orthonormal_and_all_of_them_give_the_curves_back():
+def test_vectors_are_orthonormal_and_reconstruct_the_curves():
     curves = lobes(slider_values(EXPONENT, 40))
     components = decompose(curves)
-    # forty curves about their mean span no more than 39 dimensions; the last vector belongs to none
+    # forty curves minus their mean span at most 39 dimensions; the last vector is arbitrary
     gram = components.vectors @ components.vectors.T
     np.testing.assert_allclose(gram, np.eye(40), atol=1e-12)
     np.testing.assert_allclose(components.mean, curves.mean(axis=0))
@@ -45,7 +45,7 @@ def test_no_other_vectors_of_that_number_are_better():
 
 
 def test_figure_5_of_nguyen_2010():
-    """Blinn-Phong on [3, 300], exponents evenly spaced; RMS over bands and exponents relative to the curves' own."""
+    """Blinn-Phong on [3, 300], exponents evenly spaced; RMS over bands and exponents, relative to the curves."""
     components = decompose(lobes(slider_values(EXPONENT, 298)))
     exact = lobes(slider_values(EXPONENT, 297, at_midpoints=True))
     errors = {}
@@ -68,7 +68,7 @@ def test_slider_runs_through_its_range():
     np.testing.assert_allclose(slider_values(EXPONENT, 2, at_midpoints=True), [77.25, 225.75])
 
 
-def test_bands_along_a_slider_are_those_of_a_look():
+def test_bands_along_a_slider_equal_those_of_a_look():
     for term in TERMS.values():
         for parameter in term.parameters:
             for curve in curves_of_parameter(term, parameter.name):

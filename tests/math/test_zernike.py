@@ -1,4 +1,4 @@
-"""The in-basis: orthonormal over the hemisphere, nested, and the kernel that sums light in it."""
+"""The hemispherical basis: orthonormal, nested, and the kernel for incident radiance coefficients."""
 
 import numba as nb
 import numpy as np
@@ -14,7 +14,7 @@ from relume.transport.incident_coefficients import F64, incident_coefficients
 
 
 def incident_coefficients_numpy(points: SurfacePoints, visible: NDArray[np.uint8], lights: TriangleLights) -> F64:
-    """Do as `incident_coefficients` for light triangles alone, in plain NumPy: its oracle.
+    """Reference of `incident_coefficients` for light triangles only, in plain NumPy.
 
     Args:
         points, visible, lights: as there.
@@ -31,7 +31,7 @@ def incident_coefficients_numpy(points: SurfacePoints, visible: NDArray[np.uint8
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def evaluate_basis_along(table, x, y, out):  # type: ignore[no-untyped-def]
-    """Evaluate all functions in one direction; rows of one ray would be written and read at every rung.
+    """Evaluate all functions in one direction; rows of one ray would be written and read at every index.
 
     Args:
         table: the `recurrence`. x, y: of the direction, local, unit. out: written. (K,) float32
@@ -54,13 +54,13 @@ def evaluate_basis_along(table, x, y, out):  # type: ignore[no-untyped-def]
 
 def test_functions_are_orthonormal_under_the_cosine():
     wi, weight = hemisphere()
-    assert weight.sum() == pytest.approx(np.pi)  # of a white sky
+    assert weight.sum() == pytest.approx(np.pi)  # of a white environment
     functions = project(wi)
     np.testing.assert_allclose(np.einsum("nk,nl,n->kl", functions, functions, weight), np.eye(NUM_FUNCTIONS), atol=1e-6)
 
 
-def test_functions_of_a_degree_are_polynomials_of_it_and_come_after_all_lower_ones():
-    """So a prefix of them is the basis of a lower degree: x^a y^b lies in it where a + b is not higher."""
+def test_functions_are_sorted_by_polynomial_degree():
+    """A prefix of the functions is the basis of a lower degree: x^a y^b lies in it if a + b is at most that degree."""
     wi, weight = hemisphere()
     functions = project(wi)
     for degree in range(DEGREE + 1):
@@ -70,11 +70,11 @@ def test_functions_of_a_degree_are_polynomials_of_it_and_come_after_all_lower_on
         assert np.abs(share[num_functions(degree - 1) :]).max() > 1e-3
 
 
-def test_nothing_arrives_from_below():
+def test_light_below_the_horizon_contributes_nothing():
     assert not project(np.array([[0.0, 0.6, -0.8], [0, 0, -1]])).any()
 
 
-def test_every_function_stands_on_one_rung():
+def test_every_function_has_one_table_entry():
     table = recurrence()
     places = [*table.cosine, *table.sine[table.order > 0]]
     assert sorted(places) == list(range(NUM_FUNCTIONS))
@@ -82,7 +82,7 @@ def test_every_function_stands_on_one_rung():
 
 @pytest.fixture
 def scattered():
-    """Points that look anywhere, lights anywhere, more than are summed at once, and bits at random."""
+    """Points and lights in random directions, more than one batch, with random bits."""
     rng = np.random.default_rng(5)
     normal, direction = (rng.normal(size=(num, 3)).astype(np.float32) for num in (40, 300))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -92,7 +92,7 @@ def scattered():
     return points, rng.integers(0, 256, (40, 38), dtype=np.uint8), lights
 
 
-def test_light_vectors_are_those_of_the_oracle(scattered):
+def test_incident_coefficients_equal_their_reference(scattered):
     points, visible, lights = scattered
     actual, expected = (
         incident_coefficients(points, visible, lights, ()),
@@ -101,7 +101,7 @@ def test_light_vectors_are_those_of_the_oracle(scattered):
     assert np.abs(actual - expected).max() < 1e-5 * np.abs(expected).max()
 
 
-def test_the_first_number_is_the_irradiance(scattered):
+def test_the_first_coefficient_is_the_irradiance(scattered):
     points, visible, lights = scattered
     cosine = np.maximum(points.normal.astype(np.float64) @ lights.direction.astype(np.float64).T, 0)
     is_visible = np.unpackbits(visible, axis=1, count=300, bitorder="little")
@@ -111,7 +111,7 @@ def test_the_first_number_is_the_irradiance(scattered):
     )
 
 
-def test_functions_along_one_direction_are_all_functions():
+def test_functions_in_one_direction_equal_all_functions():
     wi, _ = hemisphere(6, 8)
 
     @nb.njit

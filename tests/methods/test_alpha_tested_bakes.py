@@ -1,4 +1,4 @@
-"""Bakes of scenes with holes: what is opened later sees through them as the bake did, and so do pictures."""
+"""Bakes of alpha-tested surfaces: opened bakes and pictures see through them like the bake."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ POINT_LIGHT = LightGeometry("point", (0.2, 1.8, 0.5))
 
 
 def bars():
-    """Opacity of eight upright bars, as wide as what is between them."""
+    """Opacity of eight vertical bars, as wide as their gaps."""
     return np.tile(np.repeat(np.uint8([0, 255]), 4), (4, 8))
 
 
@@ -54,7 +54,7 @@ def direct(scene, tmp_path_factory):
     return opened(scene, "direct", tmp_path_factory.mktemp("direct"))
 
 
-def test_lamps_of_an_opened_bake_shine_through(scene, direct):
+def test_local_lights_of_an_opened_bake_pass_through_holes(scene, direct):
     x, z = np.random.default_rng(1).uniform(-1, 1, (2, 2000))
     points = make_surface_points(np.stack([x, np.full_like(x, 1e-3), z], axis=1), np.tile([0, 1, 0], (2000, 1)))
     geometry = build_scene_buffers(scene)
@@ -68,7 +68,7 @@ def test_lamps_of_an_opened_bake_shine_through(scene, direct):
 
 
 @pytest.mark.parametrize("method", ["direct", "gather"])
-def test_pictures_agree_with_brute_force(scene, method, tmp_path):
+def test_pictures_of_alpha_tested_surfaces_equal_the_reference(scene, method, tmp_path):
     bake = opened(scene, method, tmp_path)
     look = make_look(bake)
     wanted = reference_image(
@@ -81,7 +81,7 @@ def test_pictures_agree_with_brute_force(scene, method, tmp_path):
     assert relative_rmse(picture, reference_image(without, "front", look, (48, 36), 0)) > 0.15
 
 
-def test_a_moving_eye_sees_through_and_shaders_are_told(scene, tmp_path):
+def test_a_free_camera_and_the_browser_use_alpha_testing(scene, tmp_path):
     bake = opened(scene, "probes", tmp_path)
     holes = bake.embree.alpha_test
     assert holes is not None
@@ -92,7 +92,7 @@ def test_a_moving_eye_sees_through_and_shaders_are_told(scene, tmp_path):
     assert relative_rmse(render_image(bake, "front", look), wanted) < 0.2
 
 
-def test_bakes_of_whole_surfaces_hold_nothing_of_holes(scene, tmp_path):
+def test_bakes_of_opaque_surfaces_store_no_opacity(scene, tmp_path):
     whole = [Material(material.name, material.terms) for material in scene.materials]
     without = make_tiny_scene(*scene.meshes, camera=scene.cameras[0], environment=studio(), materials=whole)
     bake = opened(without, "probes", tmp_path)

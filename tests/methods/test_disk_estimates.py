@@ -1,4 +1,4 @@
-"""Disk that plans ask for: what a bake takes and not much more, and less than a scene of glass could take at most."""
+"""Planned disk space: near the real size of a bake, and less than the upper bound of scenes with glass."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ Usage = namedtuple("Usage", "total used free")
 
 
 def glasses():
-    """A ball and a pane of tinted glass over a floor."""
+    """A ball and a sheet of tinted glass over a floor."""
     floor = quad("floor", [[-3, -1, 3], [3, -1, 3], [3, -1, -3], [-3, -1, -3]], 0)
     pane = quad("pane", [[0.1, -0.5, 0], [1.3, -0.5, 0], [1.3, 0.7, 0], [0.1, 0.7, 0]], 2)
     clear = {"model": "ggx", "color": [1, 1, 1], "params": {"roughness": 0.1, "f0": [0.04] * 3}}
@@ -47,7 +47,7 @@ def glasses():
 
 
 @pytest.fixture(autouse=True)
-def nothing_was_tried(monkeypatch):
+def no_cached_trials(monkeypatch):
     monkeypatch.setattr(memories._AssetCache, "cache", Cache(1 << 20))
 
 
@@ -67,7 +67,7 @@ def planned(scene, recipe):
     ],
     ids=["direct", "many lights", "gather"],
 )
-def test_fixed_views_take_a_third_of_their_plan_at_least_and_never_more(make, recipe, tmp_path):
+def test_fixed_views_take_between_a_third_and_all_of_their_plan(make, recipe, tmp_path):
     scene = make()
     plan, taken = (
         planned(scene, recipe),
@@ -79,7 +79,7 @@ def test_fixed_views_take_a_third_of_their_plan_at_least_and_never_more(make, re
 
 @pytest.mark.slow
 @pytest.mark.parametrize("make", [glasses, lambda: cornell_box("sky")], ids=["glass", "box"])
-def test_so_do_points_of_the_free_camera(make, tmp_path, unmeasured):
+def test_free_camera_probes_take_between_a_third_and_all_of_their_plan(make, tmp_path, unmeasured):
     scene, recipe = make(), Recipe("probes", ("front",), (64, 48), 300, num_probes=30_000)
     plan, taken = (
         planned(scene, recipe),
@@ -88,7 +88,7 @@ def test_so_do_points_of_the_free_camera(make, tmp_path, unmeasured):
     assert taken <= plan.planned_bytes <= 3 * taken
 
 
-def test_a_scene_of_glass_is_baked_where_its_bound_does_not_fit(tmp_path, monkeypatch):
+def test_a_glass_scene_is_baked_although_its_bound_does_not_fit(tmp_path, monkeypatch):
     recipe = Recipe("gather", ("front",), (160, 120), 60)
     plan = planned(glasses(), recipe)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(1 << 40, 0, 371_000_000))
@@ -98,7 +98,7 @@ def test_a_scene_of_glass_is_baked_where_its_bound_does_not_fit(tmp_path, monkey
         check_budget(replace(plan, disk_bytes=0), tmp_path, 0)
 
 
-def test_a_plan_that_is_asked_for_again_tries_nothing(monkeypatch):
+def test_a_repeated_plan_runs_no_trials(monkeypatch):
     scene, recipe = glasses(), Recipe("direct", ("front",), (240, 180), 300)
     first = planned(scene, recipe)
     monkeypatch.setattr(disk, "bake_in_process", lambda *_: pytest.fail("baked again"))
@@ -107,21 +107,21 @@ def test_a_plan_that_is_asked_for_again_tries_nothing(monkeypatch):
     assert larger.planned_bytes > 3 * first.planned_bytes
 
 
-def test_small_bounds_are_plans_and_so_are_those_where_nothing_can_be_tried(monkeypatch):
+def test_bounds_are_plans_if_they_are_small_or_trials_fail(monkeypatch):
     scene, small = glasses(), Recipe("direct", ("front",), (64, 48), 100)
     monkeypatch.setattr(disk, "bake_in_process", lambda *_: pytest.fail("tried"))
     assert planned(scene, small).planned_bytes == METHODS["direct"].plan(scene, small).store_bytes
 
-    def no_room(*_):
+    def disk_full(*_):
         raise OSError("no room")
 
-    monkeypatch.setattr(disk, "bake_in_process", no_room)
+    monkeypatch.setattr(disk, "bake_in_process", disk_full)
     large = replace(small, size=(240, 180))
     assert planned(scene, large).planned_bytes == METHODS["direct"].plan(scene, large).store_bytes
 
 
 def test_a_store_stops_growing_before_the_disk_is_full(tmp_path, monkeypatch):
-    """By arrays as by files of a task, whatever was planned."""
+    """For arrays and for files of tasks, whatever was planned."""
     store, file = create_store(tmp_path / "s.zarr", {}), scratch_file(tmp_path)
     rows = np.zeros((1 << 18, 8), np.uint8)
     store.write_whole("some", rows)

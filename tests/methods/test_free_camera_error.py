@@ -1,4 +1,4 @@
-"""What a bake says that its moving pictures are off by, against whole pictures."""
+"""The measured free-camera error of a bake, against whole images."""
 
 import numpy as np
 from session_edits import relative_rmse
@@ -21,7 +21,7 @@ def baked(scene, folder, num_points):
     return open_bake(bake_in_process(METHODS["probes"], scene, recipe, folder / f"{num_points}.zarr"), Cache(1 << 30))
 
 
-def off_in_a_whole_picture(transfer, scene):
+def error_of_a_whole_image(transfer, scene):
     look, view = looks.validate(transfer.default_look, transfer.default_look), transfer.views["front"]
     moving = FreeCameraPicture(transfer, "front")
     moving.set_look(look)
@@ -31,17 +31,17 @@ def off_in_a_whole_picture(transfer, scene):
     return relative_rmse(moving.image(), exact)
 
 
-def test_a_bake_knows_what_its_pictures_are_off_by(corner, tmp_path):
+def test_a_bake_stores_the_error_of_its_images(corner, tmp_path):
     few, many = (baked(corner, tmp_path, num) for num in (80, 1500))
     for transfer in (few, many):
         error = transfer.free_camera_error
         assert 0 < error.standard_error < 0.5 * error.value
-        # a small picture errs along edges, besides
-        assert 0.7 * error.value < off_in_a_whole_picture(transfer, corner) < 2 * error.value
+        # a small image also has errors along edges
+        assert 0.7 * error.value < error_of_a_whole_image(transfer, corner) < 2 * error.value
     assert few.free_camera_error.value > 1.5 * many.free_camera_error.value
 
 
-def test_what_is_dark_is_off_by_nothing_that_is_known(corner, tmp_path):
+def test_the_error_of_a_black_scene_is_unknown(corner, tmp_path):
     dark = make_tiny_scene(
         *corner.meshes,
         camera=corner.cameras[0],

@@ -1,4 +1,4 @@
-"""Reflected light in pictures: its kernel against plain NumPy, its pictures against path tracing and against bakes."""
+"""Indirect light in pictures: the kernel against plain NumPy, pictures against path tracing and against bakes."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def lights():
 
 
 @pytest.fixture(scope="module")
-def cells(lights):
+def patches(lights):
     rng = np.random.default_rng(4)
     normal = ref.unit(rng.normal(size=(NUM_CELLS, 4, 3))).astype(np.float32)
     visible = rng.integers(0, 256, (NUM_CELLS, 4, (lights.num_lights + 7) // 8)).astype(np.uint8)
@@ -77,16 +77,16 @@ def cells(lights):
     )
 
 
-def sent_by_cells(cells, lights, first=1, last=24, reflectances=REFLECTANCES):
-    reflecting = cells.reflectance_operator(reflectances)
-    vectors = cells.incident_coefficients(reflecting.rows, lights, OUTGOING_DEGREE)
+def outgoing_from_patches(patches, lights, first=1, last=24, reflectances=REFLECTANCES):
+    reflecting = patches.reflectance_operator(reflectances)
+    vectors = patches.incident_coefficients(reflecting.rows, lights, OUTGOING_DEGREE)
     return solve_indirect(
-        cells, reflecting, IncidentLight(cells.irradiance(lights), vectors), first, last
-    ).outgoing_light(cells)
+        patches, reflecting, IncidentLight(patches.irradiance(lights), vectors), first, last
+    ).outgoing_light(patches)
 
 
-def by_square(sent):
-    """All that is sent, in every direction that is told apart. (cells, squares, 3)"""
+def radiance_by_bin(sent):
+    """All outgoing radiance in every direction bin. (patches, bins, 3)"""
     radiance = np.repeat(sent.isotropic[:NUM_CELLS, None].astype(float), SIDE * SIDE, axis=1)
     has = sent.lobe[:NUM_CELLS] >= 0
     radiance[has] += (sent.scale[:, None] * sent.table)[sent.lobe[:NUM_CELLS][has]]
@@ -94,8 +94,8 @@ def by_square(sent):
 
 
 @pytest.fixture(scope="module")
-def receivers(cells, lights):
-    """Points in the dark but for reflected light; a tenth of the rays finds nothing."""
+def receivers(patches, lights):
+    """Points with indirect light only; a tenth of the rays hits nothing."""
     rng = np.random.default_rng(5)
     dark = ref.make_random_receivers(30, lights.num_lights, seed=6)
     pattern = make_pattern(20, 13, 7)
@@ -106,7 +106,7 @@ def receivers(cells, lights):
             below = local_ray(pattern, ray, lattice_offsets(pattern, 50 + p), *wo.astype(np.float32))[2] <= 0
             if below or rng.random() < 0.1:
                 links[p, ray] = NO_PATCH
-    rays = GatherRays(links, pattern, sent_by_cells(cells, lights))
+    rays = GatherRays(links, pattern, outgoing_from_patches(patches, lights))
     points = dark.points._replace(seed=np.arange(50, 80, dtype=np.uint32))
     return ShadingPoints(points, dark.wo, np.zeros_like(dark.visible), (rays,))
 
@@ -148,8 +148,8 @@ def image_numpy(model, bands, receivers):
     return out
 
 
-def test_rays_are_summed_where_a_term_knows_no_direction(lights, receivers):
-    """Nothing is listed then; a surface that is seen from behind sends nothing."""
+def test_rays_of_view_independent_terms_are_summed(lights, receivers):
+    """Nothing is listed; a surface seen from behind reflects nothing."""
     bands = {"theta_i": np.full((3, 64), [[0.5], [1.0], [0.25]])}
     behind = replace(receivers, wo=np.where(np.arange(30)[:, None] < 3, -receivers.wo, receivers.wo))
     expected = image_numpy("lambert", bands, behind)
@@ -160,7 +160,7 @@ def test_rays_are_summed_where_a_term_knows_no_direction(lights, receivers):
 
 
 @pytest.mark.parametrize("model", list(ANALYTIC))
-def test_rays_are_added_as_plain_numpy_adds_them(model, lights, receivers):
+def test_gathered_radiance_equals_plain_numpy(model, lights, receivers):
     bands = bands_of(model)
     expected = image_numpy(model, bands, receivers)
     actual = image(model, bands, None, lights, receivers)
@@ -170,13 +170,13 @@ def test_rays_are_added_as_plain_numpy_adds_them(model, lights, receivers):
 
 
 @pytest.mark.parametrize(("model", "curve"), CURVES)
-def test_any_curve_may_be_the_free_one(model, curve, lights, receivers):
+def test_any_curve_of_gathered_light_can_be_free(model, curve, lights, receivers):
     bands = bands_of(model)
     none = image(model, bands, None, lights, receivers)
     np.testing.assert_allclose(image(model, bands, curve, lights, receivers), none, rtol=1e-4, atol=2e-6 * none.max())
 
 
-def test_several_settings_at_once_are_those_one_by_one(lights, receivers):
+def test_several_settings_equal_single_ones(lights, receivers):
     bands = bands_of("cook_torrance")
     name = TERMS["cook_torrance"].curves[0].name
     several = np.stack([bands[name] * k for k in (1.0, 2.0, 0.5)], axis=1)
@@ -187,7 +187,7 @@ def test_several_settings_at_once_are_those_one_by_one(lights, receivers):
         np.testing.assert_allclose(together[:, k], alone, rtol=1e-4, atol=1e-6 * alone.max())
 
 
-def test_reflected_light_adds_to_the_lights_own(lights, receivers):
+def test_indirect_light_adds_to_direct_light(lights, receivers):
     lit = ref.only_above(ref.make_random_receivers(30, lights.num_lights, seed=6), lights)
     direct_and_indirect = replace(receivers, visible=lit.visible)
     bands = bands_of("blinn_phong")
@@ -195,29 +195,32 @@ def test_reflected_light_adds_to_the_lights_own(lights, receivers):
     np.testing.assert_allclose(image("blinn_phong", bands, None, lights, direct_and_indirect), sum(parts), rtol=1e-5)
 
 
-def test_black_surfaces_reflect_nothing_and_number_of_bounces_counts(cells, lights):
-    black = sent_by_cells(cells, lights, 1, 5, (BLACK, BLACK))
-    assert not by_square(black).any()
-    by_bounces = [by_square(sent_by_cells(cells, lights, 1, n)).sum() for n in (1, 2, 3, 25, 26)]
+def test_black_surfaces_reflect_nothing_and_bounces_are_counted(patches, lights):
+    black = outgoing_from_patches(patches, lights, 1, 5, (BLACK, BLACK))
+    assert not radiance_by_bin(black).any()
+    by_bounces = [radiance_by_bin(outgoing_from_patches(patches, lights, 1, n)).sum() for n in (1, 2, 3, 25, 26)]
     assert by_bounces[0] < by_bounces[1] < by_bounces[2] < by_bounces[3]
     assert by_bounces[4] == pytest.approx(by_bounces[3], rel=1e-4)
 
 
-def test_first_and_further_reflections_are_all_of_them(cells, lights):
-    for split in (1, 2, 3):  # directions are kept for some of them
-        parts = [by_square(sent_by_cells(cells, lights, *which)) for which in ((1, split), (split + 1, 6), (1, 6))]
+def test_first_and_further_bounces_sum_to_all(patches, lights):
+    for split in (1, 2, 3):  # some of them have direction bins
+        parts = [
+            radiance_by_bin(outgoing_from_patches(patches, lights, *which))
+            for which in ((1, split), (split + 1, 6), (1, 6))
+        ]
         np.testing.assert_allclose(parts[0] + parts[1], parts[2], rtol=1e-3, atol=1e-4 * parts[2].max())
         assert np.all(parts[1].sum(axis=(0, 1)) > 0)
 
 
-def test_reflectance_takes_each_texture_where_a_term_names_it(cells):
-    reflectance_map = cells.reflectance_operator(REFLECTANCES)
+def test_reflectance_uses_the_texture_of_each_term(patches):
+    reflectance_map = patches.reflectance_operator(REFLECTANCES)
     unpacked = [unpack_reflectance(of_material)[..., 0] for of_material in REFLECTANCES]
     expected = np.where(
-        cells.material[:, None] == 0, unpacked[0][0], unpacked[1][0] + unpacked[1][1] * cells.textures[0]
+        patches.material[:, None] == 0, unpacked[0][0], unpacked[1][0] + unpacked[1][1] * patches.textures[0]
     )
     np.testing.assert_allclose(reflectance_map.reflectance, np.minimum(expected, 1), rtol=1e-5)
-    np.testing.assert_array_equal(reflectance_map.rows, np.flatnonzero(cells.material == 1))
+    np.testing.assert_array_equal(reflectance_map.rows, np.flatnonzero(patches.material == 1))
 
 
 def test_reflectance_of_diffuse_terms():
@@ -228,19 +231,19 @@ def test_reflectance_of_diffuse_terms():
 
 
 def test_reflectance_of_highlights():
-    """Of a cosine lobe cos^s in θh it is known; a mirror of any width reflects all where its Fresnel curve does."""
+    """Known for a cosine lobe cos^s in θh; a mirror of any width reflects its Fresnel curve."""
     plain = {"color": [1.0, 0.5, 0.0], "texture": None, "curves": {}}
     for exponent in (5.0, 400.0, 20_000.0):
         blinn = {**plain, "model": "blinn_phong", "params": {"exponent": exponent}}
-        np.testing.assert_allclose(reflectance(blinn), _by_drawing(blinn), rtol=0.02)
+        np.testing.assert_allclose(reflectance(blinn), _by_sampling(blinn), rtol=0.02)
     lambert = {**plain, "model": "lambert", "params": {}}
     combined = unpack_reflectance(pack_reflectance([lambert, {**blinn, "texture": "specular"}]))[..., 0]
     np.testing.assert_allclose(combined[0], [1.0, 0.5, 0.0], rtol=1e-6)
     np.testing.assert_allclose(combined[2], reflectance(blinn), atol=0.5 / 128)
 
 
-def _by_drawing(document):
-    """The same by Monte Carlo: ωi drawn by the term's own lobe."""
+def _by_sampling(document):
+    """The same by Monte Carlo: ωi sampled from the term's own lobe."""
     rng = np.random.default_rng(3)
     r, phi = np.sqrt(rng.random(4000)), 2 * np.pi * rng.random(4000)
     wo = np.stack([r * np.cos(phi), r * np.sin(phi), np.sqrt(1 - r * r)], axis=-1)
@@ -256,7 +259,7 @@ def default_look(transfer):
 
 
 def against_paths(scene, transfer, index, every, spp):
-    """Light that surfaces have reflected onto samples of a material, and by path tracing with its variance. (n, 3)"""
+    """Indirect light at samples of a material, and by path tracing with its variance. (n, 3)"""
     view, look, name = transfer.views["front"], default_look(transfer), transfer.material_names[index]
     reflected = transfer.outgoing_patch_light(illumination_from_look(look, transfer.material_names, has_bounces=True))
     rows, lit = view.rows(index), view.receivers(index, reflected)
@@ -280,8 +283,8 @@ def against_paths(scene, transfer, index, every, spp):
     return radiance[rows_compared], reference.mean[0], reference.variance[0], position[rows_compared]
 
 
-def test_gathered_light_is_that_of_path_tracing(corner, gathered):
-    """Some hundred points: their mean by a percent, each within the noise of paths and rays."""
+def test_gathered_light_equals_path_tracing(corner, gathered):
+    """A few hundred points: their mean within 1 %, each within the noise of paths and rays."""
     parts = [against_paths(corner, gathered, index, 12, 24)[:3] for index in range(len(gathered.material_names))]
     reference, gathered_light, variance = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     deviation = np.sqrt(variance.sum(axis=0)) / len(reference)  # of the mean
@@ -293,8 +296,8 @@ def test_gathered_light_is_that_of_path_tracing(corner, gathered):
     assert np.sqrt(max(0.0, square - noise) / (gathered_light**2).mean()) < 0.12
 
 
-def test_a_metal_floor_throws_light_where_it_goes(tmp_path):
-    """A sun low in the west over rough metal: the eastern wall gets almost twice what the northern one gets."""
+def test_a_metal_floor_reflects_light_in_the_right_direction(tmp_path):
+    """A low western sun over rough metal: the eastern wall gets almost twice the light of the northern one."""
     radiance = np.full((32, 64, 3), 0.02, np.float32)
     sun = ref.unit(np.array([-0.75, 0.66, 0.0]))
     radiance[texel_directions(32, 64) @ sun > 0.95] = 20.0
@@ -308,21 +311,19 @@ def test_a_metal_floor_throws_light_where_it_goes(tmp_path):
         floor, east, north, camera=camera, environment=radiance, materials=[white, Material("Metal", [rough])]
     )
     transfer = bake_corner_scene(scene, "gather", tmp_path)
-    reference, expected, variance, position = against_paths(
-        scene, transfer, 0, 1, 64
-    )  # its noise is that of the 48 paths
+    reference, expected, variance, position = against_paths(scene, transfer, 0, 1, 64)  # with the noise of 48 paths
     means = []
     for wall in (position[:, 0] > 0.99, position[:, 2] < -0.99):
         mean, expected_mean = reference[wall].mean(), expected[wall].mean()
-        deviation = np.sqrt(variance[wall].sum(axis=0)).mean() / wall.sum()  # channels have the same paths
+        deviation = np.sqrt(variance[wall].sum(axis=0)).mean() / wall.sum()  # channels share paths
         assert abs(mean - expected_mean) < 0.04 * expected_mean + 3 * deviation
         assert deviation < 0.03 * expected_mean
         means.append(expected_mean)
     assert means[0] > 1.5 * means[1]
 
 
-def test_colours_of_the_look_are_those_of_a_bake_with_them(corner, gathered, tmp_path):
-    """The wall made green in the editor: what it throws onto the floor is what a bake of a green wall gives."""
+def test_colors_of_a_look_equal_a_bake_with_these_colors(corner, gathered, tmp_path):
+    """The wall made green in the look: its light on the floor equals that of a bake with a green wall."""
 
     def green(document):
         document["materials"]["Red"]["terms"][0]["color"] = [0.1, 0.7, 0.2]
@@ -338,7 +339,7 @@ def test_colours_of_the_look_are_those_of_a_bake_with_them(corner, gathered, tmp
     expected = render_image(green_bake, "front", default_look(green_bake))
     before = render_image(gathered, "front", default_look(gathered))
     assert np.abs(edited - before).mean() > 0.05 * before.mean()
-    # other seeds, other cells: what is compared is the light, not its noise
+    # other seeds and patches: the light is compared, not its noise
     assert np.abs(edited - expected).mean() < 0.02 * expected.mean()
 
 
@@ -347,8 +348,8 @@ def direct(corner, tmp_path_factory):
     return bake_corner_scene(corner, "direct", tmp_path_factory.mktemp("direct"))
 
 
-def test_without_reflection_a_picture_is_the_direct_one(gathered, direct):
-    """All diffuse terms black: what is left has the lights' own light only."""
+def test_without_reflectance_the_picture_has_direct_light_only(gathered, direct):
+    """With all diffuse terms black."""
 
     def black(document):
         for material in document["materials"].values():
@@ -364,7 +365,7 @@ def test_without_reflection_a_picture_is_the_direct_one(gathered, direct):
 
 
 def showing(transfer, show, bounces=24):
-    """The picture of some paths only."""
+    """A picture of some light paths only."""
 
     def change(document):
         document["transport"] = {"show": show, "bounces": bounces}
@@ -372,7 +373,7 @@ def showing(transfer, show, bounces=24):
     return render_uncached(transfer, make_look(transfer, change))
 
 
-def test_pictures_of_some_paths_add_up_to_that_of_all(gathered):
+def test_pictures_of_light_paths_sum_to_the_whole(gathered):
     whole = render_image(gathered, "front", default_look(gathered))
     parts = [showing(gathered, show) for show in ("direct", "first_bounce", "further_bounces")]
     np.testing.assert_allclose(sum(parts), whole, rtol=1e-4, atol=1e-6)
@@ -392,8 +393,8 @@ def test_bounces_are_counted_from_direct_light(gathered, direct):
     np.testing.assert_array_equal(showing(direct, "all", 3), unreflected)
 
 
-def test_what_is_shown_may_change_in_a_session(gathered, monkeypatch):
-    """From reflected light alone, glimpsed before there is any other, to all light."""
+def test_the_displayed_paths_can_change_in_a_session(gathered, monkeypatch):
+    """From indirect light alone, previewed before other light is ready, to all light."""
     monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 300)
     picture = Picture(gathered, "front", Cache(BUDGET))
     for show in ("first_bounce", "all", "direct"):
@@ -414,20 +415,20 @@ def test_what_is_shown_may_change_in_a_session(gathered, monkeypatch):
         np.testing.assert_array_equal(run_until_exact(picture).image(), showing(gathered, show))
 
 
-def test_a_thinned_bake_has_the_same_light(gathered, monkeypatch):
-    """Its samples keep the rays that were traced for them; its neighbours are others."""
+def test_a_downsampled_bake_has_the_same_light(gathered, monkeypatch):
+    """Its samples keep their traced rays; neighbors differ."""
     monkeypatch.setattr("relume.views.view.make_neighbor_filter", lambda *of_samples: None)
     transfer, step = open_transfer(Path(gathered.key), Cache(1 << 30)), 3
     whole = Picture(transfer, "front", Cache(BUDGET))
     few = Picture(transfer.downsampled("front", step), "front", Cache(BUDGET))
-    for picture in (whole, few):  # no look whose images are kept beside the store
+    for picture in (whole, few):  # no look with stored images
         picture.set_look(make_look(transfer, lambda document: document["transport"].update(bounces=5)))
     np.testing.assert_allclose(
         run_until_exact(few).image(), run_until_exact(whole).image()[::step, ::step], rtol=1e-4, atol=1e-6
     )
 
 
-def test_light_that_is_turned_is_glimpsed_with_what_it_reflects(gathered, monkeypatch):
+def test_a_rotation_is_previewed_with_its_indirect_light(gathered, monkeypatch):
     monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 300)
     picture = run_until_exact(Picture(gathered, "front", Cache(BUDGET)))
 

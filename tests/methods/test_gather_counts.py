@@ -1,4 +1,4 @@
-"""Numbers of gather samples and rays that a recipe asks for: kept in the store, counted in the plan, and bounded."""
+"""Requested numbers of patches and gather rays: stored, counted in the plan, and bounded."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def recipe_of(method: str, **asked: int) -> Recipe:
 
 
 @pytest.mark.parametrize("method", GATHERING)
-def test_a_store_has_as_many_as_its_recipe_asks_for(corner, tmp_path: Path, method: str) -> None:
+def test_a_store_has_the_requested_counts(corner, tmp_path: Path, method: str) -> None:
     recipe = recipe_of(method, num_patches=200, gather_rays=100)
     path = bake_in_process(METHODS[method], corner, recipe, tmp_path / "s.zarr")
     store = open_store(path)
@@ -54,7 +54,7 @@ def test_a_store_has_as_many_as_its_recipe_asks_for(corner, tmp_path: Path, meth
 
 
 @pytest.mark.parametrize("method", GATHERING)
-def test_the_plan_counts_what_is_asked_for(corner, method: str) -> None:
+def test_the_plan_uses_the_requested_counts(corner, method: str) -> None:
     plan, recipe = METHODS[method].plan, recipe_of(method, num_patches=1000, gather_rays=100)
     usual = plan(corner, recipe)
     more_rays = plan(corner, replace(recipe, gather_rays=1100))
@@ -68,7 +68,7 @@ def test_the_plan_counts_what_is_asked_for(corner, method: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("method", "asked", "said"),
+    ("method", "asked", "message"),
     [
         *((method, {"num_patches": 63}, "give 64 to") for method in GATHERING),
         *((method, {"gather_rays": bad}, "give 16 to 4,096") for method in GATHERING for bad in (0, 15, 4097, -1)),
@@ -78,12 +78,12 @@ def test_the_plan_counts_what_is_asked_for(corner, method: str) -> None:
         ("direct", {"gather_rays": 100}, "leave them out"),
     ],
 )
-def test_what_no_store_can_have_is_refused(corner, method: str, asked: dict[str, int], said: str) -> None:
-    with pytest.raises(PlanError, match=said):
+def test_invalid_counts_of_a_recipe_are_rejected(corner, method: str, asked: dict[str, int], message: str) -> None:
+    with pytest.raises(PlanError, match=message):
         METHODS[method].plan(corner, recipe_of(method, **asked))
 
 
-def test_recipes_are_read_as_they_were_written_and_older_ones_too() -> None:
+def test_recipes_survive_serialization_and_older_ones_are_read() -> None:
     recipe = recipe_of("gather", num_patches=200, gather_rays=100)
     assert recipe_from_json(recipe_json(recipe)) == recipe
     text = recipe_json(recipe_of("gather")).replace('"gather_rays":null,', "").replace('"num_patches":null,', "")

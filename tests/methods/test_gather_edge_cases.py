@@ -1,4 +1,4 @@
-"""Scenes that leave gather cells nothing to do: baked quickly, shown without a failure, black where no light is."""
+"""Scenes without indirect light: baked quickly, rendered without errors, black where there is no light."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ def test_a_view_of_nothing_shows_the_background(tmp_path):
     assert image.min() > 0
 
 
-def test_an_object_without_a_pixel_can_be_edited(tmp_path):
-    """It stands behind the camera and lights what is seen."""
+def test_an_object_outside_the_view_can_be_edited(tmp_path):
+    """It is behind the camera and lights visible surfaces."""
     behind = sphere("behind", (0, 0, 6), 1.5, 1)
     materials = [Material("Seen", (WHITE,)), Material("Behind", (WHITE,))]
     transfer = transfer_of(make_tiny_scene(TRIANGLE, behind, camera=FRONT, materials=materials), tmp_path)

@@ -1,4 +1,4 @@
-"""Light on cells while a hand moves: found from a small map, and never taken for what is exact."""
+"""Indirect light during edits: computed from a small map, and never used as exact."""
 
 from pathlib import Path
 
@@ -26,8 +26,8 @@ def turned(transfer):
     return light_in(transfer, make_look(transfer, lambda document: document["environment"].update(rotation=77.0)))
 
 
-def seen_of(transfer, light):
-    """What cells send in the end, exactly, as others see it in the mean."""
+def mean_outgoing(transfer, light):
+    """Exact mean outgoing radiance of patches after all bounces."""
     cells, on_cells, paths = transfer.patches, transfer.indirect._direct_light, light.paths
     reflecting = cells.reflectance_operator(light.reflectances)
     incident = on_cells.incident_light(light, reflecting, is_preview=False)
@@ -42,19 +42,19 @@ def one_bounce(document):
     document["transport"].update(bounces=1)
 
 
-def test_what_a_hand_saw_is_not_what_is_exact(store, monkeypatch):
+def test_previewed_light_is_not_reused_as_exact(store, monkeypatch):
     monkeypatch.setattr(transfers, "PREVIEW_WIDTH", 4)
     expected = open_transfer(store, Cache(BUDGET))
     exact = expected.indirect.exact(turned(expected)).isotropic
     again = open_transfer(store, Cache(BUDGET))
     rough = again.indirect.preview(turned(again))
-    assert np.abs(rough - exact).max() > 1e-3 * exact.max()  # the small map is another one
+    assert np.abs(rough - exact).max() > 1e-3 * exact.max()  # the small map differs
     np.testing.assert_array_equal(again.indirect.exact(turned(again)).isotropic, exact)
 
 
 @pytest.mark.parametrize("edit", [blue_wall, one_bounce])
-def test_a_change_goes_where_highlights_send_it(gathered, edit):
-    """Even light of the polished floor would err by 7 and 13 %."""
+def test_a_change_follows_the_direction_of_highlights(gathered, edit):
+    """Isotropic light of the polished floor would be wrong by 7 and 13 %."""
     before, after = (light_in(gathered, make_look(gathered, *edits)) for edits in ((), (edit,)))
-    exact = seen_of(gathered, after) - seen_of(gathered, before)
+    exact = mean_outgoing(gathered, after) - mean_outgoing(gathered, before)
     assert relative_rmse(gathered.indirect.preview_delta(before, after), exact) < 0.02

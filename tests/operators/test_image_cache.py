@@ -1,4 +1,4 @@
-"""Images kept beside a store: found by whoever wants the same, forgotten where they grow too large, never trusted."""
+"""Images stored with a bake: found by every user of the same image, evicted by age, always verified."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def refuse():
     raise AssertionError("it is made again")
 
 
-def test_images_used_longest_ago_are_forgotten(tmp_path):
+def test_least_recently_used_images_are_deleted(tmp_path):
     images, folder = ImageFiles(tmp_path, CODE, 2 * FILE_BYTES), tmp_path / CODE
     folder.mkdir()
     for second, key in enumerate(("a", "b")):
@@ -39,7 +39,7 @@ def test_images_used_longest_ago_are_forgotten(tmp_path):
         images.get(key, SHAPE, lambda key=key: shaded(ord(key)))
         (path,) = set(folder.iterdir()) - files
         os.utime(path, (second, second))
-    assert images.get("a", SHAPE, refuse).image[0, 0, 0] == ord("a")  # and so it is the newest
+    assert images.get("a", SHAPE, refuse).image[0, 0, 0] == ord("a")  # now the most recently used
     images.get("c", SHAPE, lambda: shaded(ord("c")))
     assert len(list(folder.glob("*.npy"))) == 2
     images.get("a", SHAPE, refuse)
@@ -47,7 +47,7 @@ def test_images_used_longest_ago_are_forgotten(tmp_path):
         images.get("b", SHAPE, refuse)
 
 
-def test_a_damaged_image_is_made_again(tmp_path):
+def test_a_damaged_image_is_computed_again(tmp_path):
     images = ImageFiles(tmp_path, CODE)
     images.get("a", SHAPE, lambda: shaded(1))
     (path,) = (tmp_path / CODE).iterdir()
@@ -56,7 +56,7 @@ def test_a_damaged_image_is_made_again(tmp_path):
     assert images.get("a", SHAPE, refuse).image.max() == 2
 
 
-def test_what_other_code_made_is_never_found_and_goes_when_this_code_keeps_its_first(tmp_path):
+def test_images_of_other_code_are_ignored_and_deleted_with_the_first_write(tmp_path):
     (tmp_path / "of_no_code.npy").write_bytes(b"kept before images were named by code")
     before, after = ImageFiles(tmp_path, OTHER), ImageFiles(tmp_path, CODE)
     before.get("a", SHAPE, lambda: shaded(1))
@@ -67,7 +67,7 @@ def test_what_other_code_made_is_never_found_and_goes_when_this_code_keeps_its_f
     assert after.get("a", SHAPE, refuse).image.max() == 2
 
 
-def test_after_an_upgrade_an_image_is_made_anew(baked, tmp_path, monkeypatch):
+def test_after_an_upgrade_images_are_computed_again(baked, tmp_path, monkeypatch):
     store = shutil.copytree(baked, tmp_path / "store.zarr", ignore=shutil.ignore_patterns(*DERIVED_FOLDERS))
     made, finished = [], Shade._complete_image
 
@@ -86,7 +86,7 @@ def test_after_an_upgrade_an_image_is_made_anew(baked, tmp_path, monkeypatch):
     assert len(made) == 2 * num_images
 
 
-def test_the_image_of_an_edited_look_is_there_after_a_restart(transfer, monkeypatch):
+def test_the_image_of_an_edited_look_survives_a_restart(transfer, monkeypatch):
     look = make_look(transfer, set_sigma(0.23456))
     before = open_exact_picture(transfer, look=look).image()
     monkeypatch.setattr(Shade, "_complete_image", lambda *args: refuse())

@@ -1,4 +1,4 @@
-"""Rows against the projector, whose image of the same light is exact, and their kernels against plain NumPy."""
+"""Transport rows against the projector, whose image of the same light is exact, and their kernels against NumPy."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ NONE = tessellate_environment(np.ones((8, 16, 3), np.float32), 40).empty()
 
 @pytest.fixture(scope="module")
 def receivers():
-    """Points that see cells by neighbourhoods, so that their rows are smooth; a tenth of the rays finds nothing."""
+    """Points that hit neighboring patches, so that their rows are smooth; a tenth of the rays hits nothing."""
     rng = np.random.default_rng(5)
     dark = ref.make_random_receivers(NUM_POINTS, 8, seed=6)
     middle = np.linspace(0, NUM_CELLS, NUM_POINTS)[:, None]
@@ -44,7 +44,7 @@ def receivers():
 
 
 def light(seed):
-    """Of cells: smooth but for a step."""
+    """Radiance of patches: smooth with one step."""
     at = np.arange(NUM_CELLS)[:, None] / NUM_CELLS
     phase = np.random.default_rng(seed).random((2, 3))
     radiance = np.zeros((NO_PATCH + 1, 3), np.float32)
@@ -72,8 +72,8 @@ def image_by_rows(term, bands, receivers, radiance):
 
 
 @pytest.mark.parametrize("times", [1, 3])
-def test_rows_are_shared_as_rays_are(receivers, times):
-    """Samples take part in each other's image with the weights that the exact image has."""
+def test_rows_are_filtered_like_rays(receivers, times):
+    """Samples contribute to each other's image with the weights of the exact image."""
     rng = np.random.default_rng(8)
     weights = csr_array(rng.random((NUM_POINTS,) * 2) * (rng.random((NUM_POINTS,) * 2) < 0.02) + np.eye(NUM_POINTS))
     (rays,) = receivers.rays
@@ -91,8 +91,8 @@ def freeze(term, bands, receivers, is_canceled=lambda: False):
 
 
 @pytest.mark.parametrize("model", list(ANALYTIC))
-def test_all_rows_are_the_projector(model, receivers):
-    """With room for every coefficient what is left is the rounding to 16 bits."""
+def test_complete_rows_equal_the_projector(model, receivers):
+    """With all coefficients only the rounding to 16 bits remains."""
     term = TERMS[model]
     bands = bands_of(term)
     expected = exact_image(term, bands, receivers, light(2))
@@ -109,7 +109,7 @@ def test_channels_may_differ(receivers):
     np.testing.assert_allclose(image_by_rows(term, bands, receivers, light(2)), expected, rtol=2e-3, atol=2e-3)
 
 
-def test_error_falls_with_the_coefficients_kept(receivers, monkeypatch):
+def test_the_error_falls_with_the_number_of_coefficients(receivers, monkeypatch):
     term = TERMS["lambert"]
     expected, errors = exact_image(term, bands_of(term), receivers, light(2)), []
     for num_coefficients in (4, 16, 64):
@@ -119,14 +119,14 @@ def test_error_falls_with_the_coefficients_kept(receivers, monkeypatch):
     assert errors[1] < 0.03 * np.linalg.norm(expected)
 
 
-def test_black_light_brings_nothing_and_may_be_what_is_expected(receivers):
+def test_black_light_gives_black_and_can_be_the_expected_light(receivers):
     black = np.zeros((NO_PATCH + 1, 3), np.float32)
     term = TERMS["lambert"]
     assert not image_by_rows(term, bands_of(term), receivers, black).any()
     assert np.all(expected_light(black[:NUM_CELLS]) > 0)
 
 
-def test_points_that_see_no_cell_have_empty_rows(receivers):
+def test_points_without_hits_have_empty_rows(receivers):
     lost = replace(receivers.rays[0], gather_hits=np.full_like(receivers.rays[0].gather_hits, NO_PATCH))
     term = TERMS["lambert"]
     assert not image_by_rows(term, bands_of(term), replace(receivers, rays=(lost,)), light(2)).any()
@@ -138,8 +138,8 @@ def test_freezing_may_be_cancelled(receivers):
         freeze(term, bands_of(term), receivers, lambda: True)
 
 
-def test_of_coefficients_that_matter_alike_none_displaces_a_better_one():
-    """The mean comes last of all; it was lost where the least that were kept were several."""
+def test_ties_never_displace_better_coefficients():
+    """The mean comes last; it was lost if several stored coefficients were equally small."""
     details = np.ones((9, 4), np.float32)
     details[-1] = 100
     index = np.arange(8, -1, -1, dtype=np.int32)
@@ -150,7 +150,7 @@ def test_of_coefficients_that_matter_alike_none_displaces_a_better_one():
 
 
 @pytest.mark.parametrize("num_patches", [1, 2, 13, 64])
-def test_transform_of_few_cells_is_that_of_all(num_patches):
+def test_the_transform_of_few_patches_equals_that_of_all(num_patches):
     rng = np.random.default_rng(num_patches)
     patches = np.sort(rng.choice(64, num_patches, replace=False)).astype(np.int32)
     sums = rng.random((num_patches, 5), np.float32)

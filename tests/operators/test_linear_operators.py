@@ -1,4 +1,4 @@
-"""Streaming, freezing and the cache of frozen operators, against NumPy and direct projection."""
+"""Streaming, freezing and caching of linear operators, against NumPy and direct projection."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_streamed_columns_are_the_product(counts, shape):
     np.testing.assert_allclose(image, expected, atol=1e-4)
 
 
-def test_columns_list_what_changes_and_nothing_else():
+def test_columns_list_only_changes():
     change = np.zeros((3, 16))
     change[0, [3, 9]], change[2, 15] = [1.5, -2], 1e-20
     columns = changed_columns(change)
@@ -51,7 +51,7 @@ def test_columns_list_what_changes_and_nothing_else():
 
 
 @pytest.mark.parametrize("bounds", [[0, 96], [0, 10, 10, 61, 96], [0, 0, 48, 96], [0, 32, 64, 90]])
-def test_each_level_has_columns_of_its_own(bounds):
+def test_each_level_has_its_own_columns(bounds):
     transport = RNG.normal(size=(2, 3, 8, 48)).astype(np.float32)
     image = np.zeros((2, 3, 48), np.float32)
     change = RNG.normal(size=(len(bounds) - 1, 3, 8)) * (RNG.random((len(bounds) - 1, 3, 8)) < 0.7)
@@ -162,7 +162,7 @@ def test_cache_returns_what_it_has():
     assert cache.get_cached("other", LinearOperator) is None
 
 
-def test_larger_than_the_budget_is_refused_before_anything_is_made_or_dropped():
+def test_operators_larger_than_the_budget_are_rejected_before_any_work():
     cache = Cache(1000)
     small = cache.get("small", LinearOperator, 480, lambda: operator(480))
     with pytest.raises(MemoryBudgetError) as refused:
@@ -172,7 +172,7 @@ def test_larger_than_the_budget_is_refused_before_anything_is_made_or_dropped():
 
 
 @pytest.mark.parametrize("problem", [CancelledError("cancelled"), MemoryError(), KeyboardInterrupt()])
-def test_freeze_that_ends_early_leaves_nothing(problem):
+def test_an_interrupted_freeze_leaves_nothing(problem):
     cache = Cache(1000)
 
     def fails():
@@ -186,7 +186,7 @@ def test_freeze_that_ends_early_leaves_nothing(problem):
     assert cache.get("k", LinearOperator, 960, lambda: operator(960)) is cache.get_cached("k", LinearOperator)
 
 
-def test_two_who_want_the_same_thing_at_once_make_it_once():
+def test_concurrent_requests_compute_once():
     cache, made, start = Cache(100_000), [], threading.Barrier(8)
 
     def make():
@@ -210,8 +210,8 @@ def test_two_who_want_the_same_thing_at_once_make_it_once():
     assert cache.used_bytes == operators[0].num_bytes
 
 
-def test_one_who_gives_up_lets_the_others_make_it_once():
-    """The first is cancelled while a second waits; a third comes when the second is at it: made once, for both."""
+def test_a_cancelled_request_lets_the_others_compute_once():
+    """The first is cancelled while a second waits; a third arrives during the second: computed once for both."""
     cache, made, outcome = Cache(100_000), [], []
     first_runs, go_on, second_runs = threading.Event(), threading.Event(), threading.Event()
 
@@ -249,7 +249,7 @@ def test_one_who_gives_up_lets_the_others_make_it_once():
     assert cache.used_bytes == 480
 
 
-def test_many_threads_and_keys_never_lose_count():
+def test_many_threads_and_keys_keep_the_count():
     cache, errors = Cache(5000), []
 
     def work(seed):

@@ -1,4 +1,4 @@
-"""Operators along a parameter: images at its nodes, and between them."""
+"""Operators along a parameter: images at its nodes and between them."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ def bands_of(document):
 
 
 def shaded(document, lights, receivers):
-    """All curves contracted, straight from the projector. (n, 3)"""
+    """All curves contracted, from the projector. (n, 3)"""
     term, bands = TERMS[document["model"]].normalized(document), bands_of(document)
     return Projector(term, contract(term, bands, None), lights, receivers).project(0, len(receivers.normal))[:, 0]
 
 
 def image_of(along, document, count):
-    """R(p) as a frame would make it. (n, 3)"""
+    """R(p) as in a frame. (n, 3)"""
     linearised, frozen = along
     tiles, _, _, samples = frozen.transport.shape
     image = np.zeros((tiles, 3, samples), np.float32)
@@ -66,32 +66,32 @@ def relative(actual, expected):
     return np.sqrt(np.mean((actual - expected) ** 2) / np.mean(np.float64(expected) ** 2))
 
 
-def spread_evenly(document, parameter, lights, receivers):
-    """What the samples would show if what the parameter moves were spread evenly over all directions. (n, 3)"""
+def uniform_response(document, parameter, lights, receivers):
+    """Radiance of the samples if the lobe moved by the parameter were uniform over all directions. (n, 3)"""
     term, bands = TERMS[document["model"]].normalized(document), bands_of(document)
-    even = {c.name: solid_angles(c) / solid_angles(c).sum() for c in curves_of_parameter(term, parameter)}
-    bands |= {name: np.repeat((bands[name] @ share)[:, None], len(share), axis=1) for name, share in even.items()}
+    uniform = {c.name: solid_angles(c) / solid_angles(c).sum() for c in curves_of_parameter(term, parameter)}
+    bands |= {name: np.repeat((bands[name] @ share)[:, None], len(share), axis=1) for name, share in uniform.items()}
     return Projector(term, contract(term, bands, None), lights, receivers).project(0, len(receivers.normal))[:, 0]
 
 
-def beyond(actual, expected, even):
-    """Largest error of a sample, as a share of itself and of a hundredth of what it would show, spread evenly."""
-    return float((np.abs(actual - expected) / (np.float64(expected) + 0.01 * even + 1e-12)).max())
+def relative_excess(actual, expected, uniform):
+    """Largest error of a sample, relative to itself plus a hundredth of its uniform response."""
+    return float((np.abs(actual - expected) / (np.float64(expected) + 0.01 * uniform + 1e-12)).max())
 
 
 @pytest.mark.parametrize(("model", "parameter"), ALL)
-def test_every_sample_is_held_at_any_value(model, parameter, lights, receivers):
+def test_the_error_of_each_sample_is_bounded_at_any_value(model, parameter, lights, receivers):
     along = frozen_along({"model": model, "params": {}}, parameter, lights, receivers)
     declared = TERMS[model].parameter(parameter)
     # the sharpest tenth, and the whole range
     for value in (*slider_values(declared, 60, at_midpoints=True)[[0, 2, 5, -6, -3, -1]], *slider_values(declared, 7)):
         document = {"model": model, "params": {parameter: float(value)}}
         expected = shaded(document, lights, receivers)
-        even = spread_evenly(document, parameter, lights, receivers)
-        assert beyond(image_of(along, document, 70), expected, even) < MAX_ERROR
+        uniform = uniform_response(document, parameter, lights, receivers)
+        assert relative_excess(image_of(along, document, 70), expected, uniform) < MAX_ERROR
 
 
-def test_columns_are_the_images_at_the_nodes(lights, receivers):
+def test_columns_equal_the_images_at_the_nodes(lights, receivers):
     document = {"model": "cook_torrance", "params": {"sigma": [0.1, 0.3, 0.6], "extinction": [0.0, 2.0, 6.0]}}
     linearised, frozen = frozen_along(document, "ior", lights, receivers)
     columns = frozen.transport.transpose(2, 0, 3, 1).reshape(linearised.num_columns, -1, 3)[:, :70]
@@ -111,7 +111,7 @@ def test_each_channel_has_its_own_value_and_its_own_nodes(lights, receivers):
     assert relative(image_of(along, at, 70), shaded(at, lights, receivers)) < 3 * MAX_ERROR
 
 
-def test_several_settings_at_once_are_each_alone(lights, receivers):
+def test_several_settings_equal_each_alone(lights, receivers):
     term = TERMS["ashikhmin_shirley"]
     rng = np.random.default_rng(2)
     bands = {curve.name: rng.uniform(0.1, 1, (3, curve.num_bands)) for curve in term.curves}
@@ -125,15 +125,15 @@ def test_several_settings_at_once_are_each_alone(lights, receivers):
         np.testing.assert_allclose(together[:, k], alone, rtol=1e-5)
 
 
-def test_what_cannot_be_linearised_is_left_to_the_bands():
+def test_parameters_that_cannot_be_linearized_use_bands():
     assert linearize({"model": "lambert", "params": {}}, "nothing") is None
     drawn = {"theta_h": {"points": [[0, 1], [90, 0]]}}
     assert linearize({"model": "ggx", "params": {}, "curves": drawn}, "roughness") is None
-    # theta_h is not among those that f0 moves
+    # f0 does not change theta_h
     assert linearize({"model": "ggx", "params": {}, "curves": drawn}, "f0") is not None
 
 
-def test_cancelling_stops(lights, receivers):
+def test_cancelling_stops_the_freeze(lights, receivers):
     document = {"model": "ggx", "params": {}}
     linearised = linearize(document, "f0")
     with pytest.raises(CancelledError):
@@ -141,7 +141,7 @@ def test_cancelling_stops(lights, receivers):
 
 
 def products(model, parameter, values):
-    """Every moved curve's bands at values of a parameter, multiplied in all combinations. (n, J_1 · J_2 · …)"""
+    """Bands of all moved curves at values of a parameter, multiplied in all combinations. (n, J_1 · J_2 · …)"""
     rows = []
     for value in values:
         bands = bands_of({"model": model, "params": {parameter: float(value)}})
@@ -151,7 +151,7 @@ def products(model, parameter, values):
 
 
 @pytest.mark.parametrize(("model", "parameter"), ALL)
-def test_every_band_is_held_at_any_value(model, parameter):
+def test_the_error_of_each_band_is_bounded_at_any_value(model, parameter):
     linearised, term = linearize({"model": model, "params": {}}, parameter), TERMS[model]
     assert linearised.num_columns <= MAX_NODES
     weights = joint([solid_angles(curve) for curve in curves_of_parameter(term, parameter)])
@@ -166,8 +166,8 @@ def test_every_band_is_held_at_any_value(model, parameter):
 
 
 @pytest.mark.parametrize(("model", "parameter"), SLIDERS)
-def test_images_at_the_nodes_do_not_cancel(model, parameter):
-    """Coefficients of both signs are small enough that rounding, a millionth of an image, stays below the error."""
+def test_node_coefficients_do_not_cancel(model, parameter):
+    """Coefficients of both signs are small enough to keep rounding, a millionth of an image, below the error."""
     linearised = linearize({"model": model, "params": {}}, parameter)
     nodes = products(model, parameter, linearised.nodes[0].values)
     for value in slider_values(TERMS[model].parameter(parameter), 61, at_midpoints=True):
@@ -176,7 +176,7 @@ def test_images_at_the_nodes_do_not_cancel(model, parameter):
         assert (1e-6 * np.abs(coefficients) @ nodes <= MAX_ERROR / 2 * (exact + 0.01 * exact.mean())).all()
 
 
-def test_more_nodes_are_added_where_the_error_is_worst():
+def test_nodes_are_added_at_the_largest_error():
     rng = np.random.default_rng(4)
     values, curves = np.arange(9.0), rng.uniform(0, 1, (9, 32))
     between = 0.5 * (curves[:-1] + curves[1:])
@@ -186,7 +186,7 @@ def test_more_nodes_are_added_where_the_error_is_worst():
     assert many.error < 1e-3 < few.error
 
 
-def test_a_parameter_that_makes_nothing_has_nodes_of_nothing():
+def test_a_parameter_without_effect_has_zero_nodes():
     nothing = np.zeros((5, 8))
     nodes = choose_nodes(np.arange(5.0), nothing, nothing[1:], np.ones(8), 4, 0.1)
     assert nodes.error == 0

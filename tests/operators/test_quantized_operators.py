@@ -1,4 +1,4 @@
-"""Operators that take less memory: columns in 16 bits, and columns of some samples, against those in float32."""
+"""Quantized and subsampled operators: columns in 16 bits, and columns of some samples, against float32."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ RNG = np.random.default_rng(4)
 
 
 def packed_of(transport):
-    """Of columns in float32, (tiles, 3, J, samples), whose blocks are as bright as they please."""
+    """Quantize columns in float32, (tiles, 3, J, samples), with blocks of any brightness."""
     tiles, _, num, samples = transport.shape
     blocks = -(-samples // BLOCK_SAMPLES)
     values, scale = np.zeros(transport.shape, np.int16), np.zeros((tiles, 3, num, blocks), np.float32)
@@ -30,7 +30,7 @@ def packed_of(transport):
 
 
 def whole_numbers(packed):
-    """Its columns. (tiles, 3, J, samples) float64"""
+    """Columns of the quantized operator. (tiles, 3, J, samples) float64"""
     scale = np.repeat(packed.scale, BLOCK_SAMPLES, axis=3)[..., : packed.transport.shape[3]]
     return packed.transport * scale.astype(float)
 
@@ -41,7 +41,7 @@ def lively(*shape):
 
 @pytest.mark.parametrize("counts", [(0, 0, 0), (1, 4, 5), (3, 0, 7), (8, 8, 8)])
 @pytest.mark.parametrize("shape", [(1, 16), (2, 1040)])
-def test_streamed_packed_columns_are_the_product(counts, shape):
+def test_streamed_quantized_columns_are_the_product(counts, shape):
     tiles, samples = shape
     packed = packed_of(lively(tiles, 3, 8, samples))
     change, image = np.zeros((3, 8)), RNG.normal(size=(tiles, 3, samples)).astype(np.float32)
@@ -52,7 +52,7 @@ def test_streamed_packed_columns_are_the_product(counts, shape):
     np.testing.assert_allclose(image, expected, rtol=1e-5, atol=1e-5 * np.abs(expected).max())
 
 
-def test_levels_of_packed_columns_end_where_those_of_others_do():
+def test_levels_of_quantized_columns_have_the_same_ends():
     packed, bounds = packed_of(lively(2, 3, 6, 1040)), np.array([0, 500, 500, 1300, 2080])
     change = RNG.normal(size=(4, 3, 6))
     images = np.zeros((2, 2, 3, 1040), np.float32)
@@ -61,9 +61,9 @@ def test_levels_of_packed_columns_end_where_those_of_others_do():
     np.testing.assert_allclose(images[0], images[1], atol=1e-5 * np.abs(images[1]).max())
 
 
-def test_sixteen_bits_leave_half_a_step_of_each_block_s_largest_number():
+def test_16_bits_round_to_half_a_step_of_the_block_maximum():
     rows = (RNG.normal(size=(3, 100, 5)) * 10.0 ** RNG.integers(-20, 20, size=(3, 1, 5))).astype(np.float32)
-    rows[0, :, 0], rows[1, :, 1] = 0, 1e-42  # nothing, and numbers that processors are slow with
+    rows[0, :, 0], rows[1, :, 1] = 0, 1e-42  # zeros and subnormal numbers
     values, scale = quantize(rows)
     rest = np.abs(values * scale[:, None].astype(float) - rows)
     assert np.all(rest <= 0.5001 * np.abs(rows).max(axis=1, keepdims=True) / 32767 + 1e-41)
@@ -71,7 +71,7 @@ def test_sixteen_bits_leave_half_a_step_of_each_block_s_largest_number():
     assert not values[0, :, 0].any()
 
 
-def test_packed_columns_take_half_the_memory_and_tell_each_sample_s():
+def test_quantized_columns_take_half_the_memory():
     transport = lively(2, 3, 64, 1040)
     packed = packed_of(transport)
     assert packed.num_bytes == quantized_bytes(2080, 64) if tile_layout(2080) == (2, 1040) else True
@@ -79,8 +79,8 @@ def test_packed_columns_take_half_the_memory_and_tell_each_sample_s():
     np.testing.assert_allclose(packed.columns_at(1040 + 700), whole_numbers(packed)[1, :, :, 700])
 
 
-def test_what_some_samples_say_is_spread_to_all():
-    """Against NumPy, samples padded to whole tiles."""
+def test_subsampled_changes_are_interpolated_to_all_samples():
+    """Against NumPy, with samples padded to whole tiles."""
     rows = RNG.normal(size=(7, 3)).astype(np.float32)
     near = RNG.integers(0, 7, size=(90, 3)).astype(np.int32)
     weight = RNG.random((90, 3)).astype(np.float32)
@@ -93,15 +93,15 @@ def test_what_some_samples_say_is_spread_to_all():
     np.testing.assert_allclose(image, expected, atol=1e-5)
 
 
-def test_a_thin_operator_adds_what_its_chosen_samples_say():
+def test_a_subsampled_operator_adds_the_change_of_its_samples():
     few = LinearOperator(lively(1, 3, 4, 16), RNG.random((3, 4)))
     near = RNG.integers(0, 10, size=(40, 3)).astype(np.int32)
     weight = RNG.dirichlet(np.ones(3), 40).astype(np.float32)
-    thin = SubsampledOperator(few, 10, near, weight)
+    subsampled = SubsampledOperator(few, 10, near, weight)
     change, image = RNG.normal(size=(3, 4)), np.zeros((1, 3, 48), np.float32)
-    thin.add(change, image)
+    subsampled.add(change, image)
     for sample in (0, 17, 39):
-        expected = (thin.columns_at(sample) * change).sum(axis=1)
+        expected = (subsampled.columns_at(sample) * change).sum(axis=1)
         np.testing.assert_allclose(image[0, :, sample], expected, rtol=1e-4, atol=1e-5 * np.abs(image).max())
-    np.testing.assert_allclose(thin.importance, 2 * few.importance)  # one stands for four
+    np.testing.assert_allclose(subsampled.importance, 2 * few.importance)  # each represents four
     assert subsampled_bytes(40, 10, 4) == quantized_bytes(10, 4) + near.nbytes + weight.nbytes

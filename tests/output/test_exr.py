@@ -1,4 +1,4 @@
-"""OpenEXR files read back by OpenImageIO: layers and their names, attributes, half and full floats."""
+"""OpenEXR files read back by OpenImageIO: layers and names, attributes, half and full floats."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_alpha_and_layers_are_channels_of_their_names(tmp_path):
     np.testing.assert_array_equal(pixels[..., order], image[..., [0, 1, 2, 3, 0, 2]])
 
 
-def test_a_layer_for_each_light_that_shines_and_each_kind_of_path():
+def test_each_enabled_light_and_each_light_path_has_a_layer():
     lights = {"Key": POINT, "Off": POINT | {"enabled": False}, "Black": POINT | {"intensity": 0}}
     look = look_with(lights=lights)
     lit = ["light_environment", "light_Key"]
@@ -74,14 +74,14 @@ def test_a_layer_for_each_light_that_shines_and_each_kind_of_path():
     )
 
 
-def test_light_groups_are_direct_and_reflected_light_of_each_light():
+def test_light_groups_are_direct_and_indirect_light_of_each_light():
     look = look_with(lights={"Key": POINT, "Off": POINT | {"enabled": False}})
     groups = light_group_layers(look, has_indirect=True)
     names = ["light_environment_direct", "light_environment_indirect", "light_Key_direct", "light_Key_indirect"]
     assert names_of(groups) == names
     assert [layer.look.transport.paths for layer in groups[:2]] == [(True, 1, 0), (False, 1, 24)]
     assert names_of(light_group_layers(look, has_indirect=False)) == names[::2]
-    # a compositor finds what it asks for
+    # names that a compositor expects
     assert names_of(light_group_layers(look_with(), has_indirect=False)) == names[:1]
     shown = look_with(transport={"show": "first_bounce"})
     (first,) = light_group_layers(shown, has_indirect=True)
@@ -90,7 +90,7 @@ def test_light_groups_are_direct_and_reflected_light_of_each_light():
     assert names_of(light_group_layers(behind, has_indirect=True)) == [*names[:2], "light_background"]
 
 
-def test_names_of_light_groups_keep_what_they_end_with():
+def test_names_of_light_groups_keep_their_suffix():
     names = ["x" * 79, "x" * 80, "a b", "a_b"]
     groups = names_of(light_group_layers(look_with(lights=dict.fromkeys(names, POINT)), has_indirect=True))[2:]
     assert all(name.endswith(("_direct", "_indirect")) for name in groups)
@@ -99,7 +99,7 @@ def test_names_of_light_groups_keep_what_they_end_with():
     assert "light_a_b_2_direct" in groups
 
 
-def test_a_background_of_one_colour_is_a_layer_of_its_own_and_catchers_leave_none():
+def test_a_background_color_has_a_layer_and_shadow_catchers_have_none():
     look = look_with(lights={"Key": POINT}, background={"kind": "color", "color": [0.2, 0.3, 0.4]})
     *lit, behind = light_and_path_layers(look, has_indirect=False)
     assert behind.source == "background"
@@ -118,7 +118,7 @@ def test_a_background_of_one_colour_is_a_layer_of_its_own_and_catchers_leave_non
     assert make_layers(False, look, has_indirect=True) == []
 
 
-def test_lights_with_names_alike_or_without_letters_have_layers_of_their_own():
+def test_lights_with_similar_names_have_distinct_layers():
     names = ["a.b/c", "a b c", "A-B-C", "灯", "🙂", "environment", "x" * 79, "x" * 80, "../..", "key\nR", "Lampe é"]
     layers = light_and_path_layers(look_with(lights=dict.fromkeys(names, POINT)), has_indirect=False)
     assert [layer.source for layer in layers] == ["environment", *names]
@@ -135,7 +135,7 @@ def test_layer_names_are_plain_short_and_different(names):
     assert len({name.casefold() for name in layers}) == len(names) + 4
 
 
-def test_the_picture_of_a_light_has_that_light_alone():
+def test_the_image_of_a_light_contains_that_light_only():
     look = look_with(lights={"Key": POINT, "Fill": POINT, "Off": POINT | {"enabled": False}})
     for layer in light_and_path_layers(look, has_indirect=False):
         shining = [name for name, light in layer.look.lights.items() if any(light.gain)]
@@ -143,7 +143,7 @@ def test_the_picture_of_a_light_has_that_light_alone():
         assert shining == [layer.source]
 
 
-def test_attributes_say_where_the_picture_comes_from(tmp_path):
+def test_attributes_describe_the_origin_of_the_image(tmp_path):
     camera = make_camera("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8)
     look = look_with(environment={"map": "studio"}, lights={"灯": POINT})
     layers = light_and_path_layers(look, has_indirect=False)
@@ -167,7 +167,7 @@ def test_attributes_say_where_the_picture_comes_from(tmp_path):
 
 
 @pytest.mark.parametrize("catcher", [True, False])
-def test_a_ground_is_told_as_what_it_was_shown(catcher):
+def test_attributes_state_whether_the_ground_is_a_shadow_catcher(catcher):
     camera, scene = make_camera("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8), with_ground(still_life())
     default, ground = default_look(scene.materials), scene.materials[-1].name
     look = validate({"materials": {ground: {"shadow_catcher": catcher}}}, default)
@@ -175,7 +175,7 @@ def test_a_ground_is_told_as_what_it_was_shown(catcher):
     assert validate(json.loads(attributes["relume:look"]), default) == look
 
 
-def test_points_in_the_world_are_found_in_the_picture():
+def test_world_points_project_to_their_pixels():
     camera = make_camera("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8)
     x, y = np.array([0, 48, 0, 12], np.float32), np.array([0, 32, 32, 24], np.float32)
     world = camera.to_world[:3, 3] + 2.5 * camera_directions(camera, SIZE, x, y)
@@ -183,7 +183,7 @@ def test_points_in_the_world_are_found_in_the_picture():
     np.testing.assert_allclose(projected[:, :2] / projected[:, 3:], np.stack([x / 48, y / 32], axis=1), atol=1e-5)
 
 
-def test_export_tells_how_far_it_is_and_leaves_nothing_where_it_fails(tmp_path):
+def test_export_reports_progress_and_leaves_no_file_on_failure(tmp_path):
     look = look_with(lights={"Key": POINT})
     layers = light_and_path_layers(look, has_indirect=False)
     fractions: list[float] = []

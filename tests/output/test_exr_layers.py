@@ -1,4 +1,4 @@
-"""Layers of an exported picture add up to it: those of the lights, and those of the light paths."""
+"""Layers of an exported image sum to it: those of lights, and those of light paths."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_light_groups_sum_to_the_picture(gathered, tmp_path):
 
 
 def exported(transfer, folder, background, layering):
-    """The layers of a picture under three lights, and the channels of its file by name."""
+    """The layers of an image under three lights, and the channels of its file by name."""
 
     def change(document):
         document["lights"].update(LIGHTS)
@@ -50,7 +50,7 @@ def exported(transfer, folder, background, layering):
     layers = make_layers(layering, look, has_indirect=True)
     fractions: list[float] = []
     path = folder / "a.exr"
-    with open_copy(transfer) as other:  # one for all layers, as in a server
+    with open_copy(transfer) as other:  # one copy for all layers, as in a server
         export_exr(
             path, lambda edited, progress: render_image(other, "front", edited, progress=progress), look, layers, {},
             progress=fractions.append,
@@ -63,7 +63,7 @@ def exported(transfer, folder, background, layering):
 
 
 def assert_sum(channel, names):
-    """Each value is rounded to eleven bits, the smallest of halves to 2^-25; and none of the layers is black."""
+    """Values are rounded to 11 bits, the smallest halves to 2^-25; no layer is black."""
     assert min(max(channel[f"{name}.{c}"].max() for c in "RGB") for name in names) > 0.003
     for c in "RGB":
         parts = np.array([channel[f"{name}.{c}"] for name in names])

@@ -1,4 +1,4 @@
-"""Thumbnails: a diffuse ball against the sum over its lights, a highlight on top of it, a ball of every term."""
+"""Thumbnails: a diffuse ball against the sum over its lights, a highlight added, a ball of every term."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ def term(model: str, **given: object) -> dict[str, object]:
     return complete_term(("ball",), {"model": model, "color": [1.0, 1.0, 1.0], **given}, None)
 
 
-def test_middle_of_a_diffuse_ball_is_the_light_of_its_half_space() -> None:
+def test_the_center_of_a_diffuse_ball_is_the_light_of_its_hemisphere() -> None:
     size = 33
     middle = render_preview([term("lambert")], size)[size // 2, size // 2]
     cosine = np.maximum(_lights().direction[:, 2].astype(float), 0)
@@ -31,15 +31,15 @@ def test_highlight_adds_to_the_body_and_corners_stay_empty() -> None:
 
 
 @pytest.mark.parametrize("model", sorted(name for name, term_class in TERMS.items() if not name.startswith("measured")))
-def test_every_term_makes_a_ball(model: str) -> None:
+def test_every_term_renders_a_ball(model: str) -> None:
     image = render_preview([term(model)], 8)
     assert np.isfinite(image).all()
     assert image.min() >= 0
     assert image[3:5, 3:5].max() > 0
 
 
-def test_a_ball_shows_its_images_in_color_and_place() -> None:
-    """Red above, blue below; a channel that the material has no image of leaves the color."""
+def test_a_ball_shows_its_images() -> None:
+    """Red above, blue below; a channel without an image leaves the color."""
     pixels = np.zeros((70, 30, 3), np.uint8)
     pixels[:35, :, 0] = pixels[35:, :, 2] = 255
     images = {"diffuse": Texture(pixels, encoding=TextureEncoding("srgb", (1.0, 1.0, 1.0)))}

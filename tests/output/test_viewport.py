@@ -1,4 +1,4 @@
-"""The picture that cameras are placed by: where things are, and that they can be told apart."""
+"""The camera placement viewport: positions and distinguishable surfaces."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ SIZE = (64, 48)
 
 
 def facing(distance: float) -> Camera:
-    """On the +Z axis, looking at the origin."""
+    """A camera on the +Z axis that looks at the origin."""
     to_world = np.eye(4)
     to_world[2, 3] = distance
     return Camera("eye", to_world, 0.8)
@@ -23,7 +23,7 @@ def facing(distance: float) -> Camera:
 
 @pytest.fixture(scope="module")
 def walls() -> Viewport:
-    """A red wall on the left and a mirror with a greenish picture's colours on the right, both in the plane z = 0."""
+    """A red wall on the left and a mirror with greenish texture on the right, both in the plane z = 0."""
     left = quad("left", [[-1, -1, 0], [0, -1, 0], [0, 1, 0], [-1, 1, 0]], 0)
     right = quad("right", [[0, -1, 0], [1, -1, 0], [1, 1, 0], [0, 1, 0]], 1)
     red = Material("Red", ({"model": "lambert", "color": [0.8, 0.1, 0.1]},))
@@ -35,7 +35,7 @@ def walls() -> Viewport:
     return Viewport.from_scene(make_scene("Walls", [left, right], [red, printed], [facing(3)], environment))
 
 
-def test_surfaces_have_their_colours_and_their_places(walls: Viewport) -> None:
+def test_surfaces_have_their_colors_and_positions(walls: Viewport) -> None:
     image = walls.image(facing(3), SIZE)
     assert image.shape == (48, 64, 3)
     assert image.dtype == np.uint8
@@ -44,22 +44,22 @@ def test_surfaces_have_their_colours_and_their_places(walls: Viewport) -> None:
     assert right[1] > 1.5 * right[0]
     assert outside.max() < 60
     point = walls.point_at(facing(3), SIZE, 32 + 8, 24 - 4)
-    step = 2 * 3 * np.tan(0.4) / 48  # metres a pixel, on the plane
+    step = 2 * 3 * np.tan(0.4) / 48  # meters per pixel, in the plane
     np.testing.assert_allclose(point, [8 * step, 4 * step, 0], atol=1e-5)
     assert walls.point_at(facing(3), SIZE, 1, 1) is None
 
 
-def test_a_surface_is_darker_where_it_turns_away(walls: Viewport) -> None:
+def test_a_surface_is_darker_at_grazing_angles(walls: Viewport) -> None:
     aside, turn = facing(0), np.radians(70)
     aside.to_world[:3, 0] = [np.cos(turn), 0, -np.sin(turn)]
     aside.to_world[:3, 2] = [np.sin(turn), 0, np.cos(turn)]
     aside.to_world[:3, 3] = 3 * aside.to_world[:3, 2]
     straight, slanted = (srgb_decode(walls.image(camera, SIZE)[24, 30] / 255.0) for camera in (facing(3), aside))
-    np.testing.assert_allclose(slanted / straight, 0.604 / 0.9, rtol=0.05)  # what the shares of light come to
+    np.testing.assert_allclose(slanted / straight, 0.604 / 0.9, rtol=0.05)  # ratio of the light terms
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_the_framing_camera_sees_the_scene_and_its_corners_hold_it(name: str) -> None:
+def test_the_default_camera_frames_the_scene(name: str) -> None:
     scene = built_in(name)
     viewport = Viewport.from_scene(scene)
     image = viewport.image(viewport.default_camera, SIZE)

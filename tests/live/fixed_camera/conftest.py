@@ -1,4 +1,4 @@
-"""Pictures are followed to the last digits, in bakes of their own: images kept beside others' are shaded otherwise."""
+"""Pictures are compared to the last digits, in separate bakes: stored images of other bakes are shaded differently."""
 
 from shared_bakes import baked, corner, gathered, transfer, unmeasured
 from subdivided_shading import shade_with_projector

@@ -1,4 +1,4 @@
-"""One picture, one light: background and objects change over together, whatever a hand does."""
+"""Background and objects change to a new environment together, during any sequence of edits."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ COLOURS = np.eye(3)
 
 @pytest.fixture(scope="module")
 def maps(tmp_path_factory):
-    """A red environment, a green one and a blue one: a picture of one light has one colour."""
+    """A red, a green and a blue environment: a picture of one light has one color."""
     folder = tmp_path_factory.mktemp("maps")
     with STORE.with_search_folder(tmp_path_factory.mktemp("shelf")) as library:
         white = dusk() / [1.0, 0.4, 0.2]
@@ -30,18 +30,18 @@ def maps(tmp_path_factory):
 
 @pytest.fixture(params=["transfer", "gathered"])
 def opened(request):
-    """A bake of light from the environment alone, with textures, and one of light between surfaces too."""
+    """A bake of environment light with textures, and one with indirect light."""
     return request.getfixturevalue(request.param)
 
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch):
-    """Glimpses are of few samples, as those of large pictures are."""
+    """Previews of few samples, like those of large images."""
     monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 300)
 
 
 def lit_by(maps, number, *, light_position=None, sigma=None, **environment):
-    """A change of the look: one of the maps, a lamp of the same colour somewhere, a curve."""
+    """A change of the look: one of the maps, a light of the same color at a position, a curve."""
 
     def change(document):
         document["environment"].update(map=maps[number], **environment)
@@ -55,8 +55,8 @@ def lit_by(maps, number, *, light_position=None, sigma=None, **environment):
     return change
 
 
-def colours_of(picture):
-    """Which channels there is any light in."""
+def colors_of(picture):
+    """Channels with any light."""
     return np.flatnonzero(picture.image().reshape(-1, 3).max(axis=0) > 0).tolist()
 
 
@@ -66,7 +66,7 @@ def start(transfer, look, **options):
     return picture
 
 
-def test_exchanged_environment_comes_all_at_once(opened, maps):
+def test_a_new_environment_appears_everywhere_at_once(opened, maps):
     red, blue = (make_look(opened, lit_by(maps, k)) for k in (0, 2))
     picture = run_until_exact(start(opened, red))
     before = picture.image()
@@ -77,15 +77,15 @@ def test_exchanged_environment_comes_all_at_once(opened, maps):
     assert isinstance(run_next_job(picture), SparsePreview)
     come = picture.advance(None)
     assert (come.fidelity, come.complete) == ("preview", True)
-    assert colours_of(picture) == [2]
+    assert colors_of(picture) == [2]
     while not picture.advance(None).exact:
         run_next_job(picture)
         picture.advance(None)
-        assert colours_of(picture) == [2]
+        assert colors_of(picture) == [2]
     np.testing.assert_array_equal(picture.image(), exact_image(opened, blue))
 
 
-def test_where_memory_is_short_the_old_picture_is_kept_until_all_is_shaded(transfer, maps):
+def test_without_memory_for_a_preview_the_old_picture_stays(transfer, maps):
     picture = Picture(transfer, "front", Cache(200_000))
     picture.set_look(make_look(transfer, lit_by(maps, 0)))
     before = run_until_exact(picture).image()
@@ -93,10 +93,10 @@ def test_where_memory_is_short_the_old_picture_is_kept_until_all_is_shaded(trans
     while not picture.advance(None).exact:
         np.testing.assert_array_equal(picture.image(), before)
         assert not isinstance(run_next_job(picture), SparsePreview)
-    assert colours_of(picture) == [1]
+    assert colors_of(picture) == [1]
 
 
-def test_colour_of_a_material_does_not_wait_for_light(transfer, maps):
+def test_a_material_color_does_not_wait_for_light(transfer, maps):
     picture = run_until_exact(start(transfer, make_look(transfer, lit_by(maps, 0))))
     before = picture.image()
 
@@ -106,12 +106,12 @@ def test_colour_of_a_material_does_not_wait_for_light(transfer, maps):
 
     picture.set_look(make_look(transfer, painted))
     assert picture.advance(None).changed
-    assert colours_of(picture) == [0]
+    assert colors_of(picture) == [0]
     assert not np.array_equal(picture.image(), before)
 
 
-def test_environment_s_gain_comes_with_its_light(transfer, maps):
-    """Beside a lamp the gain is part of the light, without one it multiplies the picture."""
+def test_the_gain_of_an_environment_appears_with_its_light(transfer, maps):
+    """Next to local lights the gain is part of the light, without them it multiplies the picture."""
     picture = run_until_exact(start(transfer, make_look(transfer, lit_by(maps, 0, scale=4.0))))
     before = picture.image()
     picture.set_look(make_look(transfer, lit_by(maps, 0, light_position=0.6, scale=4.0)))
@@ -120,8 +120,8 @@ def test_environment_s_gain_comes_with_its_light(transfer, maps):
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
-def test_hand_that_never_waits_sees_one_light_at_a_time(opened, maps, seed):
-    """Maps exchanged, turned, dimmed, lamps added and moved, curves edited, all undone, in any order."""
+def test_continuous_edits_never_mix_two_lights(opened, maps, seed):
+    """Maps swapped, rotated, dimmed, lights added and moved, curves edited, undo, in random order."""
     rng = np.random.default_rng(seed)
 
     def any_look():
@@ -134,7 +134,7 @@ def test_hand_that_never_waits_sees_one_light_at_a_time(opened, maps, seed):
 
     looks = [any_look()]
     picture, changes = run_until_exact(start(opened, looks[0])), 0
-    shown = colours_of(picture)
+    shown = colors_of(picture)
     for _ in range(60):
         if rng.random() < 0.4:
             looks.append(looks[rng.integers(len(looks))] if rng.random() < 0.3 else any_look())
@@ -142,21 +142,21 @@ def test_hand_that_never_waits_sees_one_light_at_a_time(opened, maps, seed):
         if picture.next_job() is not None and rng.random() < 0.8:
             need = picture.next_job()
             made = need.run(lambda share: None, lambda: False)
-            if rng.random() < 0.4:  # the hand moves on meanwhile
+            if rng.random() < 0.4:  # the edit continues meanwhile
                 looks.append(any_look())
                 picture.set_look(looks[-1])
             picture.install(need, made)
         advance = picture.advance(8)
         assert advance.complete
-        assert len(colours_of(picture)) == 1, "a picture of two lights"
-        changes += colours_of(picture) != shown
-        shown = colours_of(picture)
+        assert len(colors_of(picture)) == 1, "a picture of two lights"
+        changes += colors_of(picture) != shown
+        shown = colors_of(picture)
     assert changes > 3
     expected = exact_image(opened, looks[-1])
     assert relative_rmse(run_until_exact(picture).image(), expected) < 3e-3
 
 
-def test_opened_picture_is_whole_at_once_and_then_shaded(opened, maps, monkeypatch):
+def test_an_opened_picture_is_complete_at_once_and_then_shaded(opened, maps, monkeypatch):
     look = make_look(opened, lit_by(maps, 1, rotation=77.0))
     monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED_AT_ONCE", 100)
     picture = start(opened, look, is_watched=True)
@@ -174,15 +174,15 @@ def test_opened_picture_is_whole_at_once_and_then_shaded(opened, maps, monkeypat
     np.testing.assert_array_equal(run_until_exact(picture).image(), expected)
 
 
-def test_what_comes_straight_is_seen_before_light_between_surfaces_is_found(gathered, maps, monkeypatch):
+def test_direct_light_is_shown_before_indirect_light(gathered, maps, monkeypatch):
     monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED_AT_ONCE", 100)
     lit = lit_by(maps, 1, rotation=33.0)
 
-    def straight(document):
+    def show_direct(document):
         lit(document)
         document["transport"] = {**document.get("transport", {}), "show": "direct"}
 
-    looks = make_look(gathered, straight), make_look(gathered, lit)
+    looks = make_look(gathered, show_direct), make_look(gathered, lit)
     direct, all_light = (exact_image(gathered, look) for look in looks)
     read, some_rays = [], View.subset_rays
     monkeypatch.setattr(View, "subset_rays", lambda *given: read.append(given) or some_rays(*given))
@@ -200,7 +200,7 @@ def test_what_comes_straight_is_seen_before_light_between_surfaces_is_found(gath
     assert relative_rmse(first.image() - before, all_light - direct) < 0.4
 
 
-def test_curve_that_moves_meanwhile_does_not_wait_for_the_hand_to_rest(transfer, maps, monkeypatch):
+def test_a_curve_edit_is_shown_while_light_is_computed(transfer, maps, monkeypatch):
     monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED_AT_ONCE", 100)
     picture = start(transfer, make_look(transfer, lit_by(maps, 1)), is_watched=True)
     run_next_job(picture)
@@ -209,14 +209,14 @@ def test_curve_that_moves_meanwhile_does_not_wait_for_the_hand_to_rest(transfer,
     assert not picture.next_job().is_refinement
 
 
-def test_picture_whose_images_were_kept_is_opened_without_a_preview(transfer, maps, monkeypatch):
+def test_a_picture_with_stored_images_opens_without_a_preview(transfer, maps, monkeypatch):
     monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED_AT_ONCE", 100)
     look = make_look(transfer, lit_by(maps, 2))
     run_until_exact(start(transfer, look))
     assert not isinstance(start(transfer, look, is_watched=True).next_job(), SparsePreview)
 
 
-def test_surfaces_are_told_what_they_send_out_when_light_changes_and_not_else(transfer, maps, monkeypatch):
+def test_emission_is_updated_only_when_light_changes(transfer, maps, monkeypatch):
     picture, calls = run_until_exact(start(transfer, make_look(transfer, lit_by(maps, 0)))), []
     shine = ViewImages.set_emission
     monkeypatch.setattr(ViewImages, "set_emission", lambda *given: calls.append(given) or shine(*given))
@@ -226,8 +226,8 @@ def test_surfaces_are_told_what_they_send_out_when_light_changes_and_not_else(tr
         assert len(calls) == (light_position is not None)
 
 
-def test_an_old_preview_s_gain_does_not_come_back(transfer):
-    """A light without lamps is the same light at another brightness: what multiplied it in a preview is forgotten."""
+def test_the_gain_of_an_old_preview_is_discarded(transfer):
+    """Environment light without local lights changes only in brightness: the factor of a preview is discarded."""
 
     def look(**environment):
         return make_look(transfer, lambda document: document["environment"].update(environment))

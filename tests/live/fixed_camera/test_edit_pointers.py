@@ -1,4 +1,4 @@
-"""JSON Pointers to what a hand may hold."""
+"""JSON Pointers to values that can be edited interactively."""
 
 import pytest
 
@@ -22,7 +22,7 @@ from relume.live.fixed_camera.edit_pointers import (
         ("/environment/rotation", EnvironmentPointer("rotation")),
     ],
 )
-def test_a_pointer_is_read_and_written_alike(text, meant):
+def test_a_pointer_survives_parsing_and_formatting(text, meant):
     assert parse_pointer(text) == meant
     assert str(meant) == text
 
@@ -46,11 +46,11 @@ def test_a_pointer_is_read_and_written_alike(text, meant):
         "/environment/rotation/0",
     ],
 )
-def test_what_points_to_nothing_is_refused(text):
+def test_pointers_to_nothing_are_rejected(text):
     with pytest.raises(ParameterError, match="pointer"):
         parse_pointer(text)
 
 
-def test_only_a_curve_is_one():
+def test_only_curves_are_recognized_as_curves():
     with pytest.raises(ParameterError, match="curve"):
         parse_curve("/lights/Lamp")

@@ -1,4 +1,4 @@
-"""Surfaces that shine as images say: seen so, and lighting others from where they are bright."""
+"""Surfaces that emit by an image: visible, and illuminating others from their bright parts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SIZE = 40, 30
 
 
 def panel(cuts=16):
-    """A wall of many triangles, the unit square of an image."""
+    """A wall of many triangles with the unit square as UV coordinates."""
     x, y = (g.ravel() for g in np.meshgrid(np.linspace(0, 1, cuts + 1), np.linspace(0, 1, cuts + 1)))
     corner = (np.arange(cuts)[:, None] * (cuts + 1) + np.arange(cuts)).ravel()
     lower = np.stack([corner, corner + 1, corner + cuts + 2], axis=1)
@@ -34,7 +34,7 @@ def panel(cuts=16):
 
 @pytest.fixture(scope="module")
 def scene():
-    """A floor before a dark panel, of which an orange and a blue field shine."""
+    """A floor before a dark panel with an orange and a blue emissive field."""
     pixels = np.zeros((16, 16, 3), np.uint8)
     pixels[4:8, 1:5], pixels[6:14, 11:15] = [255, 120, 20], [20, 80, 200]
     texture = Texture(pixels, encoding=TextureEncoding("srgb"))
@@ -60,22 +60,22 @@ def pictures(scene, transfer):
     return image, reference_image(scene, "front", look, SIZE, 512), transfer.views["front"].material_ids()
 
 
-def test_the_image_is_seen(pictures) -> None:
+def test_the_emission_image_is_visible(pictures) -> None:
     actual, reference, ids = pictures
     wall = ids == 1
     assert reference[wall].max() > 20 * np.median(reference[wall])
     np.testing.assert_allclose(actual[wall], reference[wall], rtol=0.05, atol=0.01 * reference.max())
 
 
-def test_others_are_lit_from_where_it_is_bright(pictures) -> None:
-    """Triangle by triangle, by brightness: the floor has the colours' mean; brute force has each texel's."""
+def test_bright_parts_illuminate_other_surfaces(pictures) -> None:
+    """By triangles, with their brightness: the floor gets the mean color; the reference uses each texel."""
     actual, reference, ids = pictures
     brightness, expected = luminance(actual[ids == 0]), luminance(reference[ids == 0])
     assert relative_rmse(brightness, expected) < 0.05
     np.testing.assert_allclose(actual[ids == 0].sum(axis=0), reference[ids == 0].sum(axis=0), rtol=0.1)
 
 
-def test_brightness_and_colour_of_the_light_multiply_the_image(transfer, pictures) -> None:
+def test_intensity_and_color_of_the_light_multiply_the_image(transfer, pictures) -> None:
     def brighter(document):
         red, green, _ = document["lights"]["Panel"]["emission"]
         document["lights"]["Panel"]["emission"] = [3 * red, green, 0.0]
@@ -88,16 +88,16 @@ def test_brightness_and_colour_of_the_light_multiply_the_image(transfer, picture
     assert actual[inner][:, 2].max() < 0.05 * before[inner][:, 2].max()
 
 
-def test_picture_is_what_the_twin_gives(transfer, pictures) -> None:
+def test_the_picture_equals_the_numpy_reference(transfer, pictures) -> None:
     assert relative_rmse(pictures[0], ref.full_evaluation(transfer, "front", make_look(transfer))) < 1e-5
 
 
-def test_a_moving_eye_sees_the_image(scene, tmp_path, pictures) -> None:
+def test_a_free_camera_shows_the_emission_image(scene, tmp_path, pictures) -> None:
     recipe = Recipe("probes", ("front",), SIZE, 400, num_probes=2000)
     moving = open_bake(bake_in_process(METHODS["probes"], scene, recipe, tmp_path / "probes.zarr"), Cache(1 << 30))
     actual, (_, reference, ids) = render_image(moving, "front", make_look(moving)), pictures
     inner = (ids == 1) & np.roll(ids == 1, 1, 0) & np.roll(ids == 1, -1, 0) & np.roll(ids == 1, 1, 1)
     inner &= np.roll(ids == 1, -1, 1)
     off = np.abs(actual - reference)[inner] / reference.max()
-    assert np.median(off) < 0.01  # one ray a pixel, in the middle of it: rims of fields differ
+    assert np.median(off) < 0.01  # one ray through the pixel center: edges of fields differ
     assert np.corrcoef(actual[inner].ravel(), reference[inner].ravel())[0, 1] > 0.97

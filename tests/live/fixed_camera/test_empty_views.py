@@ -1,4 +1,4 @@
-"""Where there is nothing to see the picture is black, and comes back."""
+"""Views without light or visible materials are black, and recover."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_black_environment_is_black_in_every_pixel_and_stays_so(tmp_path):
     assert not run_until_exact(picture).image().any()
 
 
-def test_material_without_terms_or_with_zero_curves_is_black(transfer):
+def test_a_material_without_terms_or_with_zero_curves_is_black(transfer):
     def nothing(document):
         document["materials"]["Ball"]["terms"] = []
 

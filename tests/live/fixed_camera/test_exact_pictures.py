@@ -1,4 +1,4 @@
-"""The oracle of pictures does not believe the picture: neither its files nor its shading."""
+"""Exact pictures do not depend on the picture under test: neither on its files nor on its shading."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ shaded = Shade._complete_image
 
 
 def too_bright(*args):
-    """Every image by a hundredth."""
+    """Every image 1 % too bright."""
     return ShadedTerm(shaded(*args).image * np.float32(1.01))
 
 
-def test_images_that_a_session_has_kept_are_not_read(transfer, monkeypatch):
+def test_stored_images_of_a_session_are_not_read(transfer, monkeypatch):
     with open_copy(transfer) as shown:
         look = make_look(shown, set_sigma(0.31))
         with monkeypatch.context() as broken:
             broken.setattr(Shade, "_complete_image", too_bright)
             wrong = open_exact_picture(shown, look=look).image()
         assert relative_rmse(wrong, exact_image(shown, look)) > 0.005
-        np.testing.assert_array_equal(open_exact_picture(shown, look=look).image(), wrong)  # which a session would read
+        np.testing.assert_array_equal(open_exact_picture(shown, look=look).image(), wrong)  # a session would read it
 
 
-def test_shading_that_is_wrong_everywhere_is_found(transfer, monkeypatch):
+def test_a_common_shading_error_is_detected(transfer, monkeypatch):
     monkeypatch.setattr(Shade, "_complete_image", too_bright)
     with pytest.raises(AssertionError, match="Mismatched elements"):
         exact_image(transfer, make_look(transfer))

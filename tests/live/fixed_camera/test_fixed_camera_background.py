@@ -1,4 +1,4 @@
-"""What is seen behind objects, and a ground that catches their shadows, against sums over all directions."""
+"""Background and shadow catchers of fixed views, against sums over all directions."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ from relume.scene.model import Material
 
 
 @pytest.fixture(scope="module")
-def standing(tmp_path_factory):
-    """Of direct light alone, opened."""
+def direct_bake(tmp_path_factory):
+    """A bake of direct light, opened."""
     return bake_corner_scene(ball_scene(studio()), "direct", tmp_path_factory.mktemp("standing"))
 
 
 @pytest.fixture(scope="module")
-def reflecting(tmp_path_factory):
-    """The same with light between surfaces."""
+def indirect_bake(tmp_path_factory):
+    """The same with indirect light."""
     return bake_corner_scene(ball_scene(studio()), "gather", tmp_path_factory.mktemp("reflecting"))
 
 
@@ -52,7 +52,7 @@ def rendered(transfer, *several):
 
 
 def directions(transfer):
-    """In which every pixel's first sample is seen. (height, width, 3)"""
+    """View direction of every pixel's first sample. (height, width, 3)"""
     view = transfer.views["front"]
     position = transfer.store.read("views/0/position")
     position[: view.num_surface_samples] -= CAMERA.to_world[:3, 3].astype(np.float32)
@@ -61,15 +61,15 @@ def directions(transfer):
 
 
 def ground_points(transfer):
-    """Where the camera meets the ground, in its inner pixels. (n, 3)"""
+    """Points of the ground at the centers of its inner pixels. (n, 3)"""
     towards = directions(transfer)[inner(transfer, "Ground")].astype(float)
     camera_position = CAMERA.to_world[:3, 3]
     height = camera_position[1] - (CENTRE[1] - RADIUS)
     return camera_position + towards * (height / -towards[:, 1])[:, None]
 
 
-def free_share(points, environment, degrees=0.0):
-    """Brute force: irradiance of a level ground over that without the ball, by sums over a fine map. (n, 3)"""
+def unoccluded_fraction(points, environment, degrees=0.0):
+    """Brute force: irradiance of a horizontal ground over that without the ball, by sums over a fine map. (n, 3)"""
     height = 128
     w = texel_directions(height, 2 * height).reshape(-1, 3).astype(float)
     light = lookup(environment, rotate_about_y(w, -degrees)) * np.maximum(w[:, 1:2], 0)
@@ -83,14 +83,14 @@ def free_share(points, environment, degrees=0.0):
     return np.array(shares)
 
 
-def test_ground_alone_is_not_seen(tmp_path):
+def test_a_ground_without_objects_is_invisible(tmp_path):
     floor = quad("Ground", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 0)
     catcher = Material("Ground", ({"model": "lambert", "color": [0.2, 0.5, 0.2]},), shadow_catcher=True)
     for k, around in enumerate((np.full((16, 32, 3), [0.5, 0.7, 2.0], np.float32), studio())):
         scene = make_tiny_scene(floor, camera=CAMERA, environment=around, materials=[catcher])
         transfer = bake_corner_scene(scene, "direct", tmp_path / str(k))
         is_inner = inner(transfer, "Ground") | inner(transfer, None)
-        is_inner |= k == 0  # in even light nothing may show where it ends
+        is_inner |= k == 0  # in uniform light its border is invisible
         assert is_inner.sum() > 700
         image = rendered(transfer)
         expected = lookup(around, directions(transfer).reshape(-1, 3)).reshape(image.shape)
@@ -102,115 +102,120 @@ def test_ground_alone_is_not_seen(tmp_path):
 
 
 @pytest.mark.parametrize("degrees", [0.0, 70.0])
-def test_shadows_are_those_of_brute_force(standing, degrees):
-    image = rendered(standing, background(kind="color", color=[1.0, 1.0, 1.0]), environment(rotation=degrees))
-    ours, expected = image[inner(standing, "Ground")], free_share(ground_points(standing), studio(), degrees)
+def test_shadows_equal_brute_force(direct_bake, degrees):
+    image = rendered(direct_bake, background(kind="color", color=[1.0, 1.0, 1.0]), environment(rotation=degrees))
+    ours, expected = (
+        image[inner(direct_bake, "Ground")],
+        unoccluded_fraction(ground_points(direct_bake), studio(), degrees),
+    )
     assert expected.min() < 0.5 < 0.98 < expected.max()
     assert np.sqrt(np.mean((ours - expected) ** 2)) < 0.012
     assert np.quantile(np.abs(ours - expected), 0.99) < 0.05
 
 
-def miss_of(points):
-    """How far from the middle of the ball the way from points to the lamp passes. (n,)"""
+def distance_to_ray(points):
+    """Distance of the ball's center to the ray from each point to the light. (n,)"""
     light_position = np.array(POINT_LIGHT["position"])
     towards = (light_position - points) / np.linalg.norm(light_position - points, axis=1, keepdims=True)
     along = np.einsum("nc,nc->n", towards, CENTRE - points)
     return np.sqrt(np.sum((CENTRE - points) ** 2, axis=1) - along**2)
 
 
-def test_ground_is_as_dark_as_its_lamp_says(standing):
-    image = rendered(standing, set_only_area_light, background(kind="color", color=[2.0, 1.0, 0.5]))
-    miss = miss_of(ground_points(standing))
-    shares = image[inner(standing, "Ground")] / [2.0, 1.0, 0.5]
+def test_the_ground_has_the_shadow_of_its_light(direct_bake):
+    image = rendered(direct_bake, set_only_area_light, background(kind="color", color=[2.0, 1.0, 0.5]))
+    miss = distance_to_ray(ground_points(direct_bake))
+    shares = image[inner(direct_bake, "Ground")] / [2.0, 1.0, 0.5]
     assert (shares[miss < 0.97 * RADIUS] == 0).all()
     assert (miss < 0.97 * RADIUS).sum() > 10
     np.testing.assert_allclose(shares[miss > 1.03 * RADIUS], 1, rtol=1e-4)
 
 
-def blue_lamp_alone(document):
+def set_only_blue_light(document):
     document["environment"]["intensity"] = 0.0
     document["lights"]["Lamp"] = {**POINT_LIGHT, "emission": [0.0, 0.0, 5.0]}
 
 
-def test_ground_where_no_light_would_fall_shows_what_is_behind(standing):
-    """Nothing shadows it there: outside the cone of a spot, around a lamp that is itself an object."""
-    colour, ground, points = np.array([2.0, 1.0, 0.5]), inner(standing, "Ground"), ground_points(standing)
+def test_an_unlit_ground_shows_the_background(direct_bake):
+    """Nothing is shadowed there: outside the cone of a spot light, around a light that is itself an object."""
+    colour, ground, points = np.array([2.0, 1.0, 0.5]), inner(direct_bake, "Ground"), ground_points(direct_bake)
     behind = background(kind="color", color=colour.tolist())
     below = points - POINT_LIGHT["position"]
     is_outside = np.degrees(np.arctan2(np.hypot(below[:, 0], below[:, 2]), -below[:, 1])) > 20.5
-    lit_by_spot = rendered(standing, set_only_spot_light, behind)
+    lit_by_spot = rendered(direct_bake, set_only_spot_light, behind)
     shares = lit_by_spot[ground] / colour
     assert 50 < is_outside.sum() < len(points) - 50
     np.testing.assert_allclose(shares[is_outside], 1, rtol=1e-5)
-    miss = np.where(is_outside, np.inf, miss_of(points))
+    miss = np.where(is_outside, np.inf, distance_to_ray(points))
     np.testing.assert_array_equal(shares[miss < 0.97 * RADIUS], 0)
     assert (miss < 0.97 * RADIUS).sum() > 5
-    lit_by_ball = rendered(standing, set_only_emissive_ball, behind)
+    lit_by_ball = rendered(direct_bake, set_only_emissive_ball, behind)
     np.testing.assert_allclose(lit_by_ball[ground] / colour, 1, rtol=1e-5)
     for alone, expected in ((set_only_spot_light, lit_by_spot), (set_only_emissive_ball, lit_by_ball)):
-        *image, alpha = np.moveaxis(rendered(standing, alone, background(kind="transparent")), 2, 0)
+        *image, alpha = np.moveaxis(rendered(direct_bake, alone, background(kind="transparent")), 2, 0)
         composed = np.dstack(image) + (1 - alpha[..., None]) * colour
-        np.testing.assert_allclose(composed, expected, rtol=3e-4, atol=1e-5)  # alpha says nothing of shares over one
-        assert not rendered(standing, alone, behind, set_paths("further_bounces"))[ground].any()
+        np.testing.assert_allclose(composed, expected, rtol=3e-4, atol=1e-5)  # alpha cannot represent ratios above one
+        assert not rendered(direct_bake, alone, behind, set_paths("further_bounces"))[ground].any()
 
 
-def test_reflected_light_beside_the_rim_of_a_cone_is_held_against_no_less_than_there_is(reflecting):
-    """Else single pixels would shine thousands of times as bright as what is behind."""
-    image = rendered(reflecting, set_only_spot_light, background(kind="color", color=[2.0, 1.0, 0.5]))
-    shares = image[inner(reflecting, "Ground")] / [2.0, 1.0, 0.5]
+def test_ratios_at_the_edge_of_a_cone_are_bounded(indirect_bake):
+    """Otherwise single pixels would be thousands of times as bright as the background."""
+    image = rendered(indirect_bake, set_only_spot_light, background(kind="color", color=[2.0, 1.0, 0.5]))
+    shares = image[inner(indirect_bake, "Ground")] / [2.0, 1.0, 0.5]
     assert shares.max() <= MAX_CATCHER_RATIO * (1 + 1e-5)
     assert np.median(shares) == pytest.approx(1, abs=0.01)
 
 
-def test_ground_under_a_lamp_of_one_channel_hides_that_channel_alone(standing):
-    shares = rendered(standing, blue_lamp_alone, background(kind="color", color=[1.0, 1.0, 1.0]))
-    shares = shares[inner(standing, "Ground")]
+def test_a_light_of_one_channel_casts_a_shadow_in_that_channel(direct_bake):
+    shares = rendered(direct_bake, set_only_blue_light, background(kind="color", color=[1.0, 1.0, 1.0]))
+    shares = shares[inner(direct_bake, "Ground")]
     np.testing.assert_allclose(shares[:, :2], 1, rtol=1e-5)
     assert (shares[:, 2].min(), shares[:, 2].max()) == (0, pytest.approx(1, rel=1e-4))
 
 
-def test_there_is_no_seam_where_the_ground_ends():
+def test_the_border_of_the_ground_has_no_seam():
     scene = ball_scene(studio())
     rim = scene.meshes[-1].positions[1:]
-    assert np.abs(free_share(rim.astype(float), studio()) - 1).max() < 1e-3
+    assert np.abs(unoccluded_fraction(rim.astype(float), studio()) - 1).max() < 1e-3
     assert rim[:, 1].max() < CENTRE[1] - RADIUS < rim[:, 1].min() + 1e-3
 
 
-def test_reflected_light_colours_the_ground(reflecting, standing):
-    """What is shown is the light that a white ground has, over that without the ball, in front of what is behind."""
+def test_indirect_light_colors_the_ground(indirect_bake, direct_bake):
+    """The background times the light on a white ground, over that without the ball."""
     white = background(kind="color", color=[1.0, 1.0, 1.0])
-    catcher, ground = rendered(reflecting, white), inner(reflecting, "Ground")
-    plain = rendered(reflecting, plain_ground)
+    catcher, ground = rendered(indirect_bake, white), inner(indirect_bake, "Ground")
+    plain = rendered(indirect_bake, plain_ground)
     level = texel_directions(128, 256).reshape(-1, 3).astype(float)
     weights = np.maximum(level[:, 1], 0) * np.repeat(texel_solid_angles(128, 256), 256)
     unoccluded = weights @ lookup(studio(), level.astype(np.float32))
     expected = plain[ground] / (0.5 / np.pi * unoccluded)
     np.testing.assert_allclose(catcher[ground], expected, rtol=0.01)
-    gained = catcher[ground] / rendered(standing, white)[ground]
+    gained = catcher[ground] / rendered(direct_bake, white)[ground]
     assert gained[:, 0].max() > 1.05
     assert gained[:, 1].max() < 0.5 * (gained[:, 0].max() - 1) + 1
-    parts = [rendered(reflecting, white, set_paths(paths)) for paths in ("direct", "first_bounce", "further_bounces")]
+    parts = [
+        rendered(indirect_bake, white, set_paths(paths)) for paths in ("direct", "first_bounce", "further_bounces")
+    ]
     np.testing.assert_allclose(np.sum(parts, axis=0), catcher, rtol=1e-3, atol=1e-4)
 
 
-def test_background_is_the_map_or_a_colour_or_blurred(standing):
-    outside, plain = inner(standing, None), rendered(standing)
+def test_the_background_is_the_map_a_color_or_blurred(direct_bake):
+    outside, plain = inner(direct_bake, None), rendered(direct_bake)
     if not outside.any():
         pytest.fail("the view shows no background")
     for scale in (2.0, 0.0):
-        image = rendered(standing, background(kind="color", color=[0.3, 0.2, 0.1]), environment(intensity=scale))
+        image = rendered(direct_bake, background(kind="color", color=[0.3, 0.2, 0.1]), environment(intensity=scale))
         np.testing.assert_allclose(image[outside], np.broadcast_to([0.3, 0.2, 0.1], image[outside].shape), rtol=1e-5)
-    image = rendered(standing, background(kind="color"))
-    ball = inner(standing, "Ball")
+    image = rendered(direct_bake, background(kind="color"))
+    ball = inner(direct_bake, "Ball")
     np.testing.assert_array_equal(image[ball], plain[ball])
     turn = 40.0
-    image = rendered(standing, background(kind="blurred", blur=12.0), environment(rotation=turn, intensity=2.0))
-    towards = rotate_about_y(directions(standing)[outside].astype(float), -turn).astype(np.float32)
+    image = rendered(direct_bake, background(kind="blurred", blur=12.0), environment(rotation=turn, intensity=2.0))
+    towards = rotate_about_y(directions(direct_bake)[outside].astype(float), -turn).astype(np.float32)
     np.testing.assert_allclose(image[outside], 2 * lookup(prefiltered(downsampled(studio()), 12.0), towards), rtol=1e-4)
 
 
-def test_transparent_pictures_compose_over_anything(tmp_path, standing):
-    """Over a colour they are what that colour as a background gives, in grey light: shadows have no colour in alpha."""
+def test_transparent_images_composite_over_any_background(tmp_path, direct_bake):
+    """Over a color they equal that color as a background, in gray light: alpha has no color."""
     grey = np.repeat(studio()[..., :1], 3, axis=-1)
     transfer = bake_corner_scene(ball_scene(grey), "direct", tmp_path)
     image = rendered(transfer, background(kind="transparent"))
@@ -228,60 +233,60 @@ def test_transparent_pictures_compose_over_anything(tmp_path, standing):
     np.testing.assert_array_equal(shown[inner(transfer, "Ball")], image[inner(transfer, "Ball")])
 
 
-def test_a_live_picture_switches_at_once(standing):
-    """Nothing has to be shaded for another background, and none for a catcher that becomes a plain ground."""
-    picture = run_until_exact(Picture(standing, "front", Cache(BUDGET)))
+def test_a_live_picture_switches_at_once(direct_bake):
+    """Another background needs no shading, nor does switching a shadow catcher to a plain ground."""
+    picture = run_until_exact(Picture(direct_bake, "front", Cache(BUDGET)))
     assert picture.encode_alpha(picture.all_tiles()) is None
     behind = [background(kind=kind) for kind in ("blurred", "color", "transparent")]
     for change in (*behind, plain_ground):
-        picture.set_look(make_look(standing, change))
+        picture.set_look(make_look(direct_bake, change))
         advance = picture.advance(None)
         assert advance.exact
         assert advance.changed
-        np.testing.assert_array_equal(picture.image(), rendered(standing, change)[..., :3])
-    picture.set_look(make_look(standing, background(kind="transparent")))
+        np.testing.assert_array_equal(picture.image(), rendered(direct_bake, change)[..., :3])
+    picture.set_look(make_look(direct_bake, background(kind="transparent")))
     picture.advance(None)
     alpha = np.frombuffer(picture.encode_alpha(picture.all_tiles()), np.uint8)
     assert len(alpha) == SIZE[0] * SIZE[1]
     assert {0, 255} <= set(alpha)
-    picture.set_look(make_look(standing))
-    np.testing.assert_array_equal(run_until_exact(picture).image(), rendered(standing))
+    picture.set_look(make_look(direct_bake))
+    np.testing.assert_array_equal(run_until_exact(picture).image(), rendered(direct_bake))
 
 
-def test_lamps_that_move_keep_the_ground_near_its_look(standing):
-    picture = Picture(standing, "front", Cache(BUDGET))
+def test_moving_lights_keep_an_approximate_shadow_catcher(direct_bake):
+    picture = Picture(direct_bake, "front", Cache(BUDGET))
     behind = background(kind="color", color=[1.0, 1.0, 1.0])
-    picture.set_look(make_look(standing, changes(set_only_area_light, behind)))
+    picture.set_look(make_look(direct_bake, changes(set_only_area_light, behind)))
     before = run_until_exact(picture).image()
     moved = {**POINT_LIGHT, "position": [-0.5, 1.8, 0.4]}
     change = changes(set_only_area_light, behind, lambda d: d["lights"].update(Lamp=moved))
-    picture.set_look(make_look(standing, change))
+    picture.set_look(make_look(direct_bake, change))
     picture.advance(None)
-    ground, exact = inner(standing, "Ground"), rendered(standing, change)
+    ground, exact = inner(direct_bake, "Ground"), rendered(direct_bake, change)
     errors = [relative_rmse(image[ground], exact[ground]) for image in (picture.image(), before)]
     assert errors[0] < 0.5 * errors[1]
     np.testing.assert_allclose(run_until_exact(picture).image(), exact, rtol=1e-4, atol=1e-5)
 
 
 @pytest.mark.parametrize("kind", ["map", "blurred", "color"])
-def test_brightness_of_the_environment_multiplies_what_is_there(standing, kind, monkeypatch):
-    """Only a colour, which is not the light's own, is written anew."""
+def test_environment_intensity_multiplies_the_picture(direct_bake, kind, monkeypatch):
+    """Only a background color, which does not depend on light, is composited again."""
     brighter = changes(background(kind=kind), environment(intensity=2.0, color=[1.0, 0.5, 0.2]))
-    expected = rendered(standing, brighter)
-    picture = Picture(standing, "front", Cache(BUDGET))
-    picture.set_look(make_look(standing, background(kind=kind)))
+    expected = rendered(direct_bake, brighter)
+    picture = Picture(direct_bake, "front", Cache(BUDGET))
+    picture.set_look(make_look(direct_bake, background(kind=kind)))
     run_until_exact(picture)
     write, written = Background._background_radiance, []
     monkeypatch.setattr(Background, "_background_radiance", lambda *given: written.append(given) or write(*given))
-    picture.set_look(make_look(standing, brighter))
+    picture.set_look(make_look(direct_bake, brighter))
     assert picture.advance(None).changed
     assert bool(written) == (kind == "color")
     np.testing.assert_allclose(picture.image(), expected, rtol=1e-6)
 
 
-def test_coverage_follows_the_ground_alone(standing, monkeypatch):
-    """Whatever a hand does a live picture hides what a new one of the same look does, and asks no more than it must."""
-    picture, asked = Picture(standing, "front", Cache(BUDGET)), []
+def test_coverage_depends_on_the_ground_only(direct_bake, monkeypatch):
+    """After any edit, a live picture has the alpha of a new picture of the same look, with minimal requests."""
+    picture, asked = Picture(direct_bake, "front", Cache(BUDGET)), []
     ask = Background._shadow_opacity
     transparent = background(kind="transparent")
     ball = [lambda d, c=c: d["materials"]["Ball"]["terms"][0].update(color=[c, 0.1, 0.1]) for c in (0.3, 0.6)]
@@ -295,8 +300,8 @@ def test_coverage_follows_the_ground_alone(standing, monkeypatch):
         (area_light, 1),
     ]
     for change, max_error in steps:
-        look = make_look(standing, changes(transparent, change))
-        expected = render_image(standing, "front", look, for_display=True)[..., 3]
+        look = make_look(direct_bake, changes(transparent, change))
+        expected = render_image(direct_bake, "front", look, for_display=True)[..., 3]
         picture.set_look(look)
         run_until_exact(picture)
         with monkeypatch.context() as patched:
@@ -305,6 +310,6 @@ def test_coverage_follows_the_ground_alone(standing, monkeypatch):
             tiles = picture.encode_alpha([(0, 0, 40, 10), (0, 10, 15, 20), (15, 10, 25, 20)])
         assert len(asked) == max_error
         alpha = picture.alpha(for_display=True)
-        np.testing.assert_allclose(alpha, expected, atol=1e-6)  # lamps are mixed in, which rounds otherwise
+        np.testing.assert_allclose(alpha, expected, atol=1e-6)  # lights are mixed, with other rounding
         shown = to_bytes(alpha)
         assert tiles == b"".join(tile.tobytes() for tile in (shown[:10], shown[10:, :15], shown[10:, 15:]))

@@ -1,4 +1,4 @@
-"""Colours and bounces dragged in a picture with light between surfaces: near at once, exact at rest."""
+"""Colors and bounces edited with indirect light: near exact at once, exact when the edit stops."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def colored(transfer, color, **transport):
 
 @pytest.fixture
 def prepared(gathered):
-    """An exact picture whose red wall somebody is about to colour."""
+    """An exact picture prepared for an edit of the red wall's color."""
     picture = run_until_exact(Picture(gathered, "front", Cache(BUDGET)))
     picture.prepare(RED)
     needs = []
@@ -41,7 +41,7 @@ def prepared(gathered):
     return picture
 
 
-def test_colour_bleeding_follows_a_dragged_colour(gathered, prepared):
+def test_color_bleeding_follows_a_dragged_color(gathered, prepared):
     before = prepared.image()
     for blue in (0.2, 0.5, 0.8):
         look = colored(gathered, [0.1, 0.1, blue])
@@ -52,10 +52,10 @@ def test_colour_bleeding_follows_a_dragged_colour(gathered, prepared):
         assert relative_rmse(before, exact) > 0.1
         need = prepared.next_job()
         assert isinstance(need, Shade)
-        assert need.is_refinement  # it waits until the hand rests
+        assert need.is_refinement  # runs when the edit stops
 
 
-def test_at_rest_a_followed_picture_is_a_fresh_one(gathered, prepared):
+def test_the_picture_is_exact_when_the_edit_stops(gathered, prepared):
     prepared.set_look(colored(gathered, [0.3, 0.2, 0.5]))
     prepared.advance(32)
     last = colored(gathered, [0.1, 0.7, 0.2])
@@ -76,7 +76,7 @@ def test_undo_is_exact_at_once(gathered, prepared):
 
 
 @pytest.mark.parametrize("bounces", [0, 1, 3])
-def test_bounces_follow(gathered, prepared, bounces):
+def test_the_number_of_bounces_is_followed(gathered, prepared, bounces):
     look = colored(gathered, [0.8, 0.1, 0.1], bounces=bounces)
     prepared.set_look(look)
     assert not prepared.advance(32).exact
@@ -85,8 +85,8 @@ def test_bounces_follow(gathered, prepared, bounces):
     np.testing.assert_array_equal(run_until_exact(prepared).image(), exact)
 
 
-def test_from_no_bounces_reflected_light_comes_in(gathered):
-    """Rows are frozen while there is no reflected light to judge coefficients by."""
+def test_indirect_light_appears_from_zero_bounces(gathered):
+    """Rows are frozen without indirect light by which to rank coefficients."""
     picture = Picture(gathered, "front", Cache(BUDGET))
     picture.set_look(colored(gathered, [0.8, 0.1, 0.1], bounces=0))
     still = run_until_exact(picture).image()
@@ -114,7 +114,7 @@ def test_the_first_edit_freezes_rows_and_all_terms_follow_together(gathered):
     assert errors[-1] < 0.01 < errors[0]
 
 
-def test_all_black_surfaces_are_followed_to_direct_light(gathered, prepared):
+def test_black_surfaces_leave_direct_light(gathered, prepared):
     def black(document):
         for material in document["materials"].values():
             material["terms"][0]["color"] = [0.0, 0.0, 0.0]
@@ -122,12 +122,12 @@ def test_all_black_surfaces_are_followed_to_direct_light(gathered, prepared):
     look = make_look(gathered, black)
     prepared.set_look(look)
     prepared.advance(32)
-    # where a highlight sends its light stays as it was until the hand rests: of all that there was, 3 % here
+    # directions of highlights are updated when the edit stops: 3 % of the former light here
     assert relative_rmse(prepared.image(), exact_image(gathered, look)) < 0.04
 
 
-def test_a_diffuse_curve_is_not_followed_by_rows_of_another(gathered, prepared):
-    """The wall's own term is shaded anew; what it throws onto the others follows."""
+def test_a_diffuse_curve_edit_does_not_use_other_rows(gathered, prepared):
+    """The wall's own term is shaded again; the light that it reflects onto others follows."""
 
     def draw(document):
         document["materials"]["Blue"]["terms"][0]["params"]["sigma"] = 0.9
@@ -138,8 +138,8 @@ def test_a_diffuse_curve_is_not_followed_by_rows_of_another(gathered, prepared):
     np.testing.assert_array_equal(run_until_exact(prepared).image(), exact_image(gathered, look))
 
 
-def lamp_at(transfer, x, **others):
-    """The look with a lamp above the floor."""
+def light_at(transfer, x, **others):
+    """The look with a point light above the floor."""
 
     def change(document):
         light = {"kind": "point", "position": [x, 0.8, 0.2], "emission": [3.0, 2.5, 2.0], **others}
@@ -148,8 +148,8 @@ def lamp_at(transfer, x, **others):
     return make_look(transfer, change)
 
 
-def follow_lamp(transfer, *looks):
-    """A picture that has settled in the first look, whose lamp is then dragged through the others."""
+def follow_light(transfer, *looks):
+    """A picture that is exact in the first look, whose light is then dragged through the others."""
     picture = Picture(transfer, "front", Cache(BUDGET))
     picture.set_look(looks[0])
     run_until_exact(picture).prepare("/lights/Lamp")
@@ -162,47 +162,47 @@ def follow_lamp(transfer, *looks):
     return picture
 
 
-def test_a_moved_lamp_is_followed_with_its_shadows_and_what_it_reflects(gathered):
-    looks = [lamp_at(gathered, x) for x in (-0.5, -0.2, 0.1, 0.4)]
-    picture = follow_lamp(gathered, *looks)
+def test_a_moved_light_is_followed_with_shadows_and_indirect_light(gathered):
+    looks = [light_at(gathered, x) for x in (-0.5, -0.2, 0.1, 0.4)]
+    picture = follow_light(gathered, *looks)
     exact, start = (exact_image(gathered, look) for look in (looks[-1], looks[0]))
     assert relative_rmse(picture.image(), exact) < 0.1 * relative_rmse(start, exact)
     np.testing.assert_array_equal(run_until_exact(picture).image(), exact)
 
 
-def test_a_lamp_with_an_extent_is_followed_by_few_samples(gathered):
+def test_an_area_light_is_followed_with_few_samples(gathered):
     kind = {"kind": "rectangle", "direction": [0, -1, 0], "size": [0.3, 0.3], "emission": [30.0, 30.0, 30.0]}
-    looks = [lamp_at(gathered, x, **kind) for x in (-0.5, 0.4)]
-    picture = follow_lamp(gathered, *looks)
+    looks = [light_at(gathered, x, **kind) for x in (-0.5, 0.4)]
+    picture = follow_light(gathered, *looks)
     start, exact = (exact_image(gathered, look) for look in looks)
     assert relative_rmse(picture.image(), exact) < 0.25 * relative_rmse(start, exact)
     np.testing.assert_array_equal(run_until_exact(picture).image(), exact)
 
 
-def test_a_lamp_moved_where_only_direct_light_was_baked_needs_no_rows(corner, tmp_path):
+def test_a_moved_light_in_a_direct_bake_needs_no_rows(corner, tmp_path):
     direct = bake_corner_scene(corner, "direct", tmp_path)
-    looks = [lamp_at(direct, x) for x in (-0.5, 0.4)]
-    picture, exact = follow_lamp(direct, *looks), exact_image(direct, looks[-1])
+    looks = [light_at(direct, x) for x in (-0.5, 0.4)]
+    picture, exact = follow_light(direct, *looks), exact_image(direct, looks[-1])
     np.testing.assert_allclose(picture.image(), exact, rtol=1e-3, atol=1e-4)
     np.testing.assert_array_equal(run_until_exact(picture).image(), exact)
 
 
-def test_a_lamp_put_back_is_exact_at_once(gathered):
-    looks = [lamp_at(gathered, x) for x in (-0.5, 0.4)]
-    picture = follow_lamp(gathered, *looks)
+def test_a_light_moved_back_is_exact_at_once(gathered):
+    looks = [light_at(gathered, x) for x in (-0.5, 0.4)]
+    picture = follow_light(gathered, *looks)
     picture.set_look(looks[0])
     assert picture.advance(32).exact
     np.testing.assert_array_equal(picture.image(), exact_image(gathered, looks[0]))
 
 
-def test_where_the_cache_has_no_room_light_is_glimpsed(gathered):
+def test_without_cache_memory_light_is_previewed(gathered):
     picture = run_until_exact(Picture(gathered, "front", Cache(300_000)))
     picture.set_look(colored(gathered, [0.1, 0.1, 0.8]))
     picture.advance(32)
     assert isinstance(picture.next_job(), SparsePreview)
 
 
-def test_a_direct_bake_has_nothing_to_follow(corner, tmp_path):
+def test_a_direct_bake_has_no_rows(corner, tmp_path):
     direct = bake_corner_scene(corner, "direct", tmp_path)
     picture = run_until_exact(Picture(direct, "front", Cache(BUDGET)))
     picture.prepare(RED)
@@ -212,7 +212,7 @@ def test_a_direct_bake_has_nothing_to_follow(corner, tmp_path):
     assert picture.next_job() is None
 
 
-def test_rows_of_a_term_whose_own_curve_moves_are_not_made_at_every_edit(gathered, prepared):
+def test_rows_of_an_edited_term_are_not_rebuilt_at_every_edit(gathered, prepared):
     def draw(document):
         document["materials"]["Blue"]["terms"][0]["params"]["sigma"] = 0.9
 
@@ -221,9 +221,9 @@ def test_rows_of_a_term_whose_own_curve_moves_are_not_made_at_every_edit(gathere
     assert not isinstance(prepared.next_job(), PrecomputeRows)
 
 
-def test_a_lamp_just_added_is_exact_before_anything_is_made_for_moving_it(gathered):
+def test_an_added_light_is_exact_before_it_is_prepared_for_dragging(gathered):
     picture = run_until_exact(Picture(gathered, "front", Cache(BUDGET)))
-    picture.set_look(lamp_at(gathered, 0.4))
+    picture.set_look(light_at(gathered, 0.4))
     picture.advance(32)
     picture.prepare("/lights/Lamp")
     made = []
@@ -234,13 +234,13 @@ def test_a_lamp_just_added_is_exact_before_anything_is_made_for_moving_it(gather
     assert isinstance(picture.next_job(), PrecomputeRows)
 
 
-def test_only_the_part_of_light_that_an_edit_changes_is_shaded(gathered, monkeypatch):
-    def shown(x=0.43, **transport):  # no other test has shown it: images of looks stay beside a bake
+def test_only_changed_light_is_shaded(gathered, monkeypatch):
+    def shown(x=0.43, **transport):  # unused by other tests: images of looks are stored with a bake
         light = {"kind": "point", "position": [x, 0.8, 0.2], "emission": [3.0, 2.5, 2.0]}
         return make_look(gathered, lambda d: (d["lights"].update(Lamp=light), d["transport"].update(transport)))
 
     def shaded(look):
-        """What has been shaded when the picture rests in a look: whether of the environment, and kinds of rays."""
+        """Shading calls until the picture is exact: whether for the environment, and kinds of rays."""
         calls.clear()
         picture.set_look(look)
         run_until_exact(picture)

@@ -35,7 +35,7 @@ BALL = "/materials/Ball/terms/1/curves/"
         pytest.param(2, 9_000_000, 250, id="tight", marks=pytest.mark.slow),
     ],
 )
-def test_long_session_of_random_edits_is_what_a_full_evaluation_gives(transfer, seed, budget_bytes, num_steps):
+def test_a_long_session_of_random_edits_equals_a_full_evaluation(transfer, seed, budget_bytes, num_steps):
     rng, cache = np.random.default_rng(seed), Cache(budget_bytes)
     picture = run_until_exact(Picture(transfer, "front", cache))
     document, checked, inexact = copy.deepcopy(transfer.default_look), 0, 0
@@ -88,8 +88,8 @@ def set_param(document, sigma):
     document["materials"]["Ball"]["terms"][1]["params"] = {"sigma": sigma, "ior": 1.8, "extinction": 0.0}
 
 
-def test_refinement_only_ever_comes_nearer(transfer):
-    """Every step adds the columns that move the picture most; the rest of the difference shrinks to nothing."""
+def test_refinement_decreases_the_error(transfer):
+    """Every step adds the columns with the largest change of the picture; the remaining difference vanishes."""
     picture = Picture(transfer, "front", Cache(BUDGET))
     picture.prepare(BALL + "theta_h")
     run_until_exact(picture)
@@ -108,26 +108,26 @@ def test_refinement_only_ever_comes_nearer(transfer):
 
 
 def one_pixel(transport):
-    """The operator of a single sample whose transport along a curve of 64 bands begins with these numbers."""
+    """The operator of a single sample whose transport for a curve of 64 bands begins with these numbers."""
     columns = np.zeros((1, 3, 64, 16), np.float32)
     columns[0, :, : len(transport), 0] = transport
     return LinearOperator(columns, np.sqrt((columns**2).sum(axis=(0, 3))).astype(float))
 
 
 def target_of(*bands):
-    """The curve of a diffuse term, drawn by hand. (3, 64)"""
+    """A drawn curve of a diffuse term. (3, 64)"""
     return {"theta_i": np.tile([float(v) for v in bands] + [0.0] * (64 - len(bands)), (3, 1))}
 
 
 def start(frozen):
-    """One pixel that shows nothing, under an operator along its whole curve."""
+    """One black pixel, under an operator of its whole curve."""
     light = Illumination(BAKED_ENVIRONMENT, (), LightPaths(True, 1, 0))
     empty = DisplayedImage(np.zeros((1, 3, frozen.transport.shape[3]), np.float32))
     return empty.evaluate_operator(frozen, CurveBasis("theta_i", "θi", 64), target_of(0), light)
 
 
-def test_what_moves_the_picture_most_goes_first(monkeypatch):
-    """A small change of a coefficient that much light falls on before a large one that lights nothing."""
+def test_the_largest_changes_of_the_picture_come_first(monkeypatch):
+    """A small change of a coefficient with much transport comes before a large one without."""
     monkeypatch.setattr("relume.operators.edit_basis.analysis", identity_basis.analysis)
     frozen = one_pixel([0.01, 100, 2])
     shown, target, order = start(frozen), target_of(50, 1, 10), []
@@ -138,7 +138,7 @@ def test_what_moves_the_picture_most_goes_first(monkeypatch):
 
 
 def test_didactic_example_of_table_2(monkeypatch):
-    """One pixel, T = (3, 5, 2), one multiplication a frame; bands themselves as the basis, as in the paper."""
+    """One pixel, T = (3, 5, 2), one multiplication per frame; the bands are the basis, as in the paper."""
     monkeypatch.setattr("relume.operators.edit_basis.analysis", identity_basis.analysis)
     frozen = one_pixel([3, 5, 2])
 
@@ -146,8 +146,8 @@ def test_didactic_example_of_table_2(monkeypatch):
     assert not shown.image.any()
     session = [  # c_perfect, R_perfect, c_diff, R_effective, c_effective
         ((4, 2, 1), 24, (4, 2, 1), 12, (4, 0, 0)),  # a curve with geometric decay is loaded
-        ((4, 5, 1), 39, (0, 5, 1), 37, (4, 5, 0)),  # its middle is amplified
-        ((4, 4, 0), 32, (0, -1, 0), 32, (4, 4, 0)),  # all but the left part goes down by one
+        ((4, 5, 1), 39, (0, 5, 1), 37, (4, 5, 0)),  # its center is amplified
+        ((4, 4, 0), 32, (0, -1, 0), 32, (4, 4, 0)),  # all but the left part decreases by one
     ]
     non_linear, incremental = [], []
     for perfect, r_perfect, difference, r_effective, effective in session:
@@ -166,11 +166,11 @@ def test_didactic_example_of_table_2(monkeypatch):
 
 
 @pytest.mark.parametrize(("common", "is_exact"), [(0, True), (10_000, False)])
-def test_images_know_what_float32_sums_have_left_in_them(common, is_exact):
-    """All columns have the same in common, which cancels: what is left of a sum is mostly rounding where it is much."""
+def test_images_track_the_rounding_of_float32_sums(common, is_exact):
+    """A common offset of all columns cancels: if it is large, mostly rounding remains."""
     rng = np.random.default_rng(8)
     columns = (rng.normal(size=(1, 3, 64, 1024)) + common * rng.normal(size=1024)).astype(np.float32)
-    coefficients = rng.integers(-100, 100, 64).astype(float)  # float32 has them
+    coefficients = rng.integers(-100, 100, 64).astype(float)  # exact in float32
     coefficients[-1] -= coefficients.sum()
     frozen = LinearOperator(columns, np.sqrt((columns.astype(float) ** 2).sum(axis=(0, 3))))
     empty = start(frozen)
@@ -182,7 +182,7 @@ def test_images_know_what_float32_sums_have_left_in_them(common, is_exact):
 
 
 def test_local_edit_of_a_peaked_curve_is_exact_where_non_linear_approximation_is_not(transfer):
-    """Figure 5: 20 of 256 wavelet terms. The peak stands still and costs nothing; non-linear spends its terms on it."""
+    """Figure 5: 20 of 256 wavelet terms. The constant peak costs nothing; non-linear approximation spends its terms on it."""
     wave = 3 + 2 * np.sin(np.linspace(0, 25, 156))
 
     def drawn(rise):
@@ -210,7 +210,7 @@ def test_local_edit_of_a_peaked_curve_is_exact_where_non_linear_approximation_is
     assert picture.advance(20).exact
     expected = ref.full_evaluation(transfer, "front", with_rise(6.0))
     assert relative_rmse(picture.image(), expected) < 1e-6
-    assert relative_rmse(before, expected) > 1e-3  # the edit can be seen
+    assert relative_rmse(before, expected) > 1e-3  # the edit is visible
 
     view, term = transfer.views["front"], TERMS["cook_torrance"]
     document = with_rise(6.0).materials["Ball"].terms[1]

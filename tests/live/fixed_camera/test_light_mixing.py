@@ -1,4 +1,4 @@
-"""Lights brightened, tinted, switched and soloed: mixed from images of single sources, exactly, of few of them."""
+"""Lights dimmed, tinted, switched and soloed: mixed exactly from few images of single sources."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ def changed(name, **fields):
 
 @pytest.fixture
 def lit(transfer):
-    """A picture under three lights and the environment, at rest."""
+    """An exact picture under three lights and the environment."""
     picture = Picture(transfer, "front", Cache(BUDGET))
     picture.set_look(look_with(transfer, ALL))
     return run_until_exact(picture)
 
 
 def num_made(picture):
-    """What is made until the picture rests, glimpses aside."""
+    """Number of jobs until the picture is exact, without previews."""
     made = 0
     while (need := picture.next_job()) is not None:
         made += not isinstance(need, SparsePreview)
@@ -70,7 +70,7 @@ def test_first_change_shades_one_source_and_later_ones_nothing(transfer, lit, fi
         np.testing.assert_allclose(lit.image(), exact_image(transfer, look), rtol=1e-4, atol=1e-5)
 
 
-def test_environment_s_brightness_is_mixed_beside_lights(transfer, lit):
+def test_the_intensity_of_the_environment_is_mixed(transfer, lit):
     for environment in ({"intensity": 0.0}, {"intensity": 2.0, "color": [0.5, 1.0, 1.0]}):
         look = look_with(transfer, ALL, environment)
         lit.set_look(look)
@@ -80,7 +80,7 @@ def test_environment_s_brightness_is_mixed_beside_lights(transfer, lit):
     assert lit.advance(None).exact
 
 
-def test_solo_shows_what_the_others_switched_off_would_show(transfer, lit):
+def test_solo_equals_the_other_lights_switched_off(transfer, lit):
     whole = look_with(transfer, ALL)
     lit.set_look(whole, solo=frozenset({"Sun"}))
     run_until_exact(lit)
@@ -91,7 +91,7 @@ def test_solo_shows_what_the_others_switched_off_would_show(transfer, lit):
     np.testing.assert_allclose(run_until_exact(lit).image(), exact_image(transfer, whole), rtol=1e-4, atol=1e-5)
 
 
-def test_soloed_light_is_shaded_alone_and_the_others_come_back_at_once(transfer, lit):
+def test_a_soloed_light_is_shaded_alone_and_the_others_return_at_once(transfer, lit):
     solo = {name: light | {"enabled": name == "Sun"} for name, light in ALL.items()}
     look = look_with(transfer, solo, {"intensity": 0.0})
     lit.set_look(look)
@@ -106,7 +106,7 @@ def test_soloed_light_is_shaded_alone_and_the_others_come_back_at_once(transfer,
 
 
 @pytest.mark.parametrize("environment", [{}, {"rotation": 40.0}])
-def test_after_a_solo_the_others_come_back_without_being_shaded(transfer, lit, environment):
+def test_after_a_solo_the_others_are_not_shaded_again(transfer, lit, environment):
     def look_at(sun_scale):
         lights = changed("Panel", intensity=3.0) | {"Sun": SUN | {"intensity": sun_scale}}
         return look_with(transfer, lights, environment)
@@ -132,8 +132,8 @@ def test_curves_that_were_changed_under_one_light_are_shaded_under_all(transfer,
 
 
 @pytest.mark.slow
-def test_gains_and_curves_changed_by_turns_stay_exact(transfer, lit):
-    """A curve's operator belongs to one light; after another gain it is made anew, never used on."""
+def test_alternating_gains_and_curves_stay_exact(transfer, lit):
+    """A curve's operator belongs to one light; another gain needs a new one."""
 
     def edited(scale, exponent):
         lights = changed("Lamp", intensity=scale)
@@ -152,7 +152,7 @@ def test_gains_and_curves_changed_by_turns_stay_exact(transfer, lit):
         np.testing.assert_allclose(lit.image(), expected, rtol=3e-3, atol=1e-4)
 
 
-def test_touching_a_light_makes_its_own_image_ahead(transfer, lit):
+def test_preparing_a_light_computes_its_image(transfer, lit):
     lit.prepare("/lights/Panel")
     while (need := lit.next_job()) is not None:
         lit.install(need, need.run(lambda share: None, lambda: False))
@@ -163,7 +163,7 @@ def test_touching_a_light_makes_its_own_image_ahead(transfer, lit):
     np.testing.assert_allclose(lit.image(), exact_image(transfer, look), rtol=3e-3, atol=1e-4)
 
 
-def test_a_light_in_hand_is_prepared_again_where_it_was_put(transfer, lit):
+def test_a_moved_light_is_prepared_again_at_its_position(transfer, lit):
     lit.prepare("/lights/Panel")
     run_until_exact(lit).set_look(look_with(transfer, changed("Panel", position=[-0.9, 1.4, 1.0])))
     run_until_exact(lit)
@@ -173,7 +173,7 @@ def test_a_light_in_hand_is_prepared_again_where_it_was_put(transfer, lit):
     np.testing.assert_allclose(lit.image(), exact_image(transfer, look), rtol=3e-3, atol=1e-4)
 
 
-def test_nothing_is_made_ahead_where_the_cache_would_drop_something_for_it(transfer):
+def test_prewarming_never_evicts(transfer):
     picture = Picture(transfer, "front", Cache(BUDGET))
     picture.set_look(look_with(transfer, ALL))
     run_until_exact(picture).prepare("/lights/Panel")

@@ -1,4 +1,4 @@
-"""Pictures under local lights: linear in their gains, followed while they move, frozen and edited as others are."""
+"""Pictures under local lights: linear in their gains, followed while they move, frozen and edited like others."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def rendered(transfer, lights, environment=None, change=lambda document: None, v
 
 
 @pytest.mark.parametrize("light", [POINT_LIGHT, PANEL, SPOT, SUN], ids=lambda light: light["kind"])
-def test_light_adds_to_that_of_the_environment(transfer, light):
+def test_local_lights_add_to_the_environment(transfer, light):
     alone = rendered(transfer, {"A": light}, ENVIRONMENT_OFF)
     beside = rendered(transfer, {"A": light}, {"intensity": 0.5, "color": [1.0, 0.5, 0.2]})
     environment = rendered(transfer, {}, {"intensity": 0.5, "color": [1.0, 0.5, 0.2]})
@@ -61,13 +61,13 @@ def test_picture_is_linear_in_the_gains_of_lights(transfer):
     np.testing.assert_allclose(together, expected, rtol=1e-3, atol=1e-5)
 
 
-def test_lights_that_are_off_leave_the_picture_as_it_is_without_them(transfer):
+def test_disabled_lights_do_not_change_the_picture(transfer):
     off = {"A": POINT_LIGHT | {"enabled": False}, "B": SUN | {"intensity": 0.0}, "C": SPOT | {"color": [0, 0, 0]}}
     np.testing.assert_array_equal(rendered(transfer, off), rendered(transfer, {}))
 
 
 def test_curves_are_edited_under_local_lights_and_stay_exact(transfer):
-    """A highlight frozen, dragged, and then compared with a picture that starts from its curve."""
+    """A highlight is frozen, dragged, and compared with a picture of the final curve."""
     lights = {"A": POINT_LIGHT, "B": PANEL}
 
     def steeper(document):
@@ -84,7 +84,7 @@ def test_curves_are_edited_under_local_lights_and_stay_exact(transfer):
     np.testing.assert_allclose(image, exact_image(transfer, make_look(transfer, steeper)), rtol=2e-3, atol=1e-4)
 
 
-def test_moving_light_is_followed_and_then_exact(transfer):
+def test_a_moving_light_is_followed_and_then_exact(transfer):
     def moved(document):
         document["lights"]["A"] = POINT_LIGHT | {"position": [-0.9, 1.2, 1.0]}
 
@@ -99,12 +99,12 @@ def test_moving_light_is_followed_and_then_exact(transfer):
 
 
 def showing(show):
-    """A change of a look to some of its light paths."""
+    """A change of a look that shows some of its light paths."""
     return lambda document: document.update(transport={"show": show, "bounces": 24})
 
 
 def room(*, has_sides=True, lights=(), emitter=None):
-    """A floor below a lamp that faces down, seen from the side."""
+    """A floor below an emitter that faces down, seen from the side."""
     floor = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
     emitter = emitter or quad("lamp", [[-0.3, 1, -0.3], [0.3, 1, -0.3], [0.3, 1, 0.3], [-0.3, 1, 0.3]], 1)
     grey = ({"model": "lambert", "color": [0.5, 0.5, 0.5]},)
@@ -130,7 +130,7 @@ def baked(scene, folder, method="direct"):
 
 
 @pytest.mark.parametrize("is_two_sided", [True, False])
-def test_shining_surface_is_seen_and_lights_the_floor(tmp_path, is_two_sided):
+def test_an_emissive_surface_is_visible_and_lights_the_floor(tmp_path, is_two_sided):
     transfer = baked(room(has_sides=is_two_sided, lights=[SHINING]), tmp_path)
     assert [transfer.local.num_samples(LightGeometry(kind)) for kind in ("mesh", "rectangle")] == [256, 64]
     assert transfer.local.num_samples(LightGeometry("mesh"), SAMPLES_PER_PATCH_POINT) == 4 * SAMPLES_PER_PATCH_POINT
@@ -153,8 +153,8 @@ def test_emitter_without_area_or_pixels_changes_nothing(tmp_path):
     np.testing.assert_allclose(shining, off, rtol=1e-5)
 
 
-def test_cells_reflect_local_light(tmp_path):
-    """A spot below the lamp's underside lights that by reflection alone; on cells it is what the formula says."""
+def test_patches_reflect_local_light(tmp_path):
+    """A spot below the emitter lights its underside only indirectly; irradiance of patches equals the formula."""
     transfer = baked(room(has_sides=False), tmp_path, "gather")
     lights = {"A": {"kind": "spot", "position": [0, 0.9, 0], "cone": [10, 40], "emission": [5.0, 5.0, 5.0]}}
     shown = {
@@ -184,7 +184,7 @@ def test_cells_reflect_local_light(tmp_path):
     assert np.abs(irradiance[on_floor] - expected).mean() < 0.05 * expected.mean()
 
 
-def test_closed_box_has_the_light_inside_it_and_none_from_outside(tmp_path):
+def test_a_closed_box_contains_its_light(tmp_path):
     corners = np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], float)
     up = np.array([0, 2, 0])
     sides = [corners[::-1], corners + up]

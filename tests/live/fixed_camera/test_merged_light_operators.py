@@ -1,6 +1,6 @@
-"""Operators of merged lights: there soon, near, and gone when the exact one is there.
+"""Operators of merged lights: available early, near exact, and replaced by the exact operator.
 
-The bake has 149 lights, large ones, over which a rough operator divides too little: others are nearer
+The bake has 149 large lights, and the merged-light operator divides them too coarsely: larger bakes are more accurate
 (`bench/relume_bench/curve_switch.py`).
 """
 
@@ -24,11 +24,11 @@ FLOOR = "/materials/Floor/terms/1/"
 
 
 def visible_fraction_numpy(visible: NDArray[np.uint8], subset: TriangleSubset, num_clusters: int) -> F64:
-    """Do as `visible_fraction` for all points, in plain NumPy: its oracle.
+    """Reference of `visible_fraction` for all points in plain NumPy.
 
     Args:
         visible: bits of all parts. (n, bytes) uint8
-        subset: which merged triangle each is of, and its share. num_clusters: of merged triangles, C.
+        subset: merged triangle and fraction of each light. num_clusters: number of merged triangles, C.
     Returns:
         (n, C)
     """
@@ -54,13 +54,13 @@ def bent(value):
 
 
 @pytest.fixture
-def patience(monkeypatch):
-    """None: no operator is made fast enough."""
+def wait_limit(monkeypatch):
+    """None: no operator is built fast enough."""
     monkeypatch.setattr(operator_budget, "_SLOW_PAIRS_PER_THREAD", 0)
     monkeypatch.setattr(operator_budget, "_MIN_LIGHTS_TO_MERGE", 0)
 
 
-def test_merged_lights_bring_the_same_light_from_nearly_the_same_directions(transfer):
+def test_merged_lights_preserve_light_and_directions(transfer):
     lights = transfer.lights
     merged = cluster_lights(lights, transfer.tiles, 100)
     assert 90 < merged.num_lights <= 100
@@ -74,14 +74,14 @@ def test_merged_lights_bring_the_same_light_from_nearly_the_same_directions(tran
     np.testing.assert_allclose(brought[lit], towards[lit], rtol=1e-4, atol=1e-5 * light.max())
 
 
-def test_those_that_a_coarser_division_would_have_are_merged(transfer):
-    """As few as there were to begin with: octants; as many: none is merged."""
+def test_lights_of_a_coarser_subdivision_are_merged(transfer):
+    """The minimum is the octants; with as many clusters as lights none are merged."""
     assert cluster_lights(transfer.lights, transfer.tiles, 8).num_lights == 8
     every = cluster_lights(transfer.lights, transfer.tiles, 10**6)
     np.testing.assert_allclose(np.sort(every.irradiance[:, 0]), np.sort(transfer.lights.irradiance[:, 0]), rtol=1e-6)
 
 
-def test_points_see_the_share_of_the_parts_that_they_see(transfer):
+def test_visible_fractions_equal_those_of_the_merged_lights(transfer):
     merged = cluster_lights(transfer.lights, transfer.tiles, 100)
     visible = transfer.views["front"].receivers(0).visible
     fractions = np.full((merged.num_lights, len(visible)), np.nan, np.float32)
@@ -90,20 +90,20 @@ def test_points_see_the_share_of_the_parts_that_they_see(transfer):
 
 
 @pytest.mark.parametrize(
-    ("held", "drags"),
+    ("pointer", "drags"),
     [("curves/theta_h", [bent(3), bent(5)]), ("params/roughness", [roughened(0.35), roughened(0.25)])],
 )
-def test_a_hand_goes_on_by_the_rough_one_until_the_exact_one_is_there(transfer, wait_limit, held, drags):
+def test_edits_use_the_merged_operator_until_the_exact_one_is_ready(transfer, wait_limit, pointer, drags):
     memory = Cache(1 << 30)
     picture = open_exact_picture(transfer, cache=memory)
     before = picture.image()
-    picture.prepare(FLOOR + held)
+    picture.prepare(FLOOR + pointer)
     assert run_next_job(picture).form == operator_budget.MERGED_LIGHT
     exact = picture.next_job()
     assert exact.form == operator_budget.EXACT
     assert not exact.is_refinement
     for change in drags:
-        picture.set_look(make_look(transfer, change), active_pointer=FLOOR + held)
+        picture.set_look(make_look(transfer, change), active_pointer=FLOOR + pointer)
         assert picture.advance(None).fidelity == "incremental"
         assert picture.next_job().key == exact.key, "the hand does not stop it"
         expected = ref.full_evaluation(transfer, "front", make_look(transfer, change))
@@ -112,13 +112,13 @@ def test_a_hand_goes_on_by_the_rough_one_until_the_exact_one_is_there(transfer, 
     picture.install(exact, exact.run(lambda share: None, lambda: False))
     assert memory.get_cached((*exact.key, "roughly"), MergedLightOperator) is None
     assert isinstance(memory.get_cached(exact.key, LinearOperator), LinearOperator)
-    assert picture.advance(None).exact == (held == "curves/theta_h")
+    assert picture.advance(None).exact == (pointer == "curves/theta_h")
     assert relative_rmse(run_until_exact(picture).image(), expected) < 1e-6
-    picture.set_look(make_look(transfer), active_pointer=FLOOR + held)
+    picture.set_look(make_look(transfer), active_pointer=FLOOR + pointer)
     assert relative_rmse(run_until_exact(picture).image(), before) < 1e-6
 
 
-def test_where_it_is_there_or_nothing_is_shown_yet_the_exact_one_is_made(transfer, wait_limit):
+def test_the_exact_operator_is_built_if_it_is_cached_or_nothing_is_shown(transfer, wait_limit):
     memory = Cache(1 << 30)
     open_exact_picture(transfer, FLOOR + "curves/theta_h", cache=memory)
     again = open_exact_picture(transfer, cache=memory)

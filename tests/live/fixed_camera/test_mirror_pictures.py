@@ -1,4 +1,4 @@
-"""Mirrors: what is seen in them against the same seen by mirrored eyes, and what looks make of it."""
+"""Mirrors: their images against those of mirrored cameras, and edits of mirrors."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ def metal(roughness=0.03, name="Mirror"):
 
 
 def box(name, x, material):
-    """A ball that stands for a thing in a room."""
+    """A sphere that stands for an object in a room."""
     return sphere(name, [x, 0.1, 0.6], 0.35, material, num_rings=24)
 
 
 def room(mirror, light=None):
-    """A mirror at z = −1 that fills the picture, and two things of which one is between it and the eye's side."""
+    """A mirror at z = −1 that fills the image, and two objects, one between the mirror and the camera."""
     wall = quad("mirror", [[-4, -4, -1], [4, -4, -1], [4, 4, -1], [-4, 4, -1]], 0)
     camera = make_camera("front", (0, 0.3, 2.4), (0.2, 0, -1), 0.8)
     return make_tiny_scene(
@@ -57,10 +57,12 @@ def shown(transfer, change=lambda document: None):
 
 
 def through_the_mirror(scene):
-    """The same, seen from behind the mirror with nothing there: what the picture shows where the mirror is."""
+    """The same scene from behind the mirror without the mirror: the image that the mirror shows."""
     flip = np.diag([1.0, 1.0, -1.0, 1.0])
     flip[2, 3] = -2.0
-    to_world = flip @ scene.cameras[0].to_world @ np.diag([-1.0, 1.0, 1.0, 1.0])  # right is left, or it were no frame
+    to_world = (
+        flip @ scene.cameras[0].to_world @ np.diag([-1.0, 1.0, 1.0, 1.0])
+    )  # swaps right and left to stay right-handed
     return make_tiny_scene(
         *scene.meshes[1:], camera=replace(scene.cameras[0], to_world=to_world), materials=list(scene.materials),
         environment=scene.environment.radiance,
@@ -73,15 +75,15 @@ def hung(tmp_path_factory):
 
 
 def angles(scene, size=SIZE):
-    """Of all pixels at the mirror. (height, width)"""
+    """Angles of all pixels at the mirror. (height, width)"""
     y, x = np.divmod(np.arange(size[0] * size[1]), size[0])
     rays = camera_directions(scene.cameras[0], size, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))
     return rays, np.abs(rays[:, 2]).reshape(size[1], size[0])
 
 
-def test_a_mirror_shows_what_is_seen_from_behind_it(tmp_path):
+def test_a_mirror_shows_the_image_of_a_mirrored_camera(tmp_path):
     light = studio(64)
-    light[texel_directions(64, 128)[..., 2] < 0] = 0  # light that the wall would hide from the things before it
+    light[texel_directions(64, 128)[..., 2] < 0] = 0  # light that the wall would occlude
     scene = room(metal(), light)
     transfer = baked(scene, tmp_path / "mirror")
     expected = shown(baked(through_the_mirror(scene), tmp_path / "behind"))[:, ::-1]
@@ -93,7 +95,7 @@ def test_a_mirror_shows_what_is_seen_from_behind_it(tmp_path):
     assert np.quantile(away, 0.95) < 0.01 * wanted[is_mirror].mean()
 
 
-def test_a_ball_of_chrome_shows_the_light_around(tmp_path):
+def test_a_chrome_ball_reflects_the_environment(tmp_path):
     ball = sphere("ball", [0, 0, 0], 0.8, 0, num_rings=200)
     scene = make_tiny_scene(
         ball, camera=make_camera("front", (0, 0.3, 3), (0, 0, 0), 0.6), environment=studio(128), materials=[metal()]
@@ -114,7 +116,7 @@ def test_a_ball_of_chrome_shows_the_light_around(tmp_path):
     assert np.median(off / wanted[on].clip(1e-3)) < 0.01
 
 
-def test_two_mirrors_that_face_each_other_end(tmp_path):
+def test_facing_mirrors_terminate(tmp_path):
     front = quad("front", [[-2, -2, -1], [2, -2, -1], [2, 2, -1], [-2, 2, -1]], 0)
     back = quad("back", [[2, -2, 3], [-2, -2, 3], [-2, 2, 3], [2, 2, 3]], 0)
     camera = make_camera("front", (0, 0.1, 1), (0.1, 0, -1), 0.8)
@@ -124,7 +126,7 @@ def test_two_mirrors_that_face_each_other_end(tmp_path):
     assert mirrored.chain.material.shape[1] == 2
     assert (mirrored.chain.material == 0).all(axis=1).any()
     assert np.isfinite(shown(transfer)).all()
-    assert shown(transfer).mean() > 0.01  # the last one reflects as far as its lobe goes
+    assert shown(transfer).mean() > 0.01  # the last one reflects with its lobe
 
 
 def set_roughness(value):
@@ -134,14 +136,14 @@ def set_roughness(value):
     return change
 
 
-def test_roughened_it_is_a_lobe_again(hung, tmp_path):
+def test_a_roughened_mirror_is_a_lobe(hung, tmp_path):
     rough = baked(room(metal(0.3)), tmp_path)
     assert rough.views["front"].mirrored is None
     away = np.abs(shown(hung, set_roughness(0.3)) - shown(rough))
-    assert np.quantile(away, 0.9) < 1e-5  # but for pixels that have more samples for what is seen in them
+    assert np.quantile(away, 0.9) < 1e-5  # except for pixels with more samples of their mirror image
 
 
-def test_a_mirror_stays_until_its_lobe_can_be_shown(hung):
+def test_a_mirror_stays_until_its_lobe_is_ready(hung):
     picture = Picture(hung, "front", Cache(1 << 30))
     sharp, wanted = run_until_exact(picture).image(), shown(hung, set_roughness(0.3))
     is_mirror = hung.views["front"].material_ids() == 0
@@ -160,14 +162,14 @@ def test_a_mirror_stays_until_its_lobe_can_be_shown(hung):
         run_until_exact(picture)
 
 
-def test_it_stays_as_well_while_another_light_is_awaited(hung):
+def test_a_mirror_stays_while_new_light_is_computed(hung):
     def rough_and_turned(document):
         set_roughness(0.3)(document)
         document["environment"]["rotation"] = 90.0
 
     picture = Picture(hung, "front", Cache(1 << 30))
     run_until_exact(picture)
-    picture.prepare("/materials/Mirror/terms/0/params/roughness")  # the operator that a hand would follow
+    picture.prepare("/materials/Mirror/terms/0/params/roughness")  # the operator that the edit would use
     sharp = run_until_exact(picture).image()
     picture.set_look(make_look(hung, rough_and_turned))
     assert not picture.advance(None).exact
@@ -175,7 +177,7 @@ def test_it_stays_as_well_while_another_light_is_awaited(hung):
     np.testing.assert_allclose(run_until_exact(picture).image(), shown(hung, rough_and_turned), atol=1e-4)
 
 
-def test_between_mirror_and_lobe_is_a_mixture(hung):
+def test_mirror_and_lobe_are_blended(hung):
     sharp, soft = shown(hung, set_roughness(0.03)), shown(hung, set_roughness(0.06))
     half = shown(hung, set_roughness(0.05))
     is_mirror = hung.views["front"].material_ids() == 0
@@ -193,7 +195,7 @@ def test_a_drawn_highlight_is_a_lobe(hung):
     assert shown(hung, draw)[inside].max() < 1e-6
 
 
-def test_its_colour_and_its_fresnel_curve_multiply(hung):
+def test_mirror_color_and_fresnel_curve_multiply(hung):
     plain = shown(hung)
 
     def edit(document):
@@ -209,7 +211,7 @@ def test_its_colour_and_its_fresnel_curve_multiply(hung):
     np.testing.assert_allclose(np.median(ratio / (0.25 * np.array([0.5, 1, 2]) / was[lit]), axis=0), 1, rtol=0.01)
 
 
-def test_edits_in_a_session_end_where_a_render_does(hung):
+def test_edits_of_a_mirror_end_at_the_render(hung):
     picture = Picture(hung, "front", Cache(1 << 30))
     for roughness in (0.03, 0.3, 0.045, 0.03):
         look = make_look(hung, set_roughness(roughness))
@@ -218,7 +220,7 @@ def test_edits_in_a_session_end_where_a_render_does(hung):
         np.testing.assert_allclose(picture.image(), render_image(hung, "front", look), rtol=1e-4, atol=1e-5)
 
 
-def test_an_edit_of_a_mirror_sends_its_tiles_and_the_things_in_it_are_not_pointed_at(hung):
+def test_a_mirror_edit_sends_its_tiles_and_picking_hits_the_mirror(hung):
     picture = Picture(hung, "front", Cache(1 << 30))
     picture.set_look(make_look(hung))
     run_until_exact(picture)
@@ -232,7 +234,7 @@ def test_an_edit_of_a_mirror_sends_its_tiles_and_the_things_in_it_are_not_pointe
     assert picture.inspect(SIZE[0] // 2, 4)["material"] == "Mirror"
 
 
-def test_mirrors_show_the_light_whatever_is_put_behind(hung):
+def test_mirrors_reflect_the_environment_for_any_background(hung):
     def colored(document):
         document["background"] = {"kind": "color", "color": [0, 1, 0], "blur": 10.0}
 
@@ -247,10 +249,10 @@ def test_gather_pictures_have_mirrors_too(tmp_path):
     assert shown(transfer)[is_mirror].mean() > shown(direct)[is_mirror].mean()
 
 
-def test_a_rectangle_that_shines_is_seen_in_a_mirror_where_it_hangs(hung):
+def test_an_area_light_is_visible_in_a_mirror(hung):
     centre, side = np.array([0.0, 1.6, 0.5]), 0.6
 
-    def lamp(towards):
+    def area_light(towards):
         def change(document):
             document["environment"]["intensity"] = 0
             document["lights"] = {
@@ -269,15 +271,15 @@ def test_a_rectangle_that_shines_is_seen_in_a_mirror_where_it_hangs(hung):
     is_out = (np.abs(offset[:, :2]) > side / 2 + 0.05).any(axis=1).reshape(cosine.shape)
     is_mirror = hung.views["front"].material_ids() == 0
     assert is_in.sum() > 20
-    picture = shown(hung, lamp(-1))
+    picture = shown(hung, area_light(-1))
     wanted = 7 * np.stack([schlick(cosine, f0) for f0 in F0], axis=-1)
     np.testing.assert_allclose(picture[is_in & is_mirror], wanted[is_in & is_mirror], rtol=0.01)
     assert np.median(picture[is_out & is_mirror]) < 0.1
-    assert np.abs(shown(hung, lamp(1))[is_in & is_mirror]).max() < 1  # it shines away from the mirror
+    assert np.abs(shown(hung, area_light(1))[is_in & is_mirror]).max() < 1  # it emits away from the mirror
 
 
-def test_a_rectangle_that_is_dimmed_in_a_session_is_dimmed_in_the_mirror(hung):
-    def lamp(emission, **fields):
+def test_dimming_an_area_light_dims_its_mirror_image(hung):
+    def area_light(emission, **fields):
         def change(document):
             document["lights"] = {
                 "Panel": {"kind": "rectangle", "position": [0, 1.6, 0.5], "direction": [0, 0, -1], "size": [0.6, 0.6],
@@ -287,7 +289,7 @@ def test_a_rectangle_that_is_dimmed_in_a_session_is_dimmed_in_the_mirror(hung):
         return change
 
     picture = Picture(hung, "front", Cache(1 << 30))
-    for change in (lamp(7), lamp(2), lamp(2, enabled=False), lamp(3), lambda document: None):
+    for change in (area_light(7), area_light(2), area_light(2, enabled=False), area_light(3), lambda document: None):
         look = make_look(hung, change)
         picture.set_look(look)
         run_until_exact(picture)

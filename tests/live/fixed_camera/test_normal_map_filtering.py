@@ -1,4 +1,4 @@
-"""Highlights on bumps that are smaller than a pixel, against many small pixels that see every bump for itself."""
+"""Highlights of bumps smaller than a pixel, against many small pixels that resolve every bump."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ SLOPES = 0.12
 
 
 def bumps(side=256):
-    """Normals whose slopes are of a normal distribution, bumps of a few texels, which few more lie between."""
+    """Normals with normally distributed slopes, in bumps of a few texels."""
     slopes = gaussian_filter(np.random.default_rng(7).normal(0, 1, (side, side, 2)), (2, 2, 0), mode="wrap")
     slopes *= SLOPES / slopes.std()
     normals = np.concatenate([-slopes, np.ones((side, side, 1))], axis=-1)
@@ -33,7 +33,7 @@ def bumps(side=256):
 
 @pytest.fixture(scope="module")
 def scene():
-    """A polished floor of small bumps, in the light of a lamp that it mirrors."""
+    """A polished floor of small bumps that reflects a light."""
     shiny = {"model": "ggx", "texture": None, "params": {"roughness": 0.3, "f0": 0.9}, "roughness_map": "roughness"}
     floor = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
     radiance = np.full((32, 64, 3), 0.05, np.float32)
@@ -44,8 +44,8 @@ def scene():
     )
 
 
-def followed(scene, follows):
-    """The scene whose floor its bumps widen, or do not."""
+def with_filtering(scene, follows):
+    """The scene whose floor is widened by its bumps, or not."""
     floor = scene.materials[0]
     return replace(scene, materials=(replace(floor, terms=({**floor.terms[0], "roughness_map": follows},)),))
 
@@ -59,12 +59,12 @@ def shown(scene, folder):
 
 
 def of_blocks(picture):
-    """Means over so many pixels that the bumps of each are about all bumps."""
+    """Means over enough pixels to average all bumps."""
     return picture.reshape(picture.shape[0] // BLOCK, BLOCK, picture.shape[1] // BLOCK, BLOCK, 3).mean(axis=(1, 3))
 
 
-def test_they_are_as_wide_as_all_bumps_together(scene, tmp_path):
-    fine = followed(scene, False)
+def test_filtered_highlights_are_as_wide_as_all_bumps(scene, tmp_path):
+    fine = with_filtering(scene, False)
     look = validate({}, default_look(fine.materials))
     width, height = SIZE
     many = reference_image(fine, "front", look, (FINER * width, FINER * height), 12)
@@ -74,7 +74,7 @@ def test_they_are_as_wide_as_all_bumps_together(scene, tmp_path):
 
 
 def test_the_widening_adds_the_variance_of_slopes():
-    """Of a large sample of normals: α² + 2 σ² for σ² of their slopes, as far as slopes are small."""
+    """For a large sample of normals: α² + 2 σ² with the variance σ² of their slopes, for small slopes."""
     rng = np.random.default_rng(3)
     slopes = rng.normal(0, 0.05, (200_000, 2))
     normals = np.concatenate([-slopes, np.ones((len(slopes), 1))], axis=1)
@@ -83,9 +83,9 @@ def test_the_widening_adds_the_variance_of_slopes():
     assert width**4 == pytest.approx(0.3**4 + 2 * 0.05**2, rel=0.02)
 
 
-def test_levels_reach_as_far_as_bumps_widen(scene):
+def test_roughness_levels_cover_the_widening(scene):
     levels = levels_of_material(scene.materials[0])
     assert levels[0] == 1
     assert 1 < levels[-1] * 0.3 / (0.3**4 + 2 * SLOPES**2) ** 0.25 < 1.25  # some pixels cover steeper bumps than others
-    assert levels_of_material(followed(scene, False).materials[0]) == ()
+    assert levels_of_material(with_filtering(scene, False).materials[0]) == ()
     assert levels_of_material(replace(scene.materials[0], normal_map=None)) == ()

@@ -1,4 +1,4 @@
-"""Operators that the memory has no room for in float32: in 16 bits, or of some samples; the picture exact at rest."""
+"""Operators too large in float32: in 16 bits, or of some samples; the picture is exact when the edit stops."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from relume.operators.linear_operator import operator_bytes, quantized_bytes
 from relume.operators.subsampled import SubsampledOperator
 
 FLOOR, WALL = "/materials/Floor/terms/1/", "/materials/Wall/terms/1/"
-IMAGES = 400_000  # the still life's, and what else its pictures need
+IMAGES = 400_000  # images of the still life and other data of its pictures
 A_THOUSANDTH = 1e-3
 
 
@@ -54,12 +54,12 @@ def half(transfer):
 
 @pytest.fixture
 def small(transfer):
-    """Memory for operators of some of the floor's samples, and for no other of it."""
+    """Memory for operators of some of the floor's samples only."""
     return Cache(quantized_bytes(num_samples(transfer, "Floor"), 256) - IMAGES)
 
 
-def drag(picture, transfer, change, hand, max_coefficients=None):
-    picture.set_look(make_look(transfer, change), active_pointer=hand)
+def drag(picture, transfer, change, pointer, max_coefficients=None):
+    picture.set_look(make_look(transfer, change), active_pointer=pointer)
     assert picture.next_job() is None or picture.next_job().is_refinement
     return picture.advance(max_coefficients)
 
@@ -68,7 +68,7 @@ def shown_exactly(transfer, change):
     return ref.full_evaluation(transfer, "front", make_look(transfer, change))
 
 
-def test_a_curve_in_sixteen_bits_is_followed_to_a_thousandth_and_exact_at_rest(transfer, half):
+def test_a_16_bit_operator_is_near_exact_and_then_exact(transfer, half):
     picture = open_exact_picture(transfer, FLOOR + "curves/theta_h", cache=half)
     before = picture.image()
     for points in ([[0, 3.0], [20, 0.5], [90, 0]], [[0, 9.0], [5, 0.1], [90, 0.02]]):
@@ -83,7 +83,7 @@ def test_a_curve_in_sixteen_bits_is_followed_to_a_thousandth_and_exact_at_rest(t
     np.testing.assert_array_equal(run_until_exact(picture).image(), before)
 
 
-def test_a_hundred_drags_in_sixteen_bits_leave_no_trace(transfer, half):
+def test_a_hundred_drags_in_16_bits_leave_no_error(transfer, half):
     rng = np.random.default_rng(3)
     picture = open_exact_picture(transfer, FLOOR + "curves/theta_h", cache=half)
     before = picture.image()
@@ -95,7 +95,7 @@ def test_a_hundred_drags_in_sixteen_bits_leave_no_trace(transfer, half):
 
 
 @pytest.mark.parametrize("held", ["curves/theta_h", pytest.param("params/roughness", marks=pytest.mark.slow)])
-def test_where_that_is_too_much_some_samples_say_what_changes(transfer, small, monkeypatch, held):
+def test_a_subsampled_operator_is_used_if_16_bits_are_too_large(transfer, small, monkeypatch, held):
     if held == "params/roughness":  # its few nodes would fit
         small._state.budget_bytes = quantized_bytes(num_samples(transfer, "Floor"), 12)
         monkeypatch.setattr(operator_budget, "_SUBSAMPLED_BUDGET_DIVISOR", 1)
@@ -122,8 +122,8 @@ def test_where_that_is_too_much_some_samples_say_what_changes(transfer, small, m
     np.testing.assert_array_equal(run_until_exact(picture).image(), before)
 
 
-def test_what_did_not_change_is_as_it_was(transfer, small):
-    """Shadows and edges of an image stay to the last digit where a drag comes back."""
+def test_a_drag_back_restores_the_picture(transfer, small):
+    """Shadows and edges of an image are restored to the last digit."""
     picture = open_exact_picture(transfer, FLOOR + "curves/theta_h", cache=small)
     before = picture.image()
     drag(picture, transfer, rough(0.2), FLOOR + "curves/theta_h")
@@ -132,7 +132,7 @@ def test_what_did_not_change_is_as_it_was(transfer, small):
     assert relative_rmse(picture.image(), before) < 1e-6
 
 
-def test_a_look_that_moves_on_while_its_operator_is_made_is_caught_up_with(transfer, small):
+def test_edits_during_the_computation_of_an_operator_are_applied(transfer, small):
     picture = open_exact_picture(transfer, cache=small)
     picture.prepare(FLOOR + "curves/theta_h")
     job = picture.next_job()
@@ -145,7 +145,7 @@ def test_a_look_that_moves_on_while_its_operator_is_made_is_caught_up_with(trans
 
 @pytest.mark.slow
 def test_two_curves_one_after_another(transfer, small):
-    """The second is of another material, and has room; then both have changed at once, as after an undo."""
+    """The second has memory and another material; then both change at once, as in an undo."""
     picture = open_exact_picture(transfer, FLOOR + "curves/theta_h", cache=small)
     before = picture.image()
     first, second = rough(0.3), bent([[0, 5.0], [9, 0.5], [90, 0]], "Wall")
@@ -165,8 +165,8 @@ def test_two_curves_one_after_another(transfer, small):
 
 
 @pytest.mark.slow
-def test_a_second_curve_of_the_same_term_waits_until_the_first_is_known(transfer, small):
-    """A hand that moves on before it rests: neither curve's operator can say what the other does."""
+def test_a_second_curve_of_a_term_waits_for_the_first(transfer, small):
+    """For an edit that switches curves before it stops: the operator of neither curve includes the other."""
     picture = open_exact_picture(transfer, FLOOR + "curves/theta_h", cache=small)
     drag(picture, transfer, bent([[0, 3.0], [20, 0.5], [90, 0]]), FLOOR + "curves/theta_h", 3)
 
@@ -180,7 +180,7 @@ def test_a_second_curve_of_the_same_term_waits_until_the_first_is_known(transfer
     assert relative_rmse(run_until_exact(picture).image(), shown_exactly(transfer, both)) < 1e-6
 
 
-def test_light_between_surfaces_is_in_it_as_well(gathered, monkeypatch):
+def test_subsampled_operators_include_indirect_light(gathered, monkeypatch):
     monkeypatch.setattr(operator_budget, "_MIN_SAMPLES", 64)
     memory = Cache(quantized_bytes(num_samples(gathered, "Floor"), 256) - 200_000)
     picture = run_until_exact(Picture(gathered, "front", memory))
@@ -190,7 +190,7 @@ def test_light_between_surfaces_is_in_it_as_well(gathered, monkeypatch):
     assert job.form.step > 1
     change, images = 1e-2 * np.ones((3, 256)), np.zeros((2, *job.target.live.ready.image.shape), np.float32)
     for form, image in zip((job.form, operator_budget.EXACT), images, strict=True):
-        some = replace(job, form=form, key=form, target=job.target._replace(images=with_room(picture._images)))
+        some = replace(job, form=form, key=form, target=job.target._replace(images=with_budget(picture._images)))
         some.run(lambda share: None, lambda: False).add(analysis(change), image)
     assert relative_rmse(images[0], images[1]) < 0.05
     look = bent([[0, 9.0], [25, 1.5], [90, 0]])
@@ -201,8 +201,8 @@ def test_light_between_surfaces_is_in_it_as_well(gathered, monkeypatch):
     np.testing.assert_array_equal(run_until_exact(picture).image(), before)
 
 
-def with_room(images):
-    """The same images with another memory."""
+def with_budget(images):
+    """The same images with another budget."""
     copied = copy.copy(images)
     copied.cache = Cache(1 << 28)
     return copied

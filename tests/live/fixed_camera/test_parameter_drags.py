@@ -1,4 +1,4 @@
-"""Live pictures under a hand on a slider: followed along the parameter, near the look while it moves, exact at rest."""
+"""Live pictures during slider edits: followed along the parameter, approximate while it moves, exact when it stops."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ROUGHNESS, THETA_H = f"{TERM}/params/roughness", f"{TERM}/curves/theta_h"
 
 
 def shiny(roughness=0.4, curves=None, **more):
-    """The ball's highlight as glTF means it."""
+    """The ball's highlight in glTF's parameters."""
 
     def change(document):
         term = {"model": "ggx", "color": [0.8, 0.7, 0.6], "params": {"roughness": roughness, **more}}
@@ -42,14 +42,14 @@ def make(picture, need):
     picture.install(need, need.run(lambda share: None, lambda: False))
 
 
-def held(picture, pointer):
+def prepare(picture, pointer):
     picture.prepare(pointer)
     make(picture, picture.next_job())
     return picture
 
 
-def test_a_slider_of_several_curves_is_followed_at_once_and_its_picture_is_near(transfer, picture):
-    held(picture, ROUGHNESS)
+def test_a_slider_of_several_curves_is_followed_at_once(transfer, picture):
+    prepare(picture, ROUGHNESS)
     assert picture.next_job() is None
     for roughness in (0.41, 0.1, 0.9, 0.33):
         picture.set_look(make_look(transfer, shiny(roughness)))
@@ -62,8 +62,8 @@ def test_a_slider_of_several_curves_is_followed_at_once_and_its_picture_is_near(
         assert 1e-7 < error < MAX_ERROR
 
 
-def test_at_rest_it_is_shaded_and_then_exact_and_the_slider_still_in_hand(transfer, picture):
-    held(picture, ROUGHNESS)
+def test_when_the_slider_stops_the_picture_is_exact_and_still_prepared(transfer, picture):
+    prepare(picture, ROUGHNESS)
     picture.set_look(make_look(transfer, shiny(0.2)))
     picture.advance(None)
     need = picture.next_job()
@@ -79,8 +79,8 @@ def test_at_rest_it_is_shaded_and_then_exact_and_the_slider_still_in_hand(transf
     assert relative_rmse(picture.image(), exact(transfer, shiny(0.7))) < MAX_ERROR
 
 
-def test_shading_of_a_look_that_the_hand_has_left_is_not_shown(transfer, picture):
-    held(picture, ROUGHNESS)
+def test_shading_of_an_outdated_look_is_not_shown(transfer, picture):
+    prepare(picture, ROUGHNESS)
     picture.set_look(make_look(transfer, shiny(0.2)))
     picture.advance(None)
     old = picture.next_job()
@@ -92,19 +92,19 @@ def test_shading_of_a_look_that_the_hand_has_left_is_not_shown(transfer, picture
 
 
 @pytest.mark.parametrize("hand", [None, THETA_H, "/lights/Lamp"])
-def test_what_the_hand_is_on_is_never_guessed_from_looks(transfer, picture, hand):
+def test_the_active_control_is_never_inferred_from_looks(transfer, picture, hand):
     picture.set_look(make_look(transfer, shiny(0.3)), active_pointer=hand)
     assert isinstance(picture.next_job().basis, CurveBasis)
 
 
-def test_pointer_to_nothing_that_a_hand_may_hold_is_refused_and_the_look_stays(transfer, picture):
+def test_pointers_to_no_control_are_rejected_and_the_look_stays(transfer, picture):
     with pytest.raises(ParameterError):
         picture.set_look(make_look(transfer, shiny(0.3)), active_pointer="/display/exposure")
     assert picture.next_job() is None
     assert picture.advance(None).exact
 
 
-def test_a_hand_that_took_hold_of_nothing_is_known_from_its_edits(transfer, picture):
+def test_an_unprepared_control_is_inferred_from_its_edits(transfer, picture):
     picture.set_look(make_look(transfer, shiny(0.3)), active_pointer=ROUGHNESS)
     need = picture.next_job()
     assert isinstance(need.basis, ParameterOperator)
@@ -115,18 +115,18 @@ def test_a_hand_that_took_hold_of_nothing_is_known_from_its_edits(transfer, pict
     assert relative_rmse(picture.image(), exact(transfer, shiny(0.6))) < MAX_ERROR
 
 
-def test_open_curve_hands_over_to_a_slider_that_moves_others_too(transfer, picture):
-    held(picture, THETA_H)
-    held(picture, ROUGHNESS)
+def test_a_prepared_curve_is_replaced_by_a_slider_of_several_curves(transfer, picture):
+    prepare(picture, THETA_H)
+    prepare(picture, ROUGHNESS)
     picture.set_look(make_look(transfer, shiny(0.6)))
     picture.advance(None)
     assert relative_rmse(picture.image(), exact(transfer, shiny(0.6))) < MAX_ERROR
 
 
-def test_open_curve_is_enough_for_a_slider_that_moves_nothing_else(transfer):
-    """Its wavelets are there, and exact: nodes would only be another freeze, and less true."""
+def test_a_prepared_curve_serves_a_slider_of_that_curve(transfer):
+    """Its exact wavelets are there: nodes would be another freeze, and less accurate."""
     picture = run_until_exact(Picture(transfer, "front", Cache(BUDGET)))
-    held(picture, THETA_H)
+    prepare(picture, THETA_H)
     picture.prepare(f"{TERM}/params/sigma")
     assert picture.next_job() is None
 
@@ -138,8 +138,8 @@ def test_open_curve_is_enough_for_a_slider_that_moves_nothing_else(transfer):
     assert picture.advance(None).exact
 
 
-def test_a_drawn_curve_is_not_said_by_nodes(transfer, picture):
-    held(picture, ROUGHNESS)
+def test_a_drawn_curve_is_not_represented_by_nodes(transfer, picture):
+    prepare(picture, ROUGHNESS)
     picture.set_look(make_look(transfer, shiny(0.2)))
     picture.advance(None)
     drawn = shiny(0.2, {"theta_h": {"points": [[0, 3], [20, 0.2], [60, 2]]}})
@@ -152,26 +152,26 @@ def test_a_drawn_curve_is_not_said_by_nodes(transfer, picture):
     assert relative_rmse(picture.image(), exact(transfer, drawn)) < 1e-6
 
 
-def test_another_slider_of_the_term_takes_over(transfer, picture):
-    held(picture, ROUGHNESS)
+def test_another_slider_of_the_term_replaces_the_operator(transfer, picture):
+    prepare(picture, ROUGHNESS)
     picture.set_look(make_look(transfer, shiny(0.2)))
     picture.advance(None)
-    held(picture, f"{TERM}/params/f0")
+    prepare(picture, f"{TERM}/params/f0")
     picture.set_look(make_look(transfer, shiny(0.2, f0=0.7)))
     picture.advance(None)
     assert relative_rmse(picture.image(), exact(transfer, shiny(0.2, f0=0.7))) < MAX_ERROR
     assert relative_rmse(run_until_exact(picture).image(), exact(transfer, shiny(0.2, f0=0.7))) < 1e-6
 
 
-def test_pictures_at_the_same_place_share_the_operator_of_a_slider(transfer):
+def test_pictures_of_the_same_view_share_the_operator_of_a_slider(transfer):
     cache = Cache(BUDGET)
     first, second = (Picture(transfer, "front", cache) for _ in range(2))
     for picture, roughness in ((first, 0.2), (second, 0.8)):
         picture.set_look(make_look(transfer, shiny(roughness)))
         run_until_exact(picture)
-    held(first, ROUGHNESS)
+    prepare(first, ROUGHNESS)
     used = cache.used_bytes
-    held(second, ROUGHNESS)
+    prepare(second, ROUGHNESS)
     assert cache.used_bytes == used
     second.set_look(make_look(transfer, shiny(0.5)))
     second.advance(None)

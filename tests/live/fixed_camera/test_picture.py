@@ -1,4 +1,4 @@
-"""Live pictures: switching curves, edits, what is exact, and the same frame from a store again."""
+"""Live pictures: switching curves, edits, exactness, and equal frames of a reopened store."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from relume.look import validate
 
 
 @pytest.mark.parametrize("view", ["front", "left"])
-def test_scenes_own_look_is_what_a_full_evaluation_gives(transfer, view):
+def test_the_default_look_equals_a_full_evaluation(transfer, view):
     picture = open_exact_picture(transfer, view=view)
     expected = ref.full_evaluation(transfer, view, make_look(transfer))
     assert relative_rmse(picture.image(), expected) < 1e-6
@@ -22,7 +22,7 @@ def test_scenes_own_look_is_what_a_full_evaluation_gives(transfer, view):
 
 
 @pytest.mark.parametrize("pointers", [("theta_h", "theta_d"), ("theta_d", "theta_h", "theta_d")])
-def test_switching_curves_changes_nothing(transfer, pointers):
+def test_switching_curves_does_not_change_the_picture(transfer, pointers):
     picture = open_exact_picture(transfer)
     before = picture.image()
     for name in pointers:
@@ -55,7 +55,7 @@ def test_two_curves_edited_at_once(transfer):
     assert relative_rmse(picture.image(), ref.full_evaluation(transfer, "front", look)) < 1e-6
 
 
-def test_curve_is_followed_at_once_when_it_is_open(transfer):
+def test_a_prepared_curve_is_followed_at_once(transfer):
     picture = open_exact_picture(transfer, BALL + "theta_h")
     picture.set_look(make_look(transfer, set_sigma(0.1)))
     assert picture.next_job() is None
@@ -64,7 +64,7 @@ def test_curve_is_followed_at_once_when_it_is_open(transfer):
     assert advance.changed
 
 
-def test_exact_is_said_only_of_exact_pictures(transfer):
+def test_only_exact_pictures_are_reported_as_exact(transfer):
     picture = open_exact_picture(transfer, BALL + "theta_h")
     look = make_look(transfer, set_sigma(0.07))
     expected = ref.full_evaluation(transfer, "front", look)
@@ -77,7 +77,7 @@ def test_exact_is_said_only_of_exact_pictures(transfer):
     assert relative_rmse(picture.image(), expected) < 1e-6
 
 
-def test_picture_whose_curve_is_not_frozen_yet_waits_and_is_not_exact(transfer):
+def test_a_picture_whose_curve_is_not_frozen_waits_and_is_not_exact(transfer):
     picture = open_exact_picture(transfer)
     before = picture.image()
     picture.set_look(make_look(transfer, set_sigma(0.07)))
@@ -87,7 +87,7 @@ def test_picture_whose_curve_is_not_frozen_yet_waits_and_is_not_exact(transfer):
     np.testing.assert_array_equal(picture.image(), before)
 
 
-def test_only_the_tiles_of_what_changed_are_new(transfer):
+def test_only_changed_tiles_are_sent(transfer):
     picture = open_exact_picture(transfer, BALL + "theta_h", WALL + "alpha")
     assert not picture.advance(None).changed
     before = picture.image()
@@ -113,8 +113,8 @@ def test_payload_is_the_picture(transfer):
     np.testing.assert_array_equal(words, rgb9e5_pack(picture.image()))
 
 
-def test_flat_curve_looks_the_same_whatever_curve_is_open(transfer):
-    """A curve drawn flat, as a session shows it after it was open, and as a render of the same look shows it."""
+def test_a_flat_curve_gives_the_same_picture_with_any_prepared_curve(transfer):
+    """A curve drawn flat: in a session that prepared it, and in a render of the same look."""
 
     def flat(document):
         document["materials"]["Ball"]["terms"] = [{"model": "cook_torrance", "color": [1, 1, 1]}]
@@ -167,7 +167,7 @@ def test_curves_of_each_channel_reach_their_channel(transfer):
         open_exact_picture(transfer, look=make_look(transfer, change)).image() for change in (red, plain)
     )
     alone = find_pure_ball_pixels(transfer)
-    # lights of which a curve sees less than a billionth are left out, and the curves of red see others
+    # lights below a billionth of a curve are omitted, and the curves of red omit others
     nothing = 1e-9 * white[alone].max()
     np.testing.assert_allclose(coloured[alone][:, 1:], white[alone][:, 1:], rtol=1e-5, atol=nothing)
     assert relative_rmse(coloured[alone][:, 0], white[alone][:, 0]) > 0.01
@@ -175,8 +175,8 @@ def test_curves_of_each_channel_reach_their_channel(transfer):
     assert relative_rmse(coloured, expected) < 1e-6
 
 
-def test_the_image_of_another_model_is_never_called_exact(transfer):
-    """Lambert and Oren and Nayar have the same curve of the incident angle, and different images."""
+def test_an_image_of_another_model_is_never_exact(transfer):
+    """Lambert and Oren–Nayar have the same curve of the incident angle, and different images."""
 
     def rough(document):
         term = {"model": "oren_nayar", "color": [0.5, 0.5, 0.5], "params": {"sigma": 1.0}}

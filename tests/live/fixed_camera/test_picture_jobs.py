@@ -1,4 +1,4 @@
-"""What a picture waits for: eviction, sharing, cancelling, and what is made for a look that is gone."""
+"""Pending jobs of a picture: eviction, sharing, cancelling, and results of outdated looks."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
 from relume.operators.linear_operator import operator_bytes
 
 
-def test_evicted_in_mid_drag_recovers(transfer):
-    """Half of a change has been shown when another session takes the cache; the rest comes after freezing again."""
+def test_an_eviction_during_a_drag_recovers(transfer):
+    """Half of a change is shown when another session takes the cache; the rest follows after the operator is frozen again."""
     rows = transfer.views["front"].rows(2)
     cache = Cache(operator_bytes(rows.stop - rows.start, 256) + 200_000)  # one operator, and the images
     picture = open_exact_picture(transfer, BALL + "theta_h", cache=cache)
@@ -34,7 +34,7 @@ def test_evicted_in_mid_drag_recovers(transfer):
     assert relative_rmse(picture.image(), ref.full_evaluation(transfer, "front", look)) < 1e-6
 
 
-def test_sessions_that_agree_share_and_those_that_do_not_are_kept_apart(transfer):
+def test_sessions_share_equal_operators_only(transfer):
     cache = Cache(BUDGET)
     open_exact_picture(transfer, BALL + "theta_h", cache=cache)
     used = cache.used_bytes
@@ -42,7 +42,7 @@ def test_sessions_that_agree_share_and_those_that_do_not_are_kept_apart(transfer
     second.set_look(make_look(transfer, set_sigma(0.5)))
     second.prepare(BALL + "theta_h")
     run_until_exact(second)
-    assert cache.used_bytes - used < operator_bytes(297, 256) / 2  # θh's own values are no part of its operator
+    assert cache.used_bytes - used < operator_bytes(297, 256) / 2  # values of θh are not part of its operator
     third = open_exact_picture(
         transfer, BALL + "theta_h", cache=cache, look=make_look(transfer, set_sigma(0.5, ior=3.0))
     )
@@ -52,7 +52,7 @@ def test_sessions_that_agree_share_and_those_that_do_not_are_kept_apart(transfer
         assert relative_rmse(picture.image(), expected) < 1e-6
 
 
-def test_cancelled_freeze_leaves_picture_and_cache_as_they_were(transfer):
+def test_a_cancelled_freeze_changes_neither_picture_nor_cache(transfer):
     cache = Cache(BUDGET)
     picture = open_exact_picture(transfer, cache=cache)
     before, used = picture.image(), cache.used_bytes
@@ -73,7 +73,7 @@ def drawn(document):
 
 
 def test_a_curve_whose_operator_does_not_fit_is_shaded(transfer):
-    """It can be opened and drawn; the picture stands until the hand rests, and then shows it."""
+    """It can be prepared and drawn; the picture stays until the edit stops, and is then updated."""
     picture = open_exact_picture(transfer, cache=Cache(400_000))
     before = picture.image()
     picture.prepare(BALL + "theta_h")
@@ -92,7 +92,7 @@ def test_a_curve_whose_operator_does_not_fit_is_shaded(transfer):
     np.testing.assert_array_equal(run_until_exact(picture).image(), before)
 
 
-def test_a_curve_whose_operator_does_not_fit_is_shaded_while_a_turned_light_is_prepared(transfer):
+def test_a_curve_without_operator_is_shaded_while_a_rotation_is_prepared(transfer):
     picture = open_exact_picture(transfer, cache=Cache(400_000))
     picture.prepare("/environment/rotation")
     job = picture.next_job()
@@ -109,7 +109,7 @@ def many_terms(document):
         material["terms"] = [{"model": "lambert", "color": [0.1, 0.1, 0.1], "texture": None}] * 16
 
 
-def test_a_look_whose_images_do_not_fit_is_refused_and_the_picture_stands(transfer):
+def test_a_look_whose_images_do_not_fit_is_rejected_and_the_picture_stays(transfer):
     picture = open_exact_picture(transfer, cache=Cache(400_000))
     before = picture.image()
     with pytest.raises(MemoryBudgetError):
@@ -119,8 +119,8 @@ def test_a_look_whose_images_do_not_fit_is_refused_and_the_picture_stands(transf
     np.testing.assert_array_equal(picture.image(), before)
 
 
-def test_picture_follows_what_is_open_while_a_freeze_of_something_else_is_made(transfer):
-    """What a need makes does not depend on what is done to its picture meanwhile."""
+def test_a_prepared_curve_is_followed_during_another_freeze(transfer):
+    """A job's result does not depend on edits of its picture."""
     picture = open_exact_picture(transfer, BALL + "theta_h")
     picture.prepare(WALL + "alpha")
     need = picture.next_job()
@@ -138,25 +138,25 @@ def test_picture_follows_what_is_open_while_a_freeze_of_something_else_is_made(t
     before = picture.image()
     picture.install(need, made[0])
     job = picture.next_job()
-    assert job is None or isinstance(job, Resum)  # the steps of the drag, when the hand rests
+    assert job is None or isinstance(job, Resum)  # rounding of the drag's steps, when it stops
     np.testing.assert_array_equal(picture.image(), before)
-    picture.highlight_pixels(WALL + "alpha", 0, 10)  # it is open now
+    picture.highlight_pixels(WALL + "alpha", 0, 10)  # it is prepared now
 
 
-def test_operator_of_dormant_curves_that_changed_meanwhile_is_not_adopted(transfer):
+def test_an_operator_with_outdated_fixed_curves_is_not_used(transfer):
     picture = open_exact_picture(transfer, BALL + "theta_d")
     picture.prepare(BALL + "theta_h")
     need = picture.next_job()
     look = make_look(transfer, set_sigma(0.2, ior=3.0))
     picture.set_look(look)
-    assert picture.advance(None).exact  # θd, which is dormant in what is made
+    assert picture.advance(None).exact  # θd, which is fixed in the operator
     picture.install(need, need.run(ignore_progress, lambda: False))
     assert picture.next_job().key != need.key
     assert relative_rmse(run_until_exact(picture).image(), ref.full_evaluation(transfer, "front", look)) < 1e-6
 
 
-def test_image_of_an_older_look_is_shown_until_there_is_a_newer_one(transfer):
-    """Else a hand that does not rest would never see the material."""
+def test_an_older_image_is_shown_until_a_newer_one_is_ready(transfer):
+    """Otherwise a continuous edit would never show the material."""
     picture = Picture(transfer, "front", Cache(BUDGET))
     while (need := picture.next_job()).term.model != "cook_torrance":
         picture.install(need, need.run(ignore_progress, lambda: False))
@@ -170,7 +170,7 @@ def test_image_of_an_older_look_is_shown_until_there_is_a_newer_one(transfer):
     assert relative_rmse(run_until_exact(picture).image(), ref.full_evaluation(transfer, "front", look)) < 1e-6
 
 
-def test_opening_picture_shows_cheap_terms_of_all_materials_first(transfer):
+def test_an_opening_picture_shows_cheap_terms_first(transfer):
     def lambert_and_glossy(document):
         for material in document["materials"].values():
             material["terms"] = [{"model": "cook_torrance"}, {"model": "lambert"}]
@@ -193,10 +193,10 @@ def test_opening_picture_shows_cheap_terms_of_all_materials_first(transfer):
     assert [name for name, _ in shaded[:num_materials]] == sorted(sizes, key=sizes.get)[-num_materials:]
     shaded, need = order("/materials/Wall/terms/0/curves/theta_d")
     assert shaded == [("Wall", "lambert")]
-    assert need.basis.affected_curves == ("theta_d",)  # its operator gives the image as well
+    assert need.basis.affected_curves == ("theta_d",)  # its operator also gives the image
 
 
-def test_what_is_made_for_a_term_that_is_gone_is_dropped(transfer):
+def test_results_of_a_removed_term_are_discarded(transfer):
     picture = open_exact_picture(transfer)
     picture.prepare(BALL + "theta_h")
     need = picture.next_job()

@@ -1,4 +1,4 @@
-"""Probing and brushing: what a pixel is made of, and where a stretch of a curve shows."""
+"""Pixel probe and highlighting: the terms of a pixel, and the pixels of a part of a curve."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from session_edits import make_look
 from relume.core.errors import NotPrecomputedError, ParameterError
 
 
-def test_probe_shares_sum_to_the_terms_radiance(transfer):
+def test_probe_bands_sum_to_the_radiance_of_the_term(transfer):
     look = make_look(transfer, set_single_term_ball)
     pointer = "/materials/Ball/terms/0/curves/theta_h"
     picture = open_exact_picture(transfer, pointer, look=look)
@@ -28,8 +28,8 @@ def test_probe_shares_sum_to_the_terms_radiance(transfer):
         assert np.min(probe["bands"]) > -1e-6 * image.max()
 
 
-def test_probe_of_each_band_is_what_that_band_alone_gives(transfer):
-    """A curve with all but some bands at zero shows what the probe says of them."""
+def test_each_band_of_the_probe_equals_that_band_alone(transfer):
+    """A curve that is zero except for some bands gives the probe's values of these bands."""
     pointer = "/materials/Ball/terms/0/curves/theta_h"
 
     def only(first, last):
@@ -48,7 +48,7 @@ def test_probe_of_each_band_is_what_that_band_alone_gives(transfer):
     np.testing.assert_allclose(bands[:, 40:90].sum(axis=1), image[y, x], rtol=1e-3, atol=1e-5)
 
 
-def test_probe_finds_the_surface_that_the_camera_sees_there(transfer):
+def test_the_probe_returns_the_visible_surface(transfer):
     picture, view = open_exact_picture(transfer), next(iter(transfer.views.values()))
     to_camera = np.linalg.inv(view.camera.to_world)
     height = 2 * np.tan(view.camera.yfov / 2)
@@ -77,7 +77,7 @@ def test_probe_of_background_and_outside(transfer):
 
 
 @pytest.mark.parametrize(("scale", "color"), [(2.0, [1.0, 1.0, 1.0]), (0.5, [1.0, 0.2, 3.0])])
-def test_scaled_and_coloured_light_changes_probe_and_picture_alike_without_freezing(transfer, scale, color):
+def test_light_gains_scale_probe_and_picture_without_freezing(transfer, scale, color):
     def brighten(document):
         document["environment"] |= {"intensity": scale, "color": color}
 
@@ -94,7 +94,7 @@ def test_scaled_and_coloured_light_changes_probe_and_picture_alike_without_freez
         np.testing.assert_allclose(actual.T, gain * expected.T, rtol=1e-6)
 
 
-def test_brush_over_everything_is_the_material_and_stretches_add_up(transfer):
+def test_highlighting_all_bands_is_the_material_and_parts_add_up(transfer):
     pointer = "/materials/Ball/terms/0/curves/theta_h"
     picture = open_exact_picture(transfer, pointer, look=make_look(transfer, set_single_term_ball))
     whole = picture.highlight_pixels(pointer, 0, 90)
@@ -112,7 +112,7 @@ def test_brush_over_everything_is_the_material_and_stretches_add_up(transfer):
     assert whole.shape == (48, 64)
 
 
-def test_brush_agrees_with_the_probe(transfer):
+def test_highlighting_equals_the_probe(transfer):
     picture = open_exact_picture(transfer, BALL + "theta_h")
     brushed = picture.highlight_pixels(BALL + "theta_h", 90 * 10 / 256, 90 * 40 / 256)
     luminance = np.float64([0.2126, 0.7152, 0.0722])
@@ -122,13 +122,13 @@ def test_brush_agrees_with_the_probe(transfer):
         assert brushed[y, x] == pytest.approx(share, abs=1e-4)
 
 
-def test_brush_needs_an_open_curve(transfer):
+def test_highlighting_needs_a_prepared_curve(transfer):
     with pytest.raises(NotPrecomputedError, match="take it in hand"):
         open_exact_picture(transfer).highlight_pixels(BALL + "theta_h", 0, 10)
 
 
 @pytest.mark.parametrize("pointer", ["/materials/Nobody/terms/0/curves/theta_h", BALL + "nothing", "", "/", BALL[:-1]])
-def test_pointers_to_nothing_are_refused(transfer, pointer):
+def test_pointers_to_no_curve_are_rejected(transfer, pointer):
     picture = open_exact_picture(transfer)
     for call in (picture.prepare, picture.curve, lambda p: picture.highlight_pixels(p, 0, 10)):
         with pytest.raises(ParameterError):

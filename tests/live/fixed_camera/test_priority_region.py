@@ -1,4 +1,4 @@
-"""What is seen of a picture is exact first; what was made of the rest is kept, and the whole is what it ever was."""
+"""The visible region of a picture is exact first; results of the rest are kept, and the whole stays exact."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ REGION = (4, 6, 16, 12)
 
 @pytest.fixture(autouse=True)
 def large(monkeypatch):
-    """Small pictures are treated as large ones are; steps are as small as what is seen of them."""
+    """Treat small pictures like large ones, in steps as small as the visible region."""
     for name, value in {
         "priority_region._MIN_HIDDEN_SAMPLES": 0,
         "strategies.sparse_preview._MAX_SHADED_AT_ONCE": 0,
@@ -32,7 +32,7 @@ def large(monkeypatch):
     monkeypatch.setattr("relume.operators.shade._MIN_ROWS_PER_STEP", 16)
 
 
-def seen(image):
+def visible_part(image):
     x, y, width, height = REGION
     return image[y : y + height, x : x + width]
 
@@ -41,7 +41,7 @@ TURNS = count(1)
 
 
 def opened(transfer, region=REGION):
-    """A picture of a look of which no image is kept, its first preview shown."""
+    """A picture of a look without stored images, after its first preview."""
     picture = Picture(transfer, "front", Cache(BUDGET), is_watched=True)
     degrees = float(next(TURNS))
     picture.set_look(make_look(transfer, lambda document: document["environment"].update(rotation=degrees)))
@@ -51,8 +51,8 @@ def opened(transfer, region=REGION):
     return picture
 
 
-def until_seen(picture):
-    """Make what is wanted until what is seen is exact; what was made."""
+def run_until_visible_is_exact(picture):
+    """Run jobs until the visible region is exact; return them."""
     made = []
     while picture.advance(None).fidelity != "exact":
         made.append(run_next_job(picture))
@@ -60,22 +60,22 @@ def until_seen(picture):
 
 
 @pytest.mark.parametrize("method", ["transfer", "gathered"])
-def test_what_is_seen_is_exact_before_the_rest(request, method):
+def test_the_visible_region_is_exact_first(request, method):
     transfer = request.getfixturevalue(method)
     picture = opened(transfer)
-    made = until_seen(picture)
+    made = run_until_visible_is_exact(picture)
     assert any(isinstance(job, ShadeRegion) for job in made)
     assert not picture.advance(None).exact
     early = picture.image()
     whole = run_until_exact(picture).image()
-    np.testing.assert_array_equal(seen(early), seen(whole))
+    np.testing.assert_array_equal(visible_part(early), visible_part(whole))
     assert np.abs(early - whole).max() > 1e-3
     np.testing.assert_allclose(whole, ref.full_evaluation(transfer, "front", picture._look), rtol=1e-3, atol=1e-5)
 
 
-def test_somewhere_else_is_exact_when_that_is_looked_at(transfer):
+def test_another_region_becomes_exact_when_it_is_visible(transfer):
     picture = opened(transfer)
-    until_seen(picture)
+    run_until_visible_is_exact(picture)
     picture.look_at((5, 7, 4, 4))
     assert picture.advance(None).fidelity == "exact"
     picture.look_at((20, 10, 16, 12))
@@ -84,7 +84,7 @@ def test_somewhere_else_is_exact_when_that_is_looked_at(transfer):
     assert picture.advance(None).fidelity == "preview"
 
 
-def test_what_is_stopped_goes_on_from_there(transfer, monkeypatch):
+def test_interrupted_shading_resumes(transfer, monkeypatch):
     picture = opened(transfer, None)
     while isinstance(job := picture.next_job(), SparsePreview) or job.target.material.num_samples < 100:
         run_next_job(picture)
@@ -101,7 +101,7 @@ def test_what_is_stopped_goes_on_from_there(transfer, monkeypatch):
     assert sum(stop - start for start, stop in shaded) == job.target.material.num_samples
 
 
-def test_a_large_picture_is_seen_finer_and_finer(transfer, monkeypatch):
+def test_a_large_picture_is_refined_progressively(transfer, monkeypatch):
     monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 4)
     monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MIN_FINER_RATIO", 1)
     picture, images = opened(transfer, None), []

@@ -1,4 +1,4 @@
-"""The whole way, from a scene to a frame, against the reflection integral over every texel with embreex's own rays."""
+"""The whole pipeline from a scene to a frame, against the reflection integral over every texel with embreex's rays."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def scene():
 
 @pytest.fixture(scope="module")
 def transfer(scene, tmp_path_factory):
-    """Through the archive, as a worker in another process gets it."""
+    """Loaded from the scene folder, as by a worker in another process."""
     folder = tmp_path_factory.mktemp("truth")
     save_scene(scene, folder / "scene")
     recipe = Recipe("direct", ("front",), (48, 36), 1000)
@@ -69,7 +69,7 @@ def visible_texels(scene, origins, normals, directions):
     return visible
 
 
-def truth_of(scene, transfer, material, rows, look):
+def reference_radiance(scene, transfer, material, rows, look):
     """Radiance of some of a material's samples. (n, 3)"""
     view = transfer.views["front"]
     receivers = view.receivers(material)
@@ -105,7 +105,7 @@ def test_frame_is_the_reflection_integral(scene, transfer, edit, bound):
         sample_pixels = np.unique(view.pixel[own][is_whole[view.pixel[own]]])[::11]
         assert len(sample_pixels) > 5
         rows = np.nonzero(np.isin(view.pixel[own], sample_pixels))[0]
-        shares = weight[own][rows] * truth_of(scene, transfer, material, rows, look)
+        shares = weight[own][rows] * reference_radiance(scene, transfer, material, rows, look)
         pixels = np.zeros_like(image, np.float64)
         np.add.at(pixels, view.pixel[own][rows], shares)
         actual.append(image[sample_pixels])

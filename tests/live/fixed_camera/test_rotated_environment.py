@@ -1,4 +1,4 @@
-"""The environment turned: weighed again from the same bake."""
+"""Rotation of the environment: lights are weighted again in the same bake."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from relume.store.bake_protocol import Recipe
 
 
 @pytest.mark.parametrize("degrees", [30.0, -90.0])
-def test_turned_environment_is_weighed_again_and_back_again_is_as_before(transfer, degrees):
+def test_a_rotation_is_reweighted_and_rotating_back_restores_the_picture(transfer, degrees):
     picture = open_exact_picture(transfer, BALL + "theta_h")
     before = picture.image()
     look = make_look(transfer, rotate_environment(degrees))
     picture.set_look(look)
     assert picture.next_job().state == "shading"
-    np.testing.assert_array_equal(picture.image(), before)  # stands until there is a new one
+    np.testing.assert_array_equal(picture.image(), before)  # unchanged until a new one is ready
     turned = run_until_exact(picture).image()
     assert relative_rmse(turned, ref.full_evaluation(transfer, "front", look)) < 1e-6
     assert relative_rmse(turned, before) > 0.1
@@ -34,14 +34,14 @@ def test_turned_environment_is_weighed_again_and_back_again_is_as_before(transfe
     np.testing.assert_allclose(run_until_exact(picture).image(), before, rtol=1e-5, atol=1e-6)
 
 
-def test_whole_turns_are_no_turn(transfer):
+def test_full_rotations_change_nothing(transfer):
     picture = open_exact_picture(transfer)
     picture.set_look(make_look(transfer, rotate_environment(360.0)))
     assert picture.next_job() is None
     assert picture.advance(None).exact
 
 
-def test_curves_follow_under_turned_light(transfer):
+def test_curves_follow_in_a_rotated_environment(transfer):
     def edit(document):
         rotate_environment(45.0)(document)
         document["materials"]["Ball"]["terms"][1]["params"]["sigma"] = 0.35
@@ -56,7 +56,7 @@ def test_curves_follow_under_turned_light(transfer):
     assert relative_rmse(picture.image(), expected) < 1e-5
 
 
-def test_turning_a_relightable_bake_is_near_a_fresh_bake_of_the_turned_map(tmp_path):
+def test_a_rotated_relightable_bake_is_near_a_fresh_bake(tmp_path):
     scene = still_life()
     radiance = scene.environment.radiance
     environment = replace(scene.environment, radiance=np.roll(radiance, -radiance.shape[1] // 4, axis=1))
@@ -69,6 +69,6 @@ def test_turning_a_relightable_bake_is_near_a_fresh_bake_of_the_turned_map(tmp_p
         render_image(rotated, "front", make_look(rotated, rotate_environment(degrees))) for degrees in (90.0, 0.0)
     ]
     expected = render_image(two, "front", make_look(two))
-    # docs/direct-light.md#environment-triangles: half a per cent to some per cent, by the lobe
+    # docs/direct-light.md#environment-triangles: 0.5 % to a few percent, depending on the lobe
     assert relative_rmse(images[0], expected) < 0.03
     assert relative_rmse(images[1], expected) > 0.2

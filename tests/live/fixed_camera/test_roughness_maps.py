@@ -1,4 +1,4 @@
-"""Materials as rough as their maps say: exact, along curves and sliders, under moved light; brute force agrees."""
+"""Roughness maps: exact, along curves and sliders, under moved light, and against the reference."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FLOOR = "/materials/Floor/terms/1/"
 
 
 def roughness_map(size=64):
-    """Four smooth and four rough squares, the smooth ones rougher from left to right; its mean stands for one."""
+    """Four smooth and four rough squares, the smooth ones rougher from left to right; the mean is one."""
     y, x = np.mgrid[0:size, 0:size] * 4 // size
     pixels = np.where((x + y) % 2, 60 + np.mgrid[0:size, 0:size][1], 230).astype(np.uint8)[..., None]
     max_value = 255 / float(pixels.mean())
@@ -34,7 +34,7 @@ def roughness_map(size=64):
 
 @pytest.fixture(scope="module")
 def scene():
-    """A floor with a map of roughness, before a wall, under a small bright light."""
+    """A floor with a roughness map, before a wall, under a small bright light."""
     shiny = {"model": "ggx", "color": [1.0, 1.0, 1.0], "texture": None, "roughness_map": "roughness"}
     floor = ({"model": "lambert", "color": [0.2, 0.3, 0.2]}, {**shiny, "params": {"roughness": 0.4, "f0": 0.5}})
     materials = [
@@ -79,10 +79,10 @@ def of_the_floor(transfer):
     return (view.material_ids() == 0).reshape(view.height, view.width)
 
 
-def test_picture_is_brute_force_and_the_mean_is_not(scene, tmp_path) -> None:
+def test_the_picture_equals_the_reference_and_the_mean_roughness_does_not(scene, tmp_path) -> None:
     recipe = Recipe("direct", ("front",), (48, 36), 1500)
     transfer = open_transfer(bake_in_process(METHODS["direct"], scene, recipe, tmp_path / "s.zarr"), Cache(1 << 30))
-    look = changed(transfer, roughness=0.8)  # of smoother texels highlights are narrower than the triangles of light
+    look = changed(transfer, roughness=0.8)  # highlights of smoother texels are narrower than light triangles
     reference, actual = reference_image(scene, "front", look, (48, 36), 0), shown(transfer, look).image()
     assert relative_rmse(actual, reference) < 0.04
     assert np.median(np.abs(actual - reference) / reference) < 1e-3
@@ -91,7 +91,7 @@ def test_picture_is_brute_force_and_the_mean_is_not(scene, tmp_path) -> None:
     assert np.median((np.abs(mean - reference) / reference)[of_the_floor(transfer)]) > 0.05
 
 
-def test_samples_are_of_the_levels_that_the_map_says(direct) -> None:
+def test_samples_have_the_levels_of_the_map(direct) -> None:
     ratios, level = direct.views["front"].roughness_levels(0)
     assert 8 < len(ratios) <= 24
     assert np.all(np.diff(level.astype(int)) >= 0)
@@ -101,7 +101,7 @@ def test_samples_are_of_the_levels_that_the_map_says(direct) -> None:
 
 
 @pytest.mark.parametrize("name", ["direct", pytest.param("gather", marks=pytest.mark.slow)])
-def test_picture_is_what_the_projector_gives_level_by_level(name, request) -> None:
+def test_the_picture_equals_the_projector_level_by_level(name, request) -> None:
     transfer = request.getfixturevalue(name)
     actual = shown(transfer).image()
     assert relative_rmse(actual, ref.full_evaluation(transfer, "front", make_look(transfer))) < 1e-5
@@ -167,7 +167,7 @@ def test_a_material_without_a_map_has_none_to_follow(direct) -> None:
     np.testing.assert_array_equal(shown(direct).image(), shown(direct, make_look(direct, without)).image())
 
 
-def test_turned_light_is_previewed_and_exact_at_rest(direct) -> None:
+def test_a_rotation_is_previewed_and_then_exact(direct) -> None:
     picture, look = shown(direct), changed(direct, turn=40.0)
     picture.set_look(look, active_pointer="/environment/rotation")
     assert isinstance(run_next_job(picture), SparsePreview)
@@ -178,7 +178,7 @@ def test_turned_light_is_previewed_and_exact_at_rest(direct) -> None:
 
 
 @pytest.mark.slow
-def test_moved_lamp_is_followed(gather) -> None:
+def test_a_moved_light_is_followed(gather) -> None:
     picture = shown(gather, changed(gather, light=[0.3, 0.9, 0.3]))
     picture.prepare("/lights/lamp")
     made = []
@@ -193,7 +193,7 @@ def test_moved_lamp_is_followed(gather) -> None:
     assert relative_rmse(run_until_exact(picture).image(), exact) < 1e-4
 
 
-def test_probe_and_brush_know_the_level_of_a_pixel(direct) -> None:
+def test_probe_and_highlighting_use_the_level_of_a_pixel(direct) -> None:
     def alone(document):
         del document["materials"]["Floor"]["terms"][0]
 
@@ -208,13 +208,13 @@ def test_probe_and_brush_know_the_level_of_a_pixel(direct) -> None:
     radiance = np.array([probe["radiance"] for probe in probes])
     np.testing.assert_allclose(radiance, image[y[::19], x[::19]], rtol=1e-5)
     summed = np.array([np.sum(probe["bands"], axis=1) for probe in probes])
-    assert np.median(np.abs(summed - radiance) / radiance) < 1e-4  # pixels of edges see other surfaces as well
+    assert np.median(np.abs(summed - radiance) / radiance) < 1e-4  # edge pixels also contain other surfaces
     share = picture.highlight_pixels(pointer, 0, 90)
     assert np.median(share[y, x]) == pytest.approx(1, abs=1e-3)
 
 
 @pytest.mark.parametrize("damage", ["none of the material's", "not sorted"])
-def test_levels_that_do_not_fit_are_damage(direct, damage) -> None:
+def test_inconsistent_levels_are_damage(direct, damage) -> None:
     class Damaged:
         attributes, shape = direct.store.attributes, direct.store.shape
 

@@ -1,4 +1,4 @@
-"""A bake's lights, images and operators are all in the memory that it was opened with, sessions' and renders' alike."""
+"""Lights, images and operators of a bake are all in the cache it was opened with, for sessions and renders."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CURVE = "/materials/Floor/terms/1/curves/theta_h"
 
 
 def lit(number):
-    """Another environment, another blur, another place of the lamp, another reflectance."""
+    """Another environment, blur, light position and reflectance."""
 
     def change(document):
         document["environment"].update(rotation=10.0 * number, map=("sunset", "overcast")[number % 2])
@@ -29,7 +29,7 @@ def lit(number):
     return change
 
 
-def test_nothing_that_grows_is_outside(gathered):
+def test_all_growing_data_is_in_the_cache(gathered):
     memory = Cache(BUDGET)
     transfer = open_transfer(Path(gathered.key), memory)
     render_image(transfer, "front", make_look(transfer, lit(0)))
@@ -42,12 +42,12 @@ def test_nothing_that_grows_is_outside(gathered):
     lights = {"lights", "environment on patches", "light on patches", "local light", "indirect light", "reflectance"}
     assert lights | {"shaded term", "shadow cache", "neighbor filter", "background", "blurred environment"} <= kinds
     entries = [*memory._state.persistent.values(), *memory._state.transient.values()]
-    sizes = [entry.num_bytes for entry in entries]  # lights find out later how wide they are, a number each
+    sizes = [entry.num_bytes for entry in entries]  # the widths of lights are computed later, one number each
     assert [live_bytes(getattr(entry, "value", entry)) for entry in entries] == pytest.approx(sizes, rel=0.05)
     assert {holder.bake for holder in memory.bytes_by_owner()} == {Path(gathered.key).stem, ""}
 
 
-def test_renders_push_nothing_out_that_a_session_looks_at(gathered):
+def test_renders_do_not_evict_data_of_sessions(gathered):
     path = Path(gathered.key)
     whole = Cache(BUDGET)
     open_exact_picture(open_transfer(path, whole), CURVE, cache=whole)

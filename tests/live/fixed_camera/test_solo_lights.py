@@ -1,4 +1,4 @@
-"""Sources of light shown alone: as if the others were switched off, and without a word about it in the look."""
+"""Soloed lights: equal to the others switched off, without a change of the look."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ENVIRONMENT = {"intensity": 0.5, "color": [1.0, 0.5, 0.25], "rotation": 20.0}
 
 
 def look(has_point: bool = True, spot: bool = False, **environment: object) -> Look:
-    """A lamp that is on, a spot that is off, and the light around, each as it is asked for."""
+    """An enabled point light, a disabled spot light and the environment, each if requested."""
     lights = {"Lamp": {**POINT_LIGHT, "enabled": has_point}, "Spot": {"kind": "spot", "enabled": spot}}
     return validate({"lights": lights, "environment": {**ENVIRONMENT, **environment}}, default_look([WHITE]))
 
@@ -38,11 +38,11 @@ def shown(look_document: Look, *solo: str) -> tuple[object, object]:
         (("Nobody",), look()),
     ],
 )
-def test_light_is_that_of_the_look_with_the_others_off(solo: tuple[str, ...], switched: Look) -> None:
+def test_solo_illumination_equals_the_others_off(solo: tuple[str, ...], switched: Look) -> None:
     assert shown(look(), *solo) == shown(switched)
 
 
-def test_a_light_without_emission_is_as_dark_alone_as_it_is() -> None:
+def test_a_soloed_light_without_emission_is_black() -> None:
     dark = validate({"lights": {"Lamp": {**POINT_LIGHT, "intensity": 0.0}}}, default_look([WHITE]))
     light, gain = shown(dark, "Lamp")
     assert gain == (0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Pictures while the environment is turned: a few samples shaded at once, all of them at rest."""
+"""Pictures while the environment is rotated: a few samples shaded at once, all when the edit stops."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ def make(picture, need):
 
 @pytest.fixture
 def few(monkeypatch):
-    """As few samples as a picture of 200 × 150 would have shaded."""
+    """As few samples as for a picture of 200 × 150."""
     monkeypatch.setattr("relume.live.fixed_camera.strategies.sparse_preview._MAX_SHADED", 600)
 
 
 @pytest.mark.usefixtures("few")
-def test_a_turned_light_is_glimpsed_at_once_and_shaded_at_rest(transfer, picture):
+def test_a_rotation_is_previewed_at_once_and_then_shaded(transfer, picture):
     still = picture.image()
     picture.set_look(make_look(transfer, turned(70)))
     need = picture.next_job()
@@ -55,7 +55,7 @@ def test_a_turned_light_is_glimpsed_at_once_and_shaded_at_rest(transfer, picture
 
 
 @pytest.mark.usefixtures("few")
-def test_a_hand_that_never_rests_sees_the_light_go(transfer, picture):
+def test_a_continuous_rotation_is_followed(transfer, picture):
     picture.set_look(make_look(transfer, turned(20)))
     need = picture.next_job()
     picture.set_look(make_look(transfer, turned(40)))
@@ -69,7 +69,7 @@ def test_a_hand_that_never_rests_sees_the_light_go(transfer, picture):
 
 
 @pytest.mark.usefixtures("few")
-def test_touching_the_rotation_chooses_the_samples_and_changes_nothing(transfer, picture):
+def test_preparing_the_rotation_selects_samples_only(transfer, picture):
     before = picture.image()
     picture.prepare("/environment/rotation")
     need = picture.next_job()
@@ -80,21 +80,21 @@ def test_touching_the_rotation_chooses_the_samples_and_changes_nothing(transfer,
     np.testing.assert_array_equal(picture.image(), before)
 
 
-def test_a_picture_that_shows_nothing_yet_is_shaded_not_glimpsed(transfer):
+def test_an_empty_picture_is_shaded_without_preview(transfer):
     picture = Picture(transfer, "front", Cache(BUDGET))
     picture.set_look(make_look(transfer, turned(70)))
     assert not isinstance(picture.next_job(), SparsePreview)
     assert not picture.next_job().is_refinement
 
 
-def test_where_memory_is_short_there_is_no_glimpse(transfer):
+def test_without_memory_there_is_no_preview(transfer):
     picture = run_until_exact(Picture(transfer, "front", Cache(200_000)))
     picture.set_look(make_look(transfer, turned(70)))
     assert not isinstance(picture.next_job(), SparsePreview)
 
 
 @pytest.mark.usefixtures("few")
-def test_samples_between_are_means_of_their_neighbours(transfer):
+def test_other_samples_are_means_of_their_neighbors(transfer):
     view = transfer.views["front"]
     for material in range(len(transfer.material_names)):
         sparse, rows = choose_samples(transfer, view, material, 0, has_indirect=True), view.rows(material)

@@ -59,7 +59,7 @@ def under(name, **more):
     return change
 
 
-def test_a_swap_is_weighed_again_and_back_again_is_as_before(plain, map_name):
+def test_a_swap_is_reweighted_and_swapping_back_restores_the_picture(plain, map_name):
     picture = run_until_exact(Picture(plain, "front", Cache(BUDGET)))
     before = picture.image()
     look = make_look(plain, under(map_name, rotation=30.0, scale=2.0))
@@ -72,7 +72,7 @@ def test_a_swap_is_weighed_again_and_back_again_is_as_before(plain, map_name):
     np.testing.assert_allclose(run_until_exact(picture).image(), before, rtol=1e-5, atol=1e-6)
 
 
-def test_curves_follow_in_swapped_light(plain, map_name):
+def test_curves_follow_in_a_swapped_environment(plain, map_name):
     def edit(document):
         under(map_name)(document)
         document["materials"]["Ball"]["terms"][1]["params"]["sigma"] = 0.35
@@ -104,14 +104,14 @@ def test_a_relightable_bake_is_nearer_to_a_fresh_one_than_a_plain_bake(plain, ma
     assert errors[1] < 0.05
 
 
-def test_brute_force_is_lit_by_the_swapped_map_too(map_name):
+def test_the_reference_uses_the_swapped_map(map_name):
     look = validate({"environment": {"map": map_name, "rotation": 40.0}}, default_look(still_life().materials))
     own = validate({"environment": {"rotation": 40.0}}, default_look(still_life().materials))
     swapped = reference_image(still_life(), "front", look, SIZE, 50)
     np.testing.assert_array_equal(swapped, reference_image(scene_under(dusk()), "front", own, SIZE, 50))
 
 
-def test_a_map_that_is_gone_is_refused_and_the_picture_stays(plain, map_name):
+def test_a_missing_map_is_rejected_and_the_picture_stays(plain, map_name):
     picture = run_until_exact(Picture(plain, "front", Cache(BUDGET)))
     look = make_look(plain, under(map_name))
     gone = look.model_copy(update={"environment": look.environment.model_copy(update={"map": "env:" + 16 * "0"})})
@@ -122,7 +122,7 @@ def test_a_map_that_is_gone_is_refused_and_the_picture_stays(plain, map_name):
     assert picture.advance(None).exact
 
 
-def test_looks_of_stores_that_know_no_map_are_completed(plain):
+def test_looks_of_stores_without_maps_are_completed(plain):
     old = {**plain.default_look, "environment": {"intensity": 1.0, "color": [1.0, 1.0, 1.0], "rotation": 0.0}}
     assert validate({}, old).environment.map is None
     assert validate({"environment": {"map": "sunset"}}, old).environment.map == "sunset"

@@ -1,4 +1,4 @@
-"""A small picture of every term, as a frame shows it, against brute force over every texel."""
+"""A small picture of every term, in a frame, against the reference over every texel."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
 
 SIZE, NUM_LIGHTS = (32, 24), 1500
-# What 1,500 triangles with one shadow ray each leave over: shadow edges move by up to a triangle, for all terms alike
+# Error of 1,500 triangles with one shadow ray each: shadow edges move by up to a triangle, for all terms alike
 # (SHADOWS); a highlight also sees quotient and cosine at one direction for a whole triangle (HIGHLIGHT), and a quotient
 # without masking grows towards the horizon, where it changes across the triangle (UNMASKED).
 SHADOWS, HIGHLIGHT, UNMASKED = 0.01, 0.02, 0.03
@@ -57,7 +57,7 @@ def picture(scene, tmp_path_factory):
 
 
 @pytest.mark.parametrize("model", CASES)
-def test_picture_of_a_term_is_brute_force(model, scene, picture) -> None:
+def test_the_picture_of_a_term_equals_the_reference(model, scene, picture) -> None:
     transfer, live = picture
     params, bound = CASES[model]
     curves = {"theta_o": {"points": [[0, 1.0], [50, 0.8], [90, 0.3]]}} if model != "ggx" else {}

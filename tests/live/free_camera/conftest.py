@@ -1,4 +1,4 @@
-"""Whose bakes nobody asks what they are off by."""
+"""Bakes of these tests skip the measurement of their error."""
 
 from shared_bakes import unmeasured
 

@@ -1,4 +1,4 @@
-"""Edges of what a moving eye sees, against pictures of many times the size."""
+"""Antialiased edges with a free camera, against images of many times the size."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ FINER = 8
 
 @pytest.fixture(scope="module")
 def opened(tmp_path_factory):
-    """A black ball before a white wall in even light."""
+    """A black ball before a white wall in uniform light."""
     black, white = (
         Material(name, ({"model": "lambert", "color": [c] * 3},)) for name, c in (("Ball", 0.0), ("Wall", 1.0))
     )
@@ -42,14 +42,14 @@ def picture(opened, scale):
 
 
 def coverage(opened):
-    """Share of each pixel that the ball takes. (height, width)"""
+    """Coverage of each pixel by the ball. (height, width)"""
     size = SIZE[0] * FINER, SIZE[1] * FINER
     face = trace_primary(opened.stored_scene, opened.embree, CAMERA, size).hits.face[: size[0] * size[1]]
     is_ball = (face >= 0) & (opened.stored_scene.face_material[np.maximum(face, 0)] == 0)
     return is_ball.reshape(SIZE[1], FINER, SIZE[0], FINER).mean(axis=(1, 3))
 
 
-def test_edges_are_the_means_of_what_their_pixels_see(opened):
+def test_edge_pixels_are_means_over_their_area(opened):
     actual, reference = picture(opened, 1), picture(opened, FINER)
     gbuffer = trace_primary(opened.stored_scene, opened.embree, CAMERA, SIZE)
     is_edge = np.zeros(SIZE[::-1], bool).ravel()
@@ -60,9 +60,9 @@ def test_edges_are_the_means_of_what_their_pixels_see(opened):
     partly = (ball > 0.2) & (ball < 0.8)
     assert partly.sum() > 10
     assert is_edge[partly].all()
-    middles = np.where(ball < 0.5, reference.max(), 0)  # what one ray says
+    centers = np.where(ball < 0.5, reference.max(), 0)  # by one ray
     assert np.sqrt(np.mean((actual - reference)[partly] ** 2)) < 0.6 * np.sqrt(
-        np.mean((middles - reference)[partly] ** 2)
+        np.mean((centers - reference)[partly] ** 2)
     )
     np.testing.assert_allclose(actual[~is_edge], reference[~is_edge], atol=0.05 * reference.max())
 
@@ -73,13 +73,13 @@ def test_pixels_within_one_surface_take_one_ray(opened):
     assert len(gbuffer.directions) == SIZE[0] * SIZE[1]
 
 
-def test_a_picture_of_edges_alone_takes_fewer_rays_for_each():
+def test_images_full_of_edges_take_fewer_rays_per_pixel():
     assert samples_per_edge(0, 1000) == samples_per_edge(100, 1000) == len(EDGE_SAMPLE_POSITIONS)
     assert samples_per_edge(250, 1000) == 2
     assert samples_per_edge(900, 1000) == 0
 
 
-def test_pixels_without_more_rays_stay_what_they_were():
+def test_pixels_without_more_rays_are_unchanged():
     values = np.arange(18, dtype=np.float32).reshape(6, 3)
     resolved = resolve(values, np.array([1, 1], np.int32), 4)
     np.testing.assert_array_equal(resolved[[0, 2, 3]], values[[0, 2, 3]])

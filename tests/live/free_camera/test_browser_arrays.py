@@ -1,4 +1,4 @@
-"""What goes to a shader: how many functions a table needs, light vectors in half precision, textures that fit."""
+"""Arrays for the browser: number of basis functions per table, half-precision coefficients, texture sizes."""
 
 import itertools
 
@@ -28,7 +28,7 @@ def test_a_diffuse_table_needs_one_function_and_a_shiny_one_all() -> None:
     assert degrees_of(GLOSSY) == DEGREE
 
 
-def test_a_degree_below_the_bound_is_left_out() -> None:
+def test_degrees_below_the_bound_are_omitted() -> None:
     of_function = np.repeat(np.arange(DEGREE + 1), np.arange(DEGREE + 1) + 1)
     table = np.zeros((2, 4, 3, NUM_FUNCTIONS), np.float32)
     table[:, ..., 0] = 1
@@ -39,7 +39,7 @@ def test_a_degree_below_the_bound_is_left_out() -> None:
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e9])
 @pytest.mark.parametrize("num", [1, 15, NUM_FUNCTIONS])
-def test_light_vectors_survive_half_precision_whatever_their_size(size: float, num: int) -> None:
+def test_coefficients_of_any_size_survive_half_precision(size: float, num: int) -> None:
     coefficients = np.random.default_rng(SEED).normal(0, size, (50, 3, NUM_FUNCTIONS)).astype(np.float32)
     sent = material_arrays._vector_arrays("vectors/4", coefficients, num)
     scale, factor = sent["vectors/4/scale"][0]
@@ -50,7 +50,7 @@ def test_light_vectors_survive_half_precision_whatever_their_size(size: float, n
     assert np.abs(decoded - coefficients[:, :, :num]).max() <= 1e-3 * np.abs(coefficients).max()
 
 
-def test_materials_get_the_functions_that_they_know() -> None:
+def test_materials_get_their_basis_functions() -> None:
     bump, narrow = np.array([False, True, False, False]), {**LAMBERT, "model": "ggx", "params": {"alpha": 0.02}}
     materials = MaterialState.from_terms([[LAMBERT], [LAMBERT], [LAMBERT, GLOSSY], [narrow]])
     total, others = material_arrays.needed_function_counts(materials, bump)
@@ -63,7 +63,7 @@ def test_materials_get_the_functions_that_they_know() -> None:
     assert total.tolist() == [num_functions(FAST_DEGREE), NUM_FUNCTIONS, NUM_FUNCTIONS, 0]
 
 
-def test_slots_are_the_vertices_of_the_lattice() -> None:
+def test_slots_are_the_nodes_of_the_lattice() -> None:
     rows = np.array([[1, 3], [0, 2], [1, 0], [0, 0]], np.uint8)
     counts = num_nodes(rows).ravel()
     first = (np.cumsum(counts) - counts).reshape(rows.shape).astype(np.uint32)
@@ -79,12 +79,12 @@ def test_slots_are_the_vertices_of_the_lattice() -> None:
                 continue
             slot = own[0] + node_index(r, i, j) if r > 1 else own[[0, 2, 1][node_index(r, i, j)]]
             assert slots.lattice_node[slot] == node[begin + node_index(r, i, j)]
-    assert (slots.sides[1, 0] == slots.sides[1, 1]).all()  # a side without any has what the other has
+    assert (slots.sides[1, 0] == slots.sides[1, 1]).all()  # a side without nodes has those of the other
     assert (slots.sides[2, 1] == slots.sides[2, 0]).all()
     assert not slots.sides[3].any()
 
 
-def test_the_finest_level_of_the_largest_texture_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_finest_level_of_the_largest_texture_is_dropped_first(monkeypatch: pytest.MonkeyPatch) -> None:
     sides = [(8, 4, 2, 1), (4, 2, 1)]
     levels, first, end = [], [0], 0
     for texture in sides:

@@ -1,4 +1,4 @@
-"""Ways of an eye: closed where they go around, through every camera where they go along."""
+"""Camera paths: turntables are closed, and interpolated paths pass through every camera."""
 
 from types import SimpleNamespace
 
@@ -18,7 +18,7 @@ def camera(position, turn=0.0, yfov=0.7):
     return Camera("front", to_world, yfov)
 
 
-def test_a_turntable_sees_the_middle_alike_from_all_sides_and_closes():
+def test_a_turntable_keeps_the_center_and_is_closed():
     cameras = turntable(camera([1, 1.5, 9]), np.array([1.0, 1, 3]), 12)
     np.testing.assert_array_equal(cameras[0].to_world, camera([1, 1.5, 9]).to_world)
     middle = np.array([1.0, 1, 3, 1])
@@ -26,10 +26,10 @@ def test_a_turntable_sees_the_middle_alike_from_all_sides_and_closes():
     np.testing.assert_allclose(centers, np.tile(centers[0], (12, 1)), atol=1e-12)
     steps = [np.linalg.norm(cameras[k].to_world - cameras[k - 1].to_world) for k in range(12)]
     np.testing.assert_allclose(steps, steps[0])
-    assert cameras[3].to_world[0, 3] > 3  # to the right first
+    assert cameras[3].to_world[0, 3] > 3  # first to the right
 
 
-def test_a_picture_is_about_what_its_middle_shows_or_is_as_deep_as_the_scene():
+def test_the_pivot_is_the_surface_at_the_image_center_or_the_scene_depth():
     near, far = ([[x, y, z] for x, y in ((1.5, 0), (3, 0), (2, 3))] for z in (3.7, 3.1))  # of one material
     aside = [[8, 0, 0], [9, 0, 0], [8, 1, 0]]
     positions, faces = np.array([*near, *far, *aside], np.float32), np.arange(9, dtype=np.uint32).reshape(3, 3)
@@ -42,7 +42,7 @@ def test_a_picture_is_about_what_its_middle_shows_or_is_as_deep_as_the_scene():
     np.testing.assert_allclose(pivot_of(transfer, camera([0, 1.5, -9])), [1, 1, 3], atol=1e-12)
 
 
-def test_a_way_goes_through_its_cameras_and_never_leaves_the_rotations():
+def test_a_path_passes_through_its_cameras_with_valid_rotations():
     keys = [camera([0, 1, 5]), camera([4, 2, 3], 0.9, 0.5), camera([5, 1, -1], 2.0, 1.0)]
     cameras = interpolate_cameras(keys, 9)
     for key, frame in zip(keys, cameras[::4], strict=True):
@@ -56,12 +56,12 @@ def test_a_way_goes_through_its_cameras_and_never_leaves_the_rotations():
 
 
 @pytest.mark.parametrize("num", [1, 2, 7])
-def test_one_camera_stays_where_it_is(num):
+def test_a_path_of_one_camera_is_constant(num):
     assert [pose.to_world.tolist() for pose in interpolate_cameras([camera([0, 1, 5])], num)] == [
         camera([0, 1, 5]).to_world.tolist()
     ] * num
 
 
-def test_as_many_frames_as_cameras_are_these():
+def test_as_many_frames_as_cameras_are_the_cameras():
     keys = [camera([0, 1, 5]), camera([4, 2, 3], 0.9)]
     assert interpolate_cameras(keys, 2) == keys

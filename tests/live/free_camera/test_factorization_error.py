@@ -1,4 +1,4 @@
-"""What people are told of the in-out factorisation of a term."""
+"""Reported in-out factorization error of a term."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def test_one_function_is_enough_for_a_diffuse_surface():
     assert error.residual < 1e-3
 
 
-def test_sharper_highlights_need_more_until_they_are_mirrors():
+def test_sharper_highlights_need_more_functions_up_to_mirrors():
     errors = [factorization_error(document("phong", params={"exponent": e})) for e in (4.0, 8.0, 10.0, 300.0)]
     needed = [error.required_functions or 1000 for error in errors]
     assert needed == sorted(needed)
@@ -29,7 +29,7 @@ def test_sharper_highlights_need_more_until_they_are_mirrors():
 
 
 @pytest.mark.parametrize("exponent", [3.0, 15.0])
-def test_what_is_missed_is_what_a_projection_onto_a_prefix_leaves(exponent):
+def test_the_error_is_the_residual_of_a_projection(exponent):
     term = document("blinn_phong", params={"exponent": exponent})
     wi, weight = hemisphere(64, 128)
     functions, cosine = project(wi), cosines()

@@ -1,4 +1,4 @@
-"""What moving views show behind surfaces and on grounds that catch shadows, against fixed views of the same place."""
+"""Background and shadow catchers with a free camera, against fixed views of the same camera."""
 
 import numpy as np
 import pytest
@@ -44,12 +44,12 @@ def moving(tmp_path_factory):
     return open_bake(store, Cache(1 << 30))
 
 
-def rendered(transfer, *several, **kwargs):
-    return render_image(transfer, "front", make_look(transfer, changes(*several)), **kwargs)
+def rendered(transfer, *changes_applied, **kwargs):
+    return render_image(transfer, "front", make_look(transfer, changes(*changes_applied)), **kwargs)
 
 
 @pytest.mark.parametrize(
-    ("several", "at_most"),
+    ("changes_applied", "at_most"),
     [
         ((), 0.03),
         ((WHITE,), 0.05),
@@ -62,28 +62,28 @@ def rendered(transfer, *several, **kwargs):
         ((WHITE, plain_ground), 0.05),
     ],
 )
-def test_grounds_are_as_dark_as_in_fixed_views(fixed, moving, several, at_most):
-    """But for edges, which are not antialiased, and shadows as sharp as points are dense."""
-    expected, actual = rendered(fixed, *several), rendered(moving, *several)
+def test_shadow_catchers_equal_fixed_views(fixed, moving, changes_applied, at_most):
+    """Except for edges, which are not antialiased, and for shadows limited by the probe density."""
+    expected, actual = rendered(fixed, *changes_applied), rendered(moving, *changes_applied)
     is_compared = inner(fixed, "Ground") | inner(fixed, None)
     assert np.sqrt(np.mean((actual - expected)[is_compared] ** 2) / np.mean(expected[is_compared] ** 2)) < at_most
 
 
-def test_where_nothing_hides_light_nothing_is_hidden(moving, fixed):
+def test_unoccluded_grounds_are_transparent(moving, fixed):
     """To rounding: both are sums of the same light."""
     lit = changes(WHITE, set_paths("direct"), lambda d: d["lights"].update(Lamp=POINT_LIGHT))
     ground = rendered(moving, lit)[inner(fixed, "Ground")]
-    assert (np.abs(ground - 1) < 1e-3).all(axis=1).mean() > 0.25  # points lie where it is not so
+    assert (np.abs(ground - 1) < 1e-3).all(axis=1).mean() > 0.25  # some probes are occluded
     assert ground.min() < 0.5
 
 
-def test_light_between_surfaces_alone_has_no_background(moving, fixed):
+def test_indirect_light_alone_has_no_background(moving, fixed):
     image = rendered(moving, COLOUR, set_paths("first_bounce"))
     assert not image[inner(fixed, None)].any()
     assert image[inner(fixed, "Ground")].any()
 
 
-def test_transparent_pictures_hide_what_fixed_ones_hide(fixed, moving):
+def test_transparent_pictures_have_the_alpha_of_fixed_views(fixed, moving):
     expected, actual = rendered(fixed, TRANSPARENT), rendered(moving, TRANSPARENT)
     assert actual.shape == (*SIZE[::-1], 4)
     is_ground = inner(fixed, "Ground")

@@ -1,4 +1,4 @@
-"""Beams: suns and small lamps whose shadows pixels of a moving view find, against all shadow rays and fixed views."""
+"""Hard-shadow lights: sun disks and small lights with per-pixel shadows, against all shadow rays and fixed views."""
 
 import copy
 
@@ -36,7 +36,7 @@ LIGHTS = {
 }  # fmt: skip
 
 
-def hard_sky(turn=0.0):
+def environment_with_sun(turn=0.0):
     towards = texel_directions(128, 256).astype(np.float64)
     c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
     sun = SUN @ np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
@@ -75,34 +75,34 @@ def picture_of(bake, look, *, draws=True):
 
 
 def error(actual, expected):
-    """Relative to what is expected, root mean square."""
+    """Root mean square error relative to the expected values."""
     return np.sqrt(np.mean((actual - expected) ** 2) / np.mean(expected**2))
 
 
 @pytest.fixture(scope="module")
 def sunlit(tmp_path_factory):
-    return opened(scene(hard_sky()), "probes", tmp_path_factory.mktemp("beams"))
+    return opened(scene(environment_with_sun()), "probes", tmp_path_factory.mktemp("beams"))
 
 
 @pytest.fixture(scope="module")
 def fixed(tmp_path_factory):
-    return opened(scene(hard_sky()), "direct", tmp_path_factory.mktemp("fixed"))
+    return opened(scene(environment_with_sun()), "direct", tmp_path_factory.mktemp("fixed"))
 
 
-def test_shares_are_those_of_all_shadow_rays(sunlit):
-    """Where all targets say the same about a pixel and its neighbours, so does what is predicted."""
+def test_visible_fractions_equal_those_of_all_shadow_rays(sunlit):
+    """Where all targets agree at a pixel and its neighbors, the prediction agrees, too."""
     picture = picture_of(sunlit, look_of(sunlit))
     picture.image()
     gbuffer, solid = picture._current_gbuffer(), sunlit.occlusion_mesh
-    (beam,) = sunlit.hard_shadow_lights(picture._current_light(), None)
-    fractions = visible_fractions(solid, gbuffer, CAMERA, SIZE, beam.targets)
+    (hard_light,) = sunlit.hard_shadow_lights(picture._current_light(), None)
+    fractions = visible_fractions(solid, gbuffer, CAMERA, SIZE, hard_light.targets)
     face, position = gbuffer.hits.face, CAMERA.to_world[:3, 3] + gbuffer.hits.distance[:, None] * gbuffer.directions
     normal = solid.stored_scene.face_normal[face] * -np.sign(
         np.einsum("nc,nc->n", solid.stored_scene.face_normal[face], gbuffer.directions)
     )[:, None].astype(np.float32)
     hits = np.flatnonzero(face >= 0)
     origins = (position + solid.surface_offset * normal)[hits].astype(np.float32)
-    towards = np.ascontiguousarray(beam.targets.towards.reshape(-1, 3))
+    towards = np.ascontiguousarray(hard_light.targets.towards.reshape(-1, 3))
     bits = trace_visibility(sunlit.embree, origins, np.ascontiguousarray(normal[hits]), towards).visible
     expected = np.zeros(len(face))
     expected[hits] = np.unpackbits(bits, axis=1, count=len(towards), bitorder="little").mean(axis=1)
@@ -123,7 +123,7 @@ def test_shares_are_those_of_all_shadow_rays(sunlit):
 
 @pytest.mark.parametrize("terms", [(LAMBERT,), (LAMBERT, GLOSSY)], ids=["diffuse", "glossy"])
 def test_a_hard_sun_casts_the_shadows_of_a_fixed_view(terms, tmp_path):
-    sunlit_scene = scene(hard_sky(), terms)
+    sunlit_scene = scene(environment_with_sun(), terms)
     fixed, bake = (opened(sunlit_scene, method, tmp_path) for method in ("direct", "probes"))
     expected = render_image(fixed, "front", look_of(fixed))
     by_pixels = error(picture_of(bake, look_of(bake)).image(), expected)
@@ -132,9 +132,9 @@ def test_a_hard_sun_casts_the_shadows_of_a_fixed_view(terms, tmp_path):
     assert by_points > 1.5 * by_pixels
 
 
-def test_a_turned_sun_casts_its_shadows_where_it_stands(sunlit, tmp_path):
-    """Those of a sky that was baked as it is turned; the bake's own lights lie about where the sun was."""
-    turned = scene(hard_sky(70.0))
+def test_a_rotated_sun_casts_rotated_shadows(sunlit, tmp_path):
+    """Shadows equal those of a bake of the rotated environment; the bake's own lights lie around the original sun."""
+    turned = scene(environment_with_sun(70.0))
     baked = opened(turned, "direct", tmp_path)
     expected = render_image(baked, "front", look_of(baked))
     look = look_of(sunlit, lambda document: document["environment"].update(rotation=70.0))
@@ -144,7 +144,7 @@ def test_a_turned_sun_casts_its_shadows_where_it_stands(sunlit, tmp_path):
 
 
 @pytest.mark.parametrize("kind", LIGHTS)
-def test_small_lamps_cast_the_shadows_of_a_fixed_view(kind, sunlit, fixed):
+def test_small_lights_cast_the_shadows_of_a_fixed_view(kind, sunlit, fixed):
     def lit(document):
         document["lights"] = {"Lamp": copy.deepcopy(LIGHTS[kind])}
         document["environment"]["intensity"] = 0.0
@@ -155,15 +155,15 @@ def test_small_lamps_cast_the_shadows_of_a_fixed_view(kind, sunlit, fixed):
     assert error(picture_of(sunlit, look_of(sunlit, lit), draws=False).image(), expected) > 1.5 * by_pixels
 
 
-def test_points_know_all_light_that_beams_take_from_them(sunlit):
-    """Where nothing hides the sun, what a shader gets is what is interpolated and the beam."""
+def test_hard_shadow_lights_and_probe_light_sum_to_the_whole(sunlit):
+    """Without occlusion of the sun, a shader gets the interpolated light plus the hard-shadow light."""
     light = illumination_from_look(look_of(sunlit), sunlit.material_names, has_bounces=True)
     whole, apart = combine_all(sunlit, light), combine_all(sunlit, light, has_hard_shadows=True)
-    (beam,) = apart.hard_shadow_lights
+    (hard_light,) = apart.hard_shadow_lights
     assert not whole.hard_shadow_lights
-    together = apart.total[:, :, 0] + beam.gain * beam.vectors[:, :, 0]
+    together = apart.total[:, :, 0] + hard_light.gain * hard_light.vectors[:, :, 0]
     is_lit = whole.total[:, 0, 0] > 0.9 * together[:, 0]
     assert 0.2 < is_lit.mean() < 0.9
     off = np.abs(whole.total[is_lit][:, :, 0] / together[is_lit] - 1).max(axis=1)
-    assert np.quantile(off, 0.99) < 0.02  # some are in a penumbra
+    assert np.quantile(off, 0.99) < 0.02  # some lie in a penumbra
     assert (apart.total[:, 0, 0] < 0.3 * together[is_lit, 0].max()).all()

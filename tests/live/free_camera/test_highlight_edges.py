@@ -1,4 +1,4 @@
-"""Rims of highlights a pixel thin, against pictures of many times the size."""
+"""Highlight edges one pixel thin, against images of many times the size."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def beside(luminance, y, x):
 
 
 @pytest.mark.parametrize("share", [1.0, 0.05])
-def test_rims_are_the_pixels_that_differ_most_from_one_beside_them(monkeypatch, share):
+def test_highlight_edges_are_the_pixels_with_the_largest_differences(monkeypatch, share):
     monkeypatch.setattr(highlight_edges, "_MAX_EDGE_FRACTION", share)
     rng = np.random.default_rng(1)
     image = rng.exponential(size=(13, 17, 3)).astype(np.float32) ** 3
@@ -41,7 +41,7 @@ def test_rims_are_the_pixels_that_differ_most_from_one_beside_them(monkeypatch, 
     np.testing.assert_array_equal(find_highlight_edges(image, is_asked), expected)
 
 
-def test_rays_share_no_row_and_no_column():
+def test_rays_have_distinct_rows_and_columns():
     assert len(np.unique(RAY_POSITIONS[:, 0])) == len(np.unique(RAY_POSITIONS[:, 1])) == len(RAY_POSITIONS)
     assert ((RAY_POSITIONS > 0) & (RAY_POSITIONS < 1)).all()
     np.testing.assert_allclose(RAY_POSITIONS.mean(axis=0), 0.5)
@@ -49,7 +49,7 @@ def test_rays_share_no_row_and_no_column():
 
 @pytest.fixture(scope="module")
 def shiny(tmp_path_factory):
-    """A ball that is a highlight, seen across its horizon, where the sky that it shows is narrowest."""
+    """A glossy ball seen toward its horizon, where the reflected environment is narrowest."""
     term = {"model": "ggx", "color": [1.0] * 3, "params": {"roughness": 0.25, "f0": 0.9}}
     radiance = np.full((32, 64, 3), 0.05, np.float32)
     radiance[12, ::8] = 60
@@ -66,7 +66,7 @@ def shown(opened, scale):
     return image.reshape(SIZE[1], scale, SIZE[0], scale, 3).mean(axis=(1, 3))
 
 
-def test_rims_show_what_their_pixels_see(shiny, monkeypatch):
+def test_highlight_edges_are_means_over_their_pixels(shiny, monkeypatch):
     actual = shown(shiny, 1)
     monkeypatch.setattr(highlight_edges, "_MAX_EDGE_FRACTION", 0.0)
     without, reference = shown(shiny, 1), shown(shiny, FINER)

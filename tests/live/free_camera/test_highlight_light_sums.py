@@ -1,4 +1,4 @@
-"""What points send of the sky in highlights, summed over the lights that they see."""
+"""Outgoing environment light of probes in highlights, summed over visible lights."""
 
 import numpy as np
 import pytest
@@ -43,10 +43,10 @@ def sum_lights_numpy(
     camera_position: F32,
     probe: int,
 ) -> F64:
-    """Do as `sum_lights` for one point with a lobe, in plain NumPy: its oracle.
+    """Reference of `sum_lights` for one probe with a lobe in plain NumPy.
 
     Args:
-        stored_scene, visibility_bits, lights, lobes, camera_position: as there. probe: number of the point.
+        stored_scene, visibility_bits, lights, lobes, camera_position: as there. probe: its index.
     Returns:
         (3,) float64
     """
@@ -95,7 +95,7 @@ def surface(tmp_path_factory):
 
 
 def lights_of(rng, num, radius):
-    """Four beside each other, one after another."""
+    """Four neighboring lights, one after another."""
     towards = np.repeat(rng.normal(size=(num // 4, 3)), 4, axis=0)
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
     towards += rng.normal(scale=0.01, size=(num, 3))
@@ -105,14 +105,14 @@ def lights_of(rng, num, radius):
 
 
 def facing(surface, least):
-    """Points that see the eye from not too aslant."""
+    """Probes that face the camera at no grazing angle."""
     towards = CAMERA_POSITION - surface.probes.position
     cosine = np.einsum("pk,pk->p", surface.probes.normal, towards) / np.linalg.norm(towards, axis=1)
     return np.flatnonzero(cosine > least)
 
 
 @pytest.mark.parametrize("term", [document("ggx", roughness=0.4, f0=0.9), document("blinn_phong", exponent=400.0)])
-def test_the_kernel_does_what_its_twin_does(surface, term):
+def test_the_kernel_equals_its_reference(surface, term):
     rng, num = np.random.default_rng(5), surface.probes.num_points
     lobes = build_lobes([[term]])
     lights = EnvironmentLights.from_lights(*lights_of(rng, 152, rng.uniform(0, 0.3, 152)))
@@ -135,7 +135,7 @@ def test_the_kernel_does_what_its_twin_does(surface, term):
     ],
 )
 def test_wide_highlights_are_sums_of_the_brdf_over_lights(surface, term):
-    """Small lights, some of them seen, against the terms themselves."""
+    """Small lights, some of them visible, against the terms themselves."""
     rng, num, lobes = np.random.default_rng(6), surface.probes.num_points, build_lobes([[term]])
     assert not lobes.lobe_confidence[0, cosines() > 0.4].any()
     towards, light, radius = lights_of(rng, 400, 0.01)
@@ -164,8 +164,8 @@ def test_wide_highlights_are_sums_of_the_brdf_over_lights(surface, term):
 
 
 @pytest.mark.parametrize("roughness", [0.02, 0.1, 0.25])
-def test_under_a_white_sky_nothing_is_gained_or_lost(surface, roughness):
-    """Lights as wide as those of a bake; what lobes show of it is one."""
+def test_a_white_environment_preserves_energy(surface, roughness):
+    """Lights as wide as those of a bake; the lobes' share of the environment is one."""
     num, lobes = surface.probes.num_points, build_lobes([[document("ggx", roughness=roughness, f0=0.9)]])
     tiles = Tiles(np.arange(8 << 8, 16 << 8, dtype=np.uint64))
     light = np.broadcast_to(tiles.solid_angles[:, None], (2048, 3)).astype(np.float32)

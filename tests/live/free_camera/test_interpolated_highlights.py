@@ -1,4 +1,4 @@
-"""Highlights between points: the sky in them is found for each pixel, and only the rest is interpolated."""
+"""Highlights between probes: environment lobes are evaluated per pixel, and only the rest is interpolated."""
 
 import numpy as np
 import pytest
@@ -51,10 +51,10 @@ CAMERA = make_camera("front", [0, 0.5, 3], [0, 0, 0], 0.75)
 
 
 def lists_numpy(lobe_lights: LobeLightLists, width: int, bin_index: int) -> NDArray[np.intp]:
-    """Find the lights of a list in plain NumPy: the oracle, in no order.
+    """Reference of a light list in plain NumPy, in any order.
 
     Args:
-        lobe_lights: whose lights. width, bin_index: of the list.
+        lobe_lights: the lights. width, bin_index: of the list.
     """
     centers, farthest = _DIRECTION_BINS
     lights = lobe_lights.lights.astype(np.float64)
@@ -88,8 +88,8 @@ def shiny_ball(tmp_path_factory):
     return opened(scene, "probes", folder), picture_of(opened(scene, "direct", folder))
 
 
-def test_highlights_of_few_points_on_a_ball_are_those_of_a_fixed_view(shiny_ball, monkeypatch):
-    """Some hundred points under a bright lamp; without their lobes they are patches."""
+def test_highlights_of_few_probes_equal_a_fixed_view(shiny_ball, monkeypatch):
+    """A few hundred probes under a bright light; without their lobes the highlights are patchy."""
     moving, expected = shiny_ball
 
     def error():
@@ -102,7 +102,7 @@ def test_highlights_of_few_points_on_a_ball_are_those_of_a_fixed_view(shiny_ball
     assert error() > 2.5 * interpolated_error
 
 
-def test_points_take_no_more_than_half_of_what_a_pixel_finds_in_its_lobe(shiny_ball, monkeypatch):
+def test_probes_subtract_at_most_half_of_a_pixels_lobe(shiny_ball, monkeypatch):
     def shown_beside(broad):
         def changed(surface, gbuffer, pixel_angle, outgoing, *others):
             return shade_pixels(
@@ -114,7 +114,7 @@ def test_points_take_no_more_than_half_of_what_a_pixel_finds_in_its_lobe(shiny_b
             )
 
         monkeypatch.setattr(frame_module, "shade_pixels", changed)
-        return picture_of(shiny_ball[0])[18:30, 26:38]  # the ball's middle, beside rims, which have rays of their own
+        return picture_of(shiny_ball[0])[18:30, 26:38]  # the center of the ball, without edges, which have more rays
 
     alone, limit = shown_beside(0.0), shown_beside(-1e4)
     assert alone.max() > 0.1
@@ -124,7 +124,7 @@ def test_points_take_no_more_than_half_of_what_a_pixel_finds_in_its_lobe(shiny_b
 BRIGHT_LIGHTS = np.array([[0.0, 0.6, 0.8, 3.0, 2.0, 1.0, 3e-4], [1.0, 0.0, 0.0, 0.5, 1.0, 2.0, 1e-3]], np.float32)
 
 
-def sky_light(rotation=0.0, gain=(1.0, 0.5, 2.0), bright_lights=BRIGHT_LIGHTS):
+def lobe_environment(rotation=0.0, gain=(1.0, 0.5, 2.0), bright_lights=BRIGHT_LIGHTS):
     rng = np.random.default_rng(5)
     lookup_tables = build_environment_lookup(
         rng.random((16, 32, 3), np.float32), lambda degrees: rng.random((16, 32, 3), np.float32)
@@ -132,8 +132,8 @@ def sky_light(rotation=0.0, gain=(1.0, 0.5, 2.0), bright_lights=BRIGHT_LIGHTS):
     return PrefilteredEnvironment(lookup_tables, bright_lights, rotation_of(rotation), np.array(gain, np.float32))
 
 
-def seen_along(lobes, surface, camera_position, point):
-    """Reads a lobe's tables for a point; its normal; where the eye's ray goes on along the surface. In plain NumPy."""
+def lobe_lookup(lobes, surface, camera_position, point):
+    """Lobe tables for a probe in plain NumPy: lookup function, normal, and reflected direction."""
     lobe = lobes.lobe_index[surface.material[point]]
     n = surface.probes.normal[point].astype(np.float64)
     wo = camera_position - surface.probes.position[point].astype(np.float64)
@@ -148,27 +148,29 @@ def seen_along(lobes, surface, camera_position, point):
     return at, n, aside / np.linalg.norm(aside)
 
 
-def two_numpy(lobes, surface, camera_position, point):
-    """Where both lobes of a point look, their shares, σ of both."""
-    at, n, aside = seen_along(lobes, surface, camera_position, point)
+def two_lobes_numpy(lobes, surface, camera_position, point):
+    """Directions, weights and σ of both lobes of a probe."""
+    at, n, aside = lobe_lookup(lobes, surface, camera_position, point)
     directions = [np.sqrt(1 - cosine**2) * aside + cosine * n for cosine in at(lobes.cosine)]
     return np.array(directions), np.array([at(lobes.first), 1 - at(lobes.first)]), at(lobes.sigma)
 
 
-def one_numpy(lobes, surface, camera_position, point):
-    """Where the lobe of a pixel at a point looks, its share, and its width."""
-    at, n, aside = seen_along(lobes, surface, camera_position, point)
+def one_lobe_numpy(lobes, surface, camera_position, point):
+    """Direction, weight and width of a pixel's lobe at a probe."""
+    at, n, aside = lobe_lookup(lobes, surface, camera_position, point)
     return (np.sqrt(1 - at(lobes.mean) ** 2) * aside + at(lobes.mean) * n)[None], np.ones(1), at(lobes.single_sigma)
 
 
-def sky_numpy(directions, shares, sigma, light, visibility):
-    """What lobes show of the sky, in plain NumPy: the oracle. (3,)"""
+def environment_in_lobes_numpy(directions, shares, sigma, light, visibility):
+    """Reference of the environment in lobes in plain NumPy. (3,)"""
     every = zip(directions, shares, np.broadcast_to(sigma, shares.shape), strict=True)
-    return sum(share * one_sky_numpy(direction, width, light, visibility) for direction, share, width in every)
+    return sum(
+        share * environment_in_lobe_numpy(direction, width, light, visibility) for direction, share, width in every
+    )
 
 
-def one_sky_numpy(direction, sigma, light, visibility):
-    """What one lobe shows of it."""
+def environment_in_lobe_numpy(direction, sigma, light, visibility):
+    """Environment light in one lobe."""
     level = np.clip(2 * np.log2(np.degrees(sigma) / 2) + 1, 0, len(light.environment.levels) - 1)
     rotated = rotate_about_y(direction[None], 360 * (0.5 - float(light.rotation)))
     total = np.zeros(3)
@@ -186,11 +188,9 @@ def one_sky_numpy(direction, sigma, light, visibility):
 
 @pytest.mark.parametrize("term", [BROAD_TERM, GLOSSY, SKIRTED])
 @pytest.mark.parametrize(("rotation", "is_fine"), [(0.0, False), (123.0, False), (123.0, True)])
-def test_points_add_of_the_sky_what_two_lobes_allow_of_the_in_basis_or_what_lights_say_less_what_pixels_find(
-    shiny_ball, term, rotation, is_fine
-):
+def test_probes_add_the_difference_to_the_lobe_of_pixels(shiny_ball, term, rotation, is_fine):
     moving, _ = shiny_ball
-    surface, rng, light = moving.stored_scene, np.random.default_rng(7), sky_light(rotation)
+    surface, rng, light = moving.stored_scene, np.random.default_rng(7), lobe_environment(rotation)
     num, camera_position = surface.probes.num_points, np.array([0.4, 1.5, 3.0], np.float32)
     visibility = rng.random((num, 3), np.float32)
     lobes = build_lobes([[{**term, "texture": "diffuse"}]])
@@ -213,10 +213,12 @@ def test_points_add_of_the_sky_what_two_lobes_allow_of_the_in_basis_or_what_ligh
     assert not sent[is_needed == 0].any()
     held, max_ratio = 0, float(lobes.max_ratio[0])
     for point in np.flatnonzero(is_needed)[::17]:
-        at, _, _ = seen_along(lobes, surface, camera_position.astype(np.float64), point)
+        at, _, _ = lobe_lookup(lobes, surface, camera_position.astype(np.float64), point)
         with_lights, shown = (
-            sky_numpy(*lobe(lobes, surface, camera_position.astype(np.float64), point), light, visibility[point])
-            for lobe in (two_numpy, two_numpy if is_fine or lobes.is_two[0] else one_numpy)
+            environment_in_lobes_numpy(
+                *lobe(lobes, surface, camera_position.astype(np.float64), point), light, visibility[point]
+            )
+            for lobe in (two_lobes_numpy, two_lobes_numpy if is_fine or lobes.is_two[0] else one_lobe_numpy)
         )
         reference, actual = (
             at(lobes.albedo) * (at(lobes.lobe_confidence) * with_lights + lit[point] * light.gain),
@@ -232,7 +234,7 @@ def test_points_add_of_the_sky_what_two_lobes_allow_of_the_in_basis_or_what_ligh
     assert not sent[:, [0, 2]].any()
 
 
-def test_what_is_narrower_than_lights_is_a_lobe_alone(shiny_ball):
+def test_lobes_narrower_than_lights_use_the_lobe_only(shiny_ball):
     surface, rng = shiny_ball[0].stored_scene, np.random.default_rng(7)
     assert is_narrow(white_coefficients(NARROW))
     lobes = build_lobes([[NARROW, GLOSSY]])
@@ -242,7 +244,7 @@ def test_what_is_narrower_than_lights_is_a_lobe_alone(shiny_ball):
     sent, everywhere = np.zeros((num, 3, 3), np.float32), np.ones(num, np.uint8)
     environment_light = rng.normal(size=(num, 3, 3)).astype(np.float32)
     camera_position, visibility = CAMERA.to_world[:3, 3], np.ones((num, 3), np.float32)
-    nothing, light = np.zeros((num, 3), np.float32), sky_light()
+    nothing, light = np.zeros((num, 3), np.float32), lobe_environment()
     add_environment_highlights(
         surface,
         lobes,
@@ -257,7 +259,7 @@ def test_what_is_narrower_than_lights_is_a_lobe_alone(shiny_ball):
     assert np.abs(sent).max() < 1e-4 * lobes.albedo.max()
 
 
-def test_points_see_of_the_sky_in_their_lobes_what_their_bits_say(shiny_ball):
+def test_lobe_visibility_equals_the_visibility_bits(shiny_ball):
     surface, rng = shiny_ball[0].stored_scene, np.random.default_rng(3)
     num, num_lights, lobes = surface.probes.num_points, 20, build_lobes([[NARROW]])
     directions = rng.normal(size=(num_lights, 3)).astype(np.float32)
@@ -273,7 +275,7 @@ def test_points_see_of_the_sky_in_their_lobes_what_their_bits_say(shiny_ball):
     )
     assert not actual[is_needed == 0].any()
     for point in np.flatnonzero(is_needed)[::13]:
-        towards, shares, sigma = two_numpy(lobes, surface, camera_position.astype(np.float64), point)
+        towards, shares, sigma = two_lobes_numpy(lobes, surface, camera_position.astype(np.float64), point)
         middle = shares @ towards
         size = np.linalg.norm(middle)
         variance = shares @ sigma**2 + 1 - size + listed.lights[:, 3].astype(np.float64)
@@ -284,7 +286,7 @@ def test_points_see_of_the_sky_in_their_lobes_what_their_bits_say(shiny_ball):
 
 
 @pytest.mark.parametrize("width", [0, 3, 9])
-def test_lists_have_the_lights_that_weigh_most(width):
+def test_light_lists_have_the_lights_of_largest_weight(width):
     rng = np.random.default_rng(4)
     directions = rng.normal(size=(300, 3)).astype(np.float32)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
@@ -295,7 +297,7 @@ def test_lists_have_the_lights_that_weigh_most(width):
         assert set(light_list[light_list >= 0]) == set(lists_numpy(listed, width, square))
 
 
-def test_lists_are_full_where_lights_weigh_alike():
+def test_light_lists_are_full_if_weights_are_equal():
     directions, radius = np.tile(np.array([0, 0.6, 0.8], np.float32), (100, 1)), np.full(100, 0.1, np.float32)
     luminous = np.where(np.arange(100) < 20, 2, 1).astype(np.float32)
     none = np.zeros((0, 100), np.float32)
@@ -308,8 +310,8 @@ def test_lists_are_full_where_lights_weigh_alike():
 
 
 @pytest.mark.parametrize("degrees", [4.0, 16.0])
-def test_a_blurred_sky_and_its_lamp_are_the_blurred_whole(degrees):
-    """A lamp of two degrees, too wide for a sun whose shadows are traced."""
+def test_prefiltered_environment_and_bright_light_sum_to_the_whole(degrees):
+    """A bright region of two degrees, too wide for a sun disk."""
     towards, axis = texel_directions(256, 512), np.array([0.0, 0.6, 0.8])
     radiance = np.where((towards @ axis > np.cos(np.radians(2)))[..., None], 3000.0, 1 + towards[..., 1:2] ** 2)
     whole = np.repeat(radiance, 3, axis=2).astype(np.float32)
@@ -328,8 +330,8 @@ def test_a_blurred_sky_and_its_lamp_are_the_blurred_whole(degrees):
     assert np.sqrt(np.mean((rest - expected) ** 2) / np.mean(expected**2)) > 0.5
 
 
-def test_a_surface_takes_from_its_own_points_and_not_from_what_lies_beside_it():
-    """Two balls that almost touch, and a ground: points of the other have the same normals, and are as near."""
+def test_a_surface_interpolates_its_own_probes_only():
+    """Two balls that almost touch, and a ground: probes of the other ball have the same normals at the same distance."""
     balls = [sphere(f"ball {k}", [0.102 * k, 0.05, 0], 0.05, 0, 24) for k in range(2)]
     ground = quad("ground", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 1)
     materials = [Material(name, ({"model": "lambert", "color": [1, 1, 1]},)) for name in ("Balls", "Ground")]
@@ -347,8 +349,8 @@ def test_a_surface_takes_from_its_own_points_and_not_from_what_lies_beside_it():
         assert len(np.unique(taken > 0.051)) == 1, position[vertex]
 
 
-def test_faces_hang_together_by_places_of_corners():
-    """Corners that differ in normals or textures alone are one place."""
+def test_faces_are_connected_by_vertex_positions():
+    """Vertices that differ in normals or textures only are one position."""
     apart = [
         mesh("a", [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], 0),
         mesh("b", [[1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2]], 0),

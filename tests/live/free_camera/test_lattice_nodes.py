@@ -1,4 +1,4 @@
-"""Nodes of a lattice that lie together are one point, however many there are."""
+"""Coinciding nodes of a lattice share one probe, however many there are."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +18,13 @@ from relume.raytrace.surface_points import SurfacePoints
 def keys_numpy(
     grid_nodes: NodeTable, merge_distance: float, normal_steps: int
 ) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
-    """Find the keys in plain NumPy: the oracle.
+    """Reference of the node keys in plain NumPy.
 
     Args:
-        grid_nodes: of all grids. merge_distance: of the spacing, within which they are one.
-        normal_steps: steps of a unit normal's components, within which they look the same way.
+        grid_nodes: of all grids. merge_distance: fraction of the spacing within which nodes are merged.
+        normal_steps: quantization steps of the components of a unit normal.
     Returns:
-        Two numbers that nodes have alike which lie together. (n,) uint64 each
+        Two keys that coinciding nodes have in common. (n,) uint64 each
     """
     surface_points, corner, extent = grid_nodes.surface_points, grid_nodes.corner, grid_nodes.extent
     level = np.rint(np.log2(grid_nodes.spacing / grid_nodes.spacing.min())).astype(np.uint64)
@@ -40,7 +40,7 @@ def keys_numpy(
 
 
 def nodes(num, seed=3):
-    """Nodes on a coarse raster, so that many lie together, of two materials, on both sides, of three spacings."""
+    """Nodes on a coarse raster, so that many coincide, of two materials, on both sides, of three spacings."""
     rng = np.random.default_rng(seed)
     normal = rng.choice(np.array([[0, 0, 1], [0, 1, 0], [0.6, -0.8, 0]], np.float32), num)
     position = rng.integers(-9, 9, (num, 3)).astype(np.float32) + rng.normal(scale=0.02, size=(num, 3))
@@ -50,14 +50,14 @@ def nodes(num, seed=3):
     return NodeTable(points, material, side, piece, spacing, rng.random(num) < 0.8, *bounding_cube(points))
 
 
-def test_keys_are_those_of_numpy():
+def test_keys_equal_numpy():
     some = nodes(3000)
     for together, alike in ((0.35, 4), (1e-3, 50)):
         for actual, expected in zip(_keys(some, together, alike), keys_numpy(some, together, alike), strict=True):
             np.testing.assert_array_equal(actual, expected)
 
 
-def test_nodes_that_are_shared_are_counted_as_they_are_found():
+def test_the_number_of_shared_nodes_is_predicted():
     some = nodes(20_000)
     for alike in (1, 4):
         count = len(representative_nodes(some, alike))

@@ -1,4 +1,4 @@
-"""How other light changes in highlights between points: gradients, and what pixels make of them."""
+"""Gradients of highlights between probes, and their use in pixels."""
 
 from dataclasses import replace
 
@@ -40,10 +40,10 @@ _DIFFERENCE_STEP = 1e-5  # radians
 def gradients_along_lobe_numpy(
     stored_scene: StoredScene, non_environment: F32, tables: Tables, lobes: Lobes, camera_position: F32, probe: int
 ) -> F64:
-    """Oracle of `gradients_along_lobe` for one point: differences of `shade_probes_numpy` beside the camera.
+    """Reference of `gradients_along_lobe` for one probe: finite differences of `shade_probes_numpy`.
 
     Args:
-        stored_scene, non_environment, tables, lobes, camera_position: as there. probe: number of the point, which has a
+        stored_scene, non_environment, tables, lobes, camera_position: as there. probe: index of a probe with a
         lobe.
     Returns:
         (4,) float64
@@ -88,8 +88,8 @@ def moving(tmp_path_factory):
     return open_bake(store, Cache(1 << 30))
 
 
-def from_afar(points):
-    """Light vectors of a few far lights that nothing hides. (points, 3, K) float32"""
+def distant_light(points):
+    """Incident radiance coefficients of a few distant unoccluded lights. (probes, 3, K) float32"""
     rng = np.random.default_rng(3)
     towards, light = rng.normal(size=(12, 3)), rng.uniform(0, 2, (12, 3))
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
@@ -100,9 +100,9 @@ def from_afar(points):
 
 
 @pytest.mark.parametrize("terms", [[METAL], [METAL, COAT]])
-def test_gradients_are_what_points_send_otherwise_aside(moving, terms):
+def test_gradients_equal_finite_differences(moving, terms):
     surface, tables, lobes = moving.stored_scene, build_tables([terms]), build_lobes([terms])
-    others, num = from_afar(surface.probes), surface.probes.num_points
+    others, num = distant_light(surface.probes), surface.probes.num_points
     is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
     actual = gradients_along_lobe(surface, others, tables, lobes, CAMERA_POSITION, is_needed)
     assert not actual[is_needed == 0].any()
@@ -115,10 +115,10 @@ def test_gradients_are_what_points_send_otherwise_aside(moving, terms):
     np.testing.assert_allclose(actual[::5][is_asked], expected[is_asked], rtol=2e-3, atol=2e-3 * largest)
 
 
-def test_what_has_no_highlight_or_no_other_light_turns_nothing(moving):
+def test_gradients_are_zero_without_highlight_or_light(moving):
     surface, num = moving.stored_scene, moving.stored_scene.probes.num_points
     dull, everywhere = [{**METAL, "model": "lambert", "params": {}}], np.ones(num, np.uint8)
-    others = from_afar(surface.probes)
+    others = distant_light(surface.probes)
     assert not gradients_along_lobe(
         surface, others, build_tables([dull]), build_lobes([dull]), CAMERA_POSITION, everywhere
     ).any()
@@ -128,10 +128,10 @@ def test_what_has_no_highlight_or_no_other_light_turns_nothing(moving):
 
 
 def pixels(moving, gain):
-    """Pixels of a metal ball in that light, with gradients times a gain; and of points that lie where pixels look."""
+    """Pixels of a metal ball in that light, with gradients times a gain; and with probes at the pixels."""
     surface, tables, lobes = moving.stored_scene, build_tables([[METAL]]), build_lobes([[METAL]])
     gbuffer = trace_primary(surface, moving.embree, CAMERA, SIZE).pixel_centers(SIZE[0] * SIZE[1])
-    others, everywhere = from_afar(surface.probes), np.ones(surface.probes.num_points, np.uint8)
+    others, everywhere = distant_light(surface.probes), np.ones(surface.probes.num_points, np.uint8)
     outgoing = shade_probes(surface, np.zeros_like(others), others, tables, CAMERA_POSITION, everywhere).radiance
     gradients = np.float32(gain) * gradients_along_lobe(surface, others, tables, lobes, CAMERA_POSITION, everywhere)
     broad, turn = (interpolate_to_nodes(surface, gbuffer.is_visible, values) for values in (outgoing, gradients))
@@ -152,13 +152,13 @@ def pixels(moving, gain):
     fields = (np.ascontiguousarray(values, np.float32) for values in (position, normal, tangent))
     points = SurfacePoints(*fields, hit.astype(np.uint32))
     exactly = replace(surface, probes=points, material=np.zeros(len(hit), surface.material.dtype))
-    light, every = from_afar(points), np.ones(len(hit), np.uint8)
+    light, every = distant_light(points), np.ones(len(hit), np.uint8)
     expected = shade_probes(exactly, np.zeros_like(light), light, tables, CAMERA_POSITION, every).radiance[:, 0]
     inside = np.einsum("nc,nc->n", normal, -gbuffer.directions[hit]) > 0.3
     return radiance[hit][inside], expected[inside]
 
 
-def test_half_gradients_meet_what_lies_between_points(moving):
+def test_half_gradients_improve_values_between_probes(moving):
     def error(gain):
         actual, expected = pixels(moving, gain)
         return np.sqrt(np.mean((actual - expected) ** 2) / np.mean(expected**2))
@@ -176,7 +176,7 @@ def test_a_gradient_changes_pixels_within_bounds(moving):
     np.testing.assert_allclose([ratio.min(), ratio.max()], [0.875, 1.125], rtol=1e-3)
 
 
-def test_the_window_is_for_functions_that_miss_much():
+def test_the_window_applies_to_functions_with_large_residuals():
     np.testing.assert_array_equal(window(0.0), 1)
     np.testing.assert_allclose(window(0.9), np.exp(-WINDOW_DECAY * DEGREES * (DEGREES + 2)), rtol=1e-6)
     assert np.all(window(0.9)[1:] < window(0.3)[1:])

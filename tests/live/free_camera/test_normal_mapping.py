@@ -1,4 +1,4 @@
-"""Normal maps in moving pictures, against pictures of fixed views, whose every sample is lit along its own normal."""
+"""Normal maps with a free camera, against fixed views, whose samples are lit with their own normals."""
 
 import numpy as np
 import pytest
@@ -19,15 +19,15 @@ from relume.store.bake_protocol import Recipe
 WAVES = 4
 LAMBERT = ({"model": "lambert", "color": [0.8, 0.7, 0.6]},)
 METAL = ({"model": "ggx", "color": [0.9, 0.9, 0.9], "params": {"roughness": 0.25}},)
-CAMERA = make_camera("front", [0.4, 1.6, 1.8], [0, 0, 0], 0.35)  # sees nothing but floor
+CAMERA = make_camera("front", [0.4, 1.6, 1.8], [0, 0, 0], 0.35)  # only the floor is visible
 SIZE = (64, 48)
 
 
 def light_gradient_numpy(stored_scene: StoredScene, vectors: F32, probe: int) -> F64:
-    """Do as `light_gradient` for one point, in plain NumPy: its oracle.
+    """Reference of `light_gradient` for one probe in plain NumPy.
 
     Args:
-        stored_scene, vectors: as there. probe: number of the point.
+        stored_scene, vectors: as there. probe: its index.
     Returns:
         (3,) float64
     """
@@ -38,7 +38,7 @@ def light_gradient_numpy(stored_scene: StoredScene, vectors: F32, probe: int) ->
 
 
 def waves(size=128, slope=0.35, wrap=("repeat", "repeat")):
-    """Normals of a surface that rises and falls along u, and half as much along v."""
+    """Normals of a surface that is wavy along u, and half as much along v."""
     v, u = np.mgrid[:size, :size] * 2 * np.pi * WAVES / size
     normals = np.stack([slope * np.sin(u), 0.5 * slope * np.cos(v), np.ones_like(u)], axis=-1)
     return Texture((normals / np.linalg.norm(normals, axis=-1, keepdims=True)).astype(np.float32), wrap)
@@ -57,7 +57,7 @@ def picture_of(scene, method, folder):
 
 
 def error(actual, expected):
-    """Relative to what is expected, root mean square."""
+    """Root mean square error relative to the expected values."""
     return np.sqrt(np.mean((actual - expected) ** 2) / np.mean(expected**2))
 
 
@@ -65,8 +65,8 @@ def error(actual, expected):
     ("terms", "at_most"),
     [pytest.param(LAMBERT, 0.02, id="broad"), pytest.param(METAL, 0.04, id="narrow", marks=pytest.mark.slow)],
 )
-def test_slopes_are_lit_as_in_fixed_views(terms, at_most, tmp_path):
-    """And not as flat ones are: what the map does to the picture is several times what is left."""
+def test_normal_mapped_shading_equals_fixed_views(terms, at_most, tmp_path):
+    """The effect of the map is several times the remaining error."""
     bumpy, flat = floor(terms, waves()), floor(terms, None)
     expected = picture_of(bumpy, "direct", tmp_path)
     actual_error = error(picture_of(bumpy, "probes", tmp_path), expected)
@@ -75,8 +75,8 @@ def test_slopes_are_lit_as_in_fixed_views(terms, at_most, tmp_path):
     assert ignored > 4 * actual_error
 
 
-def test_light_of_a_few_directions_comes_from_their_mean(tmp_path):
-    """D is the sum of w ω: of lights well above the horizon, about what the expansion holds."""
+def test_the_gradient_of_a_few_lights_is_their_mean_direction(tmp_path):
+    """D is the sum of w ω for lights well above the horizon, within the accuracy of the basis."""
     rng = np.random.default_rng(4)
     wi = rng.normal(size=(400, 3)) * [0.5, 0.5, 0.2] + [0, 0, 1]
     wi /= np.linalg.norm(wi, axis=1, keepdims=True)
@@ -84,7 +84,7 @@ def test_light_of_a_few_directions_comes_from_their_mean(tmp_path):
     np.testing.assert_allclose(basis_gradients() @ vectors, wi.mean(axis=0), atol=0.03)
 
 
-def test_points_are_told_where_light_comes_from_as_in_numpy(tmp_path):
+def test_the_light_gradient_equals_numpy(tmp_path):
     scene = floor(LAMBERT, waves())
     recipe = Recipe("probes", ("front",), (16, 12), 60, num_probes=500)
     surface = open_bake(
@@ -98,7 +98,7 @@ def test_points_are_told_where_light_comes_from_as_in_numpy(tmp_path):
     np.testing.assert_allclose(actual, expected * is_needed[:, None], atol=1e-4)
 
 
-def test_scenes_without_normal_maps_keep_no_tangents(tmp_path):
+def test_scenes_without_normal_maps_store_no_tangents(tmp_path):
     recipe = Recipe("probes", ("front",), (16, 12), 60, num_probes=500)
     store = bake_in_process(METHODS["probes"], floor(LAMBERT, None), recipe, tmp_path / "s.zarr")
     assert open_bake(store, Cache(1 << 30)).stored_scene.tangents.shape == (0, 4)

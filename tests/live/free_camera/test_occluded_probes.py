@@ -1,4 +1,4 @@
-"""Nodes that something stands before: pixels take no light from beyond walls, and none from under what stands there."""
+"""Occluded nodes: pixels take no light from behind walls, and none from under objects."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ BOX = [[x, y, z] for x in (-0.33, 0.33) for y in (0, 0.6) for z in (-0.33, 0.33)
 
 
 def scene():
-    """A box without an underside on a floor, under an even sky."""
+    """A box without a bottom on a floor, in a uniform environment."""
     floor = quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 0)
     sides = ([1, 5, 7, 3], [5, 4, 6, 7], [4, 0, 2, 6], [0, 1, 3, 2], [3, 7, 6, 2])
     box = [quad(f"side {k}", [BOX[i] for i in side], 1) for k, side in enumerate(sides)]
@@ -42,12 +42,12 @@ def moving(tmp_path_factory):
 
 
 def is_inside(position):
-    """Whether places on the floor lie under the box."""
+    """True for positions on the floor under the box."""
     return (np.abs(position[:, [0, 2]]) < 0.33).all(axis=1)
 
 
-def test_pixels_beside_a_box_do_without_what_lies_under_it(moving):
-    """Of every pixel of the floor, the nodes under the box have no weight, unless all three lie there."""
+def test_pixels_next_to_a_box_ignore_nodes_under_it(moving):
+    """Nodes under the box have no weight in pixels of the floor, unless all three lie there."""
     gbuffer = trace_primary(moving.stored_scene, moving.embree, CAMERA, SIZE)
     before = gbuffer.weight.copy()
     reweight(gbuffer, moving.has_occluded_neighbor, moving.occlusion_mesh)
@@ -66,7 +66,7 @@ def test_pixels_beside_a_box_do_without_what_lies_under_it(moving):
     assert 0 < changed.mean() < 0.1
 
 
-def test_the_line_where_it_stands_is_as_bright_as_in_a_fixed_view(moving, monkeypatch, tmp_path):
+def test_the_contact_line_equals_a_fixed_view(moving, monkeypatch, tmp_path):
     recipe = Recipe("gather", ("front",), SIZE, 100)
     fixed = open_bake(bake_in_process(METHODS["gather"], scene(), recipe, tmp_path / "g.zarr"), Cache(1 << 30))
     plain = validate(complete({}, moving.default_look), moving.default_look)
@@ -81,8 +81,8 @@ def test_the_line_where_it_stands_is_as_bright_as_in_a_fixed_view(moving, monkey
     assert corrected < 0.8 * error()
 
 
-def test_faces_that_meet_do_not_part_each_other(tmp_path):
-    """A room's corner: nodes on an edge lie in both walls, and are seen from either."""
+def test_adjacent_faces_do_not_occlude_each_other(tmp_path):
+    """The corner of a room: nodes on an edge lie in both walls, and are visible from both."""
     corners = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [0, 0, 2], [0, 2, 2]]
     walls = mesh("walls", corners, [[0, 1, 2], [0, 2, 3], [4, 0, 3], [4, 3, 5]], 0)
     floor = quad("floor", [[0, 0, 2], [2, 0, 2], [2, 0, 0], [0, 0, 0]], 0)

@@ -1,4 +1,4 @@
-"""Out-factors: what a term sends of each function of the in-basis, for every term of the library."""
+"""Outgoing BRDF coefficients of each basis function, for every term of the library."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ from relume.math.zernike import NUM_FUNCTIONS, project
 
 
 def fit_two_lobes_numpy(x: F64, z: F64, area: F64, brdf_cosine: F64) -> F64:
-    """Do as `fit_two_lobes` for one row, in plain NumPy: its oracle.
+    """Reference of `fit_two_lobes` for one row in plain NumPy.
 
     Args:
         x, z, area, brdf_cosine: as there. (n,)
@@ -54,7 +54,7 @@ def document(model, **fields):
     return {"model": model, "color": [1.0, 1.0, 1.0], "params": {}, "texture": None} | fields
 
 
-def test_a_diffuse_surface_is_one_number():
+def test_a_diffuse_surface_has_one_coefficient():
     coefficients = outgoing_coefficients(document("lambert", color=[0.2, 0.4, 0.8]))
     assert coefficients.table.shape == (NUM_ROWS, 1, 3, NUM_FUNCTIONS)
     np.testing.assert_allclose(
@@ -64,17 +64,18 @@ def test_a_diffuse_surface_is_one_number():
     assert coefficients.residual_energy < 1e-3
 
 
-@pytest.mark.parametrize("around", [5, 13, 22, 30])  # in each quarter, of which one alone is integrated
+@pytest.mark.parametrize("azimuth", [5, 13, 22, 30])  # one azimuth in each quadrant, of which only one is integrated
 @pytest.mark.parametrize("model", ANALYTIC)
-def test_factors_are_the_integrals_of_the_term(model, around):
-    """By another quadrature, finer than the one under test; highlights that no quadrature of it resolves are blurred by
-    the same functions."""
+def test_coefficients_are_the_integrals_of_the_term(model, azimuth):
+    """With a finer quadrature than the one under test; highlights that the latter cannot resolve are blurred by the same
+    functions.
+    """
     term = document(model)
     coefficients = outgoing_coefficients(term)
     wi, weight = hemisphere(96, 192)
     row = 18
     cosine = cosines()[row]
-    column = around if coefficients.table.shape[1] > 1 else 0
+    column = azimuth if coefficients.table.shape[1] > 1 else 0
     phi = 2 * np.pi * column / coefficients.table.shape[1]
     sine = np.sqrt(1 - cosine**2)
     wo = np.array([sine * np.cos(phi), sine * np.sin(phi), cosine])
@@ -84,7 +85,7 @@ def test_factors_are_the_integrals_of_the_term(model, around):
     assert np.abs(coefficients.table[row, column] - expected).max() < 0.05 * scale
 
 
-def test_factors_turn_with_the_eye():
+def test_coefficients_rotate_with_the_view_direction():
     term, wi_weights = document("blinn_phong", params={"exponent": 20.0}), hemisphere(48, 96)
     coefficients, (wi, weight) = outgoing_coefficients(term), wi_weights
     row, phi = 14, 1.1
@@ -97,7 +98,7 @@ def test_factors_turn_with_the_eye():
     )
 
 
-def test_what_is_missed_grows_with_the_exponent():
+def test_the_residual_grows_with_the_exponent():
     missed = [
         outgoing_coefficients(document("blinn_phong", params={"exponent": e})).residual_energy
         for e in (5.0, 20.0, 80.0, 300.0)
@@ -113,7 +114,7 @@ def test_terms_with_a_highlight_along_the_tangent_have_tables_over_both_angles()
     assert not uneven & {"lambert", "oren_nayar", "blinn_phong", "cook_torrance", "ggx"}
 
 
-def test_terms_of_one_texture_are_summed_and_others_kept_apart():
+def test_terms_of_one_texture_are_summed():
     terms = [
         document("lambert"),
         document("lambert", texture="diffuse"),
@@ -128,15 +129,15 @@ def test_terms_of_one_texture_are_summed_and_others_kept_apart():
 
 
 @pytest.mark.parametrize("roughness", [0.1, 0.2, 0.3])
-def test_a_lobe_sends_what_the_term_does_under_a_white_sky(roughness):
-    """The integral of the term, by a quadrature of its half vectors: dωi = 4 cos θd dωh."""
+def test_a_lobe_has_the_albedo_of_its_term(roughness):
+    """The integral of the term, with a quadrature over half vectors: dωi = 4 cos θd dωh."""
     term = document("ggx", params={"roughness": roughness, "f0": 0.5}, color=[1.0, 0.5, 0.25], texture="specular")
     lobes = build_lobes([[document("lambert")], [term]])
     assert lobes.lobe_index.tolist() == [-1, 0]
     nodes, weights = np.polynomial.legendre.leggauss(400)
     alpha = roughness**2
     u, phi = np.repeat((nodes + 1) / 2, 64), np.tile((np.arange(64) + 0.5) * (2 * np.pi / 64), 400)
-    tan2 = alpha**2 * u / (1 - u)  # of θh, as GGX's facets lie
+    tan2 = alpha**2 * u / (1 - u)  # of θh, distributed like GGX facets
     cos_h = 1 / np.sqrt(1 + tan2)
     sin_h = np.sqrt(1 - cos_h**2)
     half = np.stack([sin_h * np.cos(phi), sin_h * np.sin(phi), cos_h], axis=-1)
@@ -152,19 +153,19 @@ def test_a_lobe_sends_what_the_term_does_under_a_white_sky(roughness):
         assert not lobes.albedo[0, row, :2].any()
 
 
-def test_a_sharp_lobe_looks_where_a_mirror_does_and_a_wider_one_is_wider():
+def test_sharp_lobes_point_to_the_mirror_direction_and_grow_with_roughness():
     lobes = [build_lobes([[document("ggx", params={"roughness": r, "f0": 0.5})]]) for r in (0.05, 0.2, 0.35)]
     np.testing.assert_allclose(lobes[0].cosine[0, :24].mean(axis=1), cosines()[:24], atol=0.02)
     widths = [lobe.single_sigma[0, 8] for lobe in lobes]
     assert widths == sorted(widths)
-    assert all((lobe.sigma[0, :24, 1] > 2 * lobe.sigma[0, :24, 0]).all() for lobe in lobes)  # a core and its skirt
+    assert all((lobe.sigma[0, :24, 1] > 2 * lobe.sigma[0, :24, 0]).all() for lobe in lobes)  # core and tail
     assert all(lobe.is_two.all() for lobe in lobes)
 
 
 @pytest.mark.parametrize("row", [10, 16, 20])
 @pytest.mark.parametrize("exponent", [60.0, 200.0])
 def test_two_lobes_are_as_wide_as_the_highlight_along_it_and_across(row, exponent):
-    """Mean and variances over all directions, by another quadrature."""
+    """Mean and variances over all directions, with another quadrature."""
     term = document("blinn_phong", params={"exponent": exponent})
     lobes = build_lobes([[term]])
     assert not lobes.is_two.any()
@@ -182,7 +183,7 @@ def test_two_lobes_are_as_wide_as_the_highlight_along_it_and_across(row, exponen
     off = np.sin(np.arccos(lobes.cosine[0, row]) - angle)
     share = np.array([lobes.first[0, row], 1 - lobes.first[0, row]])
     variance = float(share @ lobes.sigma[0, row] ** 2)
-    # far aslant a highlight is longer than two round lobes of its width are: what is likeliest is wider across
+    # at grazing angles a highlight is longer than two round lobes: the best fit is wider across
     assert (weight @ v**2) / length == pytest.approx(variance, rel=0.2)
     assert (weight @ u**2) / length == pytest.approx(variance + share @ off**2, rel=0.1)
     assert share @ off == pytest.approx(0, abs=0.03 * np.sqrt(variance))
@@ -192,7 +193,7 @@ def test_two_lobes_are_as_wide_as_the_highlight_along_it_and_across(row, exponen
     ("model", "params"),
     [("ggx", {"roughness": 0.3, "f0": 0.9}), ("cook_torrance", {}), ("blinn_phong", {"exponent": 3000.0})],
 )
-def test_two_lobes_are_fitted_as_their_twin_does_and_better_than_one(model, params):
+def test_two_lobes_equal_their_reference_and_fit_better_than_one(model, params):
     even = lobes_module._isotropic_grid()
     value = even.quadrature.values(document(model, params=params))
     sent = np.maximum(value.mean(axis=0) * even.z, 0).astype(np.float32)
@@ -216,7 +217,7 @@ def test_two_lobes_are_fitted_as_their_twin_does_and_better_than_one(model, para
         assert weight @ np.log(two + 1e-30) > weight @ np.log(alone + 1e-30)
 
 
-def test_what_sends_nothing_has_lobes_that_do_no_harm():
+def test_black_terms_have_finite_lobes():
     nothing = np.zeros((2, 8), np.float32)
     fits = fit_two_lobes(nothing, nothing + 1, nothing[0] + 1, nothing)
     np.testing.assert_array_equal(fits, [[1, 1, 0.5, 1, 1]] * 2)
@@ -229,7 +230,7 @@ def test_terms_along_the_tangent_have_one_lobe_of_the_mean_width():
     np.testing.assert_array_equal(lobes.cosine[0, :, 0], lobes.cosine[0, :, 1])
 
 
-def test_what_the_in_basis_cannot_tell_is_not_believed_and_what_it_tells_well_is():
+def test_max_ratio_follows_the_residual_of_the_basis():
     max_ratios = [
         build_lobes([[document("blinn_phong", params={"exponent": e})]]).max_ratio[0] for e in (20.0, 30.0, 300.0)
     ]

@@ -1,4 +1,4 @@
-"""Where points lie: more where eyes begin, and where shadows end."""
+"""Probe density: higher near cameras and at shadow edges."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ CAMERA_POSITION = np.array([[0.0, 3.0, 4.0]])
 
 @pytest.fixture(scope="module")
 def scene():
-    """A floor of two faces, and a card that stands on its middle."""
+    """A floor of two faces, and a card standing on its center."""
     floor = quad("floor", [[-4, 0, -4], [-4, 0, 4], [4, 0, 4], [4, 0, -4]], 0)
     card = quad("card", [[-0.3, 0, 0.1], [0.3, 0, 0.1], [0.3, 0.5, 0.1], [-0.3, 0.5, 0.1]], 1)
     grey = [Material(name, ({"model": "lambert", "color": [0.8, 0.8, 0.8]},)) for name in ("Floor", "Card")]
@@ -33,21 +33,21 @@ def scene():
     return make_tiny_scene(floor, card, camera=camera, environment=studio(32, 20.0), materials=grey)
 
 
-def first_placed(scene, num_points=1500):
+def place_initial_probes(scene, num_points=1500):
     geometry = build_scene_buffers(scene)
     is_open = visible_sides(geometry, scene.cameras, 1)
     density = density_from_distance(geometry, CAMERA_POSITION, make_corner_grid(is_open))
     return geometry, is_open, place_probes(geometry, is_open, density, num_points)
 
 
-def by_shadows_of(scene, geometry, placed):
+def density_by_shadows(scene, geometry, placed):
     return density_from_shadows(
         geometry, placed, CAMERA_POSITION, tessellate_environment(scene.environment.radiance, 300)
     )
 
 
-def test_far_from_the_eye_points_are_farther_apart(scene):
-    geometry, _, placed = first_placed(scene)
+def test_probes_are_sparser_far_from_the_camera(scene):
+    geometry, _, placed = place_initial_probes(scene)
     camera_position, steps = np.array([0.0, 0.5, 2.0]), enumerate_nodes(placed.probe_grid.num_rows)
     power = density_from_distance(geometry, camera_position[None], placed.probe_grid).power
     where = placed.probes.position[placed.lattice_nodes.probe[placed.probe_grid.node_index, 0]]
@@ -57,8 +57,8 @@ def test_far_from_the_eye_points_are_farther_apart(scene):
     assert set(power) <= set(range(-2, 3))
 
 
-def test_both_halves_of_narrow_strips_have_grids_alike():
-    """Their middles are unlike far from the eye; what lies between points is not."""
+def test_both_halves_of_narrow_strips_have_equal_grids():
+    """Their centers differ far from the camera; the values between probes do not."""
     x = np.arange(8) * 0.02
     corners = [[[w, 0, -4], [w, 0, 4], [w + 0.02, 0, 4], [w + 0.02, 0, -4]] for w in x]
     strips = [quad(f"strip {k}", corners[k], 0) for k in range(len(x))]
@@ -74,9 +74,9 @@ def test_both_halves_of_narrow_strips_have_grids_alike():
     np.testing.assert_array_equal(rows[::2], rows[1::2])
 
 
-def test_they_are_dense_where_shadows_end(scene):
-    geometry, is_open, before = first_placed(scene)
-    after = place_probes(geometry, is_open, by_shadows_of(scene, geometry, before), 1500)
+def test_probes_are_dense_at_shadow_edges(scene):
+    geometry, is_open, before = place_initial_probes(scene)
+    after = place_probes(geometry, is_open, density_by_shadows(scene, geometry, before), 1500)
     near, far = [], []
     for placed in (before, after):
         distance = np.linalg.norm(placed.probes.position[placed.material == 0], axis=1)
@@ -86,9 +86,9 @@ def test_they_are_dense_where_shadows_end(scene):
     assert far[1] < 0.9 * far[0]
 
 
-def test_what_is_no_point_lies_on_straight_lines_between_points(scene):
-    geometry, is_open, before = first_placed(scene)
-    placed = place_probes(geometry, is_open, by_shadows_of(scene, geometry, before), 1500)
+def test_other_nodes_are_interpolated_linearly(scene):
+    geometry, is_open, before = place_initial_probes(scene)
+    placed = place_probes(geometry, is_open, density_by_shadows(scene, geometry, before), 1500)
     lattice, vertices, steps = placed.probe_grid, placed.lattice_nodes, enumerate_nodes(placed.probe_grid.num_rows)
     is_floor = geometry.face_material[steps.grid // 2] == 0
     a, b, c = geometry.positions[geometry.faces[steps.grid // 2]].transpose(1, 0, 2)
@@ -99,11 +99,11 @@ def test_what_is_no_point_lies_on_straight_lines_between_points(scene):
     off = np.linalg.norm((interpolated - where)[:, [0, 2]], axis=1) / placed.spacing
     assert len(where) > 2 * len(placed.probes.position)
     assert np.quantile(off, 0.98) < 0.05
-    assert off.max() < 1  # beside nodes that are one with others of another face
+    assert off.max() < 1  # except at nodes merged with those of another face
     np.testing.assert_allclose(vertices.weight.sum(axis=1), 1, atol=1e-5)
 
 
-def test_shadows_are_nearer_to_the_truth_so(scene, tmp_path, monkeypatch):
+def test_density_by_shadows_reduces_the_error(scene, tmp_path, monkeypatch):
     def shown(method, name):
         recipe = Recipe(method, ("front",), (64, 48), 300, num_probes=1500)
         bake = open_bake(bake_in_process(METHODS[method], scene, recipe, tmp_path / f"{name}.zarr"), Cache(1 << 30))
@@ -116,19 +116,19 @@ def test_shadows_are_nearer_to_the_truth_so(scene, tmp_path, monkeypatch):
     assert relative_rmse(now, reference) < 0.7 * relative_rmse(shown("probes", "before"), reference)
 
 
-def test_where_nothing_is_in_the_way_distance_counts_alone():
+def test_without_occlusion_only_distance_counts():
     ground = quad("ground", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
     scene = make_tiny_scene(
         ground, camera=make_camera("front", CAMERA_POSITION[0], [0, 0, 0], 0.8), environment=studio(32, 20.0)
     )
-    geometry, _, placed = first_placed(scene)
-    after = by_shadows_of(scene, geometry, placed)
+    geometry, _, placed = place_initial_probes(scene)
+    after = density_by_shadows(scene, geometry, placed)
     np.testing.assert_array_equal(
         density_from_distance(geometry, CAMERA_POSITION, placed.probe_grid).power, after.power
     )
 
 
-def test_weights_meet_light_that_is_linear():
+def test_weights_reproduce_linear_light():
     rng = np.random.default_rng(5)
     towards, normal = rng.normal(size=(200, 3, 4)), np.tile([0.0, 0, 1], (200, 1))
     weight = rng.random((200, 4))

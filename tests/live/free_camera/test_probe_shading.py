@@ -1,4 +1,4 @@
-"""From points to pixels: the lattice, the sides that have points, what an eye sees, and what is sent there."""
+"""From probes to pixels: lattice, sides with probes, primary visibility and outgoing radiance."""
 
 import math
 
@@ -29,7 +29,7 @@ from relume.scene.model import Camera
 from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
 
-BROAD_WIDTHS = {"alpha_x": 0.45, "alpha_y": 0.3}  # a highlight that the in-basis tells from around
+BROAD_WIDTHS = {"alpha_x": 0.45, "alpha_y": 0.3}  # a highlight that the basis can represent
 
 
 @pytest.fixture(scope="module")
@@ -49,21 +49,21 @@ def placed(scene, num_points=500):
 
 
 @pytest.mark.parametrize("rows", [1, 2, 7, 255])
-def test_nodes_are_numbered_once_each(rows):
+def test_each_node_has_one_number(rows):
     numbers = [node_index(rows, i, j) for i in range(rows + 1) for j in range(rows + 1 - i)]
     assert numbers == list(range(int(num_nodes(np.array([rows]))[0])))
 
 
 @pytest.mark.parametrize("num_points", [200, 500, 5000])
-def test_about_as_many_points_as_asked_for_and_none_twice(num_points):
+def test_the_number_of_probes_is_near_the_requested_one_without_duplicates(num_points):
     _, placed_probes = placed(still_life(), num_points)
     assert 0.5 * num_points < placed_probes.probes.num_points <= 1.05 * num_points + 1
     together = np.column_stack([placed_probes.probes.position, placed_probes.probes.normal, placed_probes.material])
     assert len(np.unique(together, axis=0)) == len(together)
 
 
-def test_what_vertices_take_is_from_about_them():
-    """Of their own side, where points are what they take."""
+def test_nodes_use_nearby_probes():
+    """Probes of their own side."""
     geometry, placed_probes = placed(still_life(), 4000)
     lattice, vertices, points = placed_probes.probe_grid, placed_probes.lattice_nodes, placed_probes.probes
     np.testing.assert_allclose(vertices.weight.sum(axis=1), 1, atol=1e-5)
@@ -80,9 +80,10 @@ def test_what_vertices_take_is_from_about_them():
             assert vertices.normal[vertex] @ outward > 0
 
 
-def test_a_smooth_field_is_smooth_between_points():
-    """What a mesh finer than its points shows of light that changes slowly errs by what it changes over a spacing and a
-    half, and nowhere by steps."""
+def test_a_smooth_field_is_smooth_between_probes():
+    """The error of interpolating slowly varying light on a mesh finer than its probes is at most its change over 1.5
+    spacings, without steps.
+    """
     scene = make_tiny_scene(
         sphere("ball", (0, 0, 0), 1.0, 0, num_rings=96), camera=make_camera("front", (0, 0, 4), (0, 0, 0), 0.7)
     )
@@ -93,11 +94,11 @@ def test_a_smooth_field_is_smooth_between_points():
     over_a_spacing = float(np.linalg.norm(slope)) * placed_probes.spacing
     assert len(shown) > 4 * 600
     assert np.abs(shown - 1 - placed_probes.lattice_nodes.normal @ slope).max() < 1.5 * over_a_spacing
-    # between corners of a face
+    # between vertices of a face
     assert np.ptp(shown[placed_probes.probe_grid.node_index.reshape(-1, 3)], axis=1).max() < over_a_spacing
 
 
-def test_a_solid_has_points_outside_and_a_room_that_is_seen_from_within_inside():
+def test_solids_have_probes_outside_and_rooms_inside():
     solid = make_tiny_scene(sphere("ball", (0, 0, 0), 1.0, 0), camera=make_camera("front", (0, 0, 4), (0, 0, 0), 0.7))
     sides = visible_sides(build_scene_buffers(solid), solid.cameras, 3)
     assert sides[:, 0].all()
@@ -106,7 +107,7 @@ def test_a_solid_has_points_outside_and_a_room_that_is_seen_from_within_inside()
     assert visible_sides(build_scene_buffers(room), room.cameras, 3).all()
 
 
-def test_a_scene_without_area_is_refused():
+def test_a_scene_without_area_is_rejected():
     flat = mesh("line", [[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]], 0, normals=[[0, 1, 0]] * 3)
     geometry = build_scene_buffers(make_tiny_scene(flat, camera=make_camera("front", (0, 1, 3), (0, 0, 0), 0.7)))
     is_open = np.ones((1, 2), bool)
@@ -115,7 +116,7 @@ def test_a_scene_without_area_is_refused():
         place_probes(geometry, is_open, density, 100)
 
 
-def test_the_weights_of_a_pixel_put_it_where_it_is(moving):
+def test_interpolation_weights_reproduce_the_position_of_a_pixel(moving):
     view = moving.views["front"]
     gbuffer = trace_primary(moving.stored_scene, moving.embree, view.camera, (96, 72))
     hit = gbuffer.hits.face >= 0
@@ -132,8 +133,8 @@ def test_the_weights_of_a_pixel_put_it_where_it_is(moving):
     assert set(np.flatnonzero(gbuffer.is_needed)) == set(taken)
 
 
-def test_what_points_send_is_that_of_the_oracle(moving):
-    """Of terms without a highlight all light; of the others what is not the sky's, which does not ring below black."""
+def test_probe_radiance_equals_its_reference(moving):
+    """All light for terms without a highlight; for others without the environment, which does not ring below zero."""
     materials = [
         [{"model": "lambert", "color": [0.5, 0.4, 0.3], "params": {}, "texture": "diffuse"}],
         [{"model": "ward_anisotropic", "color": [0.9, 0.8, 0.7], "params": BROAD_WIDTHS, "texture": None}],
@@ -166,8 +167,8 @@ def test_what_points_send_is_that_of_the_oracle(moving):
     )
 
 
-def test_textures_of_pixels_are_those_of_the_bakes(moving):
-    """White points under a texture show the texture; the same filter as view samples have."""
+def test_textures_of_pixels_equal_those_of_bakes(moving):
+    """White probes under a texture show the texture; with the filter of view samples."""
     scene, view, size = still_life(), moving.views["front"], (96, 72)
     surface = moving.stored_scene
     gbuffer = trace_primary(surface, moving.embree, view.camera, size)
@@ -211,7 +212,7 @@ def test_textures_of_pixels_are_those_of_the_bakes(moving):
 
 
 @pytest.mark.parametrize("rotation", [0.0, 77.0, -130.0])
-def test_the_sky_is_that_of_fixed_views(rotation):
+def test_the_background_equals_fixed_views(rotation):
     rng = np.random.default_rng(2)
     radiance, gain = rng.random((16, 32, 3), np.float32), np.array([1.0, 0.5, 2.0], np.float32)
     directions = rng.normal(size=(500, 3))
@@ -224,7 +225,7 @@ def test_the_sky_is_that_of_fixed_views(rotation):
     np.testing.assert_allclose(out[face < 0], expected[face < 0], atol=2e-3)
 
 
-def test_rays_go_through_the_middles_of_pixels(moving):
+def test_rays_pass_through_pixel_centers(moving):
     camera = Camera("level", np.eye(4), math.radians(90))
     gbuffer = trace_primary(moving.stored_scene, moving.embree, camera, (4, 2))
     first, last = gbuffer.directions[0], gbuffer.directions[7]

@@ -1,4 +1,4 @@
-"""What a few exact samples say of a whole picture, against loops over pixels and samples that do the same."""
+"""Residual correction of an image from a few exact samples, against loops over pixels and samples."""
 
 import numpy as np
 import pytest
@@ -8,8 +8,8 @@ from relume.live.free_camera.residual_correction import CorrectionSamples, apply
 STEP, WIDTH, HEIGHT = 4, 48, 32
 
 
-def places(width, height):
-    """Two materials that meet in the middle, one of them bent, under a strip of sky, seen straight from above."""
+def make_gbuffer(width, height):
+    """Two materials that meet in the center, one curved, under a strip of background, seen from above."""
     y, x = np.divmod(np.arange(width * height), width)
     u, v = (x + 0.5) / width * WIDTH, (y + 0.5) / height * HEIGHT
     along = np.maximum(u - WIDTH / 2, 0)
@@ -20,7 +20,7 @@ def places(width, height):
     return CorrectionSamples(position, normal, material, width)
 
 
-def likeness(at, p, samples, q):
+def similarity(at, p, samples, q):
     if at.material[p] < 0 or at.material[p] != samples.material[q]:
         return 0.0
     away = at.position[p].astype(np.float64) - samples.position[q]
@@ -29,25 +29,25 @@ def likeness(at, p, samples, q):
     return turn**8 * np.exp(-rise / (0.1 * np.linalg.norm(away) + 1e-9))
 
 
-def mean(weights, off):
-    return sum(w * off[q] for q, w in weights) / (sum(w for _, w in weights) + 0.02) if weights else np.zeros(3)
+def mean(weights, difference):
+    return sum(w * difference[q] for q, w in weights) / (sum(w for _, w in weights) + 0.02) if weights else np.zeros(3)
 
 
-def about(samples, q):
-    """Weights of the samples about one."""
+def weights_around(samples, q):
+    """Weights of the samples around one."""
     y, x = divmod(q, samples.width)
     for dy in (-1, 0, 1):
         for dx in (-1, 0, 1):
             if (dx, dy) != (0, 0) and 0 <= x + dx < samples.width and 0 <= y + dy < samples.height:
                 other = (y + dy) * samples.width + x + dx
-                yield other, likeness(samples, q, samples, other) * (0.5 if dx and dy else 1)
+                yield other, similarity(samples, q, samples, other) * (0.5 if dx and dy else 1)
 
 
 def expected(difference, samples, pixels):
     belief = np.zeros(len(difference))
     for material in (0, 1):
         rows = [q for q in range(len(difference)) if samples.material[q] == material]
-        differences = {q: mean([(o, w) for o, w in about(samples, q) if w > 0], difference) for q in rows}
+        differences = {q: mean([(o, w) for o, w in weights_around(samples, q) if w > 0], difference) for q in rows}
         sums, size, whole = sum(
             np.array([differences[q] @ difference[q], differences[q] @ differences[q], difference[q] @ difference[q]])
             for q in rows
@@ -63,36 +63,36 @@ def expected(difference, samples, pixels):
             row, column = divmod(q, samples.width)
             tent = max(1 - abs(u - column), 0) * max(1 - abs(v - row), 0)
             if tent > 0:
-                weights.append((q, tent * likeness(pixels, p, samples, q)))
+                weights.append((q, tent * similarity(pixels, p, samples, q)))
         out[p] = mean(weights, belief[:, None] * difference)
     return out
 
 
 @pytest.fixture(scope="module")
-def both():
-    return places(WIDTH // STEP, HEIGHT // STEP), places(WIDTH, HEIGHT)
+def corrected_twice():
+    return make_gbuffer(WIDTH // STEP, HEIGHT // STEP), make_gbuffer(WIDTH, HEIGHT)
 
 
 def image(samples, values):
     return values.reshape(samples.height, samples.width, 3).astype(np.float32)
 
 
-def test_between_samples_it_is_what_loops_find(both):
-    samples, pixels = both
+def test_the_interpolated_residual_equals_loops(corrected_twice):
+    samples, pixels = corrected_twice
     rng = np.random.default_rng(7)
     smooth = 0.1 * samples.position[:, :1] * [1, 0.5, 0.2]
-    off = np.where(samples.material[:, None] == 0, smooth, rng.normal(size=smooth.shape))
-    off[samples.material < 0] = 0
-    radiance = rng.random(off.shape) + 2
-    by = residual(image(samples, radiance), image(samples, radiance + off), samples, pixels)
-    wanted = image(pixels, expected(off, samples, pixels))
+    difference = np.where(samples.material[:, None] == 0, smooth, rng.normal(size=smooth.shape))
+    difference[samples.material < 0] = 0
+    radiance = rng.random(difference.shape) + 2
+    by = residual(image(samples, radiance), image(samples, radiance + difference), samples, pixels)
+    wanted = image(pixels, expected(difference, samples, pixels))
     np.testing.assert_allclose(by, wanted, atol=2e-6)
     assert np.abs(by).max() > 0.1
-    assert not by[:4].any()  # the sky is never off
+    assert not by[:4].any()  # the background is always exact
 
 
-def test_what_is_off_smoothly_is_mended_and_noise_is_not_believed(both):
-    samples, pixels = both
+def test_smooth_residuals_are_corrected_and_noise_is_rejected(corrected_twice):
+    samples, pixels = corrected_twice
 
     def smooth(at):
         return np.repeat(0.5 + 0.01 * at.position[:, :1], 3, axis=1) * (at.material >= 0)[:, None]
@@ -106,14 +106,14 @@ def test_what_is_off_smoothly_is_mended_and_noise_is_not_believed(both):
     assert not by.any()
 
 
-def test_samples_beside_edges_say_nothing(both):
-    samples, _ = both
+def test_samples_at_edges_have_no_weight(corrected_twice):
+    samples, _ = corrected_twice
     edges = np.array([10 * WIDTH + 21, 11 * WIDTH])  # a sample lies at x = 22, y = 10; the other is far from any
     left = samples.exclude_edges(edges, (WIDTH, HEIGHT)).material
     assert np.flatnonzero(left != samples.material).tolist() == [2 * samples.width + 5]
     assert left[2 * samples.width + 5] == -1
 
 
-def test_nothing_is_darker_than_black():
+def test_corrected_values_are_not_negative():
     corrected = apply_residual(np.full((1, 2, 3), 0.5, np.float32), np.float32([[[-1, 0, 1], [0.25, -0.5, -0.25]]]))
     np.testing.assert_array_equal(corrected, np.float32([[[0, 0.5, 1.5], [0.75, 0, 0.25]]]))
