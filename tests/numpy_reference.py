@@ -49,7 +49,7 @@ def make_receivers_at_origin(wo, normal, tangent, visible):
 
 
 def only_above(receivers, lights):
-    """The same receivers with lights below their horizon hidden."""
+    """Receivers with lights below their horizon hidden."""
     above = receivers.normal @ lights.direction.T > 0
     visible = np.packbits(above, axis=1, bitorder="little")
     return replace(receivers, visible=visible)

@@ -1,4 +1,4 @@
-"""glTF files whose geometry is packed, by Draco and by meshoptimizer."""
+"""glTF files with geometry compressed by Draco and by meshoptimizer."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ import DracoPy
 import numpy as np
 from glb_builder import Glb
 
-# Packed by the encoder of meshoptimizer 1.3, unpacked by its reference decoder.
+# Encoded by meshoptimizer 1.3 and decoded by its reference decoder.
 VECTORS: dict[str, dict[str, Any]] = {
     each["name"]: each for each in json.loads((Path(__file__).parent / "scene_io" / "meshopt_vectors.json").read_text())
 }
-SIDE = 7  # points along the grid's sides
+SIDE = 7  # vertices along each side of the grid
 GRID_FACES = 2 * (SIDE - 1) ** 2
 
 
 def grid() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions, texture coordinates and triangles of a grid in the plane z = 0, one unit by half a one each cell."""
+    """Positions, UV coordinates and triangles of a grid in the plane z = 0 with cells of 1 × 0.5."""
     y, x = np.divmod(np.arange(SIDE * SIDE), SIDE)
     quads = np.array([[i, i + 1, i + SIDE + 1, i, i + SIDE + 1, i + SIDE] for i in range(SIDE * SIDE - SIDE - 1)])
     quads = quads[np.arange(len(quads)) % SIDE != SIDE - 1]
@@ -31,7 +31,7 @@ def grid() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def add_primitive_node(glb: Glb, attributes: dict[str, int], indices: int, **more: Any) -> Glb:
-    """The document with a node that shows a primitive."""
+    """Add a node with a primitive to the document."""
     primitive = {"attributes": attributes, "indices": indices, **more}
     glb.document["meshes"] = [{"name": "grid", "primitives": [primitive]}]
     glb.document["nodes"] = [{"mesh": 0}]
@@ -46,7 +46,7 @@ def empty_accessor(glb: Glb, count: int, kind: str, component: int = 5126) -> in
 
 @cache
 def draco_bytes(level: int = 7) -> tuple[bytes, int]:
-    """The grid packed by Draco, its texture coordinates number 7; and the number of its positions."""
+    """The grid encoded by Draco, with UV coordinates as attribute 7; and the number of its positions."""
     positions, uvs, faces = grid()
     options = {"quantization_bits": 14, "compression_level": level, "preserve_order": level == 0}
     compressed = DracoPy.encode(positions, faces, generic_attributes={7: uvs}, **options)
@@ -57,7 +57,7 @@ def draco_bytes(level: int = 7) -> tuple[bytes, int]:
 
 
 def draco_glb(data: bytes | None = None, level: int = 7) -> Glb:
-    """The grid packed by Draco, or other data in its place."""
+    """The grid encoded by Draco, or other data instead."""
     positions, _, faces = grid()
     compressed, position_id = draco_bytes(level)
     glb = Glb()
@@ -73,7 +73,7 @@ def draco_glb(data: bytes | None = None, level: int = 7) -> Glb:
 
 
 def meshopt_glb(name: str = "EXT_meshopt_compression") -> Glb:
-    """The grid packed by meshoptimizer: exponents, octahedral normals, triangles; its second buffer is a fallback."""
+    """The grid encoded by meshoptimizer: exponents, octahedral normals, triangles; its second buffer is a fallback."""
     glb = Glb()
 
     def accessor(vector: str, kind: str, component: int, **more: Any) -> int:

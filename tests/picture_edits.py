@@ -1,4 +1,4 @@
-"""Pictures with curves opened, and changes to looks of the still life."""
+"""Pictures with prepared curves, and edits of looks of the still life."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ BALL, WALL = "/materials/Ball/terms/1/curves/", "/materials/Wall/terms/0/curves/
 
 
 def ignore_progress(fraction):
-    """Progress that nobody watches."""
+    """Ignore the progress of a job."""
 
 
 def open_exact_picture(transfer, *touched, cache=None, view="front", look=None):
-    """An exact picture, some curves opened one after another."""
+    """An exact picture in which curves were prepared one after another."""
     picture = Picture(transfer, view, cache or Cache(BUDGET))
     if look is not None:
         picture.set_look(look)
@@ -35,14 +35,14 @@ def set_sigma(value, **more):
 
 
 def set_single_term_ball(document):
-    """The ball with a single coloured, textured term."""
+    """Give the ball a single colored, textured term."""
     document["materials"]["Ball"]["terms"] = [
         {"model": "cook_torrance", "color": [0.9, 0.5, 0.2], "params": {"sigma": 0.3}, "texture": "diffuse"}
     ]
 
 
 def find_pure_ball_pixels(transfer, view="front"):
-    """Pixels that see nothing but the ball. (height, width) bool"""
+    """Pixels that show only the ball. (height, width) bool"""
     v = transfer.views[view]
     rows = v.rows(2)
     count = np.bincount(v.pixel, minlength=v.width * v.height)

@@ -1,4 +1,4 @@
-"""A PostgreSQL of our own in a temporary folder, where the server's programs are installed."""
+"""A PostgreSQL server in a temporary folder, if its programs are installed."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from sqlalchemy.exc import OperationalError
 
 MISSING = "PostgreSQL is not installed (Debian: apt-get install --no-install-recommends postgresql)"
 USER = "relume"
-REQUIRED_BYTES = 2 << 30  # 8 MB a database, of all processes of tests
+REQUIRED_BYTES = 2 << 30  # 8 MB per database, in all test processes
 
 
 def _program(name: str) -> str | None:
-    """Path of one of its programs, the newest version's; Debian puts them where no PATH leads."""
+    """Path of a program of the newest installed version; Debian installs them outside PATH."""
     versions = sorted(Path("/usr/lib/postgresql").glob(f"*/bin/{name}"), key=lambda path: int(path.parts[-3]))
     return str(versions[-1]) if versions else shutil.which(name)
 
 
 class Cluster:
-    """A throw-away cluster that listens on a port of this machine; stop and start it as often as you like."""
+    """A temporary cluster that listens on a local port and can be stopped and started repeatedly."""
 
     def __init__(self) -> None:
         self._initdb, self._ctl = _program("initdb"), _program("pg_ctl")
         if self._initdb is None or self._ctl is None:
             pytest.skip(MISSING)
-        self._user = _find_unprivileged_user() if os.geteuid() == 0 else None  # it refuses to run as root
+        self._user = _find_unprivileged_user() if os.geteuid() == 0 else None  # PostgreSQL does not run as root
         self._folder = Path(tempfile.mkdtemp(prefix="relume-postgresql-", dir=_find_ram_folder()))
         with socket.create_server(("127.0.0.1", 0)) as free:
             self._port = free.getsockname()[1]
@@ -48,18 +48,18 @@ class Cluster:
         return self._folder / "data"
 
     def start(self) -> None:
-        """Start it, and wait until it answers."""
+        """Start the server and wait until it answers."""
         options = f"-p {self._port} -c listen_addresses=127.0.0.1 -c unix_socket_directories='' -c fsync=off"
         self._run(
             [str(self._ctl), "-D", str(self._data), "-w", "-l", str(self._folder / "log"), "-o", options, "start"]
         )
 
     def stop(self) -> None:
-        """Stop it as a restart does: open connections are ended."""
+        """Stop the server like a restart: open connections are closed."""
         self._run([str(self._ctl), "-D", str(self._data), "-w", "-m", "fast", "stop"])
 
     def new_database(self, like: str | None = None) -> str:
-        """The URL of an empty database, or of a copy of the one at a URL, which nobody may be connected to."""
+        """Return the URL of an empty database, or of a copy of the one at a URL, which must have no connections."""
         name = f"test_{uuid.uuid4().hex}"
         with pg8000.connect(USER, host="127.0.0.1", port=self._port, database="postgres") as connection:
             connection.autocommit = True
@@ -67,7 +67,7 @@ class Cluster:
         return f"postgresql://{USER}@127.0.0.1:{self._port}/{name}"
 
     def remove(self) -> None:
-        """Stop it and forget it."""
+        """Stop the server and delete its files."""
         self._run([str(self._ctl), "-D", str(self._data), "-m", "immediate", "stop"])
         shutil.rmtree(self._folder, ignore_errors=True)
 
@@ -77,8 +77,9 @@ class Cluster:
 
 
 def _find_ram_folder() -> str | None:
-    """A folder that no disk has to follow, where there is room in one: a database is 300 files, and removing those of a
-    test file took half a minute on a disk that other tests wrote to."""
+    """A folder in memory with enough space, or None: a database has 300 files, and deleting those of a test file took
+    half a minute on a busy disk.
+    """
     shared = "/dev/shm"
     has_room = os.access(shared, os.W_OK) and shutil.disk_usage(shared).free > REQUIRED_BYTES
     return shared if has_room else None
@@ -95,5 +96,5 @@ def _find_unprivileged_user() -> pwd.struct_passwd:
 
 
 def make_unavailable_error(line: str) -> OperationalError:
-    """What a call on a server that does not answer raises. line: what the driver says."""
+    """The error of a call on a server that does not answer. line: the driver's message."""
     return OperationalError(None, None, pg8000.InterfaceError(line))

@@ -17,7 +17,7 @@ F64 = NDArray[np.float64]
 
 
 def rotate_coefficients(row: F64, phi: float) -> F64:
-    """Turn the factors of an isotropic term for φo = 0, (..., K), to another φo: what kernels do, in NumPy."""
+    """Rotate the coefficients of an isotropic term from φo = 0, (..., K), to another φo, like the kernels."""
     recurrence_table, out = recurrence(), np.array(row, np.float64)
     for basis_index, m in enumerate(recurrence_table.order):
         if m > 0:
@@ -33,12 +33,12 @@ def rotate_coefficients(row: F64, phi: float) -> F64:
 def shade_probes_numpy(
     stored_scene: StoredScene, vectors: F32, non_environment: F32, tables: Tables, camera_position: F32, probe: int
 ) -> tuple[F64, F64]:
-    """Do as `send` for one point, in plain NumPy: its oracle.
+    """Reference of `shade_probes` for one probe in plain NumPy.
 
     Args:
-        stored_scene, vectors, non_environment, tables, camera_position: as there. probe: number of the point.
+        stored_scene, vectors, non_environment, tables, camera_position: as there. probe: its index.
     Returns:
-        Radiance and sky, as there. (groups, 3) float64 each
+        Radiance and environment light, as there. (groups, 3) float64 each
     """
     lights = vectors[probe], vectors[probe] - non_environment[probe], non_environment[probe]
     plain, environment, highlights = (
@@ -50,7 +50,7 @@ def shade_probes_numpy(
 def _sum_numpy(
     stored_scene: StoredScene, light: F32, tables: Tables, camera_position: F32, probe: int, first: int
 ) -> F64:
-    """Sum the light (3, K) of a point with the tables of a kind, which begin at column `first`. (groups, 3)"""
+    """Sum the light (3, K) of a probe with the tables of a kind, which begin at column `first`. (groups, 3)"""
     probes, recurrence_table = stored_scene.probes, recurrence()
     n, t = probes.normal[probe].astype(np.float64), probes.tangent[probe].astype(np.float64)
     wo = camera_position.astype(np.float64) - probes.position[probe]

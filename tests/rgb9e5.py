@@ -1,4 +1,4 @@
-"""Pixels of shared exponents in plain NumPy: the reference of `relume.views.resolve`."""
+"""Shared-exponent pixels in plain NumPy: the reference of `relume.views.resolve`."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ RGB9E5_MAX = (2**_MANTISSA_BITS - 1) / 2**_MANTISSA_BITS * 2.0 ** (_MAX_EXPONENT
 
 
 def rgb9e5_pack(rgb: F32) -> U32:
-    """Pixels with 9 bits for each channel and 5 for an exponent they share: EXT_texture_shared_exponent.
+    """Pixels with 9 bits per channel and a shared 5-bit exponent: EXT_texture_shared_exponent.
 
     Args:
         rgb: linear; negative values and NaN become zero, large ones 65408. (..., 3)
     Returns:
         Red in the lowest bits, the exponent in the highest. (...) uint32
     """
-    clamped = np.fmin(np.fmax(np.asarray(rgb, np.float64), 0.0), RGB9E5_MAX)  # fmax takes the number, not the NaN
+    clamped = np.fmin(np.fmax(np.asarray(rgb, np.float64), 0.0), RGB9E5_MAX)  # fmax prefers the number to NaN
     largest = clamped.max(axis=-1)
     _, exponent = np.frexp(largest)
     shared = np.where(largest > 0, np.maximum(exponent + _BIAS, 0), 0)
-    # rounding up may need one more bit than the mantissa has
+    # rounding up may overflow the mantissa
     shared += np.floor(np.ldexp(largest, _BIAS + _MANTISSA_BITS - shared) + 0.5) == 2**_MANTISSA_BITS
     mantissas = np.floor(np.ldexp(clamped, (_BIAS + _MANTISSA_BITS - shared)[..., None]) + 0.5).astype(np.uint32)
     packed = mantissas[..., 0] | mantissas[..., 1] << 9 | mantissas[..., 2] << 18

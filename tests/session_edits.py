@@ -1,4 +1,4 @@
-"""What a person does in a session: edits at random, and waiting until the picture is exact."""
+"""User actions in a session: random edits, and waiting for exact pictures."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ BUDGET = 1 << 28
 
 
 def bake_corner_scene(scene, method, folder):
-    """Its view "front" in 40×30 under 400 lights, opened."""
+    """A bake of the view "front" in 40×30 under 400 lights, opened."""
     recipe = Recipe(method, ("front",), (40, 30), 400)
     return open_transfer(bake_in_process(METHODS[method], scene, recipe, folder / f"{method}.zarr"), Cache(1 << 30))
 
 
 def make_look(transfer, change=lambda document: None):
-    """The default look after `change` has edited a copy of its document in place."""
+    """The default look after `change` has edited a copy of its document."""
     document = copy.deepcopy(transfer.default_look)
     change(document)
     return validate(document, transfer.default_look)
 
 
 def run_until_exact(picture):
-    """Freeze and advance until the picture is exact and nothing waits."""
+    """Freeze and advance until the picture is exact and nothing is pending."""
     for _ in range(200):
         advance = picture.advance(None)
         if picture.next_job() is None and advance.exact:
@@ -43,29 +43,29 @@ def run_until_exact(picture):
 
 
 def run_next_job(picture):
-    """Make what waits, whatever it is; returns it."""
+    """Run the pending job and return it."""
     need = picture.next_job()
     picture.install(need, need.run(lambda share: None, lambda: False))
     return need
 
 
 def has_pending_job(picture):
-    """Whether anything is lacking, for the look or for what is touched."""
+    """True if a job is pending, for the look or for prepared edits."""
     return picture.next_job() is not None
 
 
 def has_bounces(transfer):
-    """Whether light between surfaces was baked."""
+    """True if indirect light was baked."""
     return EditAxis.BOUNCES in transfer.axes
 
 
 def relative_rmse(values, expected):
-    """Root mean square of the difference in units of that of what is expected."""
+    """Root mean square error relative to the root mean square of the expected values."""
     return np.sqrt(np.mean((values - expected) ** 2) / np.mean(expected**2))
 
 
 def make_random_term(rng):
-    """A term of any model with parameters in a lively range."""
+    """A term of any model with random parameters."""
     model = list(ANALYTIC)[rng.integers(len(ANALYTIC))]
     term = {"model": model, "color": rng.uniform(0, 1, 3).round(3).tolist(), "params": {}, "curves": {}}
     fixed = TERMS[model].fixed
@@ -73,7 +73,7 @@ def make_random_term(rng):
 
 
 def make_random_value(rng, parameter, is_fixed):
-    """A number or, where it is not fixed at freeze, three, away from the ends of the parameter's range."""
+    """A number or, for parameters that vary by channel, three, away from the ends of the parameter's range."""
     low, high = parameter.minimum, parameter.maximum
     at = rng.uniform(0.1, 0.9, 3 if rng.random() < 0.2 and not is_fixed else 1)
     values = np.exp(np.log(low) + at * np.log(high / low)) if parameter.scale == "log" else low + at * (high - low)
@@ -81,7 +81,7 @@ def make_random_value(rng, parameter, is_fixed):
 
 
 def make_random_curve(rng, num_bands):
-    """A curve drawn by hand, as points or bands, of one colour or several."""
+    """A drawn curve, as points or bands, in one channel or several."""
     angles = np.sort(rng.choice(np.arange(1, 90), rng.integers(2, 7), replace=False))
     control_points = [
         [float(angle), float(value)] for angle, value in zip(angles, rng.uniform(0, 2, len(angles)), strict=True)
@@ -91,7 +91,7 @@ def make_random_curve(rng, num_bands):
 
 
 def apply_random_edit(rng, document):
-    """Edit a complete look document in place, as an editor might; returns what was done."""
+    """Edit a complete look document in place at random; return a description."""
     name = list(document["materials"])[rng.integers(len(document["materials"]))]
     terms = document["materials"][name]["terms"]
     kind = rng.choice(
@@ -117,7 +117,7 @@ def apply_random_edit(rng, document):
             parameter.name: make_random_value(rng, parameter, parameter.name in declared.fixed),
         }
     elif kind == "curve":
-        curves = [curve for curve in declared.curves if curve is not VIEW]  # which multiplies finished samples, no more
+        curves = [curve for curve in declared.curves if curve is not VIEW]  # it only multiplies finished samples
         curve = curves[rng.integers(len(curves))]
         term["curves"] = {**term["curves"], curve.name: make_random_curve(rng, curve.num_bands)}
     elif kind == "reset":

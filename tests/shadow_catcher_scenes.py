@@ -1,4 +1,4 @@
-"""A ball above a ground that catches its shadow, and the looks in which both are tried."""
+"""A ball above a shadow-catcher ground, and edits of its looks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from relume.scene.model import Light, Material
 from relume.scene.shadow_catcher_ground import with_ground
 
 SIZE = (40, 30)
-CENTRE, RADIUS = np.array([0.0, 0.5, 0.0]), 0.35
+CENTER, RADIUS = np.array([0.0, 0.5, 0.0]), 0.35
 RED = Material("Ball", ({"model": "lambert", "color": [0.8, 0.1, 0.1]},))
 EMISSIVE_BALL = Light("Ball", {"kind": "mesh", "material": "Ball", "emission": [2.0, 1.0, 0.5], "enabled": False})
 CAMERA = make_camera("front", (0.5, 2.2, 3.2), (0, 0.25, 0), 0.7)
@@ -19,8 +19,8 @@ POINT_LIGHT = {"kind": "point", "position": [0.4, 2.0, 0.3], "emission": [5.0, 5
 
 
 def ball_scene(environment):
-    """A red ball, which may shine, above a ground."""
-    ball = sphere("ball", CENTRE, RADIUS, 0, num_rings=24)
+    """A red ball, which can be emissive, above a ground."""
+    ball = sphere("ball", CENTER, RADIUS, 0, num_rings=24)
     scene = make_tiny_scene(ball, camera=CAMERA, environment=environment, materials=[RED])
     return with_ground(replace(scene, lights=(EMISSIVE_BALL,)))
 
@@ -55,7 +55,7 @@ def set_only_area_light(document):
 
 
 def inner(transfer, name):
-    """Pixels of one sample, of a material (None: of the background). (height, width)"""
+    """Pixels with one sample, of a material (None: of the background). (height, width)"""
     view = transfer.views["front"]
     number = 65535 if name is None else list(transfer.material_names).index(name)
     return (view.material_ids() == number) & (np.diff(view.first) == 1).reshape(view.height, view.width)

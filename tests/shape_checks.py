@@ -1,7 +1,7 @@
-"""Checks the array shapes that annotations of `relume` state, `Shaped[F32, "n 3"]`, in every call that a test makes.
+"""Check the array shapes in annotations of `relume`, `Shaped[F32, "n 3"]`, in every call of a test.
 
-Import it before `relume`: it checks what is imported from then on. Nothing else reads the shapes, so an annotation
-that is not true fails the first test that calls the function.
+Import it before `relume`: it checks modules that are imported later. Nothing else reads the shapes, so a wrong
+annotation fails the first test that calls the function.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from jaxtyping import AbstractArray, jaxtyped
 
 
 class ShapeError(TypeError):
-    """An array has another shape than its annotation states, or than other arrays of the call imply."""
+    """Mismatch between the shape of an array and its annotation or other arrays of the call."""
 
 
 def _matches(value: object, hint: Any) -> bool:
-    """Whether a value has the shapes of a hint; what is no array has none."""
+    """True if a value has the shapes of a hint; values other than arrays have none."""
     if isinstance(hint, type) and issubclass(hint, AbstractArray):
         return isinstance(value, hint)
     alternatives = typing.get_args(hint)
@@ -36,7 +36,7 @@ def _matches(value: object, hint: Any) -> bool:
 
 
 def with_checks(function: types.FunctionType) -> Callable[..., Any]:
-    """The function, its shapes checked at each call; itself if its annotations state none."""
+    """Return the function with shape checks at each call; unchanged if its annotations have no shapes."""
     stated = {name: text for name, text in function.__annotations__.items() if "Shaped[" in str(text)}
     if not stated:
         return function
@@ -53,8 +53,8 @@ def with_checks(function: types.FunctionType) -> Callable[..., Any]:
 
     @functools.wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
-        result = function(*args, **kwargs)  # not inside: a context is of one thread, and calls nest
-        with jaxtyped("context"):  # the name of a dimension stands for one size in all arrays of a call
+        result = function(*args, **kwargs)  # outside: a context belongs to one thread, and calls nest
+        with jaxtyped("context"):  # a dimension has one size in all arrays of a call
             for name, value in signature.bind(*args, **kwargs).arguments.items():
                 check(name, value)
             check("return", result)
@@ -73,21 +73,21 @@ def _check_module(module: types.ModuleType) -> None:
                 setattr(owner, name, with_checks(value))
 
 
-class _Finder(importlib.abc.MetaPathFinder):
+class _CheckingImporter(importlib.abc.MetaPathFinder):
     def find_spec(
         self, name: str, path: Sequence[str] | None, target: types.ModuleType | None = None
     ) -> importlib.machinery.ModuleSpec | None:
         spec = importlib.machinery.PathFinder.find_spec(name, path, target) if name.startswith("relume.") else None
         if spec is None or not isinstance(spec.loader, importlib.machinery.SourceFileLoader):
             return None
-        spec.loader = _Loader(spec.loader.name, spec.loader.path)
+        spec.loader = _CheckingLoader(spec.loader.name, spec.loader.path)
         return spec
 
 
-class _Loader(importlib.machinery.SourceFileLoader):
+class _CheckingLoader(importlib.machinery.SourceFileLoader):
     def exec_module(self, module: types.ModuleType) -> None:
         super().exec_module(module)
         _check_module(module)
 
 
-sys.meta_path.insert(0, _Finder())
+sys.meta_path.insert(0, _CheckingImporter())

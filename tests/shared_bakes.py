@@ -1,4 +1,4 @@
-"""Fixtures: tiny bakes that are made once in each process of tests, for all that look at pictures."""
+"""Fixtures: tiny bakes, made once per test process."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from relume.store.bake_protocol import Recipe
 
 @pytest.fixture(scope="module", autouse=True)
 def unmeasured():
-    """Bakes of moving views do not measure what they are off by, a third of their time, where no test asks for it."""
+    """Free-camera bakes skip the measurement of their error, a third of their time."""
     with patch.object(free_camera_error, "measure_error", return_value=np.full(2, np.nan, np.float32)):
         yield
 
@@ -39,7 +39,7 @@ def transfer(baked):
 
 @pytest.fixture(scope="session")
 def corner():
-    """A white floor between a red wall and a glossy one, which throw light onto it."""
+    """A white floor between a red wall and a glossy wall that reflect light onto it."""
     glossy = {"model": "blinn_phong", "color": [0.12, 0.12, 0.12], "texture": None, "params": {"exponent": 30.0}}
     materials = [
         Material("Floor", ({"model": "lambert", "color": [0.7, 0.7, 0.7]}, glossy)),
@@ -57,5 +57,5 @@ def corner():
 
 @pytest.fixture(scope="session")
 def gathered(corner, tmp_path_factory):
-    """The corner's bake with light between its surfaces, opened."""
+    """The bake of the corner with indirect light, opened."""
     return bake_corner_scene(corner, "gather", tmp_path_factory.mktemp("corner"))

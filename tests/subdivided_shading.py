@@ -1,7 +1,7 @@
-"""Pictures summed from the leaves of operators: for tests that follow a picture through its routes to the last digits.
+"""Pictures summed from subdivided triangles, for tests that compare update strategies to the last digits.
 
-The product shades by boxes (`relume.transport.shading.shader`), which agree with operators to a thousandth:
-`tests/transport` holds them to that, and so does the contract. That would hide a coefficient forgotten on the way.
+The product shades with prefiltered tables (`relume.transport.shading.shader`), which agree with operators to 0.1 %:
+`tests/transport` and the contract check that. It would hide an omitted coefficient.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from relume.transport.projector import Projector
 
 
 def shade_by_subdivision(term, contraction, lights, receivers, base_radiance=None):
-    """As fine beside any other light."""
+    """Shade with a `Projector`, equally fine for any other light."""
     return Projector(term, contraction, lights, receivers)
 
 

@@ -1,4 +1,4 @@
-"""What textures show, whatever their pixels are kept as."""
+"""Values of textures, whatever the type of their pixels."""
 
 from __future__ import annotations
 

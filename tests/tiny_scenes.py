@@ -1,4 +1,4 @@
-"""Scenes of a few hundred triangles, made by code: what the numerics' tests trace, bake and freeze."""
+"""Scenes of a few hundred triangles made by code, for tests of the numerics."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from relume.scene.scene_folder import make_scene
 
 
 def make_surface_points(position, normal, first=0):
-    """Points with any tangents; the first has this seed."""
+    """Points with arbitrary tangents; the first has this seed."""
     position, normal = (np.ascontiguousarray(a, np.float32) for a in (position, normal))
     return SurfacePoints(
         position, normal, any_tangent(normal), np.arange(first, first + len(position), dtype=np.uint32)
@@ -22,7 +22,7 @@ def make_surface_points(position, normal, first=0):
 
 
 def mesh(name, positions, faces, material, normals=None, tangents=None, uvs=None):
-    """A mesh from lists; flat normals of the first face where none are given."""
+    """A mesh from lists; without normals, all have that of the first face."""
     positions, faces = np.asarray(positions, np.float32), np.asarray(faces, np.uint32)
     if normals is None:
         a, b, c = positions[faces[0]]
@@ -35,13 +35,13 @@ def mesh(name, positions, faces, material, normals=None, tangents=None, uvs=None
 
 
 def quad(name, corners, material, tangent=(1, 0, 0)):
-    """A rectangle, counter-clockwise seen from its outer side, with the unit square as texture coordinates."""
+    """A rectangle, counter-clockwise from its front, with the unit square as UV coordinates."""
     uvs = [[0, 1], [1, 1], [1, 0], [0, 0]]
     return mesh(name, corners, [[0, 1, 2], [0, 2, 3]], material, tangents=np.tile([*tangent, 1.0], (4, 1)), uvs=uvs)
 
 
 def sphere(name, center, radius, material, num_rings=12, inside=False):
-    """A ball of 4 · rings² triangles less the poles', smooth normals; `inside`: seen from its inner side."""
+    """A ball of about 4 · rings² triangles with smooth normals; `inside`: its front faces inward."""
     theta, phi = np.linspace(0, np.pi, num_rings + 1), np.linspace(0, 2 * np.pi, 2 * num_rings + 1)
     theta, phi = (grid.ravel() for grid in np.meshgrid(theta, phi, indexing="ij"))
     normals = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], axis=1)
@@ -62,7 +62,7 @@ def sphere(name, center, radius, material, num_rings=12, inside=False):
 
 
 def torus(name, radius, tube, material, num_steps=192, num_tube_steps=24, tilt=0.5):
-    """A ring about the origin, smooth normals, its axis tilted from +Y towards the viewer on +Z, radians."""
+    """A ring around the origin with smooth normals, its axis tilted from +Y toward the camera on +Z, in radians."""
     u, v = np.linspace(0, 2 * np.pi, num_steps + 1), np.linspace(0, 2 * np.pi, num_tube_steps + 1)
     u, v = (grid.ravel() for grid in np.meshgrid(u, v, indexing="ij"))
     normals = np.stack([np.cos(u) * np.cos(v), np.sin(v), np.sin(u) * np.cos(v)], axis=1)
@@ -76,12 +76,12 @@ def torus(name, radius, tube, material, num_steps=192, num_tube_steps=24, tilt=0
 
 
 def make_emissive_triangles(corners, is_two_sided):
-    """Triangles that shine evenly. corners: (T, 3, 3)"""
+    """Uniformly emissive triangles. corners: (T, 3, 3)"""
     return LightTriangles(np.asarray(corners, np.float32), np.ones(len(corners), np.float32), is_two_sided)
 
 
 def make_camera(name, origin, target, yfov):
-    """A camera at `origin` that has `target` in its middle, upright."""
+    """An upright camera at `origin` with `target` at the image center."""
     origin, target = np.asarray(origin, float), np.asarray(target, float)
     back = (origin - target) / np.linalg.norm(origin - target)
     right = np.cross([0, 1, 0], back)
@@ -93,7 +93,7 @@ def make_camera(name, origin, target, yfov):
 
 
 def studio(height=32, key=60.0):
-    """An environment that is dim and coloured all round, with a warm softbox and a small cold spot."""
+    """A dim, colored environment with a warm softbox and a small cold spot."""
     d = texel_directions(height, 2 * height).astype(float)
     ambient = 0.3 + 0.2 * d[..., 1:2] * [0.5, 0.8, 1.0] + 0.1 * d[..., :1] * [1.0, 0.2, -0.6]
 
@@ -158,7 +158,7 @@ def still_life():
 
 
 def make_tiny_scene(*meshes, camera, environment=None, materials=None) -> Scene:
-    """A scene of some meshes and one camera; white Lambert materials where none are given."""
+    """A scene of some meshes and one camera; by default with white Lambert materials."""
     if materials is None:
         count = 1 + max(m.material for m in meshes)
         materials = [Material(f"M{k}", ({"model": "lambert", "color": [1, 1, 1]},)) for k in range(count)]

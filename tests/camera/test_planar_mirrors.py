@@ -114,7 +114,7 @@ def in_the_patch():
 
 @pytest.fixture(scope="module")
 def static(tmp_path_factory):
-    """The same for the static view of a free camera."""
+    """A static view of a free camera."""
     recipe = Recipe("probes", ("front",), (64, 32), 400, num_probes=300, num_patches=1024, gather_rays=64)
     target = tmp_path_factory.mktemp("resting") / "probes.zarr"
     moving = open_bake(bake_in_process(METHODS["probes"], hall(), recipe, target), Cache(1 << 30))

@@ -75,7 +75,7 @@ def test_two_tints_side_by_side_each_show_in_a_polished_metal(tmp_path):
         np.testing.assert_allclose(of_each, np.tile(np.divide(tint, 0.9), (len(of_each), 1)), atol=0.05)
 
 
-def below_two_panes(position, radiance, degrees):
+def below_two_tints(position, radiance, degrees):
     """Outgoing radiance of a diffuse floor at positions (n, 3): a sum over texels of a rotated environment. (n, 3)"""
     height, width, _ = radiance.shape
     directions = texel_directions(height, width).reshape(-1, 3)
@@ -101,7 +101,7 @@ def test_a_diffuse_floor_below_two_tints_follows_a_rotated_environment(degrees, 
     samples = sample_view(scene, build_scene_buffers(scene), "front", SIZE)
     axes = samples.surface.points.position.T
     middle = np.stack([np.bincount(samples.pixel, samples.weight * axis) for axis in axes], axis=1)
-    wanted = below_two_panes(middle, radiance, degrees)
+    wanted = below_two_tints(middle, radiance, degrees)
     assert relative_rmse(picture.reshape(-1, 3), wanted) < 0.04
     np.testing.assert_allclose(picture.mean(axis=(0, 1)), wanted.mean(axis=0), rtol=0.03)
 

@@ -29,7 +29,7 @@ def compute_moments_numpy(texels: LightTexels, mean: F64, frame: F64, tile: int)
 
 
 def solid_angles(corners):
-    """Signed solid angles of triangles (M, 3, 3): positive if counter-clockwise from outside (van Oosterom, Strackee 1983)."""
+    """Signed solid angles of triangles (M, 3, 3): positive if counter-clockwise (van Oosterom, Strackee 1983)."""
     a, b, c = np.moveaxis(corners, 1, 0)
     volume = np.einsum("mc,mc->m", a, np.cross(b, c))
     dots = 1 + np.einsum("mc,mc->m", a, b) + np.einsum("mc,mc->m", b, c) + np.einsum("mc,mc->m", c, a)

@@ -149,7 +149,7 @@ def image_numpy(model, bands, receivers):
 
 
 def test_rays_of_view_independent_terms_are_summed(lights, receivers):
-    """Nothing is listed; a surface seen from behind reflects nothing."""
+    """Nothing is listed; back faces reflect nothing."""
     bands = {"theta_i": np.full((3, 64), [[0.5], [1.0], [0.25]])}
     behind = replace(receivers, wo=np.where(np.arange(30)[:, None] < 3, -receivers.wo, receivers.wo))
     expected = image_numpy("lambert", bands, behind)
@@ -243,7 +243,7 @@ def test_reflectance_of_highlights():
 
 
 def _by_sampling(document):
-    """The same by Monte Carlo: ωi sampled from the term's own lobe."""
+    """Reflectance by Monte Carlo: ωi sampled from the term's own lobe."""
     rng = np.random.default_rng(3)
     r, phi = np.sqrt(rng.random(4000)), 2 * np.pi * rng.random(4000)
     wo = np.stack([r * np.cos(phi), r * np.sin(phi), np.sqrt(1 - r * r)], axis=-1)

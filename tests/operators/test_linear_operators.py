@@ -211,7 +211,7 @@ def test_concurrent_requests_compute_once():
 
 
 def test_a_cancelled_request_lets_the_others_compute_once():
-    """The first is cancelled while a second waits; a third arrives during the second: computed once for both."""
+    """The first stops while a second waits; a third arrives during the second: computed once for both."""
     cache, made, outcome = Cache(100_000), [], []
     first_runs, go_on, second_runs = threading.Event(), threading.Event(), threading.Event()
 

@@ -1,4 +1,4 @@
-"""What gather rays bring, shared among neighbours: which samples are neighbours, and what the projector makes of it."""
+"""Filtering of gathered light between neighbors: which samples are neighbors, and the filtered projection."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ WIDTH, HEIGHT = 9, 7
 
 
 def grid(keep=None):
-    """Samples of a floor, one for each pixel, in an order of their own."""
+    """Samples of a floor, one per pixel, in shuffled order."""
     pixel = np.random.default_rng(1).permutation(WIDTH * HEIGHT).astype(np.uint32)
     pixel = pixel if keep is None else pixel[keep(pixel)]
     position = np.stack([pixel % WIDTH, 0 * pixel, pixel // WIDTH], axis=1).astype(np.float32)
     return pixel, position, np.tile(np.array([0, 1, 0], np.float32), (len(pixel), 1))
 
 
-def shared_by(pixel, position, normal, chance=FIXED_ALPHA_SAMPLE, **options):
+def filter_of(pixel, position, normal, chance=FIXED_ALPHA_SAMPLE, **options):
     points = SurfacePoints(position, normal, np.zeros_like(normal), pixel, chance)
     return make_neighbor_filter(pixel, WIDTH, points, **options)
 
 
-def by_hand(pixel, is_same):
+def brute_force_weights(pixel, is_same):
     """Every pair of samples, one after another."""
     weights = np.zeros((len(pixel), len(pixel)))
     for a, pa in enumerate(pixel.astype(int)):
@@ -48,65 +48,67 @@ def by_hand(pixel, is_same):
     return weights / weights.sum(axis=1, keepdims=True)
 
 
-def test_pixels_around_share_by_a_tent_and_edges_of_the_picture_by_what_is_there():
+def test_neighbors_have_tent_weights_normalized_at_image_borders():
     pixel, position, normal = grid()
-    matrix = shared_by(pixel, position, normal).diffuse.matrix
-    np.testing.assert_allclose(matrix.toarray(), by_hand(pixel, lambda a, b: True), rtol=1e-6)
+    matrix = filter_of(pixel, position, normal).diffuse.matrix
+    np.testing.assert_allclose(matrix.toarray(), brute_force_weights(pixel, lambda a, b: True), rtol=1e-6)
     np.testing.assert_allclose(matrix.sum(axis=1), 1, rtol=1e-6)
 
 
-def test_samples_of_one_pixel_count_as_one():
+def test_samples_of_one_pixel_are_averaged():
     pixel, position, normal = (np.concatenate([a, a[:20]]) for a in grid())
-    matrix = shared_by(pixel, position, normal).diffuse.matrix
-    np.testing.assert_allclose(matrix.toarray(), by_hand(pixel, lambda a, b: True), rtol=1e-6)
+    matrix = filter_of(pixel, position, normal).diffuse.matrix
+    np.testing.assert_allclose(matrix.toarray(), brute_force_weights(pixel, lambda a, b: True), rtol=1e-6)
 
 
-def test_other_pieces_of_a_surface_take_no_part():
+def test_separate_surfaces_are_not_neighbors():
     """A wall that meets the floor, and a step in it."""
     pixel, position, normal = grid()
     x, y = pixel % WIDTH, pixel // WIDTH
     normal[x > 4] = [1, 0, 0]
     position[(x <= 4) & (y > 3), 1] += 0.5
-    matrix = shared_by(pixel, position, normal).diffuse.matrix.toarray()
+    matrix = filter_of(pixel, position, normal).diffuse.matrix.toarray()
     piece = np.where(x > 4, 2, np.where(y > 3, 1, 0))
-    flat = piece != 2  # on the wall, depth as the floor has it is a rise
+    flat = piece != 2  # depth along the wall is height
     assert not matrix[piece[:, None] != piece[None, :]].any()
-    expected = by_hand(pixel, lambda a, b: piece[a] == piece[b])
+    expected = brute_force_weights(pixel, lambda a, b: piece[a] == piece[b])
     np.testing.assert_allclose(matrix[np.ix_(flat, flat)], expected[np.ix_(flat, flat)], rtol=1e-6)
 
 
-def test_samples_of_different_channels_share_nothing():
+def test_samples_of_different_channels_are_not_neighbors():
     pixel, position, normal = (np.concatenate([a, a]) for a in grid())
     chance = np.repeat(np.array([-3, -4], np.float32), len(pixel) // 2)
-    matrix = shared_by(pixel, position, normal, chance).diffuse.matrix.toarray()
+    matrix = filter_of(pixel, position, normal, chance).diffuse.matrix.toarray()
     assert not matrix[chance[:, None] != chance].any()
     np.testing.assert_allclose(matrix.sum(axis=1), 1, rtol=1e-6)
 
 
-def test_highlights_are_shared_by_what_is_turned_alike():
-    """Every other column of a floor is turned, first a little, then more; for what is scattered all are alike."""
+def test_highlights_are_filtered_between_similar_orientations():
+    """Every second column of a floor is rotated, first slightly, then more; diffuse light ignores the rotation."""
     pixel, position, normal = grid()
     is_turned = pixel % WIDTH % 2
 
     def both(degrees):
         angle = np.radians(degrees) * is_turned
         normal[:, 0], normal[:, 1] = np.sin(angle), np.cos(angle)
-        weights = shared_by(pixel, position, normal)
+        weights = filter_of(pixel, position, normal)
         return weights.diffuse.matrix.toarray(), weights.highlights.matrix.toarray()
 
-    all_alike = by_hand(pixel, lambda a, b: True)
+    all_alike = brute_force_weights(pixel, lambda a, b: True)
     for matrix in (*both(2.0), both(5.0)[0]):
         np.testing.assert_allclose(matrix, all_alike, rtol=1e-6)
-    np.testing.assert_allclose(both(5.0)[1], by_hand(pixel, lambda a, b: is_turned[a] == is_turned[b]), rtol=1e-6)
+    np.testing.assert_allclose(
+        both(5.0)[1], brute_force_weights(pixel, lambda a, b: is_turned[a] == is_turned[b]), rtol=1e-6
+    )
 
 
-def test_tents_follow_each_other_and_highlights_have_one():
+def test_diffuse_light_has_several_tent_passes_and_highlights_one():
     pixel, position, normal = grid(lambda pixel: pixel % 5 > 0)
-    weights = shared_by(pixel, position, normal, num_passes=3)
+    weights = filter_of(pixel, position, normal, num_passes=3)
     assert (weights.diffuse.num_passes, weights.highlights.num_passes) == (3, 1)
     rings, among = weights.diffuse.find_dependencies(4, 11)
     values = np.random.default_rng(9).random((len(pixel), 3))
-    once = by_hand(pixel, lambda a, b: True)
+    once = brute_force_weights(pixel, lambda a, b: True)
     shared = values[among]
     for within in reversed(rings):
         shared = within @ shared
@@ -116,8 +118,8 @@ def test_tents_follow_each_other_and_highlights_have_one():
 @pytest.mark.parametrize("times", [1, 2])
 @pytest.mark.parametrize("model", ["lambert", "cook_torrance"])
 @pytest.mark.parametrize("is_active", [False, True])
-def test_projected_points_are_the_weighted_mean_of_points_alone(model, is_active, times):
-    """Free curves and contracted ones, in ranges of any length; light of the environment is not shared."""
+def test_projected_points_are_weighted_means_of_single_points(model, is_active, times):
+    """Free and contracted curves, in ranges of any length; environment light is not filtered."""
     rng, num = np.random.default_rng(2), 70
     lights = tessellate_environment(rng.random((16, 32, 3), np.float32), 40)
     points = ref.make_random_receivers(num, lights.num_lights, seed=3)

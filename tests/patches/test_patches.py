@@ -1,4 +1,4 @@
-"""Gather cells and links, against first hits traced one by one, and against rooms where nothing may be lost."""
+"""Patches and gather hits, against first hits traced one by one, and against closed rooms that preserve energy."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ def box():
     return scene, geometry, choose_patches(scene, geometry, ("front",), (400, 400), NUM_CELLS)
 
 
-def points_of(cells, count, first=0):
+def points_of(patches, count, first=0):
     some = (
-        patch_sample_points(cells.position, cells.normal)
-        .rows(slice(None, None, POINTS_PER_PATCH * cells.num_patches // count))
+        patch_sample_points(patches.position, patches.normal)
+        .rows(slice(None, None, POINTS_PER_PATCH * patches.num_patches // count))
         .rows(slice(count))
     )
     return make_surface_points(some.position, some.normal, first)
@@ -46,8 +46,8 @@ def random_keys(num, num_sides, seed):
     return keys, rng.integers(0, num_sides, num).astype(np.int32)
 
 
-def cell_of(tree, side, key):
-    """The cell of one point, in all lanes alike."""
+def patch_of(tree, side, key):
+    """The patch of one point, with the same values in all lanes."""
     keys, nodes = (
         np.repeat(np.asarray(key, np.float32)[:, None], LANES, axis=1),
         np.full(LANES, tree.roots[side], np.int32),
@@ -57,19 +57,19 @@ def cell_of(tree, side, key):
     return int(nodes[0])
 
 
-@pytest.mark.parametrize(("num_cells", "num_points"), [(1, 50), (7, 50), (300, 5000), (50, 50)])
-def test_every_point_is_found_in_the_cell_that_it_was_put_into(num_cells, num_points):
-    keys, side = random_keys(num_points, 4, seed=num_cells)
-    tree, members = grow_tree(keys, np.ones(len(keys), np.float32), side, 6, num_cells)
+@pytest.mark.parametrize(("num_patches", "num_points"), [(1, 50), (7, 50), (300, 5000), (50, 50)])
+def test_each_point_is_located_in_its_patch(num_patches, num_points):
+    keys, side = random_keys(num_points, 4, seed=num_patches)
+    tree, members = grow_tree(keys, np.ones(len(keys), np.float32), side, 6, num_patches)
     assert sorted(np.concatenate(members)) == list(range(num_points))
-    assert len(members) == pytest.approx(num_cells, abs=4)
+    assert len(members) == pytest.approx(num_patches, abs=4)
     for cell, rows in enumerate(members):
         assert len(set(side[rows])) == 1
-        assert {cell_of(tree, side[row], keys[row]) for row in rows} == {cell}
+        assert {patch_of(tree, side[row], keys[row]) for row in rows} == {cell}
 
 
-def test_hits_just_below_the_points_of_a_plane_are_found_on_it():
-    """Points lie off their surface, with rounding; rays hit it: a few on the plane before, many on the one behind."""
+def test_hits_just_below_a_plane_are_located_on_it():
+    """Points are offset from their surface, with rounding; few points lie on the front plane, many on the back one."""
     rng = np.random.default_rng(5)
     near, far = np.float32(-1.2), np.float32(-2)
     z = np.where(np.arange(3000) < 200, near, far)
@@ -80,61 +80,61 @@ def test_hits_just_below_the_points_of_a_plane_are_found_on_it():
     is_near = [set(z[rows]) == {near} for rows in members]
     assert {len(set(z[rows])) for rows in members} == {1}
     for x, y in rng.uniform((-2.7, 0), (-2.5, 1), (50, 2)):
-        assert is_near[cell_of(tree, 0, (x, y, near, 0, 0, 1))]
+        assert is_near[patch_of(tree, 0, (x, y, near, 0, 0, 1))]
     for x, y in rng.uniform((-2.4, 0), (2.5, 1), (50, 2)):
-        assert not is_near[cell_of(tree, 0, (x, y, far, 0, 0, 1))]
+        assert not is_near[patch_of(tree, 0, (x, y, far, 0, 0, 1))]
 
 
-@pytest.mark.parametrize("why", ["what is seen is near", "the surface bends"])
-def test_cells_are_small_where_light_is_uneven(why):
-    """On one half of a plane, where as many points lie as on the other."""
+@pytest.mark.parametrize("cause", ["what is seen is near", "the surface bends"])
+def test_patches_are_small_where_light_varies(cause):
+    """On one half of a plane with as many points as the other half."""
     keys, _ = random_keys(4000, 1, seed=2)
     is_uneven, reach = keys[:, 0] < 0.5, np.full(4000, 3, np.float32)
-    bends = is_uneven & (why == "the surface bends")
+    bends = is_uneven & (cause == "the surface bends")
     keys[:, 3:] = np.where(bends[:, None], keys[:, 3:] * (1, 1, 0.3), (0, 0, 1))
     reach[is_uneven & ~bends] = 0.3
     _, members = grow_tree(keys, reach, np.zeros(4000, np.int32), 1, 400)
     assert sum(is_uneven[rows].mean() > 0.5 for rows in members) > 270
 
 
-def test_a_side_without_points_has_no_cell():
+def test_a_side_without_points_has_no_patch():
     keys, side = random_keys(100, 2, seed=1)
     tree, _ = grow_tree(keys, np.ones(len(keys), np.float32), side, 4, 10)
-    assert cell_of(tree, 3, keys[0]) == NO_PATCH
+    assert patch_of(tree, 3, keys[0]) == NO_PATCH
 
 
-def test_coinciding_points_end_in_one_cell():
+def test_coinciding_points_have_one_patch():
     keys, _ = random_keys(1, 1, seed=1)
     tree, members = grow_tree(np.repeat(keys, 100, axis=0), np.ones(100, np.float32), np.zeros(100, np.int32), 1, 10)
     assert len(members) == 1
-    assert cell_of(tree, 0, keys[0]) == 0
+    assert patch_of(tree, 0, keys[0]) == 0
 
 
-def test_no_points_make_no_cells():
+def test_no_points_give_no_patches():
     tree, members = grow_tree(np.empty((0, 6), np.float32), np.empty(0, np.float32), np.empty(0, np.int32), 2, 10)
     assert members == []
-    assert cell_of(tree, 0, (0, 0, 0, 0, 0, 1)) == NO_PATCH
+    assert patch_of(tree, 0, (0, 0, 0, 0, 0, 1)) == NO_PATCH
 
 
-def test_points_lie_where_light_can_arrive(box):
-    """None on the floor under a block, none inside one: a cell beside a block is not mixed with what it hides."""
-    scene, _, cells = box
+def test_points_lie_on_reachable_surfaces(box):
+    """None on the floor under a block, none inside a block: a patch next to a block contains no hidden points."""
+    scene, _, patches = box
     for name in ("Tall block", "Short block"):
         mesh = next(mesh for mesh in scene.meshes if mesh.name == name)
         top = mesh.positions[mesh.positions[:, 1] == mesh.positions[:, 1].max()][:, [0, 2]].astype(float)
         centre = top.mean(axis=0)
         along = np.unique(np.round(top - centre, 5), axis=0)
         u, v = along[0] + along[1], along[0] + along[2]
-        position = cells.position.reshape(-1, 3).astype(float)
+        position = patches.position.reshape(-1, 3).astype(float)
         at = np.abs((position[:, [0, 2]] - centre) @ np.linalg.inv(np.array([u, v]) / 2))
         low = position[:, 1] < mesh.positions[:, 1].max() - 1e-3
         assert not np.any(low & (at < 0.999).all(axis=1))
 
 
-def test_cells_are_small_along_contacts(box):
-    """On the floor, beside the tall block and far from all: the distance to the nearest other cell."""
-    scene, _, cells = box
-    centre = cells.position.mean(axis=1).astype(float)
+def test_patches_are_small_along_contacts(box):
+    """Distance to the nearest other patch on the floor: next to the tall block, and far from all blocks."""
+    scene, _, patches = box
+    centre = patches.position.mean(axis=1).astype(float)
     floor = centre[centre[:, 1] < 1e-3][:, [0, 2]]
     tall = next(mesh for mesh in scene.meshes if mesh.name == "Tall block").positions
     foot = tall[tall[:, 1] == 0][:, [0, 2]].astype(float)
@@ -144,22 +144,22 @@ def test_cells_are_small_along_contacts(box):
     assert np.median(spacing[from_contact < 0.03]) < 0.5 * np.median(spacing[from_contact > 0.3])
 
 
-def test_cells_are_small_where_a_polished_floor_mirrors_them(box):
-    """More of the points lie on the blocks' feet, which the floor before them mirrors, than where it is matt."""
-    plain, _, cells = box
+def test_patches_are_small_where_a_polished_floor_reflects_them(box):
+    """More points lie at the base of the blocks, which the floor reflects, than with a diffuse floor."""
+    plain, _, patches = box
     polished = cornell_box(is_floor_glossy=True)
     mirrored = choose_patches(polished, build_scene_buffers(polished), ("front",), (400, 400), NUM_CELLS)
     blocks = [k for k, material in enumerate(plain.materials) if material.name.endswith("block")]
 
-    def share(patches):
+    def fraction_of_points(patches):
         is_low = (patches.position[:, :, 1].mean(axis=1) < 0.5) & (patches.normal[:, :, 2].mean(axis=1) > 0.5)
         return np.mean(np.isin(patches.material, blocks) & is_low)
 
-    assert share(mirrored) > 1.15 * share(cells)
+    assert fraction_of_points(mirrored) > 1.15 * fraction_of_points(patches)
 
 
 def test_lobes_have_the_cosine_of_their_exponent():
-    """E cos α = (e + 1)/(e + 2) where the density is ∝ cos^e α, and azimuths are even."""
+    """E cos α = (e + 1)/(e + 2) for a density ∝ cos^e α and uniform azimuths."""
     axis = np.repeat(np.array([[0.36, 0.48, -0.8]], np.float32), 20_000, axis=0)
     for exponent in (1.0, 200.0):
         directions = lobe_directions(axis, exponent, np.random.default_rng(3))
@@ -171,25 +171,25 @@ def test_lobes_have_the_cosine_of_their_exponent():
         assert np.linalg.norm(across) < 0.02
 
 
-def test_cells_are_the_same_every_time(box):
-    scene, geometry, cells = box
+def test_patches_are_deterministic(box):
+    scene, geometry, patches = box
     again = choose_patches(scene, geometry, ("front",), (400, 400), NUM_CELLS)
-    np.testing.assert_array_equal(again.position, cells.position)
-    np.testing.assert_array_equal(again.tree.value, cells.tree.value)
+    np.testing.assert_array_equal(again.position, patches.position)
+    np.testing.assert_array_equal(again.tree.value, patches.tree.value)
 
 
-def test_neighbours_in_number_are_neighbours_in_space(box):
+def test_consecutive_patches_are_neighbors_in_space(box):
     centre = box[2].position.mean(axis=1)
     step = np.linalg.norm(np.diff(centre, axis=0), axis=1)
     anywhere = np.linalg.norm(centre[np.random.default_rng(1).permutation(len(centre))] - centre, axis=1)
     assert np.median(step) < 0.15 * np.median(anywhere)
 
 
-def test_links_are_those_of_first_hits(box):
-    """Every ray's first hit, traced by itself and located by hand."""
-    _, geometry, cells = box
-    points, pattern = points_of(cells, 40, first=100), make_pattern(24, 9, 3)
-    links = trace_gather_rays(geometry, cells.tree, points, points.normal, pattern)
+def test_gather_hits_equal_first_hits(box):
+    """Every ray is traced separately and located directly."""
+    _, geometry, patches = box
+    points, pattern = points_of(patches, 40, first=100), make_pattern(24, 9, 3)
+    links = trace_gather_rays(geometry, patches.tree, points, points.normal, pattern)
     normals = geometry.face_normals
     origins, directions, expected_of = [], [], []
     for p in range(40):
@@ -215,49 +215,49 @@ def test_links_are_those_of_first_hits(box):
             behind = normals[face] @ direction > 0
             normal = -normals[face] if behind else normals[face]
             side = 2 * geometry.face_mesh[face] + int(behind)
-            expected = cell_of(cells.tree, side, (*(origin + distance * direction), *normal))
+            expected = patch_of(patches.tree, side, (*(origin + distance * direction), *normal))
         wrong += int(expected != links.patch[p, ray])
-    assert wrong <= 0.005 * len(origins)  # rounding at the edge of a cell
+    assert wrong <= 0.005 * len(origins)  # rounding at the edge of a patch
 
 
-def test_order_and_division_of_points_do_not_matter(box):
-    _, geometry, cells = box
-    points, pattern = points_of(cells, 30), make_pattern(16, 0, 3)
-    whole = trace_gather_rays(geometry, cells.tree, points, points.normal, pattern).patch
+def test_results_do_not_depend_on_order_and_batches(box):
+    _, geometry, patches = box
+    points, pattern = points_of(patches, 30), make_pattern(16, 0, 3)
+    whole = trace_gather_rays(geometry, patches.tree, points, points.normal, pattern).patch
     subset = points.rows(slice(11, 23))
     np.testing.assert_array_equal(
-        trace_gather_rays(geometry, cells.tree, subset, subset.normal, pattern).patch, whole[11:23]
+        trace_gather_rays(geometry, patches.tree, subset, subset.normal, pattern).patch, whole[11:23]
     )
 
 
-def test_from_a_closed_room_no_ray_escapes():
-    """A ball seen from inside, its cells' rays and a viewer's: what leaks out would be missing light."""
+def test_no_ray_leaves_a_closed_room():
+    """Rays of patches and of a viewer inside a ball: an escaping ray would lose light."""
     ball = sphere("room", (0, 0, 0), 2.0, 0, num_rings=24, inside=True)
     room = make_tiny_scene(ball, camera=make_camera("front", (0, 0, 1), (0, 0, 0), 1.0))
     geometry = build_scene_buffers(room)
-    cells = choose_patches(room, geometry, ("front",), (64, 64), 500)
-    points = points_of(cells, 400)
-    links = trace_gather_rays(geometry, cells.tree, points, points.normal, make_pattern(64, 0, 1))
+    patches = choose_patches(room, geometry, ("front",), (64, 64), 500)
+    points = points_of(patches, 400)
+    links = trace_gather_rays(geometry, patches.tree, points, points.normal, make_pattern(64, 0, 1))
     assert np.mean(links.patch == NO_PATCH) < 1e-4
 
 
-def test_cells_know_how_textures_lie_on_them():
-    """On a floor along whose width u grows, as far as that is across their normals; and these without bumps."""
+def test_patches_have_tangents_of_uv_coordinates():
+    """On a floor with u along its width, within the accuracy of normals; and without normal mapping."""
     slope = np.full((2, 2, 3), (200, 128, 230), np.uint8)
     bumps = Texture(slope, encoding=TextureEncoding("normal"))
     lambert = ({"model": "lambert"},)
     scene = corner([Material("Floor", lambert, {}, bumps), Material("Wall", lambert)])
     tangents = np.broadcast_to(np.float32([1, 0, 0, 1]), scene.meshes[0].tangents.shape)
     scene = replace(scene, meshes=(replace(scene.meshes[0], tangents=tangents), *scene.meshes[1:]))
-    cells = choose_patches(scene, build_scene_buffers(scene), ("front",), (40, 30), 100)
-    points, uv = patch_sample_points(cells.position, cells.normal), cells.uv.reshape(-1, 5)
-    of_floor = np.repeat(cells.material == 0, POINTS_PER_PATCH) & (points.position[:, 1] < 1e-3)
+    patches = choose_patches(scene, build_scene_buffers(scene), ("front",), (40, 30), 100)
+    points, uv = patch_sample_points(patches.position, patches.normal), patches.uv.reshape(-1, 5)
+    of_floor = np.repeat(patches.material == 0, POINTS_PER_PATCH) & (points.position[:, 1] < 1e-3)
     floor_patches = np.flatnonzero(of_floor)
     assert len(floor_patches) > 20
     normal, tangent, turn = points.normal[floor_patches], points.tangent[floor_patches], uv[floor_patches, 3:4]
-    assert np.median(normal[:, 0]) > 0.5  # they lean to where red says, but for those bent into sight
+    assert np.median(normal[:, 0]) > 0.5  # they tilt along red, except for those corrected toward the viewer
     expected = np.array([1, 0, 0]) - normal[:, :1] * normal
     expected /= np.linalg.norm(expected, axis=1, keepdims=True)
     np.testing.assert_allclose(np.cos(turn) * tangent + np.sin(turn) * np.cross(normal, tangent), expected, atol=1e-4)
-    smooth = cells.surface_normal.reshape(-1, 3)[floor_patches]
-    np.testing.assert_allclose(np.abs(smooth), np.broadcast_to([0, 1, 0], smooth.shape), atol=1e-6)  # of both sides
+    smooth = patches.surface_normal.reshape(-1, 3)[floor_patches]
+    np.testing.assert_allclose(np.abs(smooth), np.broadcast_to([0, 1, 0], smooth.shape), atol=1e-6)  # both sides

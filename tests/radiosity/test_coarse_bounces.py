@@ -1,4 +1,4 @@
-"""Light between cells as a moving hand sees it, against what is exact."""
+"""Fast indirect light during edits, against exact light."""
 
 import numpy as np
 import numpy_reference as ref
@@ -25,8 +25,8 @@ SHINY = pack_reflectance([{**PLAIN, "model": "blinn_phong", "color": [0.4, 0.3, 
 
 
 @pytest.fixture(scope="module")
-def cells():
-    """Flat ones, whose rays hit each other anywhere; a tenth hits nothing."""
+def patches():
+    """Flat patches whose rays hit each other at random; a tenth hits nothing."""
     rng = np.random.default_rng(4)
     normal = np.repeat(ref.unit(rng.normal(size=(NUM_CELLS, 1, 3))), 4, axis=1).astype(np.float32)
     visible = rng.integers(0, 256, (NUM_CELLS, 4, 5)).astype(np.uint8)
@@ -37,15 +37,20 @@ def cells():
 
 
 @pytest.fixture(scope="module")
-def arrived(cells):
+def incident_light(patches):
     lights = tessellate_environment(np.random.default_rng(3).random((16, 32, 3), np.float32), 40)
     return IncidentLight(
-        cells.irradiance(lights), cells.incident_coefficients(np.arange(1, NUM_CELLS, 2), lights, OUTGOING_DEGREE)
+        patches.irradiance(lights), patches.incident_coefficients(np.arange(1, NUM_CELLS, 2), lights, OUTGOING_DEGREE)
     )
 
 
-def test_squares_are_those_of_the_rays(cells):
-    points, links, pattern, frames = cells.points, cells.gather_hits.reshape(-1, 55), cells.pattern, cells.frames
+def test_direction_bins_equal_those_of_the_rays(patches):
+    points, links, pattern, frames = (
+        patches.points,
+        patches.gather_hits.reshape(-1, 55),
+        patches.pattern,
+        patches.frames,
+    )
     leaving = outgoing_bins(points, links, pattern, frames)
     coming = incoming_bins(points, 4, pattern, frames)
     for p in (0, 7, 100):
@@ -58,32 +63,34 @@ def test_squares_are_those_of_the_rays(cells):
             assert leaving[p, ray] == (0 if cell == NO_PATCH else bin_of(frames, cell, *-away.astype(np.float32)))
 
 
-def test_what_arrives_quickly_is_what_arrives_in_squares(cells, arrived):
-    reflecting = cells.reflectance_operator((MATT, SHINY))
-    even, vectors = reflecting.apply(arrived)
-    now = OutgoingRadiance(even, reflecting.rows, vectors, reflecting.roughening).outgoing_light(cells)
-    exact, quick = cells.incident_light(now, reflecting.rows), incident_fast(cells, now, reflecting.rows)
+def test_fast_incident_light_equals_that_of_direction_bins(patches, incident_light):
+    reflecting = patches.reflectance_operator((MATT, SHINY))
+    even, vectors = reflecting.apply(incident_light)
+    now = OutgoingRadiance(even, reflecting.rows, vectors, reflecting.roughening).outgoing_light(patches)
+    exact, quick = patches.incident_light(now, reflecting.rows), incident_fast(patches, now, reflecting.rows)
     np.testing.assert_allclose(quick.irradiance, exact.irradiance, rtol=1e-4)
     assert relative_rmse(quick.coefficients[..., :6], exact.coefficients[..., :6]) < 0.05
-    in_squares, lobe = np.zeros((30, 3, NUM_OUTGOING)), now.lobe[cells.gather_hits]
-    light = now.isotropic[cells.gather_hits].astype(float)
-    light += np.where(lobe[..., None] >= 0, now.scale[lobe] * now.table[lobe, cells.outgoing_bins], 0)
+    in_squares, lobe = np.zeros((30, 3, NUM_OUTGOING)), now.lobe[patches.gather_hits]
+    light = now.isotropic[patches.gather_hits].astype(float)
+    light += np.where(lobe[..., None] >= 0, now.scale[lobe] * now.table[lobe, patches.outgoing_bins], 0)
     for row, cell in enumerate(reflecting.rows):
-        in_squares[row] = np.pi / 220 * light[cell].T @ bin_means().T[cells.incident_bins[cell]]
+        in_squares[row] = np.pi / 220 * light[cell].T @ bin_means().T[patches.incident_bins[cell]]
     np.testing.assert_allclose(quick.coefficients, in_squares, atol=1e-5)
 
 
 @pytest.mark.parametrize(("first", "last"), [(1, 1), (1, 24), (2, 2), (3, 5)])
 @pytest.mark.parametrize("wall", [MATT, SHINY])
-def test_what_is_sent_quickly_is_about_what_is_sent(cells, arrived, wall, first, last):
-    reflecting = cells.reflectance_operator((MATT, wall))
-    incident = IncidentLight(arrived.irradiance, arrived.coefficients[: len(reflecting.rows)])
-    exact, quick = (solve(cells, reflecting, incident, first, last) for solve in (solve_indirect, solve_indirect_fast))
+def test_fast_bounces_are_near_exact_bounces(patches, incident_light, wall, first, last):
+    reflecting = patches.reflectance_operator((MATT, wall))
+    incident = IncidentLight(incident_light.irradiance, incident_light.coefficients[: len(reflecting.rows)])
+    exact, quick = (
+        solve(patches, reflecting, incident, first, last) for solve in (solve_indirect, solve_indirect_fast)
+    )
     assert relative_rmse(quick.isotropic, exact.isotropic) < 0.03
     assert np.linalg.norm(quick.coefficients - exact.coefficients) <= 0.05 * np.linalg.norm(exact.coefficients)
 
 
-def test_a_difference_knows_the_rows_of_both():
+def test_a_difference_contains_the_rows_of_both():
     rng = np.random.default_rng(1)
     even, vectors = rng.random((2, 5, 3)).astype(np.float32), rng.random((2, 2, 3, NUM_OUTGOING)).astype(np.float32)
     falls = np.array([[0.1, 0.2], [0.3, 0.4]], np.float32)

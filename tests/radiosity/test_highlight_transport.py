@@ -1,4 +1,4 @@
-"""Light that comes straight to cells with sharp highlights, by tables, against the BRDF itself."""
+"""Direct light on patches with narrow highlights, by tables, against the BRDF itself."""
 
 import json
 
@@ -37,7 +37,7 @@ def metal(roughness, color=(1.0, 1.0, 1.0)):
 MATT = {**PLAIN, "model": "lambert", "color": [0.3, 0.2, 0.1], "params": {}}
 
 
-def cells_of(normal):
+def patches_with_normals(normal):
     rng = np.random.default_rng(4)
     visible = rng.integers(0, 256, (NUM_CELLS, 4, 6)).astype(np.uint8)
     links = np.zeros((NUM_CELLS, 4 * 5), np.uint16)
@@ -57,8 +57,8 @@ def lights():
     return tessellate_environment(np.random.default_rng(3).random((16, 32, 3), np.float32), 48)
 
 
-def mean_over_squares(document, wi):
-    """A term seen in each square by light from one direction, its mean over 64 places, by the cosine. (3, squares)"""
+def mean_over_bins(document, wi):
+    """Cosine-weighted mean of a term over 64 positions of each direction bin, for light from `wi`. (3, bins)"""
     offsets = (np.arange(SIDE * 8) + 0.5) * (2 / (SIDE * 8)) - 1
     x, y = np.meshgrid(offsets, offsets, indexing="ij")
     wo = directions_at(x, y)
@@ -73,22 +73,22 @@ def mean_over_squares(document, wi):
 
 
 @pytest.mark.parametrize("roughness", [0.3, 0.5])
-def test_tables_are_means_over_squares(roughness):
+def test_tables_are_means_over_bins(roughness):
     table, document, area = lobe_table(json.dumps(metal(roughness))), metal(roughness), bin_solid_angles()
     for b in (0, 60, 200):
-        exact = mean_over_squares(document, fine_bin_centers()[b])
+        exact = mean_over_bins(document, fine_bin_centers()[b])
         missed = np.sqrt(np.sum(area * (table[b] - exact) ** 2) / np.sum(area * exact**2))
         assert missed < 0.03
 
 
 @pytest.mark.parametrize("roughness", [0.03, 0.1])
-def test_tables_of_lobes_narrower_than_squares_send_all_of_them(roughness):
-    """A mirror head-on sends what it does, 0.9 of it, wherever in a square the lobe lies."""
+def test_tables_of_lobes_narrower_than_bins_preserve_energy(roughness):
+    """A mirror at normal incidence reflects 0.9, wherever the lobe lies in a bin."""
     sent = lobe_table(json.dumps(metal(roughness)))[:60] @ bin_solid_angles()
     np.testing.assert_allclose(sent, 0.9, rtol=0.02)
 
 
-def test_mirrorings_take_squares_where_they_take_directions():
+def test_reflection_symmetries_permute_bins_like_directions():
     rng = np.random.default_rng(1)
     wo = ref.unit(rng.normal(size=(500, 3))) * [1, 1, np.sign(1)]
     wo[:, 2] = np.abs(wo[:, 2])
@@ -98,32 +98,32 @@ def test_mirrorings_take_squares_where_they_take_directions():
         np.testing.assert_array_equal(squares[bin_index(wo)], bin_index(moved))
 
 
-def expected(cells, lights, documents, cell):
-    """What a cell sends by squares, light by light and point by point. (3, squares)"""
-    t, b = cells.frames[cell].astype(float)
+def expected(patches, lights, documents, patch):
+    """Outgoing radiance of a patch by bins, light by light and point by point. (3, bins)"""
+    t, b = patches.frames[patch].astype(float)
     n, out = np.cross(t, b), np.zeros((3, SIDE * SIDE))
-    for p, normal in enumerate(cells.points.normal.reshape(-1, 4, 3)[cell].astype(float)):
-        visible = np.unpackbits(cells.visible[cell, p], bitorder="little")[: lights.num_lights]
+    for p, normal in enumerate(patches.points.normal.reshape(-1, 4, 3)[patch].astype(float)):
+        visible = np.unpackbits(patches.visible[patch, p], bitorder="little")[: lights.num_lights]
         for m in np.flatnonzero(visible):
             d = lights.direction[m].astype(float)
             if (cosine := d @ normal) <= 0:
                 continue
-            away = 2 * cosine * normal - d  # mirrored as the point does, and back as the cell does
+            away = 2 * cosine * normal - d  # reflected about the normal of the point, and back about that of the patch
             like = 2 * (n @ away) * n - away
             wi = np.array([t @ like, b @ like, max(n @ like, 1e-3)])
-            values = sum(mean_over_squares(document, wi / np.linalg.norm(wi)) for document in documents)
+            values = sum(mean_over_bins(document, wi / np.linalg.norm(wi)) for document in documents)
             out += cosine / 4 * lights.irradiance[m].astype(float)[:, None] * values
     return out
 
 
 @pytest.mark.parametrize("spread", [0.0, 0.1])
-def test_cells_send_lights_as_their_highlights_do(lights, spread):
-    cells, documents = cells_of(flat(spread)), [metal(0.5, (0.5, 0.8, 0.3))]
+def test_patches_reflect_lights_with_their_highlights(lights, spread):
+    patches, documents = patches_with_normals(flat(spread)), [metal(0.5, (0.5, 0.8, 0.3))]
     reflectances = (pack_reflectance([MATT, *documents]),)
-    lobes = cells.highlight_tables(reflectances, cells.reflectance_operator(reflectances))
-    actual = outgoing_in_highlights(cells, lobes, DirectLobes(lights, cells.visibility_bits(lobes.rows)))
+    lobes = patches.highlight_tables(reflectances, patches.reflectance_operator(reflectances))
+    actual = outgoing_in_highlights(patches, lobes, DirectLobes(lights, patches.visibility_bits(lobes.rows)))
     area = bin_solid_angles()
-    exact = expected(cells, lights, unpack_lobes(reflectances[0]), 3)
+    exact = expected(patches, lights, unpack_lobes(reflectances[0]), 3)
     assert np.sqrt(np.sum(area * (actual[3] - exact) ** 2) / np.sum(area * exact**2)) < 0.06
     np.testing.assert_allclose(actual[3] @ area, exact @ area, rtol=0.04)
 
@@ -132,7 +132,7 @@ _LOCAL = fine_bin_centers()[60]
 
 
 class _OneRay:
-    """A light that comes to every point from one side, as one ray."""
+    """Light that reaches every point from one direction, as one ray."""
 
     max_rays_per_point = 1
 
@@ -143,41 +143,41 @@ class _OneRay:
         return num
 
 
-def test_rays_of_lamps_are_sent_as_lights_are():
-    cells, reflectances = cells_of(flat()), (pack_reflectance([metal(0.3)]),)
-    lobes = cells.highlight_tables(reflectances, cells.reflectance_operator(reflectances))
-    actual = outgoing_in_highlights(cells, lobes, DirectLobes(rays=[_OneRay()]))
-    exact = mean_over_squares(unpack_lobes(reflectances[0])[0], _LOCAL) * [[1], [2], [3]]
-    for cell in range(NUM_CELLS):
-        assert np.linalg.norm(actual[cell] - exact) < 0.03 * np.linalg.norm(exact)
+def test_rays_of_local_lights_are_reflected_like_lights():
+    patches, reflectances = patches_with_normals(flat()), (pack_reflectance([metal(0.3)]),)
+    lobes = patches.highlight_tables(reflectances, patches.reflectance_operator(reflectances))
+    actual = outgoing_in_highlights(patches, lobes, DirectLobes(rays=[_OneRay()]))
+    exact = mean_over_bins(unpack_lobes(reflectances[0])[0], _LOCAL) * [[1], [2], [3]]
+    for patch in range(NUM_CELLS):
+        assert np.linalg.norm(actual[patch] - exact) < 0.03 * np.linalg.norm(exact)
 
 
-def test_nothing_of_a_highlight_is_sent_twice(lights):
-    """With its table, functions and the even part say what is matt alone."""
-    cells = cells_of(flat())
+def test_highlights_are_not_counted_twice(lights):
+    """With a table, basis functions and the isotropic part represent only diffuse terms."""
+    patches = patches_with_normals(flat())
     glossy, matt = ((pack_reflectance(terms),) for terms in ([MATT, metal(0.3)], [MATT]))
-    reflecting, plain = cells.reflectance_operator(glossy), cells.reflectance_operator(matt)
+    reflecting, plain = patches.reflectance_operator(glossy), patches.reflectance_operator(matt)
     rows = reflecting.rows
-    incident = IncidentLight(cells.irradiance(lights), cells.incident_coefficients(rows, lights, 6))
-    lobes = cells.highlight_tables(glossy, reflecting)
+    incident = IncidentLight(patches.irradiance(lights), patches.incident_coefficients(rows, lights, 6))
+    lobes = patches.highlight_tables(glossy, reflecting)
     actual = first_bounce(reflecting, incident, (lobes, np.zeros((NUM_CELLS, 3, SIDE * SIDE), np.float32)))
     held = plain.reflectance * reflecting.energy_scale
     np.testing.assert_allclose(actual.isotropic, held / np.pi * incident.irradiance, atol=1e-5)
     assert not actual.coefficients.any()
 
 
-def test_only_highlights_that_functions_miss_have_tables():
+def test_only_highlights_beyond_the_basis_have_tables():
     assert narrow_lobes([metal(0.8)]) == []
     assert narrow_lobes([{**metal(0.2), "params": {"roughness": 0.2, "f0": 0.0}, "color": [0.1, 0.1, 0.1]}]) == []
-    assert len(narrow_lobes([metal(0.2), metal(0.8)])) == 2  # all or none of a material
-    cells = cells_of(flat())
+    assert len(narrow_lobes([metal(0.2), metal(0.8)])) == 2  # all terms of a material or none
+    patches = patches_with_normals(flat())
     reflectances = (pack_reflectance([metal(0.8)]),)
-    lobes = cells.highlight_tables(reflectances, cells.reflectance_operator(reflectances))
+    lobes = patches.highlight_tables(reflectances, patches.reflectance_operator(reflectances))
     assert len(lobes.rows) == 0
-    assert outgoing_in_highlights(cells, lobes, DirectLobes()).shape == (0, 3, SIDE * SIDE)
+    assert outgoing_in_highlights(patches, lobes, DirectLobes()).shape == (0, 3, SIDE * SIDE)
 
 
-def test_small_steps_of_a_hand_make_no_other_light():
+def test_small_edits_do_not_change_the_light():
     assert pack_reflectance([metal(0.3)]) == pack_reflectance([metal(0.3001)])
     assert pack_reflectance([metal(0.3)]) != pack_reflectance([metal(0.31)])
     before, after = unpack_lobes(pack_reflectance([metal(0.3)])), unpack_lobes(pack_reflectance([metal(0.31)]))
@@ -186,7 +186,7 @@ def test_small_steps_of_a_hand_make_no_other_light():
     assert abs(reflectance_matrix(before[0])[0, 0] - reflectance_matrix(metal(0.3))[0, 0]) < 0.01
 
 
-def test_squares_of_different_cells_are_subtracted_by_cell():
+def test_bins_are_subtracted_patch_by_patch():
     ones = np.ones((2, 3, SIDE * SIDE), np.float32)
     difference = BinnedRadiance(np.array([1, 4]), 3 * ones).subtract(BinnedRadiance(np.array([4, 7]), ones))
     np.testing.assert_array_equal(difference.rows, [1, 4, 7])

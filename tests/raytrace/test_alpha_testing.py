@@ -1,4 +1,4 @@
-"""Surfaces with holes: what rays of every kind find there, against plain NumPy."""
+"""Alpha-tested and blended surfaces: hits of all kinds of rays, against plain NumPy."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ DOWN = np.array([0, 0, -1], np.float32)
 
 
 def card_before_wall(alpha, cutoff=None, wrap=("repeat", "repeat"), times=1.0):
-    """A wall in the plane z = −1 and, before it in z = 0, a card from (0, 0) to (1, 1) with an image of opacity."""
+    """A wall in the plane z = −1 and, in front of it at z = 0, a card from (0, 0) to (1, 1) with an opacity image."""
     card = quad("card", [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], 1)
     card = replace(card, uvs=card.uvs * np.float32(times) - np.float32(MOVED if times != 1 else 0))
     wall = quad("wall", [[-2, -2, -1], [3, -2, -1], [3, 3, -1], [-2, 3, -1]], 0)
@@ -42,29 +42,29 @@ def random_alpha(seed=3, shape=(5, 7)):
 
 
 def rays_at(x, y):
-    """Origins before the card that look straight at it."""
+    """Origins in front of the card, with directions perpendicular to it."""
     return np.stack([x, y, np.ones_like(x)], axis=1).astype(np.float32)
 
 
-def opacity_behind(opacity, times, x, y):
-    """Of the card of `card_before_wall`, as its corners' coordinates lie."""
+def card_opacity(opacity, times, x, y):
+    """Opacity of the card of `card_before_wall` at its UV coordinates."""
     return opacity_at(opacity.alpha, opacity.wrap, np.stack([x, 1 - y], axis=1) * times - (MOVED if times != 1 else 0))
 
 
 @pytest.mark.parametrize("wrap", [("repeat", "mirror"), ("clamp", "repeat"), ("mirror", "clamp")])
-def test_a_cut_surface_is_there_where_its_opacity_reaches_the_bound(wrap):
+def test_an_alpha_tested_surface_is_hit_above_its_cutoff(wrap):
     rng = np.random.default_rng(1)
     x, y = rng.uniform(0.001, 0.999, (2, 20_000))
     scene = card_before_wall(random_alpha(), 0.4, wrap, times=3.7)
     face = trace_rays(build_scene_buffers(scene).embree, rays_at(x, y), np.tile(DOWN, (len(x), 1))).face
-    wanted = opacity_behind(scene.materials[1].opacity, 3.7, x, y)
-    clear = np.abs(wanted - 0.4) > 1e-3  # where rounding cannot decide
+    expected = card_opacity(scene.materials[1].opacity, 3.7, x, y)
+    clear = np.abs(expected - 0.4) > 1e-3  # away from rounding at the cutoff
     assert clear.mean() > 0.98
-    np.testing.assert_array_equal((face >= 2)[clear], (wanted >= 0.4)[clear])
+    np.testing.assert_array_equal((face >= 2)[clear], (expected >= 0.4)[clear])
     assert 0.1 < (face >= 2).mean() < 0.9
 
 
-def test_a_blended_surface_stops_its_share_of_directions_evenly_from_everywhere():
+def test_a_blended_surface_stops_a_uniform_fraction_of_directions():
     rng = np.random.default_rng(2)
     scene = card_before_wall(np.full((1, 1), 77, np.uint8))
     embree = build_scene_buffers(scene).embree
@@ -77,7 +77,7 @@ def test_a_blended_surface_stops_its_share_of_directions_evenly_from_everywhere(
     np.testing.assert_array_equal(fractions[0], fractions[1])
 
 
-def test_chances_that_are_given_share_out_opacity():
+def test_given_random_numbers_are_distributed_by_opacity():
     scene = card_before_wall(np.full((1, 1), 77, np.uint8))
     embree, num = build_scene_buffers(scene).embree, 800
     origins, directions = np.tile([0.4, 0.3, 1], (num, 1)).astype(np.float32), np.tile(DOWN, (num, 1))
@@ -88,16 +88,16 @@ def test_chances_that_are_given_share_out_opacity():
     assert (trace_rays(embree, origins, directions, np.full(1, STOP_AT_OPAQUE)).face < 2).all()
 
 
-def test_light_comes_through_holes_to_points_and_from_lamps():
+def test_light_passes_holes_to_points_and_from_local_lights():
     alpha = random_alpha(4, (6, 6))
     scene = card_before_wall(alpha, 0.5, ("clamp", "clamp"))
     geometry, (x, y) = build_scene_buffers(scene), np.random.default_rng(5).uniform(0.01, 0.99, (2, 3000))
     points = np.stack([x, y, np.full_like(x, -0.99)], axis=1).astype(np.float32)
     up = np.tile(-DOWN, (len(x), 1))
-    wanted = opacity_behind(scene.materials[1].opacity, 1.0, x, y)
-    clear = np.abs(wanted - 0.5) > 1e-3
+    expected = card_opacity(scene.materials[1].opacity, 1.0, x, y)
+    clear = np.abs(expected - 0.5) > 1e-3
     visible = trace_visibility(geometry.embree, points, up, -DOWN[None]).visible[:, 0] & 1
-    np.testing.assert_array_equal(visible[clear] == 1, (wanted < 0.5)[clear])
+    np.testing.assert_array_equal(visible[clear] == 1, (expected < 0.5)[clear])
     directional = prepare_local_lights(LightGeometry("directional", direction=(0.0, 0.0, -1.0)))
     light_visibility = trace_light_visibility(
         geometry.embree,
@@ -106,21 +106,21 @@ def test_light_comes_through_holes_to_points_and_from_lamps():
         make_light_strata(directional, 1),
         make_surface_points(points, up),
     )
-    np.testing.assert_array_equal((light_visibility[:, 0] & 1)[clear] == 1, (wanted < 0.5)[clear])
+    np.testing.assert_array_equal((light_visibility[:, 0] & 1)[clear] == 1, (expected < 0.5)[clear])
 
 
-@pytest.mark.parametrize("share", [0.1, 0.25, 0.6, 0.95])
-def test_pixels_show_a_blended_surface_by_its_opacity(share):
-    scene = card_before_wall(np.full((1, 1), round(255 * share), np.uint8))
+@pytest.mark.parametrize("coverage", [0.1, 0.25, 0.6, 0.95])
+def test_pixels_show_a_blended_surface_by_its_opacity(coverage):
+    scene = card_before_wall(np.full((1, 1), round(255 * coverage), np.uint8))
     samples = sample_view(scene, build_scene_buffers(scene), "front", (64, 48))
     of_card = np.bincount(samples.pixel, samples.weight * (samples.material == 1), minlength=64 * 48).reshape(48, 64)
     inside = of_card[16:32, 24:40]
-    assert np.abs(inside - share).max() <= 1 / 8
-    assert inside.mean() == pytest.approx(share, abs=0.01)  # eighths are dithered
+    assert np.abs(inside - coverage).max() <= 1 / 8
+    assert inside.mean() == pytest.approx(coverage, abs=0.01)  # multiples of 1/8 are dithered
     np.testing.assert_allclose(np.bincount(samples.pixel, samples.weight), 1, atol=1e-6)
 
 
-def test_the_rims_of_holes_are_smooth():
+def test_edges_of_holes_are_antialiased():
     alpha = np.zeros((64, 64), np.uint8)
     y, x = np.mgrid[:64, :64]
     alpha[np.hypot(x - 31.5, y - 31.5) < 24] = 255
@@ -134,7 +134,7 @@ def test_the_rims_of_holes_are_smooth():
     assert hidden.sum() == pytest.approx(np.pi * radius**2, rel=0.02)
 
 
-def test_scenes_without_holes_pay_nothing():
+def test_opaque_scenes_have_no_overhead():
     scene = card_before_wall(np.zeros((1, 1), np.uint8))
     whole = [Material(material.name, material.terms) for material in scene.materials]
     assert collect_alpha_masks(whole) is None
@@ -157,7 +157,7 @@ def test_scenes_without_holes_pay_nothing():
         {"texels": np.zeros(34, np.uint8)},
     ],
 )
-def test_what_a_damaged_store_says_of_holes_is_refused(damage):
+def test_damaged_opacity_of_a_store_is_rejected(damage):
     cutouts = collect_alpha_masks([Material("Wall", WHITE), Material("Card", WHITE, opacity=Opacity(random_alpha()))])
     assert isinstance(cutouts, AlphaMasks)
     check_alpha_masks(cutouts._asdict(), 2)
@@ -174,7 +174,7 @@ def test_what_a_damaged_store_says_of_holes_is_refused(damage):
         (None, True, False),
     ],
 )
-def test_only_what_blends_wants_more_rays_of_every_pixel(opacity, is_glass, blends):
+def test_only_blended_surfaces_need_more_rays_per_pixel(opacity, is_glass, blends):
     scene = card_before_wall(random_alpha())
     card = replace(scene.materials[1], opacity=opacity, glass=Glass() if is_glass else None)
     holes = build_scene_buffers(replace(scene, materials=(scene.materials[0], card))).embree.alpha_test

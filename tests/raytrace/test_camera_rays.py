@@ -1,4 +1,4 @@
-"""Rays of a camera against their twin in NumPy."""
+"""Camera rays against NumPy."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from relume.scene.examples.catalog import built_in
 SIZE = (64, 48)
 
 
-def test_rays_go_through_the_image_plane_of_the_camera():
+def test_rays_pass_through_the_image_plane():
     camera, rng = built_in("still_life").cameras[0], np.random.default_rng(5)
     x, y = (rng.uniform(0, side, 500).astype(np.float32) for side in SIZE)
     half = np.tan(camera.yfov / 2)

@@ -1,4 +1,4 @@
-"""Gather rays as estimators: what they weigh must add up to integrals that are known."""
+"""Gather rays as estimators: their weights must sum to known integrals."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def half_cosines(wi):
 
 
 def uniform(num):
-    """Even directions on the hemisphere, for quadrature. (num, 3)"""
+    """Uniform directions on the hemisphere, for quadrature. (num, 3)"""
     i = np.arange(num)
     z, phi = (i + 0.5) / num, i * np.pi * (3 - np.sqrt(5))
     across = np.sqrt(1 - z * z)
@@ -48,7 +48,7 @@ def test_directions_are_unit_and_weights_positive(num_glossy):
     assert weight.min() > 0
 
 
-def test_cosine_rays_alone_weigh_pi_together():
+def test_weights_of_cosine_rays_sum_to_pi():
     wi, weight = rays_of(make_pattern(377, 0, 1), 3)
     assert len(wi) == 377
     assert weight.sum() == pytest.approx(np.pi, rel=1e-5)
@@ -57,7 +57,7 @@ def test_cosine_rays_alone_weigh_pi_together():
 @pytest.mark.parametrize("exponent", [0, 10, 100, 1000])
 @pytest.mark.parametrize("num_glossy", [64, 200])
 def test_highlights_of_every_size_are_estimated_without_bias(exponent, num_glossy):
-    """∫ cos^s θh cos θi dω by rays of many points, against quadrature."""
+    """∫ cos^s θh cos θi dω by the rays of many points, against quadrature."""
     pattern = make_pattern(64, num_glossy, 5)
     estimates = []
     for point in range(300):
@@ -77,15 +77,15 @@ def test_glossy_rays_reduce_the_noise_of_a_highlight():
     assert noise(make_pattern(128, 128, 1)) < 0.3 * noise(make_pattern(256, 0, 1))
 
 
-def test_density_about_the_mirror_direction_is_one_over_the_half_vectors():
+def test_the_half_vector_density_integrates_to_one():
     """∫ p(h) dh = 1 over the hemisphere of h, with p(h) = 4 cos θd · p(ωi)."""
     cosine = np.linspace(0, 1, 2_000_001)
     density = 4 * np.array(glossy_pdf.py_func(cosine, 1.0), float)
     assert 2 * np.pi * np.trapezoid(density, cosine) == pytest.approx(1, rel=1e-3)
 
 
-def test_shifted_lattices_cover_the_square_evenly():
-    """All rays of many points together, as points of the unit square: u from the polar angle, v from the azimuth."""
+def test_shifted_lattices_cover_the_square_uniformly():
+    """All rays of many points, as points of the unit square: u from the polar angle, v from the azimuth."""
     pattern, counts = make_pattern(21, 0, 3), np.zeros((8, 8))
     for point in range(3000):
         x, y, _ = rays_of(pattern, point)[0].T
@@ -93,8 +93,8 @@ def test_shifted_lattices_cover_the_square_evenly():
     np.testing.assert_allclose(counts, 3000 * 21 / 64, rtol=0.05)
 
 
-def test_the_same_ray_of_all_points_goes_nearly_the_same_way():
-    """But for the few at the rim and in the middle of the disc, where shifts lead over its edge."""
+def test_a_ray_index_has_nearly_the_same_direction_at_all_points():
+    """Except near the border and the center of the disc, where shifts wrap around."""
     pattern, angles = make_pattern(377, 233, 3), []
     for ray in range(0, pattern.num_rays, 7):
         directions = np.array([local_ray(pattern, ray, lattice_offsets(pattern, point), *WO) for point in range(60)])
@@ -104,7 +104,7 @@ def test_the_same_ray_of_all_points_goes_nearly_the_same_way():
 
 
 @pytest.mark.parametrize("count", [1, 2, 55, 64, 377])
-def test_sides_of_a_lattice_are_vectors_between_its_points(count):
+def test_basis_vectors_of_a_lattice_connect_its_points(count):
     sides = make_pattern(count, 0, 1).sides[0].astype(float)
     assert abs(np.linalg.det(sides)) == pytest.approx(1 / count, rel=1e-5)
     step = _step(count)
@@ -116,10 +116,10 @@ def test_shifts_depend_on_seed_and_point():
     pattern = make_pattern(8, 0, 3)
     assert lattice_offsets(make_pattern(8, 0, 4), 5) != lattice_offsets(pattern, 5)
     far = lattice_offsets(pattern, 16_777_216 + 1), lattice_offsets(pattern, 16_777_216)
-    assert far[0] != far[1]  # points beyond the whole numbers of float32 are still told apart
+    assert far[0] != far[1]  # indices beyond the integers of float32 are still distinguished
 
 
 @pytest.mark.parametrize(("num_cosine", "num_glossy"), [(0, 8), (-1, 0), (MAX_RAYS, 1), (8, -1)])
-def test_counts_out_of_bounds_are_refused(num_cosine, num_glossy):
+def test_counts_out_of_bounds_are_rejected(num_cosine, num_glossy):
     with pytest.raises(PlanError):
         make_pattern(num_cosine, num_glossy, 0)

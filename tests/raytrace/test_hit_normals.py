@@ -1,4 +1,4 @@
-"""Normals at hits, by the kernel, against what `surface_at` interpolates."""
+"""Normals at hits by the kernel, against the interpolation of `surface_at`."""
 
 import numpy as np
 
@@ -9,8 +9,8 @@ from relume.raytrace.surface_interaction import surface_at
 from relume.scene.examples.catalog import built_in
 
 
-def test_normals_are_those_of_the_surface():
-    """Teapot and pearls, seen from within the scene: smooth, seen from behind, on edges of triangles, and nothing."""
+def test_normals_equal_those_of_the_surface():
+    """Teapot and pearls from within the scene: smooth normals, back faces, edges of triangles, and misses."""
     scene = built_in("still_life")
     geometry, camera, size = build_scene_buffers(scene), scene.cameras[0], (48, 36)
     y, x = np.divmod(np.arange(size[0] * size[1]), size[0])

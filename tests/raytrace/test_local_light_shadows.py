@@ -1,4 +1,4 @@
-"""Shadows of local lights against intersections by plain NumPy; lights that touch surfaces, and lights in walls."""
+"""Shadows of local lights against intersections in plain NumPy; lights at surfaces and inside walls."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ UP = np.array([0, 1, 0], np.float32)
 
 
 def crosses(triangles, start, end):
-    """Whether the segments (n, 3) meet any of the triangles (Möller, Trumbore 1997)."""
+    """True where a segment (n, 3) intersects any of the triangles (Möller, Trumbore 1997)."""
     a, e, f = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     along = end - start
     across = np.cross(along[:, None], f)
@@ -50,7 +50,7 @@ def surfaces():
     ],
     ids=lambda light: light.kind,
 )
-def test_bits_are_those_of_segments_that_meet_no_triangle(surfaces, light):
+def test_visibility_bits_equal_segment_intersections(surfaces, light):
     geometry, position, normal = surfaces
     made = prepare_local_lights(light)
     strata = make_light_strata(made, 16)
@@ -72,8 +72,8 @@ def test_bits_are_those_of_segments_that_meet_no_triangle(surfaces, light):
     assert 0.05 < bits.mean() < 0.95
 
 
-def test_very_many_samples_are_asked_in_fours_where_neighbours_agree():
-    """A floor in rows under a panel of which a card hides a third: bits are those of segments all the same."""
+def test_many_samples_are_traced_in_fours_where_neighbors_agree():
+    """A floor in rows under an area light, a third of it occluded by a card: bits still equal segment intersections."""
     panel, card = ([[x, y, -0.5], [1, y, -0.5], [1, y, 0.5], [x, y, 0.5]] for x, y in ((-1, 1.5), (0.37, 1.3)))
     corners = np.array(panel, np.float32)[[[0, 1, 2], [0, 2, 3]]]
     made = prepare_local_lights(LightGeometry("mesh", material="Lamp"), make_emissive_triangles(corners, False))
@@ -123,8 +123,8 @@ FLOOR = np.random.default_rng(4).uniform([-1, 1e-4, -1], [1, 1e-4, 1], (300, 3))
 NORMALS = np.tile(UP, (300, 1))
 
 
-def test_surface_that_shines_does_not_shadow_itself():
-    """The ceiling is the lamp: as bright as a rectangle where nothing is."""
+def test_an_emissive_surface_does_not_shadow_itself():
+    """The ceiling is the emitter: as bright as an unoccluded rectangle."""
     corners = CEILING.positions[CEILING.faces]
     emitter = LightGeometry("mesh", material="Lamp")
     actual = irradiance(embree_of(CEILING), emitter, FLOOR, NORMALS, make_emissive_triangles(corners, False))
@@ -135,13 +135,13 @@ def test_surface_that_shines_does_not_shadow_itself():
 
 
 @pytest.mark.parametrize("height", [2.0, 2.0 - 1e-6])
-def test_rectangle_in_the_plane_of_a_ceiling_is_not_shadowed_by_it(height):
+def test_a_rectangle_in_the_plane_of_a_ceiling_is_not_shadowed(height):
     light = LightGeometry("rectangle", (0.0, height, 0.0), size=(0.5, 0.5))
     actual = irradiance(embree_of(CEILING), light, FLOOR, NORMALS)
     assert np.all(actual > 0.01)
 
 
-def test_light_inside_a_wall_or_above_the_ceiling_lights_nothing():
+def test_lights_inside_a_wall_or_above_the_ceiling_are_occluded():
     above = quad("above", [[-1, 2.2, -1], [1, 2.2, -1], [1, 2.2, 1], [-1, 2.2, 1]], 0)
     wall = embree_of(CEILING, above)
     for light in (

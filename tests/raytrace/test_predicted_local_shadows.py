@@ -1,4 +1,4 @@
-"""Shadows predicted between few points that are traced, against the rule in NumPy over rays that are all traced."""
+"""Predicted shadows between few traced points, against the rule in NumPy on fully traced rays."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def surfaces():
 
 
 def predicted(visible, is_traced):
-    """Whether each ray of points reaches the light. seen, asked: (n, samples), of all rays that are traced"""
+    """True for each ray of a point that reaches the light. visible, is_traced: (n, samples), of all traced rays"""
     result = visible.copy()
     for first in range(0, len(visible), BLOCK):
         block = slice(first, first + BLOCK)
@@ -50,7 +50,7 @@ def predicted(visible, is_traced):
     ],
     ids=lambda light: light.kind,
 )
-def test_blocks_whose_probes_agree_are_predicted_and_all_others_traced(surfaces, light):
+def test_blocks_are_predicted_if_their_samples_agree(surfaces, light):
     geometry, position, normal = surfaces
     made = prepare_local_lights(light)
     strata = make_light_strata(made, 4)
@@ -71,7 +71,7 @@ def test_blocks_whose_probes_agree_are_predicted_and_all_others_traced(surfaces,
     assert 0.05 < visible.mean() < 0.95
 
 
-def test_points_that_no_light_reaches_stay_dark(surfaces):
+def test_unlit_points_stay_dark(surfaces):
     geometry, position, normal = surfaces
     made = prepare_local_lights(LightGeometry("point", (0.9, 1.4, 0.6)))
     strata = make_light_strata(made, 4)

@@ -1,4 +1,4 @@
-"""Predicted visibility against the full trace, against a twin in plain Python, and where prediction is hardest."""
+"""Predicted visibility against full tracing, against plain Python, and in the hardest cases."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from relume.raytrace.visibility_masks import make_light_targets, trace_visibilit
 from relume.scene.examples.still_life import demo_scene
 
 UNKNOWN, LIT, HIDDEN, BELOW = range(4)
-# What a bake may differ by from one that traces everything: bits, and relative RMSE of a picture. These pictures are a
+# Allowed difference from a fully traced bake: bits, and relative RMSE of an image. These images are a
 # fiftieth of the usual size, so that shadows change over fewer samples than they do in a bake.
 WRONG_SHARE, PICTURE_CHANGE = 1e-3, 1e-3
-HARDEST_CHANGE = 3e-3  # where all shadows are a pixel or two wide, which a picture of that size cannot show anyway
+HARDEST_CHANGE = 3e-3  # all shadows are one or two pixels wide, below the resolution of the image
 
 
 def bits_of(visible, num_lights):
@@ -33,8 +33,8 @@ def samples_of(scene, size, view=None):
     return geometry, samples.surface.points.position[solid], samples.surface.points.normal[solid]
 
 
-def both(scene, size, num_lights):
-    """Bits of the full trace and predicted ones, the light that each lets through, and the counts."""
+def trace_and_predict(scene, size, num_lights):
+    """Bits of the full trace and predicted bits, the irradiance of each, and the counts."""
     geometry, position, normal = samples_of(scene, size)
     lights = tessellate_environment(scene.environment.radiance, num_lights)
     full = trace_visibility(geometry.embree, position, normal, lights.direction)
@@ -53,20 +53,20 @@ def both(scene, size, num_lights):
 
 
 def in_pixels(scene, size, values):
-    """A value of each surface sample as the picture shows it: by its share of its pixel. (pixels,)"""
+    """Values of surface samples weighted into pixels. (pixels,)"""
     samples = sample_view(scene, build_scene_buffers(scene), scene.cameras[0].name, size)
     solid = samples.material != BACKGROUND
     return np.bincount(samples.pixel[solid], samples.weight[solid] * values, minlength=size[0] * size[1])
 
 
-def change(scene, size, full, predicted, weight):
-    """Relative RMSE of a picture of the irradiance."""
+def image_error(scene, size, full, predicted, weight):
+    """Relative RMSE of an image of the irradiance."""
     right, wrong = (in_pixels(scene, size, (bits * weight).sum(axis=1)) for bits in (full, predicted))
     return np.sqrt(np.mean((wrong - right) ** 2) / np.mean(right**2))
 
 
 def fence():
-    """Wires as thin as a third of a pixel, in front of a floor and a wall: every level's samples look between them."""
+    """Wires a third of a pixel thin in front of a floor and a wall: samples of every level see between them."""
     wires = [
         quad(f"wire{k}", [[x, 0, 0.5], [x + 0.004, 0, 0.5], [x + 0.004, 1, 0.5], [x, 1, 0.5]], 0)
         for k, x in enumerate(np.linspace(-1, 1, 41))
@@ -78,7 +78,7 @@ def fence():
 
 
 def lids():
-    """Tiles close above a floor: contact shadows a few pixels wide, between the samples that are traced first."""
+    """Tiles close above a floor: contact shadows a few pixels wide, between the first traced samples."""
     floor = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
     tiles = [
         quad(f"lid{k}", [[x, 0.01, z + 0.02], [x + 0.02, 0.01, z + 0.02], [x + 0.02, 0.01, z], [x, 0.01, z]], 0)
@@ -102,21 +102,21 @@ def first_of(lights, count):
         (fence, 1000, 2.0, HARDEST_CHANGE),
     ],
 )
-def test_predicted_bits_are_those_of_a_full_trace(scene, num_lights, saving, bound):
+def test_predicted_bits_equal_full_tracing(scene, num_lights, saving, bound):
     made, size = scene(), (96, 72)
-    full, predicted, weight, rays = both(made, size, num_lights)
+    full, predicted, weight, rays = trace_and_predict(made, size, num_lights)
     wrong = (full != predicted).sum() / rays.num_full
     assert wrong <= WRONG_SHARE
-    assert change(made, size, full, predicted, weight) <= bound
+    assert image_error(made, size, full, predicted, weight) <= bound
     assert rays.num_full > saving * rays.num_traced
     assert rays.num_checked > 0
-    # the estimate is that of what the check saw before it mended it: right to three deviations of the count
+    # the estimate is the error before correction: right within three deviations of the count
     assert wrong <= rays.error_rate + 3 * np.sqrt(rays.num_wrong + 9) / max(1, rays.num_checked)
     assert 0.1 < full[weight > 0].mean() < 0.999
 
 
-def twin(visible, facing, position, lights):
-    """The same bits and number of rays, sample by sample, from the answers of a full trace."""
+def predict_numpy(visible, facing, position, lights):
+    """Bits and number of rays, sample by sample, from the results of a full trace."""
     neighbours, power = find_neighbors(lights.direction), luminance(lights.irradiance)
     beside, strong = np.split(neighbours.neighbors, neighbours.first[1:-1]), power > 5e-3 * power.sum()
     bits, rays = np.zeros_like(visible), 0
@@ -160,7 +160,7 @@ def flood(visible, facing, is_traced, rows, samples, before, doubt, beside):
     lights = range(visible.shape[1])
     held = np.array([before[m] if facing[rows, m].any() else BELOW for m in lights])
     queue = [m for m in lights if held[m] != BELOW and doubt[m]]
-    for m in queue:  # grows as it runs
+    for m in queue:  # grows during the loop
         is_traced[samples, m] |= facing[samples, m]
         held[m] = predict(visible, facing, is_traced, rows, m)
         answers = visible[rows, m][is_traced[rows, m]]
@@ -172,15 +172,15 @@ def flood(visible, facing, is_traced, rows, samples, before, doubt, beside):
     return held, doubted
 
 
-def test_kernel_does_what_its_twin_does():
+def test_the_prediction_kernel_equals_its_reference():
     geometry, position, normal = samples_of(still_life(), (26, 20))
     lights = tessellate_environment(studio(), 300)
     visible = bits_of(trace_visibility(geometry.embree, position, normal, lights.direction).visible, lights.num_lights)
     actual = trace_visibility_masks(
         geometry.embree, position, normal, make_light_targets(lights.direction, lights.irradiance)
     )
-    assert actual.rays.num_wrong == 0  # the twin does not mend
-    bits, rays = twin(visible, normal @ lights.direction.T > 0, position, lights)
+    assert actual.rays.num_wrong == 0  # the reference does not correct
+    bits, rays = predict_numpy(visible, normal @ lights.direction.T > 0, position, lights)
     np.testing.assert_array_equal(bits_of(actual.visible, lights.num_lights), bits)
     assert actual.rays.num_traced == rays
 
@@ -197,12 +197,12 @@ def test_any_number_of_samples_and_lights(num_samples, num_lights):
     full = trace_visibility(geometry.embree, position, normal, lights.direction)
     assert actual.visible.shape == full.visible.shape
     assert actual.rays.num_traced <= actual.rays.num_full == full.num_rays
-    if num_samples <= 2:  # both are traced
+    if num_samples <= 2:  # all samples are traced
         np.testing.assert_array_equal(actual.visible, full.visible)
     assert not np.unpackbits(actual.visible, axis=1, bitorder="little")[:, num_lights:].any()
 
 
-def test_nothing_to_trace_is_no_error():
+def test_nothing_to_predict_is_no_error():
     geometry, position, normal = samples_of(still_life(), (24, 18))
     lights = tessellate_environment(studio(), 50)
     actual = trace_visibility_masks(

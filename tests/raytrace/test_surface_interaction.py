@@ -1,4 +1,4 @@
-"""Points on surfaces: where they lie when a ray hits the very edge of a triangle."""
+"""Surface points of rays that hit the edge of a triangle."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ INWARD = np.array([[-1.0, 0.0, 0.0]], np.float32)  # along the ray that hits the
 
 
 def on_wall(uv, corners=((0, 0, 0), (0, 0, 2), (0, 2, 2), (0, 2, 0))):
-    """The point of a wall in x = 0 that a ray hits at barycentric coordinates of its first triangle."""
+    """The point of a wall in x = 0 at barycentric coordinates of its first triangle."""
     floor = quad("floor", [[0, 0, 0], [2, 0, 0], [2, 0, 2], [0, 0, 2]], 0)
     geometry = build_scene_buffers(
         make_tiny_scene(quad("wall", corners, 0), floor, camera=make_camera("c", [1, 1, 1], [0, 1, 1], 1.0))
@@ -22,20 +22,20 @@ def on_wall(uv, corners=((0, 0, 0), (0, 0, 2), (0, 2, 2), (0, 2, 0))):
 
 
 @pytest.mark.parametrize("uv", [(0.4, 0.0), (0.0, 0.0), (1.0, 0.0)], ids=["edge", "corner", "other corner"])
-def test_point_on_an_edge_is_moved_off_the_surface_beside_it(uv):
-    """There it would see through the floor, in whose plane it lies."""
+def test_a_point_on_an_edge_is_moved_away_from_the_adjacent_surface(uv):
+    """On the edge it would see through the floor, in whose plane it lies."""
     position, epsilon = on_wall(uv)
     assert 0.1 * epsilon < position[1] < epsilon
     assert position[0] == pytest.approx(epsilon, rel=0.01)
 
 
-def test_other_points_stay():
+def test_other_points_are_unchanged():
     position, epsilon = on_wall((0.3, 0.3))
     np.testing.assert_allclose(position, [epsilon, 0.6, 1.2], rtol=1e-5)
 
 
-def test_point_of_a_sliver_stays_in_it():
-    """A triangle narrower than the distance to keep has a tenth of its height instead."""
+def test_a_point_of_a_sliver_stays_in_it():
+    """In a triangle narrower than the minimum distance, the distance is a tenth of its height."""
     thin = 1e-6
     geometry = build_scene_buffers(
         make_tiny_scene(

@@ -1,4 +1,4 @@
-"""Visibility bits against embreex's own tracer, and against shadows that are known in closed form."""
+"""Visibility bits against embreex's own tracer, and against shadows in closed form."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from relume.raytrace.camera_rays import camera_directions, trace_rays
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.raytrace.visibility import trace_visibility
 
-GRAZING_SHARE = 2e-5  # of the rays; those that pass within rounding of an edge may go either way
+GRAZING_SHARE = 2e-5  # of the rays; those within rounding of an edge may hit or miss
 
 
 def bits_of(visible, num_lights):
@@ -22,7 +22,7 @@ def bits_of(visible, num_lights):
 
 
 def embreex_scene(geometry):
-    """The same triangles through embreex's own wrapper: the oracle."""
+    """Triangles in embreex's own wrapper, as the reference."""
     scene = rtcore_scene.EmbreeScene()
     TriangleMesh(scene, geometry.positions[geometry.faces])
     return scene
@@ -52,7 +52,7 @@ def surfaces():
 
 @pytest.mark.parametrize("num_points", [1, 15, 16, 17, 511, 513, 1000])
 @pytest.mark.parametrize("num_lights", [8, 9, 101])
-def test_bits_are_embreexs_own_whatever_the_packets_width(surfaces, num_points, num_lights):
+def test_bits_equal_embreex_for_every_packet_width(surfaces, num_points, num_lights):
     geometry, position, normal = surfaces
     pick = np.random.default_rng(num_points).permutation(len(position))[:num_points]
     directions = unit(np.random.default_rng(5).normal(size=(num_lights, 3)))
@@ -75,7 +75,7 @@ def test_whole_view_against_embreex(surfaces):
     assert traced.trace_s > 0
 
 
-def test_lights_below_the_horizon_are_hidden_and_cost_no_ray(surfaces):
+def test_lights_below_the_horizon_are_hidden_without_rays(surfaces):
     geometry, position, normal = surfaces
     directions = unit(np.random.default_rng(6).normal(size=(64, 3)))
     bits = bits_of(trace_visibility(geometry.embree, position, normal, directions).visible, 64)
@@ -100,8 +100,8 @@ def test_nothing_to_trace_is_no_error(surfaces):
     assert traced.num_rays == 0
 
 
-def test_shadow_of_a_square_hole_is_the_analytic_one():
-    """A lid with a square hole over a floor: a point sees a direction when the ray leaves through the hole."""
+def test_the_shadow_of_a_square_hole_is_analytic():
+    """A lid with a square hole above a floor: a direction is visible if the ray passes the hole."""
     lid = [
         quad(f"lid{k}", [[x0, 1, z1], [x1, 1, z1], [x1, 1, z0], [x0, 1, z0]], 0)
         for k, (x0, x1, z0, z1) in enumerate(
@@ -122,8 +122,8 @@ def test_shadow_of_a_square_hole_is_the_analytic_one():
     assert 0.02 < bits.mean() < 0.5
 
 
-def test_shadow_of_a_ball_in_an_open_box_is_the_analytic_one():
-    """A ball over a floor between four low walls; rays near the ball's outline, where it has corners, are left out."""
+def test_the_shadow_of_a_ball_in_an_open_box_is_analytic():
+    """A ball above a floor between four low walls; rays near the ball's faceted outline are excluded."""
     ball = sphere("ball", [0, 1, 0], 0.5, 0, num_rings=24)
     floor = quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 0)
     corners = [(-2, 2), (2, 2), (2, -2), (-2, -2)]
@@ -152,8 +152,8 @@ def test_shadow_of_a_ball_in_an_open_box_is_the_analytic_one():
 
 
 @pytest.mark.parametrize("far_away", [0.0, 1000.0])
-def test_convex_things_see_all_of_the_open_sky(far_away):
-    """No surface shadows itself: neither a plane, nor a ball on whose triangles shading normals are bent."""
+def test_convex_objects_do_not_shadow_themselves(far_away):
+    """Neither a plane, nor a ball whose shading normals differ from its facets."""
     at = np.float64([far_away, 0, 0])
     plane = quad("plane", np.add([[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], at), 0)
     directions = tessellate_environment(studio(), 300).direction
@@ -175,13 +175,13 @@ def test_convex_things_see_all_of_the_open_sky(far_away):
     solid = samples.material != BACKGROUND
     position, normal = samples.surface.points.position[solid], samples.surface.points.normal[solid]
     bits = bits_of(trace_visibility(geometry.embree, position, normal, directions).visible, len(directions))
-    # facets are bent against the smooth normals by up to half of a ring: above both horizons nothing is in the way
+    # facets deviate from smooth normals by up to half a ring: above both horizons nothing occludes
     high = normal @ directions.T > np.sin(np.pi / 16)
     assert bits[high].all()
     assert high.mean() > 0.3
 
 
-def test_first_hits_are_embreexs_own():
+def test_first_hits_equal_embreex():
     scene = still_life()
     geometry = build_scene_buffers(scene)
     camera = scene.cameras[0]
@@ -191,7 +191,7 @@ def test_first_hits_are_embreexs_own():
     hits = trace_rays(geometry.embree, origin, directions)
     embreex_hits = embreex_scene(geometry).run(np.tile(origin, (len(directions), 1)), directions, output=True)
     same = hits.face == embreex_hits["primID"]
-    assert (~same).mean() < 1e-3  # a ray through the edge of two triangles may be given to either
+    assert (~same).mean() < 1e-3  # a ray through a common edge may hit either triangle
     hit = same & (hits.face >= 0)
     np.testing.assert_allclose(hits.distance[hit], embreex_hits["tfar"][hit], rtol=1e-5)
     np.testing.assert_allclose(hits.uv[hit], np.column_stack([embreex_hits["u"], embreex_hits["v"]])[hit], atol=2e-4)

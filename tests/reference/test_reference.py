@@ -1,4 +1,4 @@
-"""Brute force against closed forms, plain NumPy, its own statistics, and the frames that it is to judge."""
+"""The reference against closed forms, plain NumPy, its own statistics, and rendered frames."""
 
 from pathlib import Path
 
@@ -40,17 +40,17 @@ def image_of(scene, size, spp, *, reflects=False, **changes):
     return reference_image(scene, scene.cameras[0].name, validate(changes, default), size, spp, reflects=reflects)
 
 
-def test_white_ball_in_a_white_furnace_vanishes() -> None:
+def test_a_white_ball_in_a_white_furnace_vanishes() -> None:
     ball = sphere("ball", [0, 0, 0], 1.0, 0, num_rings=24)
     scene = make_tiny_scene(
         ball, camera=make_camera("front", [0, 0, 4], [0, 0, 0], 0.6), environment=np.ones((64, 128, 3), "f")
     )
-    # a facet hides what lies between its own plane and the smooth normal's horizon
+    # a facet occludes directions between its plane and the horizon of the smooth normal
     np.testing.assert_allclose(image_of(scene, (32, 32), 0), 1.0, rtol=0.01)
 
 
-def test_floor_under_one_texel_has_the_closed_form() -> None:
-    """R = L ΔΩ · albedo/π · cos θi, with a wall's shadow where the wall stands before the texel."""
+def test_a_floor_under_one_texel_equals_the_closed_form() -> None:
+    """R = L ΔΩ · albedo/π · cos θi, with the shadow of a wall in front of the texel."""
     radiance = np.zeros((16, 32, 3), np.float32)
     radiance[4, 16] = [300.0, 200.0, 100.0]
     wi = texel_directions(16, 32)[4, 16].astype(float)
@@ -84,7 +84,7 @@ HALF_ANGLE = [name for name, term in ANALYTIC.items() if "theta_h" in {curve.nam
 @pytest.mark.parametrize(
     ("model", "curves"), [*((name, {}) for name in ANALYTIC), *((name, DRAWN) for name in HALF_ANGLE)]
 )
-def test_terms_agree_with_the_plain_brdf(model: str, curves: dict[str, object]) -> None:
+def test_terms_equal_the_plain_brdf(model: str, curves: dict[str, object]) -> None:
     rng = np.random.default_rng(3)
     scene = make_tiny_scene(
         quad("far", [[90, 0, 1], [91, 0, 1], [91, 0, 0], [90, 0, 0]], 0),
@@ -110,7 +110,7 @@ def test_terms_agree_with_the_plain_brdf(model: str, curves: dict[str, object]) 
 
 
 def corner_of(albedo):
-    """A floor and a wall under a sky of one."""
+    """A floor and a wall in an environment of radiance one."""
     parts = [
         quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0),
         quad("wall", [[-1, 0, -1], [1, 0, -1], [1, 2, -1], [-1, 2, -1]], 0),
@@ -122,14 +122,14 @@ def corner_of(albedo):
 
 @pytest.mark.slow
 def test_white_corner_in_a_white_furnace_vanishes() -> None:
-    """What a wall hides of the sky it makes good by what it reflects."""
+    """The reflected light of the wall replaces the environment light that it occludes."""
     image = image_of(corner_of(1.0), (16, 16), 2048, reflects=True)  # noise of the mean: 0.4 %
     assert image.mean() == pytest.approx(1.0, rel=0.01)
     assert image_of(corner_of(1.0), (16, 16), 512).mean() < 0.9
 
 
-def test_light_paths_of_a_grey_corner_add_up() -> None:
-    """Russian roulette included: the same paths, told apart by their length."""
+def test_light_paths_of_a_gray_corner_add_up() -> None:
+    """Including Russian roulette: the same paths, separated by length."""
     shown = {
         show: image_of(corner_of(0.5), (16, 16), 64, reflects=True, transport={"show": show})
         for show in ("all", "direct", "first_bounce", "further_bounces")
@@ -139,29 +139,29 @@ def test_light_paths_of_a_grey_corner_add_up() -> None:
     assert 0.02 < shown["further_bounces"].mean() / shown["first_bounce"].mean() < 0.4
 
 
-def test_what_a_method_leaves_out_is_what_the_two_truths_differ_by() -> None:
+def test_the_omitted_light_is_the_difference_of_the_references() -> None:
     scene, size = corner_of(0.5), (16, 16)
 
-    def truth_of(reflects: bool, **transport: object) -> ReferenceImage:
+    def reference_of(reflects: bool, **transport: object) -> ReferenceImage:
         look = validate({"transport": transport}, default_look(scene.materials))
         return render_reference(scene, "front", look, size, 64, reflects=reflects)
 
     shown = {show: image_of(scene, size, 64, reflects=True, transport={"show": show}) for show in ("all", "direct")}
-    direct = truth_of(False)
-    np.testing.assert_allclose(direct.all_paths_image, shown["all"], rtol=1e-5)  # nothing is left of 24 bounces
+    direct = reference_of(False)
+    np.testing.assert_allclose(direct.all_paths_image, shown["all"], rtol=1e-5)  # light after 24 bounces is negligible
     np.testing.assert_allclose(direct.method_image, shown["direct"], rtol=1e-6)
     assert "reflect onto each other" in direct.omitted_paths[0]
-    few = truth_of(True, bounces=1)
+    few = reference_of(True, bounces=1)
     np.testing.assert_allclose(few.all_paths_image, shown["all"], rtol=1e-5)
     assert shown["direct"].mean() < few.method_image.mean() < few.all_paths_image.mean()
     assert few.omitted_paths == ("Light that more than 1 surfaces have reflected.",)
-    asked = truth_of(False, show="direct")  # of what is shown nothing is left out
-    np.testing.assert_array_equal(asked.all_paths_image, asked.method_image)
-    assert asked.omitted_paths == asked.unsupported_paths == ()
+    direct_only = reference_of(False, show="direct")  # no displayed light is omitted
+    np.testing.assert_array_equal(direct_only.all_paths_image, direct_only.method_image)
+    assert direct_only.omitted_paths == direct_only.unsupported_paths == ()
 
 
-def test_direct_light_seen_in_a_mirror_is_no_light_between_surfaces(tmp_path: Path) -> None:
-    """A wall of chrome before a coloured floor: frames of `direct` show the floor in it, and so does the truth."""
+def test_mirrored_direct_light_is_direct_light(tmp_path: Path) -> None:
+    """A chrome wall before a colored floor: frames of `direct` show the floor in it, and so does the reference."""
     chrome = {"model": "ggx", "color": [1, 1, 1], "params": {"roughness": 0.03, "f0": 0.9}}
     materials = (
         Material("Floor", ({"model": "lambert", "color": [0.8, 0.4, 0.1]},)),
@@ -183,11 +183,11 @@ def test_direct_light_seen_in_a_mirror_is_no_light_between_surfaces(tmp_path: Pa
     assert relative_rmse(frame[:10], followed[:10]) < 0.02
 
 
-def test_drawn_texels_estimate_all_of_them() -> None:
-    """The mean over packets with draws of their own lies within four standard errors, and the error falls."""
+def test_sampled_texels_are_unbiased() -> None:
+    """The mean over packets with separate random numbers lies within four standard errors, and the error falls."""
     scene = still_life()
     geometry, texels = build_scene_buffers(scene), environment_texels(scene.environment)
-    count = 16 * 64  # one point again and again: packets differ by their draw alone
+    count = 16 * 64  # one point repeatedly: packets differ by random numbers only
     repeat = lambda row: np.repeat(np.array([row], np.float32), count, axis=0)  # noqa: E731
     frame = repeat([0, 1, 0]), repeat([1, 0, 0]), repeat([0, 0.6, 0.8])
     points = ReferencePoints(repeat([0.6, 1e-3, 0.4]), *frame, {}, repeat([1.0])[:, 0])
@@ -203,17 +203,17 @@ def test_drawn_texels_estimate_all_of_them() -> None:
     assert spread[1] < spread[0] / 2
 
 
-def test_same_seed_same_picture() -> None:
+def test_the_same_seed_gives_the_same_image() -> None:
     scene = still_life()
     np.testing.assert_array_equal(image_of(scene, (24, 18), 40), image_of(scene, (24, 18), 40))
 
 
-def test_as_many_samples_as_texels_are_all_of_them() -> None:
+def test_as_many_samples_as_texels_use_all_texels() -> None:
     scene = still_life()
     np.testing.assert_array_equal(image_of(scene, (24, 18), 0), image_of(scene, (24, 18), 1 << 20))
 
 
-def test_rendered_frame_agrees(tmp_path: Path) -> None:
+def test_a_rendered_frame_equals_the_reference(tmp_path: Path) -> None:
     scene, size = still_life(), (48, 36)
     store = bake_in_process(DirectMethod(), scene, Recipe("direct", ("front",), size, 4000), tmp_path / "store.zarr")
     default = default_look(scene.materials)
@@ -224,8 +224,8 @@ def test_rendered_frame_agrees(tmp_path: Path) -> None:
     assert frame.mean() == pytest.approx(expected.mean(), rel=0.002)
 
 
-def test_rotation_is_that_of_a_map_turned_by_hand() -> None:
-    """Turning by one column is shifting the map by one: u falls where the map turns counter-clockwise from above."""
+def test_a_rotation_equals_a_shifted_map() -> None:
+    """A rotation by one column shifts the map by one: u decreases with the rotation."""
     radiance = studio(16)
     camera = make_camera("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8)
     ball = sphere("ball", [0, 0.5, 0], 0.5, 0, num_rings=10)
@@ -236,7 +236,7 @@ def test_rotation_is_that_of_a_map_turned_by_hand() -> None:
     np.testing.assert_allclose(turned, image_of(shifted, (32, 24), 0), rtol=2e-3, atol=1e-4)
 
 
-def test_it_can_be_cancelled_and_tells_how_far_it_is() -> None:
+def test_the_reference_reports_progress_and_can_be_cancelled() -> None:
     scene = still_life()
     look = validate({}, default_look(scene.materials))
     fractions: list[float] = []
@@ -247,7 +247,7 @@ def test_it_can_be_cancelled_and_tells_how_far_it_is() -> None:
         reference_image(scene, "front", look, (24, 18), 10, is_canceled=lambda: True)
 
 
-def test_what_a_bake_refuses_is_refused() -> None:
+def test_the_reference_rejects_what_a_bake_rejects() -> None:
     scene = still_life()
     look = validate({}, default_look(scene.materials))
     with pytest.raises(PlanError, match="no view"):
@@ -256,7 +256,7 @@ def test_what_a_bake_refuses_is_refused() -> None:
         reference_image(scene, "front", look, (100_000, 100_000), 10)
 
 
-def test_black_texels_are_left_out() -> None:
+def test_black_texels_are_omitted() -> None:
     radiance = np.zeros((8, 16, 3), np.float32)
     radiance[2, 3] = [0, 0, 1]
     assert environment_texels(Environment("one", radiance)).num_texels == 1
@@ -276,7 +276,7 @@ LIGHTS: dict[str, dict[str, object]] = {
 
 @pytest.fixture(scope="module")
 def lit_bake(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, FixedViewTransfer]:
-    """The still life, its wall a lamp."""
+    """The still life with an emissive wall."""
     parts = still_life()
     wall = Light("mesh", LIGHTS["mesh"])
     scene = make_scene("lit", parts.meshes, parts.materials, parts.cameras, parts.environment, lights=[wall])
@@ -286,7 +286,9 @@ def lit_bake(tmp_path_factory: pytest.TempPathFactory) -> tuple[Scene, FixedView
 
 
 @pytest.mark.parametrize("kind", LIGHTS)
-def test_frame_under_each_kind_of_local_light_agrees(lit_bake: tuple[Scene, FixedViewTransfer], kind: str) -> None:
+def test_frames_under_each_kind_of_local_light_equal_the_reference(
+    lit_bake: tuple[Scene, FixedViewTransfer], kind: str
+) -> None:
     scene, transfer = lit_bake
     lights = {"mesh": {"enabled": kind == "mesh"}, **({} if kind == "mesh" else {kind: LIGHTS[kind]})}
     look = validate({"environment": {"intensity": 0.0}, "lights": lights}, transfer.default_look)
@@ -294,5 +296,5 @@ def test_frame_under_each_kind_of_local_light_agrees(lit_bake: tuple[Scene, Fixe
     expected = reference_image(scene, "front", look, (48, 36), 1024 if kind in ("rectangle", "mesh") else 1)
     assert expected.mean() > 0.01
     assert frame.mean() == pytest.approx(expected.mean(), rel=0.01)
-    # curves in bands and few samples; the wall touches the floor, and few samples of it are near
+    # curves in bands and few samples; the wall touches the floor, with few samples near it
     assert relative_rmse(frame, expected) < {"rectangle": 0.03, "mesh": 0.07}.get(kind, 0.02)

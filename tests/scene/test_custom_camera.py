@@ -1,4 +1,4 @@
-"""Cameras that people place: what is refused, and that what is kept stays the same text."""
+"""Custom cameras: validation, and stable text after normalization."""
 
 import json
 import math
@@ -13,8 +13,8 @@ from relume.scene.examples.catalog import built_in
 POSE = [1, 0, 0, 3, 0, 1, 0, 2, 0, 0, 1, 9, 0, 0, 0, 1]
 
 
-def turned(degrees: float, scale: float = 1.0) -> list[float]:
-    """Turned about +Y, then scaled."""
+def rotated(degrees: float, scale: float = 1.0) -> list[float]:
+    """Rotated about +Y, then scaled."""
     c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     frame = np.array([[c, 0, s, 3], [0, 1, 0, 2], [-s, 0, c, 9], [0, 0, 0, 1]])
     frame[:3, :3] *= scale
@@ -25,7 +25,7 @@ def changed(index: int, value: float) -> list[float]:
     return [*POSE[:index], value, *POSE[index + 1 :]]
 
 
-def test_camera_of_a_scene_has_its_place_and_angle() -> None:
+def test_a_scene_camera_keeps_its_pose_and_angle() -> None:
     camera = make_custom_camera("Hero", POSE, 40).camera
     assert camera.name == "Hero"
     assert camera.to_world[:3, 3].tolist() == [3, 2, 9]
@@ -33,16 +33,16 @@ def test_camera_of_a_scene_has_its_place_and_angle() -> None:
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 7.5])
-def test_scale_is_taken_out_and_what_is_left_stays_the_same_text(scale: float) -> None:
-    placed = make_custom_camera("Hero", turned(33.3, scale), 40)
-    np.testing.assert_allclose(placed.camera.to_world, np.array(turned(33.3)).reshape(4, 4), atol=1e-12)
+def test_scale_is_removed_and_the_text_is_stable(scale: float) -> None:
+    placed = make_custom_camera("Hero", rotated(33.3, scale), 40)
+    np.testing.assert_allclose(placed.camera.to_world, np.array(rotated(33.3)).reshape(4, 4), atol=1e-12)
     text = json.dumps(placed.document())
     assert read_custom_camera(json.loads(text)) == placed
     assert json.dumps(read_custom_camera(json.loads(text)).document()) == text
 
 
 @pytest.mark.parametrize(
-    ("to_world", "said"),
+    ("to_world", "message"),
     [
         (POSE[:15], "16 finite numbers"),
         (changed(3, math.nan), "16 finite numbers"),
@@ -56,19 +56,19 @@ def test_scale_is_taken_out_and_what_is_left_stays_the_same_text(scale: float) -
         (changed(0, -1.0), "not mirrored"),
     ],
 )
-def test_what_is_no_camera_is_refused(to_world: list[float], said: str) -> None:
-    with pytest.raises(ParameterError, match=said):
+def test_invalid_poses_are_rejected(to_world: list[float], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
         make_custom_camera("Hero", to_world, 40)
 
 
 @pytest.mark.parametrize("yfov", [0.0, -40.0, 180.0, math.nan, math.inf])
-def test_angle_that_shows_nothing_is_refused(yfov: float) -> None:
+def test_invalid_angles_are_rejected(yfov: float) -> None:
     with pytest.raises(ParameterError, match="degrees"):
         make_custom_camera("Hero", POSE, yfov)
 
 
 @pytest.mark.parametrize("name", ["", " Hero", "a/b", "a\\b", "..", "x" * 81, "line\nbreak"])
-def test_name_that_is_no_part_of_an_address_is_refused(name: str) -> None:
+def test_names_that_are_invalid_in_urls_are_rejected(name: str) -> None:
     with pytest.raises(ParameterError, match="printable characters"):
         make_custom_camera(name, POSE, 40)
 
@@ -86,12 +86,12 @@ def test_name_that_is_no_part_of_an_address_is_refused(name: str) -> None:
         {"name": "Hero", "to_world": POSE, "yfov": "40"},
     ],
 )
-def test_document_that_is_no_camera_is_refused(document: object) -> None:
+def test_invalid_camera_documents_are_rejected(document: object) -> None:
     with pytest.raises(ParameterError):
         read_custom_camera(document)
 
 
-def test_a_scene_with_more_cameras_is_the_same_scene() -> None:
+def test_additional_cameras_do_not_change_the_scene_id() -> None:
     scene = built_in("cornell_box")
     own = scene.cameras[0].name
     more = with_cameras(scene, [make_custom_camera("Hero", POSE, 40).camera, make_custom_camera(own, POSE, 50).camera])

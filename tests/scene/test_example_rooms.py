@@ -1,4 +1,4 @@
-"""Scenes by code that light is reflected in: their surfaces face where they are seen from, and light gets in."""
+"""Example scenes with indirect light: front faces are visible, and light reaches the interior."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SCENES = {"cornell": cornell_box, "lamplit": lamplit_cornell_box, "interior": in
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_nothing_is_seen_from_behind(name):
+def test_no_back_face_is_visible(name):
     scene = SCENES[name]()
     for mesh in scene.meshes:
         a, b, c = (mesh.positions[mesh.faces[:, k]].astype(float) for k in range(3))
@@ -24,7 +24,7 @@ def test_nothing_is_seen_from_behind(name):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_all_materials_are_in_the_picture(name):
+def test_all_materials_are_visible(name):
     scene = SCENES[name]()
     samples = sample_view(scene, build_scene_buffers(scene), "front", (64, 64))
     assert set(range(len(scene.materials))) <= set(samples.material.tolist()) - {BACKGROUND}

@@ -1,4 +1,4 @@
-"""Warnings and what they do to the picture."""
+"""Import warnings and their effect on the image."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ def imported() -> Scene:
     return import_scene(TRIANGLE.encode(), "test", LIGHT)
 
 
-def test_an_import_tells_the_worst_first() -> None:
+def test_warnings_are_sorted_by_severity() -> None:
     assert [(warning.severity, str(warning)) for warning in imported().warnings] == [
         ("unsupported", "the material file 'none.mtl' is not beside the scene; import both together"),
         ("ignored", "lines of kind 'l' are not used; only faces are"),
     ]
 
 
-def test_effects_are_kept_with_the_scene(tmp_path: Path) -> None:
+def test_effects_are_stored_with_the_scene(tmp_path: Path) -> None:
     scene = imported()
     save_scene(scene, tmp_path)
     loaded = load_scene(tmp_path)
@@ -39,7 +39,7 @@ def test_effects_are_kept_with_the_scene(tmp_path: Path) -> None:
     ]
 
 
-def test_scenes_of_before_there_were_effects_still_open(tmp_path: Path) -> None:
+def test_scenes_without_effects_still_open(tmp_path: Path) -> None:
     save_scene(imported(), tmp_path)
     document = json.loads((tmp_path / "scene.json").read_text())
     document["warnings"] = ["something is off"]
@@ -48,7 +48,7 @@ def test_scenes_of_before_there_were_effects_still_open(tmp_path: Path) -> None:
     assert (warning, warning.severity) == ("something is off", "unsupported")
 
 
-def test_what_is_left_out_of_a_long_list_weighs_least() -> None:
+def test_long_lists_omit_the_least_severe_warnings() -> None:
     scene = imported()
     warnings = [ignored("a little thing")] * MAX_WARNINGS + [approximated("a mean")] * 3 + [unsupported("a hole")]
     listed = finalize("test", scene.meshes, scene.materials, scene.cameras, LIGHT, warnings).warnings
@@ -56,7 +56,7 @@ def test_what_is_left_out_of_a_long_list_weighs_least() -> None:
     assert (listed[-1], listed[-1].severity, len(listed)) == ("and 4 more of the kind", "ignored", MAX_WARNINGS + 1)
 
 
-def test_a_remark_survives_documents_and_processes() -> None:
+def test_a_warning_survives_serialization_and_pickling() -> None:
     import_warning = approximated("a mean")
     for copy in (
         warning_of(json.loads(json.dumps(import_warning.document()))),

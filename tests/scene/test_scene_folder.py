@@ -1,4 +1,4 @@
-"""Scenes as folders: what goes in comes out, under the same id, or is refused."""
+"""Scene folders: saved scenes are loaded unchanged with the same id, invalid ones are rejected."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from relume.scene.model import Camera, Glass, Light, Material, Mesh, Opacity, Sc
 from relume.scene.scene_folder import load_cameras, load_scene, make_scene, save_scene
 
 
-def test_another_scene_of_the_same_id_is_not_written_over_the_first(tmp_path: Path) -> None:
+def test_another_scene_with_the_same_id_does_not_overwrite_the_first(tmp_path: Path) -> None:
     scene = small_scene()
     save_scene(scene, tmp_path)
     save_scene(scene, tmp_path)
@@ -28,7 +28,7 @@ def test_another_scene_of_the_same_id_is_not_written_over_the_first(tmp_path: Pa
     assert load_scene(tmp_path).id == scene.id
     document = json.loads((tmp_path / "scene.json").read_text())
     assert document.pop("sha256")[:16] == scene.id
-    (tmp_path / "scene.json").write_text(json.dumps(document))  # as it was saved before
+    (tmp_path / "scene.json").write_text(json.dumps(document))  # as older versions saved it
     save_scene(scene, tmp_path)
     load_scene(tmp_path)
 
@@ -60,7 +60,7 @@ def small_scene(**changes: object) -> Scene:
     return make_scene(**(parts | changes))  # type: ignore[arg-type]
 
 
-def test_archive_round_trip_keeps_everything(tmp_path: Path) -> None:
+def test_saving_and_loading_keeps_everything(tmp_path: Path) -> None:
     scene = small_scene()
     save_scene(scene, tmp_path / "scene")
     loaded = load_scene(tmp_path / "scene")
@@ -107,8 +107,8 @@ def test_id_changes_with_content_but_not_with_warnings() -> None:
     assert small_scene(warnings=[]).id == scene.id
 
 
-def test_shapes_of_cameras_are_stored_and_say_nothing_of_the_content(tmp_path: Path) -> None:
-    """Scenes of before cameras had one keep their ids."""
+def test_camera_aspects_are_stored_and_not_part_of_the_id(tmp_path: Path) -> None:
+    """Ids of older scenes do not change."""
     camera = Camera("front", np.eye(4), 0.5, 16 / 9)
     wide, plain = small_scene(cameras=[camera]), small_scene(cameras=[dataclasses.replace(camera, aspect=None)])
     assert wide.id == plain.id
@@ -196,12 +196,12 @@ def test_make_scene_refuses_parts_that_do_not_fit() -> None:
         ([Light("x" * 81, {"kind": "point"})], "1 to 80"),
     ],
 )
-def test_lights_without_usable_names_or_too_many_make_no_scene(lights: list[Light], message: str) -> None:
+def test_invalid_names_or_numbers_of_lights_are_rejected(lights: list[Light], message: str) -> None:
     with pytest.raises(SceneError, match=message):
         small_scene(lights=lights)
 
 
-def test_opacity_is_kept_and_changes_the_id(tmp_path: Path) -> None:
+def test_opacity_is_stored_and_changes_the_id(tmp_path: Path) -> None:
     alpha = np.arange(12, dtype=np.uint8).reshape(3, 4)
     ids = {small_scene().id}
     for cutoff in (None, 0.5, 0.25):
@@ -227,12 +227,12 @@ def test_opacity_is_kept_and_changes_the_id(tmp_path: Path) -> None:
         Opacity(np.zeros((2, 2), np.uint8), cutoff=float("nan")),
     ],
 )
-def test_opacity_that_is_no_image_of_bytes_is_refused(opacity: Opacity) -> None:
+def test_opacity_must_be_an_8_bit_image(opacity: Opacity) -> None:
     with pytest.raises(SceneError, match=r"opacity|cut at"):
         small_scene(materials=[dataclasses.replace(small_scene().materials[0], opacity=opacity)])
 
 
-def test_glass_is_kept_and_changes_the_id(tmp_path: Path) -> None:
+def test_glass_is_stored_and_changes_the_id(tmp_path: Path) -> None:
     clear = small_scene()
     glass = Glass((0.5, 0.25, 1.0), 1.4, 0.125, (3.0, 0.0, 0.5))
     scene = small_scene(materials=[dataclasses.replace(clear.materials[0], glass=glass)])
@@ -246,13 +246,13 @@ def test_glass_is_kept_and_changes_the_id(tmp_path: Path) -> None:
     [{"ior": 0.5}, {"ior": 100.0}, {"ior": float("nan")}, {"tint": (2.0, 0.0, 0.0)}, {"absorbed": (-1.0, 0.0, 0.0)},
      {"thickness": float("inf")}, {"tint": (0.5, 0.5)}],
 )  # fmt: skip
-def test_glass_that_nothing_is_made_of_is_refused(fields: dict[str, object]) -> None:
+def test_unphysical_glass_is_rejected(fields: dict[str, object]) -> None:
     glass = dataclasses.replace(Glass(), **fields)
     with pytest.raises(SceneError, match="glass of material"):
         small_scene(materials=[dataclasses.replace(small_scene().materials[0], glass=glass)])
 
 
-def test_maps_of_roughness_are_kept(tmp_path: Path) -> None:
+def test_roughness_maps_are_stored(tmp_path: Path) -> None:
     pixels = np.arange(12, dtype=np.uint8).reshape(3, 4, 1)
     texture = Texture(pixels, ("clamp", "mirror"), TextureEncoding("share", (2.0, 2.0, 2.0)))
     material = dataclasses.replace(small_scene().materials[0], textures={"roughness": texture})
@@ -275,7 +275,7 @@ def test_maps_of_roughness_are_kept(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_textures_that_their_channel_cannot_use_are_refused(channel: str, texture: Texture) -> None:
+def test_textures_unsuitable_for_their_channel_are_rejected(channel: str, texture: Texture) -> None:
     material = dataclasses.replace(small_scene().materials[0], textures={channel: texture})
     with pytest.raises(SceneError, match=channel):
         small_scene(materials=[material])

@@ -1,4 +1,4 @@
-"""A ground under a scene: where it is, how large, and what it leaves as it was."""
+"""A shadow-catcher ground under a scene: position, size, and the unchanged scene."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from relume.scene.shadow_catcher_ground import with_ground
 CAMERA = make_camera("front", (0, 2, 5), (0, 1, 0), 0.6)
 
 
-def test_it_lies_below_everything_and_far_around():
+def test_the_ground_lies_below_the_scene_and_extends_far():
     scene = make_tiny_scene(sphere("ball", (3.0, 1.0, -2.0), 0.5, 0), camera=CAMERA)
     ground = with_ground(scene)
     disc = ground.meshes[-1]
@@ -28,7 +28,7 @@ def test_it_lies_below_everything_and_far_around():
     assert ground.cameras == scene.cameras
 
 
-def test_flat_scenes_get_one_too():
+def test_flat_scenes_get_a_ground():
     level = quad("level", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
     upright = quad("upright", [[0, 0, 0], [0, 0, 0.001], [0, 2, 0.001], [0, 2, 0]], 0)
     for mesh in (level, upright):
@@ -37,7 +37,7 @@ def test_flat_scenes_get_one_too():
         assert np.ptp(disc[:, 0]) > 10
 
 
-def test_its_name_is_free_and_there_is_one_alone(tmp_path):
+def test_the_ground_has_a_unique_name_and_is_added_once(tmp_path):
     scene = still_life()
     ground = with_ground(scene, "With a ground")
     assert [m.name for m in ground.materials] == [*(m.name for m in scene.materials), "Ground"]

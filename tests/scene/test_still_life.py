@@ -1,4 +1,4 @@
-"""The built-in still life: sound geometry, nothing in the air, nothing inside anything else, the same every time."""
+"""The built-in still life: valid geometry, no floating or intersecting objects, deterministic."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_frames_are_orthonormal(scene: Scene) -> None:
         assert set(np.unique(mesh.tangents[:, 3])) == {1.0}
 
 
-def test_faces_look_where_their_normals_do(scene: Scene) -> None:
+def test_faces_are_oriented_like_their_normals(scene: Scene) -> None:
     for mesh in scene.meshes:
         corners = mesh.positions[mesh.faces].astype(np.float64)
         faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -55,15 +55,15 @@ def test_faces_look_where_their_normals_do(scene: Scene) -> None:
         assert (faces * mesh.normals[mesh.faces].mean(1)).sum(1).min() > 0.3, mesh.name
 
 
-def test_the_table_shows_its_front_to_both_views(scene: Scene, meshes: dict[str, Mesh]) -> None:
-    """It is no closed surface; a renderer that draws fronts only must see it."""
+def test_the_table_faces_both_views(scene: Scene, meshes: dict[str, Mesh]) -> None:
+    """It is no closed surface: a renderer with back-face culling must show it."""
     mesh = meshes["Table"]
     for camera in scene.cameras:
         towards = camera.to_world[:3, 3] - mesh.positions
         assert np.mean((mesh.normals * towards).sum(axis=1) > 0) > 0.95
 
 
-def test_spheres_and_shells_are_closed_and_turned_outwards(meshes: dict[str, Mesh]) -> None:
+def test_spheres_and_shells_are_closed_and_oriented_outward(meshes: dict[str, Mesh]) -> None:
     for name in ("Tray", "Bowl", "Pearls"):
         mesh = meshes[name]
         welded = trimesh.Trimesh(np.round(mesh.positions.astype(np.float64), 7), mesh.faces)
@@ -85,7 +85,7 @@ def test_the_teapots_patches_meet() -> None:
     edges = [tessellate(points, 8).positions.reshape(9, 9, 3) for _, points in patches()]
     borders = [np.concatenate([e[0], e[-1], e[:, 0], e[:, -1]]) for e in edges]
     distance, _ = cKDTree(np.concatenate(borders)).query(np.concatenate(borders[4:12]), k=2)
-    assert distance[:, 1].max() < 1e-12  # every border point of the body's patches has a twin
+    assert distance[:, 1].max() < 1e-12  # every border point of the body's patches has a counterpart
 
 
 def test_the_teapot_is_newells(shared_data: Path) -> None:
@@ -96,7 +96,7 @@ def test_the_teapot_is_newells(shared_data: Path) -> None:
     assert distance.max() < 1e-5
 
 
-def test_things_stand_on_what_is_under_them(meshes: dict[str, Mesh]) -> None:
+def test_objects_stand_on_their_support(meshes: dict[str, Mesh]) -> None:
     pot = teapot(14, still_life.TEAPOT_HEIGHT)
     assert pot.positions[:, 1].min() == pytest.approx(0, abs=1e-12)
     floor = meshes["Tray"].positions
@@ -149,12 +149,12 @@ def test_terms_name_models_parameters_and_textures_that_exist(scene: Scene) -> N
                 assert term["texture"] in material.textures
 
 
-def test_five_models_are_on_show(scene: Scene) -> None:
+def test_the_scene_uses_five_models(scene: Scene) -> None:
     shown = {term["model"] for material in scene.materials for term in material.terms}
     assert shown == {"lambert", "ggx", "cook_torrance", "ashikhmin_shirley", "blinn_phong"}
 
 
-def test_the_studio_has_a_large_key_and_a_small_lamp(scene: Scene) -> None:
+def test_the_studio_has_a_large_key_and_a_small_light(scene: Scene) -> None:
     radiance = scene.environment.radiance.mean(-1).astype(np.float64)
     power = radiance * texel_solid_angles(*radiance.shape)[:, None]
     is_bright = radiance > 100
@@ -173,4 +173,4 @@ def test_the_views_show_the_still_life(scene: Scene, meshes: dict[str, Mesh]) ->
         half_height = np.tan(camera.yfov / 2)
         x, y = -local[:, 0] / local[:, 2] / (half_height * 4 / 3), -local[:, 1] / local[:, 2] / half_height
         assert max(np.abs(x).max(), np.abs(y).max()) < 0.95
-        assert np.ptp(y) > 0.6  # large in the picture
+        assert np.ptp(y) > 0.6  # large in the image

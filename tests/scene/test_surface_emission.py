@@ -1,4 +1,4 @@
-"""Images of what surfaces shine: means over surfaces, triangle by triangle."""
+"""Emission images: means over surfaces, triangle by triangle."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def image(pixels):
     return Texture(np.array(pixels, np.uint8), encoding=TextureEncoding("srgb"))
 
 
-def test_mean_is_over_surfaces_and_the_image_over_it() -> None:
+def test_the_image_is_normalized_by_the_mean_over_surfaces() -> None:
     red_left = image([[[255, 0, 0], [0, 0, 0]]])
     material, emission = normalize_emission(Material("m", (), {"emission": red_left}), np.array([4.0, 4, 4]), [FLOOR])
     assert emission.tolist() == [2.0, 0, 0]
@@ -25,7 +25,7 @@ def test_mean_is_over_surfaces_and_the_image_over_it() -> None:
 
 
 @pytest.mark.parametrize("pixels", [[[[255, 128, 0]]], [[[200, 200, 200], [201, 200, 199]]]])
-def test_an_image_of_one_colour_is_none(pixels) -> None:
+def test_an_image_of_one_color_is_dropped(pixels) -> None:
     material, emission = normalize_emission(
         Material("m", (), {"emission": image(pixels)}), np.array([2.0, 2, 2]), [FLOOR]
     )
@@ -33,14 +33,16 @@ def test_an_image_of_one_colour_is_none(pixels) -> None:
     assert emission[0] > 1
 
 
-def test_triangles_shine_as_their_part_of_the_image_does() -> None:
+def test_triangles_emit_the_mean_of_their_part_of_the_image() -> None:
     below = image([[[0, 0, 0]] * 4] * 2 + [[[255, 255, 255]] * 4] * 2)
-    shares = average_over_faces(below, FLOOR)  # of the first triangle three quarters lie below, of the other one
+    shares = average_over_faces(
+        below, FLOOR
+    )  # three quarters of the first triangle lie below, one quarter of the other
     np.testing.assert_allclose(shares, [[0.75] * 3, [0.25] * 3], atol=0.13)
     assert shares.mean() == pytest.approx(0.5)
 
 
-def test_faces_of_a_scene_come_in_its_order_and_others_shine_evenly() -> None:
+def test_faces_are_in_scene_order_and_others_emit_uniformly() -> None:
     wall = quad("wall", [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], 1)
     lit = Material(
         "lit", (), {"emission": Texture(np.full((1, 2, 3), 128, np.uint8), encoding=TextureEncoding("srgb"))}

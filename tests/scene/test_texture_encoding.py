@@ -1,4 +1,4 @@
-"""Textures as bytes: they say what their values said, are halved as values, and are kept as they are."""
+"""Textures as bytes: same values, downsampled as values, stored unchanged."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_display_values_are_linear_times_a_scale() -> None:
     np.testing.assert_allclose(decoded, [[[0, 2 * 0.5029, 0.5]]], atol=1e-4)
 
 
-def test_normals_are_scaled_turned_and_of_length_one() -> None:
+def test_normals_are_scaled_rotated_and_normalized() -> None:
     pixels = np.array([[[255, 127, 255], [128, 128, 255], [127, 128, 127]]], np.uint8)
     x, up, none = decode(pixels, TextureEncoding("normal", (0.5, 0.5, 1.0)))[0]
     np.testing.assert_allclose(x, np.array([0.5, 0, 1]) / np.hypot(0.5, 1), atol=5e-3)
@@ -36,12 +36,12 @@ def test_normals_are_scaled_turned_and_of_length_one() -> None:
     np.testing.assert_allclose(turned[:2], [x[1], -x[0]], atol=1e-6)
 
 
-def test_pixels_without_a_coding_are_values() -> None:
+def test_pixels_without_an_encoding_are_values() -> None:
     pixels = np.random.default_rng(2).random((3, 4, 3), np.float32)
     np.testing.assert_array_equal(decode(pixels, None), pixels)
 
 
-def test_means_and_made_textures_go_over_all_rows() -> None:
+def test_means_and_derived_textures_cover_all_rows() -> None:
     height = 2 * ROWS_PER_BATCH + 3
     values = np.random.default_rng(3).random((height, 5, 3), np.float32) * np.float32([1, 4, 0.25])
     max_values = values.max(axis=(0, 1)).astype(np.float64)
@@ -54,15 +54,17 @@ def test_means_and_made_textures_go_over_all_rows() -> None:
 
 
 @pytest.mark.parametrize("size", [(9, 7), (ROWS_PER_BATCH + 3, 6), (1, 8), (1, 1)])
-def test_pyramids_of_bytes_are_those_of_their_values(size: tuple[int, int]) -> None:
+def test_mip_maps_of_bytes_equal_those_of_their_values(size: tuple[int, int]) -> None:
     coded = Texture(random_bytes(*size), encoding=TextureEncoding("srgb", (1.0, 0.5, 2.0)))
     plain = Texture(get_texture_values(coded))
     of_bytes, of_values = MipMap(coded), MipMap(plain)
     assert [level.shape for level in of_bytes.levels] == [level.shape for level in of_values.levels]
     uv = np.random.default_rng(4).uniform(-2, 2, (500, 2)).astype(np.float32)
     for footprint in (0.0, 0.1, 0.4, 3.0):
-        actual, wanted = (pyramid.sample(uv, np.full(500, footprint, np.float32)) for pyramid in (of_bytes, of_values))
-        np.testing.assert_allclose(actual, wanted, rtol=1e-3, atol=1e-4)
+        actual, expected = (
+            pyramid.sample(uv, np.full(500, footprint, np.float32)) for pyramid in (of_bytes, of_values)
+        )
+        np.testing.assert_allclose(actual, expected, rtol=1e-3, atol=1e-4)
 
 
 def scene_with(texture: Texture) -> Scene:
@@ -71,7 +73,7 @@ def scene_with(texture: Texture) -> Scene:
     return make_tiny_scene(floor, camera=make_camera("front", (0, 2, 2), (0, 0, 0), 0.8), materials=[material])
 
 
-def test_bytes_and_codings_are_kept_in_archives(tmp_path: Path) -> None:
+def test_bytes_and_encodings_are_stored(tmp_path: Path) -> None:
     coded = Texture(random_bytes(), ("mirror", "clamp"), TextureEncoding("srgb", (0.5, 1.0, 2.0)))
     scene = scene_with(coded)
     save_scene(scene, tmp_path)
@@ -85,7 +87,7 @@ def test_bytes_and_codings_are_kept_in_archives(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "texture", [Texture(random_bytes()), Texture(np.ones((2, 2, 3), np.float32), encoding=TextureEncoding("srgb"))]
 )
-def test_pixels_that_do_not_fit_their_coding_are_refused(tmp_path: Path, texture: Texture) -> None:
+def test_pixels_that_do_not_fit_their_encoding_are_rejected(tmp_path: Path, texture: Texture) -> None:
     save_scene(scene_with(texture), tmp_path)
     with pytest.raises(SceneError, match="a texture of the scene"):
         load_scene(tmp_path)

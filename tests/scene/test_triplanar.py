@@ -1,4 +1,4 @@
-"""Which materials take a projection, because their triangles have no place in textures."""
+"""Tri-planar mapping of materials whose triangles have no UV coordinates."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ def mesh(name, material, is_mapped):
     return replace(quad(name, CORNERS, material), uvs=places if is_mapped else np.zeros_like(places))
 
 
-def test_most_triangles_decide():
+def test_the_majority_of_triangles_decides():
     def found(*meshes):
         return find_triplanar(make_tiny_scene(*meshes, camera=CAMERA))
 

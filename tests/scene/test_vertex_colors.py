@@ -1,4 +1,4 @@
-"""Colours of vertices: an image says them to within a byte, for glTF and PLY, and alike ones are no image."""
+"""Vertex colors as an image, within one byte, for glTF and PLY; uniform colors give no image."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from relume.scene_io.referenced_files import NoFiles
 LIGHT = Environment("grey", np.ones((2, 4, 3), np.float32))
 
 
-def test_look_ups_between_corners_are_what_is_between_their_colours() -> None:
+def test_lookups_interpolate_between_vertex_colors() -> None:
     rng = np.random.default_rng(3)
     calm = 0.5 + 0.15 * rng.random((50, 3, 4))
     gaudy = rng.random((50, 3, 4))
@@ -41,7 +41,7 @@ def quad(colors: np.ndarray, **pbr: object) -> Scene:
 COLORS = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1], [1, 1, 1, 0.5]], np.float32)
 
 
-def test_they_are_the_diffuse_image_and_the_opacity_of_a_glass_like_paint() -> None:
+def test_vertex_colors_give_the_diffuse_image_and_opacity() -> None:
     scene = quad(COLORS, metallicFactor=0)
     (material,), (mesh,) = scene.materials, scene.meshes
     assert scene.warnings == ()
@@ -59,7 +59,7 @@ def quad_corners() -> np.ndarray:
 
 
 @pytest.mark.parametrize("alpha", [1.0, 0.5])
-def test_alike_ones_multiply_the_colour(alpha: float) -> None:
+def test_uniform_vertex_colors_multiply_the_material_color(alpha: float) -> None:
     scene = quad(np.tile([0.25, 0.5, 1.0, alpha], (4, 1)), metallicFactor=0)
     (material,) = scene.materials
     assert not material.textures
@@ -67,7 +67,7 @@ def test_alike_ones_multiply_the_colour(alpha: float) -> None:
     np.testing.assert_allclose(color / color[2], [0.25, 0.5, 1], atol=1e-4)
 
 
-def test_of_a_material_with_textures_they_are_their_mean_and_it_says_so() -> None:
+def test_textured_materials_use_the_mean_vertex_color_with_a_warning() -> None:
     glb = Glb()
     texture = {"index": glb.texture([[[255, 255, 255], [0, 0, 0]]])}
     glb.quad({"name": "Wood", "pbrMetallicRoughness": {"baseColorTexture": texture}}, COLOR_0=COLORS)
@@ -75,7 +75,7 @@ def test_of_a_material_with_textures_they_are_their_mean_and_it_says_so() -> Non
     assert len([warning for warning in scene.warnings if "replaced by their mean" in warning]) == 1
 
 
-def test_a_ply_file_shows_them() -> None:
+def test_vertex_colors_of_ply_files_are_used() -> None:
     header = "ply\nformat ascii 1.0\nelement vertex 3\n"
     header += "".join(f"property float {name}\n" for name in ("x", "y", "z"))
     header += "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
@@ -88,7 +88,7 @@ def test_a_ply_file_shows_them() -> None:
 
 
 @pytest.mark.parametrize("objects", [1, 2])
-def test_an_obj_file_of_one_object_shows_them_and_others_say_that_they_do_not(objects: int) -> None:
+def test_vertex_colors_of_obj_files_are_used_for_one_object_only(objects: int) -> None:
     lines = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\n" + "".join(f"o {k}\nf 1 2 3\n" for k in range(objects))
     scene = import_obj(lines.encode(), "x", LIGHT, NoFiles())
     if objects == 2:

@@ -1,4 +1,4 @@
-"""Geometry packed by Draco and by meshoptimizer is the geometry that was packed."""
+"""Geometry decoded from Draco and meshoptimizer equals the encoded geometry."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 
 
 def corners(mesh: Mesh) -> set[tuple[tuple[float, ...], ...]]:
-    """Each triangle as its corners, wherever it begins."""
+    """Each triangle as its vertices in canonical order."""
     points = np.round(mesh.positions[mesh.faces], 3).tolist()
     return {min(tuple(tuple(p[(i + k) % 3]) for k in range(3)) for i in range(3)) for p in points}
 
@@ -29,13 +29,13 @@ def expected() -> set[tuple[tuple[float, ...], ...]]:
 
 
 @pytest.mark.parametrize("level", [0, 1, 7, 10])
-def test_draco_holds_the_triangles_and_their_texture_coordinates(level: int) -> None:
+def test_draco_preserves_triangles_and_uv_coordinates(level: int) -> None:
     (mesh,) = import_gltf(draco_glb(level=level).bytes(), "test", LIGHT).meshes
     assert corners(mesh) == expected()
     np.testing.assert_allclose(mesh.uvs, mesh.positions[:, :2] / [6, 3], atol=2e-3)
 
 
-def test_draco_is_not_asked_where_the_plain_data_is_there() -> None:
+def test_draco_is_ignored_if_plain_data_exists() -> None:
     glb = draco_glb(b"no Draco at all")
     positions, uvs, faces = grid()
     plain = [glb.accessor(values) for values in (positions, uvs, faces.reshape(-1))]
@@ -47,7 +47,7 @@ def test_draco_is_not_asked_where_the_plain_data_is_there() -> None:
 
 
 @pytest.mark.parametrize("name", ["EXT_meshopt_compression", "KHR_meshopt_compression"])
-def test_meshopt_holds_the_triangles_and_their_normals(name: str) -> None:
+def test_meshopt_preserves_triangles_and_normals(name: str) -> None:
     scene = import_gltf(meshopt_glb(name).bytes(), "test", LIGHT)
     (mesh,) = scene.meshes
     assert corners(mesh) == expected()
@@ -57,7 +57,7 @@ def test_meshopt_holds_the_triangles_and_their_normals(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", VECTORS)
-def test_meshopt_unpacks_as_its_reference_does(name: str) -> None:
+def test_meshopt_decoding_equals_its_reference(name: str) -> None:
     vector = VECTORS[name]
     packed, count, stride = base64.b64decode(vector["packed"]), vector["count"], vector["stride"]
     plain = np.frombuffer(base64.b64decode(vector["plain"]), np.uint8)
@@ -66,7 +66,7 @@ def test_meshopt_unpacks_as_its_reference_does(name: str) -> None:
     else:
         decode = decode_triangles if vector["mode"] == "TRIANGLES" else decode_sequence
         decoded = decode(packed, count).astype(f"<u{stride}").view(np.uint8)
-    if vector["filter"] == "OCTAHEDRAL":  # halves are rounded to even numbers here, up there
+    if vector["filter"] == "OCTAHEDRAL":  # halves round to even here, and up in the reference
         kind = "i1" if stride == 4 else "<i2"
         assert np.abs(decoded.view(kind).astype(int) - plain.view(kind)).max() <= 1
     else:

@@ -1,4 +1,4 @@
-"""What relume understands of glTF, on small files made by hand and on real ones."""
+"""glTF import of small files built by code and of real ones."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def material_of(description: dict[str, Any], glb: Glb | None = None) -> Material
     return imported((glb or Glb()).quad(description)).materials[0]
 
 
-def test_a_plain_quad_comes_as_it_is() -> None:
+def test_a_plain_quad_is_imported_unchanged() -> None:
     scene = imported(Glb().quad())
     mesh = scene.meshes[0]
     np.testing.assert_array_equal(mesh.positions, QUAD)
@@ -57,7 +57,7 @@ def test_translation_rotation_and_scale_act_in_this_order() -> None:
         {"mesh": 0, "rotation": [0, 0, half, half], "scale": [2, 1, 1], "translation": [0, 1, 0]},
     ]
     mesh = imported(glb).meshes[0]
-    # (1, 0, 0) → scaled (2, 0, 0) → turned a quarter about z (0, 2, 0) → moved (0, 3, 0) → parent (10, 3, 0)
+    # (1, 0, 0) → scaled (2, 0, 0) → rotated by 90° about z (0, 2, 0) → moved (0, 3, 0) → parent (10, 3, 0)
     np.testing.assert_allclose(mesh.positions[1], [10, 3, 0], atol=1e-6)
     np.testing.assert_allclose(mesh.normals[0], [0, 0, 1], atol=1e-6)
 
@@ -77,14 +77,14 @@ def test_normals_take_the_inverse_transpose() -> None:
 
 
 @pytest.mark.parametrize("scale", [[-1, 1, 1], [-1, -1, -1], [1, 2, -3]])
-def test_mirrors_turn_the_faces_with_the_normals(scale: list[float]) -> None:
+def test_reflections_flip_faces_and_normals(scale: list[float]) -> None:
     glb = Glb().quad()
     glb.document["nodes"][0]["scale"] = scale
     mesh = imported(glb).meshes[0]
     np.testing.assert_allclose(face_normals(mesh), mesh.normals[:2], atol=1e-6)
 
 
-def test_instances_are_meshes_of_their_own_under_their_own_names() -> None:
+def test_instances_are_separate_meshes_with_separate_names() -> None:
     glb = Glb().quad()
     glb.document["nodes"] = [{"mesh": 0, "name": "chair", "translation": [i, 0, 0]} for i in range(3)]
     glb.document["scenes"] = [{"nodes": [0, 1, 2]}]
@@ -101,7 +101,7 @@ def test_missing_normals_are_flat() -> None:
     np.testing.assert_allclose(mesh.normals, np.repeat(face_normals(mesh), 3, axis=0), atol=1e-6)
 
 
-def test_a_normal_without_length_is_made_from_the_triangles() -> None:
+def test_a_zero_normal_is_replaced_by_the_face_normals() -> None:
     normals = QUAD_NORMALS.copy()
     normals[2] = 0
     scene = imported(Glb().quad(NORMAL=normals))
@@ -119,7 +119,7 @@ def test_strips_and_fans_face_the_same_way(mode: int, corners: list[int]) -> Non
     np.testing.assert_allclose(face_normals(mesh), [[0, 0, 1]] * 2, atol=1e-6)
 
 
-def test_sparse_accessors_replace_what_they_name() -> None:
+def test_sparse_accessors_replace_their_elements() -> None:
     glb = Glb().quad()
     indices, values = glb.view(np.array([2], np.uint16).tobytes()), glb.view(np.array([2, 2, 0], "<f4").tobytes())
     glb.document["accessors"][0]["sparse"] = {
@@ -130,7 +130,7 @@ def test_sparse_accessors_replace_what_they_name() -> None:
     np.testing.assert_array_equal(imported(glb).meshes[0].positions[2], [2, 2, 0])
 
 
-def test_normalised_and_strided_attributes_are_scaled() -> None:
+def test_normalized_and_strided_attributes_are_scaled() -> None:
     uvs = np.zeros((4, 4), np.uint8)  # two of four bytes used: a stride of 4
     uvs[:, :2] = [[0, 255], [255, 255], [255, 0], [0, 51]]
     glb = Glb().quad()
@@ -168,7 +168,7 @@ def test_parameters_stay_in_the_ranges_of_the_terms() -> None:
                 assert parameter.minimum <= values.min() <= values.max() <= parameter.maximum
 
 
-def test_base_colour_textures_are_linearised_into_the_diffuse_channel() -> None:
+def test_base_color_textures_are_linearized_into_the_diffuse_channel() -> None:
     glb = Glb()
     index = glb.texture([[[0, 128, 255], [255, 0, 10]]], {"wrapS": 33_071, "wrapT": 33_648})
     pbr = {"baseColorTexture": {"index": index}, "baseColorFactor": [0.5, 1, 1, 1], "metallicFactor": 0}
@@ -180,7 +180,7 @@ def test_base_colour_textures_are_linearised_into_the_diffuse_channel() -> None:
     np.testing.assert_allclose(material.terms[0]["color"], np.array([0.5, 1, 1]) * DIELECTRIC_TRANSMISSION, atol=1e-6)
 
 
-def test_metallic_textures_share_out_base_colour() -> None:
+def test_metallic_textures_divide_the_base_color() -> None:
     glb = Glb()
     base = glb.texture([[[255, 255, 255], [255, 255, 255]]])
     packed = glb.texture([[[0, 51, 0], [0, 51, 255]]])
@@ -189,12 +189,12 @@ def test_metallic_textures_share_out_base_colour() -> None:
     np.testing.assert_allclose(get_texture_values(material.textures["diffuse"])[0, :, 0], [1, 0])
     ggx = material.terms[1]
     f0 = np.array(ggx["params"]["f0"]) * get_texture_values(material.textures["specular"])[0]
-    np.testing.assert_allclose(f0, [[0.04] * 3, [1.0] * 3], rtol=0.02)  # a byte of display values
+    np.testing.assert_allclose(f0, [[0.04] * 3, [1.0] * 3], rtol=0.02)  # 8-bit display values
     assert ggx["params"]["roughness"] == pytest.approx(0.2)
     assert ggx["texture"] == "specular"
 
 
-def test_a_varying_roughness_texture_scales_the_width_and_a_plain_one_is_its_mean() -> None:
+def test_roughness_textures_scale_the_width_or_give_their_mean() -> None:
     glb = Glb()
     packed = glb.texture([[[0, 0, 0], [0, 255, 0]]])
     pbr = {"metallicRoughnessTexture": {"index": packed}, "roughnessFactor": 0.8}
@@ -234,7 +234,7 @@ def test_normal_maps_are_scaled_and_get_tangents() -> None:
     np.testing.assert_allclose(scene.meshes[0].tangents, [[1, 0, 0, 1]] * 4, atol=1e-6)
 
 
-def test_tangents_of_mirrored_coordinates_change_hand() -> None:
+def test_tangents_of_mirrored_uvs_change_handedness() -> None:
     glb = Glb()
     index = glb.texture([[[128, 128, 255]]])
     mirrored = QUAD_UVS * np.array([-1, 1], np.float32)
@@ -247,7 +247,7 @@ def test_texture_transforms_move_coordinates() -> None:
     moved = {"offset": [0.5, 0.25], "rotation": np.pi / 2, "scale": [2, 3]}
     info = {"index": glb.texture([[[1, 2, 3]]]), "extensions": {"KHR_texture_transform": moved}}
     mesh = imported(glb.quad({"pbrMetallicRoughness": {"baseColorTexture": info}})).meshes[0]
-    # (u, v) = (1, 0) → (2, 0) → a quarter turn counter-clockwise with v down: (0, -2) → (0.5, -1.75)
+    # (u, v) = (1, 0) → (2, 0) → 90° counter-clockwise with v down: (0, -2) → (0.5, -1.75)
     np.testing.assert_allclose(mesh.uvs[2], [0.5, -1.75], atol=1e-6)
 
 
@@ -255,8 +255,8 @@ def at(scale, offset=(0, 0), **more):
     return {"extensions": {"KHR_texture_transform": {"scale": scale, "offset": list(offset)}}} | more
 
 
-def test_an_image_that_is_repeated_more_often_than_another_is_tiled() -> None:
-    """Bumps four times along u and twice along v as often as the base colour."""
+def test_images_with_different_repeats_are_tiled() -> None:
+    """The normal map repeats four times along u and twice along v relative to the base color."""
     rng, glb = np.random.default_rng(3), Glb()
     bumps, base = rng.integers(0, 255, (6, 4, 3)), rng.integers(0, 255, (2, 2, 3))
     of_base = {"index": glb.texture(base)} | at([0.5, 2], (0.25, 0.5))
@@ -266,20 +266,20 @@ def test_an_image_that_is_repeated_more_often_than_another_is_tiled() -> None:
     assert not scene.warnings
     normal_map = scene.materials[0].normal_map
     assert normal_map is not None
-    # u of the bumps is 4 u of the base − 0.5, two texels of four; v is 2 v + 0.5, three of six
+    # u of the normal map is 4 u of the base color − 0.5, two texels of four; v is 2 v + 0.5, three of six
     np.testing.assert_array_equal(normal_map.pixels, np.tile(np.roll(bumps, (-3, 2), axis=(0, 1)), (2, 4, 1)))
     np.testing.assert_allclose(scene.meshes[0].uvs, QUAD_UVS * [0.5, 2] + [0.25, 0.5])
 
 
 @pytest.mark.parametrize("other", [at([1.5, 1]), {"texCoord": 1}, at([9000, 1])])
-def test_images_that_cannot_be_placed_alike_are_told_of(other) -> None:
+def test_incompatible_texture_transforms_give_a_warning(other) -> None:
     glb = Glb()
     base, bumps = ({"index": glb.texture([[[1, 2, 3], [3, 4, 5]]])} for _ in range(2))
     scene = imported(glb.quad({"normalTexture": bumps | other, "pbrMetallicRoughness": {"baseColorTexture": base}}))
     assert any("placed differently" in warning for warning in scene.warnings)
 
 
-def test_the_second_set_of_coordinates_is_used_where_asked_for() -> None:
+def test_the_second_uv_set_is_used_if_referenced() -> None:
     glb = Glb()
     info = {"index": glb.texture([[[1, 2, 3]]]), "texCoord": 1}
     other = QUAD_UVS * np.float32(0.5)
@@ -287,7 +287,7 @@ def test_the_second_set_of_coordinates_is_used_where_asked_for() -> None:
     np.testing.assert_array_equal(mesh.uvs, other)
 
 
-def test_cameras_are_rigid_and_named_for_urls() -> None:
+def test_cameras_are_rigid_with_names_valid_in_urls() -> None:
     glb = Glb().quad()
     glb.document["cameras"] = [
         {"type": "perspective", "perspective": {"yfov": 0.6, "aspectRatio": 1.5}, "name": "Über Küche / 1"},
@@ -304,7 +304,7 @@ def test_cameras_are_rigid_and_named_for_urls() -> None:
     assert any("not a perspective" in warning for warning in scene.warnings)
 
 
-def test_a_scene_without_camera_is_framed_whole() -> None:
+def test_a_scene_without_camera_gets_a_framing_camera() -> None:
     glb = Glb().quad()
     glb.document["nodes"][0] |= {"scale": [7, 0.5, 1], "translation": [30, 2, -9]}
     scene = imported(glb)
@@ -319,7 +319,7 @@ def test_a_scene_without_camera_is_framed_whole() -> None:
     assert np.abs(x).max() > 0.5 * half_height * 4 / 3 or np.abs(y).max() > 0.5 * half_height
 
 
-def test_each_thing_not_understood_is_one_warning_that_names_it() -> None:
+def test_each_unsupported_feature_gives_one_warning() -> None:
     glb = Glb()
     texture = {"index": glb.texture([[[9, 9, 9]]])}
     description = {
@@ -339,7 +339,7 @@ def test_each_thing_not_understood_is_one_warning_that_names_it() -> None:
     assert len([warning for warning in warnings if "'Lamp'" in warning]) == 2
 
 
-def test_equal_material_names_are_told_apart() -> None:
+def test_equal_material_names_are_made_unique() -> None:
     glb = Glb().quad({"name": "Wood"})
     glb.document["materials"] *= 2
     primitives = glb.document["meshes"][0]["primitives"]
@@ -350,7 +350,7 @@ def test_equal_material_names_are_told_apart() -> None:
 def test_real_scenes_are_imported(shared_data: Path) -> None:
     names = re.compile(r"[a-z0-9-]{1,40}\Z")
     for path in sorted((shared_data / "scenes").rglob("*.gl[bt]*")):
-        if path.name in ("living_room.gltf", "chess_set.gltf"):  # one lacks an image, one is large
+        if path.name in ("living_room.gltf", "chess_set.gltf"):  # one misses an image, one is large
             continue
         scene = import_gltf(self_contained(path) if path.suffix == ".gltf" else path.read_bytes(), path.stem, LIGHT)
         assert scene.meshes, path

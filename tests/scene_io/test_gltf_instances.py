@@ -1,4 +1,4 @@
-"""Nodes that show their mesh in many places."""
+"""Nodes with instances of their mesh."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def imported(glb: Glb) -> Scene:
     return import_gltf(glb.bytes(), "test", LIGHT)
 
 
-def test_each_instance_is_moved_turned_and_scaled_inside_of_its_node() -> None:
+def test_instance_transforms_are_relative_to_their_node() -> None:
     half = np.sqrt(0.5)
     scene = imported(
         instanced(
@@ -46,7 +46,7 @@ def test_each_instance_is_moved_turned_and_scaled_inside_of_its_node() -> None:
     assert scene.warnings == ()
 
 
-def test_attributes_that_are_not_known_are_not_read() -> None:
+def test_unknown_attributes_are_not_read() -> None:
     glb = instanced(TRANSLATION=[[0, 0, 0], [2, 0, 0]], _ID=[1.0, 2.0])
     assert len(imported(glb).meshes) == 2
     assert len(imported(instanced(_ID=[1.0, 2.0])).meshes) == 1
@@ -64,15 +64,15 @@ def test_many_meshes_of_one_material_are_joined(monkeypatch: pytest.MonkeyPatch)
     np.testing.assert_array_equal(mesh.positions[mesh.faces], corners)
 
 
-def test_instances_of_no_size_and_out_of_range_are_left_out_and_said() -> None:
+def test_invalid_instances_are_omitted_with_a_warning() -> None:
     scene = imported(instanced(SCALE=[[1, 1, 1], [0, 1, 1], [np.nan, 1, 1], [1e20, 1, 1]]))
     assert len(scene.meshes) == 1
     assert any("2 of the instances" in str(warning) for warning in scene.warnings)
     assert any("scaled to nothing" in str(warning) for warning in scene.warnings)
 
 
-def test_instances_that_are_flattened_are_what_is_left_of_them() -> None:
-    """By a scale of nothing along what has no extent; and the sides of a box, which fall onto its plane."""
+def test_flattened_instances_keep_their_remaining_geometry() -> None:
+    """Scaled by zero along an axis without extent; and the sides of a box, which collapse into its plane."""
     scene = imported(instanced(SCALE=[[1, 1, 0], [2, -3, 0]]))
     assert len(scene.meshes) == 2
     for mesh, scale in zip(scene.meshes, ([1, 1, 0], [2, -3, 0]), strict=True):
@@ -82,7 +82,7 @@ def test_instances_that_are_flattened_are_what_is_left_of_them() -> None:
     assert [str(warning) for warning in scene.warnings] == ["2 meshes are flattened by their nodes, 'tree' among them"]
 
 
-def test_a_matrix_of_any_rank_sends_normals_across_what_it_makes_of_planes() -> None:
+def test_normals_stay_perpendicular_for_matrices_of_any_rank() -> None:
     rng = np.random.default_rng(3)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     for scales in ([1.0, 2.0, 3.0], [1.0, 2.0, 0.0], [1e-6, 2e-6, 3e-6]):
@@ -95,7 +95,7 @@ def test_a_matrix_of_any_rank_sends_normals_across_what_it_makes_of_planes() -> 
         assert count_dimensions(turn * scales) < 2
 
 
-def test_nodes_that_go_round_are_shown_once_and_said() -> None:
+def test_cyclic_nodes_are_shown_once_with_a_warning() -> None:
     glb = Glb().quad()
     glb.document["nodes"][0] |= {"name": "tree", "children": [1], "translation": [1, 0, 0]}
     glb.document["nodes"].append({"children": [0, 2], "translation": [0, 1, 0]})
@@ -109,7 +109,7 @@ def test_nodes_that_go_round_are_shown_once_and_said() -> None:
 
 
 @pytest.mark.parametrize("extension", [[], {"attributes": 3}, {"attributes": {"TRANSLATION": -1}}, {}])
-def test_an_extension_that_is_not_valid_is_said(extension: object) -> None:
+def test_an_invalid_instancing_extension_gives_a_warning(extension: object) -> None:
     glb = Glb().quad()
     glb.document["nodes"][0]["extensions"] = {"EXT_mesh_gpu_instancing": extension}
     scene = imported(glb)
@@ -117,7 +117,7 @@ def test_an_extension_that_is_not_valid_is_said(extension: object) -> None:
     assert any("not valid" in str(warning) for warning in scene.warnings)
 
 
-def test_instances_that_do_not_fit_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_many_instances_are_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(SceneError, match="have attributes of 1 and of 2"):
         imported(instanced(TRANSLATION=[[0, 0, 0]], SCALE=[[1, 1, 1], [1, 1, 1]]))
     with pytest.raises(SceneError, match="give vectors of 3"):

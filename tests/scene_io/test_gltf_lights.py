@@ -1,4 +1,4 @@
-"""Lights of glTF files: lamps at nodes and materials that shine, in relume's units, or refused with a sentence."""
+"""Lights of glTF files: punctual lights and emissive materials in relume's units, or rejected with a message."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def imported(glb: Glb) -> Scene:
 
 
 def with_lights(lights: list[Any], nodes: list[dict[str, Any]] | None = None) -> Glb:
-    """A quad and a node for each light, or nodes of your own."""
+    """A quad and a node for each light, or the given nodes."""
     glb = Glb().quad()
     glb.document["extensions"] = {"KHR_lights_punctual": {"lights": lights}}
     nodes = (
@@ -34,7 +34,7 @@ def with_lights(lights: list[Any], nodes: list[dict[str, Any]] | None = None) ->
     return glb
 
 
-def test_lamps_are_where_their_nodes_are_and_shine_as_brightly() -> None:
+def test_punctual_lights_have_the_pose_and_intensity_of_their_node() -> None:
     lights = [
         {"type": "point", "name": "Bulb", "color": [1, 0.5, 0], "intensity": 1366},
         {"type": "spot", "intensity": 683, "spot": {"innerConeAngle": np.pi / 6, "outerConeAngle": np.pi / 3}},
@@ -55,7 +55,7 @@ def test_lamps_are_where_their_nodes_are_and_shine_as_brightly() -> None:
     assert len([warning for warning in scene.warnings if "683" in warning]) == 1
 
 
-def test_materials_shine_with_their_factor_their_strength_and_their_texture_s_mean() -> None:
+def test_emission_is_factor_times_strength_times_texture_mean() -> None:
     glb = Glb()
     half = {"index": glb.texture([[[255, 255, 255], [0, 0, 0]]])}
     glb.quad(
@@ -75,7 +75,7 @@ def test_materials_shine_with_their_factor_their_strength_and_their_texture_s_me
     assert not scene.warnings
 
 
-def test_an_image_that_is_black_where_it_is_seen_shines_not() -> None:
+def test_emission_images_black_on_the_surface_give_no_light() -> None:
     glb = Glb()
     half = glb.texture(np.repeat([[[0, 0, 0]] * 8 + [[255, 255, 255]] * 8], 16, axis=0))
     shrunk = {"extensions": {"KHR_texture_transform": {"scale": [0.25, 1]}}}
@@ -91,21 +91,21 @@ def test_material_without_emission_is_no_light() -> None:
     assert not imported(glb.quad({"emissiveTexture": {"index": glb.texture([[[255, 255, 255]]])}})).lights
 
 
-def test_equal_names_are_told_apart_and_ranges_are_warned_of() -> None:
+def test_equal_light_names_are_made_unique_and_ranges_give_a_warning() -> None:
     point_light = {"type": "point", "name": "Lamp/1", "range": 3.0}
     scene = imported(with_lights([point_light, point_light]))
     assert [light.name for light in scene.lights] == ["Lamp-1", "Lamp-1 2"]
     assert len([warning for warning in scene.warnings if "range" in warning]) == 2
 
 
-def test_sixty_four_lights_are_read_and_thousands_are_refused() -> None:
+def test_sixty_four_lights_are_read_and_thousands_are_rejected() -> None:
     assert len(imported(with_lights([{"type": "point"}] * 64)).lights) == 64
     for num in (65, 3000):
         with pytest.raises(SceneError, match="more than 64 lights"):
             imported(with_lights([{"type": "point"}] * num))
 
 
-def test_light_too_bright_is_held_and_one_scaled_to_nothing_left_out() -> None:
+def test_too_bright_lights_are_clamped_and_zero_scaled_ones_omitted() -> None:
     named = {"extensions": {"KHR_lights_punctual": {"light": 0}}}
     scene = imported(with_lights([{"type": "spot", "intensity": 1e20}], [named, {**named, "scale": [0, 0, 0]}]))
     assert [light.fields["emission"] for light in scene.lights] == [[1e6, 1e6, 1e6]]
@@ -127,7 +127,7 @@ def test_light_too_bright_is_held_and_one_scaled_to_nothing_left_out() -> None:
         ([{"type": "point"}] * 10_001, {"light": 0}),
     ],
 )
-def test_lights_that_are_not_valid_are_refused(lights: Any, node: Any) -> None:
+def test_invalid_gltf_lights_are_rejected(lights: Any, node: Any) -> None:
     glb = with_lights(lights, [{"extensions": {"KHR_lights_punctual": node}}])
     with pytest.raises(SceneError, match="export it again"):
         imported(glb)

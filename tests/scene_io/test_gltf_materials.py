@@ -1,4 +1,4 @@
-"""Material extensions of glTF as terms: what each means, and what is said where it cannot be kept."""
+"""glTF material extensions as terms, and warnings where they cannot be represented."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ def terms_of(extensions: dict[str, Any], **material: Any) -> tuple[dict[str, Any
 
 
 @pytest.mark.parametrize(("ior", "f0"), [(1.0, 0.0), (1.33, 0.02005946), (1.5, 0.04), (2.42, 0.172394), (0.0, 1.0)])
-def test_ior_gives_the_reflectance_head_on(ior: float, f0: float) -> None:
+def test_ior_gives_the_reflectance_at_normal_incidence(ior: float, f0: float) -> None:
     ggx = terms_of({"ior": {"ior": ior}})[1]
     np.testing.assert_allclose(ggx["params"]["f0"], f0, atol=1e-6)
 
 
 @pytest.mark.parametrize(("f0", "f90"), [(0.04, 1.0), (0.17, 1.0), (0.02, 0.5), (0.0, 0.0)])
-def test_what_scatters_light_gets_what_is_not_reflected_before(f0: float, f90: float) -> None:
-    """The mean of F(θd) over light and eye, both as many as their cosine says."""
+def test_the_diffuse_term_gets_the_transmitted_light(f0: float, f90: float) -> None:
+    """The mean of F(θd) over light and view directions, both cosine-weighted."""
     rng = np.random.default_rng(7)
     square, turn = rng.random((2, 400_000)), rng.uniform(0, 2 * np.pi, 400_000)
     cosine, sine = np.sqrt(square), np.sqrt(1 - square)
@@ -66,13 +66,13 @@ def test_specular_gives_both_ends_of_the_fresnel_curve() -> None:
         np.testing.assert_allclose(actual, expected, atol=1e-6)
 
 
-def test_metals_do_not_mind_what_is_said_of_dielectrics() -> None:
+def test_metals_ignore_dielectric_parameters() -> None:
     metal = {"pbrMetallicRoughness": PLASTIC | {"metallicFactor": 1}}
     plain = terms_of({}, **metal)
     assert terms_of({"ior": {"ior": 1.1}, "specular": {"specularFactor": 0.1}}, **metal) == plain
 
 
-def test_specular_textures_share_out_the_reflectance() -> None:
+def test_specular_textures_scale_the_reflectance() -> None:
     glb = Glb()
     weight = glb.texture([[[255, 255, 255, 0], [255, 255, 255, 255]]])
     scene = imported({"specular": {"specularTexture": {"index": weight}}}, glb)
@@ -81,7 +81,7 @@ def test_specular_textures_share_out_the_reflectance() -> None:
     np.testing.assert_allclose(head_on, [[0] * 3, [0.04] * 3], atol=1e-6)
 
 
-def test_a_coat_is_a_second_highlight_that_dims_what_is_below() -> None:
+def test_a_coat_is_a_second_highlight_that_attenuates_the_base() -> None:
     bare = terms_of({})
     lambert, below, coat = terms_of({"clearcoat": {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.1}})
     assert coat["model"] == "ggx"
@@ -94,7 +94,7 @@ def test_a_coat_is_a_second_highlight_that_dims_what_is_below() -> None:
         np.testing.assert_allclose(transmitted, 1 - 0.5 * schlick(middle, 0.04), atol=2e-3)
 
 
-def test_anisotropy_stretches_along_the_turned_tangent() -> None:
+def test_anisotropy_stretches_along_the_rotated_tangent() -> None:
     scene = imported({"anisotropy": {"anisotropyStrength": 0.6, "anisotropyRotation": np.pi / 2}})
     highlight = scene.materials[0].terms[1]
     across = 0.25
@@ -102,13 +102,13 @@ def test_anisotropy_stretches_along_the_turned_tangent() -> None:
     assert highlight["model"] == "ashikhmin_shirley"
     assert highlight["params"]["nv"] == pytest.approx(2 / across**2 - 2)
     assert highlight["params"]["nu"] == pytest.approx(2 / along**2 - 2)
-    # u runs along +X; a quarter turn towards the bitangent, up
+    # u runs along +X; 90° toward the bitangent, up
     np.testing.assert_allclose(scene.meshes[0].tangents, [[0, 1, 0, 1]] * 4, atol=1e-6)
     assert any("Ashikhmin" in warning for warning in scene.warnings)
 
 
 @pytest.mark.parametrize(
-    ("is_bumpy", "has_own", "words"),
+    ("is_bumpy", "has_own", "message"),
     [
         (False, True, "smooth, as what it covers; its own normal texture is not used"),
         (True, True, "as bumpy as what it covers; its own normal texture is not used"),
@@ -116,17 +116,17 @@ def test_anisotropy_stretches_along_the_turned_tangent() -> None:
         (False, False, None),
     ],
 )
-def test_it_is_told_where_a_coat_has_other_bumps_than_what_it_covers(is_bumpy, has_own, words) -> None:
+def test_a_coat_with_another_normal_map_gives_a_warning(is_bumpy, has_own, message) -> None:
     glb = Glb()
     bumps = {"index": glb.texture([[[200, 150, 220]]])}
     coat = {"clearcoatFactor": 1} | ({"clearcoatNormalTexture": bumps} if has_own else {})
     scene = imported({"clearcoat": coat}, glb, **({"normalTexture": bumps} if is_bumpy else {}))
     messages = [str(warning) for warning in scene.warnings if "coat" in str(warning)]
-    assert len(messages) == (words is not None)
-    assert all(words in warning for warning in messages)
+    assert len(messages) == (message is not None)
+    assert all(message in warning for warning in messages)
 
 
-def test_a_turned_normal_map_means_the_same_directions() -> None:
+def test_a_rotated_normal_map_gives_the_same_directions() -> None:
     glb = Glb()
     info = {"index": glb.texture([[[200, 150, 220]]])}
     scene = imported({"anisotropy": {"anisotropyStrength": 1, "anisotropyRotation": 0.7}}, glb, normalTexture=info)
@@ -141,7 +141,7 @@ def test_a_turned_normal_map_means_the_same_directions() -> None:
     np.testing.assert_allclose(in_world(scene), in_world(plain), atol=1e-6)
 
 
-def test_anisotropy_in_all_directions_is_a_round_highlight() -> None:
+def test_anisotropy_of_varying_direction_is_a_round_highlight() -> None:
     glb = Glb()
     index = glb.texture([[[255, 128, 255], [0, 128, 255]]])
     scene = imported({"anisotropy": {"anisotropyStrength": 1, "anisotropyTexture": {"index": index}}}, glb)
@@ -149,19 +149,19 @@ def test_anisotropy_in_all_directions_is_a_round_highlight() -> None:
     assert any("all directions" in warning for warning in scene.warnings)
 
 
-def test_sheen_is_a_term_that_dims_what_lies_below_it() -> None:
+def test_sheen_is_a_term_that_attenuates_the_base() -> None:
     extensions = {"sheen": {"sheenColorFactor": [1, 0.5, 0], "sheenRoughnessFactor": 0.5}}
     scene = imported(extensions | {"clearcoat": {"clearcoatFactor": 1}})
     lambert, _, sheen, _ = scene.materials[0].terms
     assert (sheen["model"], sheen["color"], sheen["params"]) == ("sheen", [1, 0.5, 0], {"roughness": 0.5})
-    assert lambert["curves"]["theta_o"]["factors"][-1] < 0.5  # of the sheen, and of the coat
+    assert lambert["curves"]["theta_o"]["factors"][-1] < 0.5  # attenuated by sheen and coat
     for number, term in enumerate(scene.materials[0].terms):
-        complete_term((number,), term, None)  # raises where a look could not say it
+        complete_term((number,), term, None)  # raises if a look cannot represent it
 
 
 @pytest.mark.parametrize("theta_o", [0.35, 0.9, 1.3])
-def test_what_lies_below_a_sheen_is_dimmed_as_the_specification_says(theta_o: float) -> None:
-    """min(1 − E(θi), 1 − E(θo)): of even light as much to the thousandth, of light from anywhere about as much."""
+def test_sheen_attenuates_the_base_by_the_specification(theta_o: float) -> None:
+    """min(1 − E(θi), 1 − E(θo)): within 0.1 % for uniform light, approximate for light from any direction."""
     theta = (np.arange(300) + 0.5) * np.pi / 600
     transmitted = 1 - sheen_albedo(theta, 0.8)
     expected, weights = np.minimum(transmitted, np.interp(theta_o, theta, transmitted)), np.sin(theta) * np.cos(theta)
@@ -169,7 +169,7 @@ def test_what_lies_below_a_sheen_is_dimmed_as_the_specification_says(theta_o: fl
     shown = light(theta) * view(np.array(theta_o))
     assert shown @ weights == pytest.approx(expected @ weights, rel=1e-3)
     error = np.sqrt((shown - expected) ** 2 @ weights / (expected**2 @ weights))
-    assert error < 0.12  # by the viewer's angle alone it is 0.18 where that is large, and 0.15 where it is small
+    assert error < 0.12  # with the view angle alone it is 0.18 for large angles, and 0.15 for small ones
     by_view = sheen_attenuation(1.0, 0.8, by_light=False)[1](np.array(theta_o))
     assert by_view * weights.sum() == pytest.approx(expected @ weights, rel=1e-3)
 
@@ -185,7 +185,7 @@ def test_what_lies_below_a_sheen_is_dimmed_as_the_specification_says(theta_o: fl
         {"anisotropy": {"anisotropyRotation": 1e300}},
     ],
 )
-def test_what_is_not_valid_is_a_warning_and_not_used(extensions: dict[str, Any]) -> None:
+def test_invalid_parameters_give_a_warning_and_are_ignored(extensions: dict[str, Any]) -> None:
     scene = imported(extensions)
     assert scene.materials[0].terms == terms_of({})
     assert len(scene.warnings) == 1
@@ -198,7 +198,7 @@ def glass_of(extensions: dict[str, Any], **material: Any) -> Glass:
     return glass
 
 
-def test_transmission_is_a_pane_of_the_base_colour_and_leaves_less_to_be_scattered() -> None:
+def test_transmission_is_thin_glass_and_reduces_the_diffuse_term() -> None:
     scene = imported(
         {"transmission": {"transmissionFactor": 0.75}}, pbrMetallicRoughness=PLASTIC | {"roughnessFactor": 0}
     )
@@ -211,7 +211,7 @@ def test_transmission_is_a_pane_of_the_base_colour_and_leaves_less_to_be_scatter
     assert imported({"transmission": {}}).materials[0].glass is None
 
 
-def test_a_volume_is_a_solid_that_absorbs() -> None:
+def test_a_volume_is_absorbing_solid_glass() -> None:
     volume = {"thicknessFactor": 0.2, "attenuationDistance": 0.5, "attenuationColor": [1, 0.5, 0.25]}
     glass = glass_of({"transmission": {"transmissionFactor": 1}, "volume": volume, "ior": {"ior": 1.33}})
     assert (glass.thickness, glass.ior) == (0.2, 1.33)
@@ -223,21 +223,23 @@ def test_a_volume_is_a_solid_that_absorbs() -> None:
 
 
 @pytest.mark.parametrize("ior", [0.0, 0.5, 100.0])
-def test_an_index_that_no_glass_has_is_said_and_replaced(ior: float) -> None:
+def test_an_invalid_index_of_glass_is_replaced_with_a_warning(ior: float) -> None:
     scene = imported({"transmission": {"transmissionFactor": 1}, "ior": {"ior": ior}})
     assert any("index of refraction" in str(warning) for warning in scene.warnings)
     assert scene.materials[0].glass is not None
     assert scene.materials[0].glass.ior == 1.5
 
 
-@pytest.mark.parametrize(("ior", "colour", "is_said"), [(0.5, 1, True), (100, 1, True), (0, 1, True), (0, 0.2, False)])
-def test_an_index_that_nothing_opaque_has_is_said(ior: float, colour: float, is_said: bool) -> None:
-    """But for those of files whose highlights had a colour of their own, which is what 0 is for."""
-    scene = imported({"ior": {"ior": ior}, "specular": {"specularColorFactor": [colour] * 3}})
-    assert any("index of refraction" in str(warning) for warning in scene.warnings) == is_said
+@pytest.mark.parametrize(
+    ("ior", "color", "has_warning"), [(0.5, 1, True), (100, 1, True), (0, 1, True), (0, 0.2, False)]
+)
+def test_an_invalid_index_of_opaque_materials_gives_a_warning(ior: float, color: float, has_warning: bool) -> None:
+    """Except 0, which files with colored highlights use."""
+    scene = imported({"ior": {"ior": ior}, "specular": {"specularColorFactor": [color] * 3}})
+    assert any("index of refraction" in str(warning) for warning in scene.warnings) == has_warning
 
 
-def test_frosted_glass_and_textures_of_transmission_are_said() -> None:
+def test_rough_glass_and_transmission_textures_give_a_warning() -> None:
     glb = Glb()
     texture = {"index": glb.texture([[[255, 0, 0], [0, 0, 0]]])}
     passing = {"transmissionFactor": 1, "transmissionTexture": texture}
@@ -256,5 +258,5 @@ def test_frosted_glass_and_textures_of_transmission_are_said() -> None:
         {"transmission": {"transmissionFactor": 1}, "volume": {"attenuationDistance": 0}},
     ],
 )
-def test_transmission_out_of_range_is_said(extensions: dict[str, Any]) -> None:
+def test_transmission_out_of_range_gives_a_warning(extensions: dict[str, Any]) -> None:
     assert any("is not valid" in str(warning) for warning in imported(extensions).warnings)

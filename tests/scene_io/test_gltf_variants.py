@@ -22,8 +22,8 @@ def plain(name: str, *color: float, **pbr: Any) -> dict[str, Any]:
     return {"name": name, "pbrMetallicRoughness": {"baseColorFactor": [*color, 1], "metallicFactor": 0, **pbr}}
 
 
-def dressed(glb: Glb, materials: list[dict[str, Any]], mappings: list[list[dict[str, Any]]]) -> Glb:
-    """A quad for each list of mappings, all wearing material 0, with the variants "day" and "night"."""
+def with_variants(glb: Glb, materials: list[dict[str, Any]], mappings: list[list[dict[str, Any]]]) -> Glb:
+    """A quad for each list of mappings, all with material 0, with the variants "day" and "night"."""
     glb.quad(materials[0])
     primitive = glb.document["meshes"][0]["primitives"][0]
     glb.document["materials"] = materials
@@ -38,9 +38,9 @@ def imported(glb: Glb) -> Scene:
     return import_gltf(glb.bytes(), "test", LIGHT)
 
 
-def test_each_variant_is_a_look_of_the_materials_it_changes() -> None:
+def test_each_variant_is_a_look_of_its_materials() -> None:
     mappings = [{"material": 0, "variants": [0]}, {"material": 1, "variants": [1]}]
-    scene = imported(dressed(Glb(), [plain("Red", 1, 0, 0), plain("Blue", 0, 0, 1)], [mappings]))
+    scene = imported(with_variants(Glb(), [plain("Red", 1, 0, 0), plain("Blue", 0, 0, 1)], [mappings]))
     assert [material.name for material in scene.materials] == ["Red"]
     assert scene.variants["day"] == {"materials": {}}
     terms = scene.variants["night"]["materials"]["Red"]["terms"]
@@ -54,26 +54,26 @@ def test_each_variant_is_a_look_of_the_materials_it_changes() -> None:
     assert scene.warnings == ()
 
 
-def test_meshes_that_change_differently_have_materials_of_their_own() -> None:
+def test_meshes_with_different_mappings_get_separate_materials() -> None:
     mappings = [[{"material": 1, "variants": [1]}], []]
-    scene = imported(dressed(Glb(), [plain("Red", 1, 0, 0), plain("Blue", 0, 0, 1)], mappings))
+    scene = imported(with_variants(Glb(), [plain("Red", 1, 0, 0), plain("Blue", 0, 0, 1)], mappings))
     assert [material.name for material in scene.materials] == ["Red", "Red 2"]
     assert list(scene.variants["night"]["materials"]) == ["Red"]
 
 
-def test_a_texture_is_kept_where_it_is_the_same_up_to_a_colour() -> None:
+def test_a_texture_is_kept_if_it_differs_by_a_color_only() -> None:
     glb = Glb()
     info = {"index": glb.texture(np.arange(48).reshape(4, 4, 3) * 5 + 10)}
     red = plain("Red", 1, 0, 0, baseColorTexture=info)
     gold = plain("Gold", 0.5, 0.4, 0.0, baseColorTexture=info)
     gold["pbrMetallicRoughness"]["metallicFactor"] = 1
-    scene = imported(dressed(glb, [red, gold], [[{"material": 1, "variants": [1]}]]))
+    scene = imported(with_variants(glb, [red, gold], [[{"material": 1, "variants": [1]}]]))
     lambert, ggx = scene.variants["night"]["materials"]["Red"]["terms"]
     assert lambert["color"] == [0, 0, 0]
     assert ggx["texture"] == "diffuse"
     shown = np.array(ggx["color"]) * ggx["params"]["f0"] * get_texture_values(scene.materials[0].textures["diffuse"])
     expected = np.array([0.5, 0.4, 0.0]) * get_texture_values(scene.materials[0].textures["diffuse"])
-    np.testing.assert_allclose(shown, expected, atol=1e-4)  # f0 keeps clear of 0
+    np.testing.assert_allclose(shown, expected, atol=1e-4)  # f0 has a minimum above 0
     assert not any("mean colour" in warning for warning in scene.warnings)
 
 
@@ -82,7 +82,7 @@ def test_another_texture_becomes_its_mean_with_a_warning() -> None:
     first, second = glb.texture([[[255, 0, 0], [0, 255, 0]]]), glb.texture([[[255, 255, 255], [0, 0, 0]]])
     red = plain("Red", 1, 1, 1, baseColorTexture={"index": first})
     grey = plain("Grey", 1, 0.5, 1, baseColorTexture={"index": second})
-    scene = imported(dressed(glb, [red, grey], [[{"material": 1, "variants": [0]}]]))
+    scene = imported(with_variants(glb, [red, grey], [[{"material": 1, "variants": [0]}]]))
     lambert = scene.variants["day"]["materials"]["Red"]["terms"][0]
     np.testing.assert_allclose(lambert["color"], np.array([0.5, 0.25, 0.5]) * DIELECTRIC_TRANSMISSION, atol=1e-6)
     assert lambert["texture"] is None
@@ -92,13 +92,13 @@ def test_another_texture_becomes_its_mean_with_a_warning() -> None:
 def test_another_normal_map_is_a_warning() -> None:
     glb = Glb()
     bumpy = plain("Bumpy", 1, 1, 1) | {"normalTexture": {"index": glb.texture([[[200, 128, 255]]])}}
-    scene = imported(dressed(glb, [plain("Red", 1, 0, 0), bumpy], [[{"material": 1, "variants": [0]}]]))
+    scene = imported(with_variants(glb, [plain("Red", 1, 0, 0), bumpy], [[{"material": 1, "variants": [0]}]]))
     assert any("normal map" in warning for warning in scene.warnings)
 
 
-def test_variants_are_kept_with_the_scene(tmp_path) -> None:
+def test_variants_are_stored_with_the_scene(tmp_path) -> None:
     scene = imported(
-        dressed(Glb(), [plain("Red", 1, 0, 0), plain("Blue", 0, 0, 1)], [[{"material": 1, "variants": [1]}]])
+        with_variants(Glb(), [plain("Red", 1, 0, 0), plain("Blue", 0, 0, 1)], [[{"material": 1, "variants": [1]}]])
     )
     save_scene(scene, tmp_path)
     assert load_scene(tmp_path).variants == scene.variants
@@ -116,25 +116,25 @@ def test_variants_are_kept_with_the_scene(tmp_path) -> None:
         [{"material": 1, "variants": [0]}] * 101,
     ],
 )
-def test_mappings_that_are_wrong_are_refused(mappings: Any) -> None:
+def test_invalid_mappings_are_rejected(mappings: Any) -> None:
     with pytest.raises(SceneError):
-        imported(dressed(Glb(), [plain("Red", 1, 0, 0), plain("Blue", 0, 0, 1)], [mappings]))
+        imported(with_variants(Glb(), [plain("Red", 1, 0, 0), plain("Blue", 0, 0, 1)], [mappings]))
 
 
-def test_a_mapping_to_a_variant_that_there_is_not_changes_nothing() -> None:
+def test_a_mapping_to_a_missing_variant_changes_nothing() -> None:
     mappings = [[{"material": 1, "variants": [7]}]]
-    scene = imported(dressed(Glb(), [plain("Red", 1, 0, 0), plain("Blue", 0, 0, 1)], mappings))
+    scene = imported(with_variants(Glb(), [plain("Red", 1, 0, 0), plain("Blue", 0, 0, 1)], mappings))
     assert all(look == {"materials": {}} for look in scene.variants.values())
 
 
-def test_too_many_variants_are_refused() -> None:
-    glb = dressed(Glb(), [plain("Red", 1, 0, 0)], [[]])
+def test_too_many_variants_are_rejected() -> None:
+    glb = with_variants(Glb(), [plain("Red", 1, 0, 0)], [[]])
     glb.document["extensions"]["KHR_materials_variants"]["variants"] = [{}] * 101
     with pytest.raises(SceneError, match="variants"):
         imported(glb)
 
 
-def test_a_variant_as_rough_follows_the_map_and_one_with_another_has_its_mean() -> None:
+def test_a_variant_follows_the_same_roughness_map_or_has_its_mean() -> None:
     glb = Glb()
     own, other = (glb.texture([[[0, low, 0], [0, high, 0]]]) for low, high in ((50, 200), (10, 30)))
     rough = [{"metallicRoughnessTexture": {"index": index}} for index in (own, own, other)]
@@ -142,7 +142,7 @@ def test_a_variant_as_rough_follows_the_map_and_one_with_another_has_its_mean() 
         plain(name, 1, 1, 1, **parameters) for name, parameters in zip(("own", "same", "smooth"), rough, strict=True)
     ]
     mappings = [[{"material": 1, "variants": [0]}, {"material": 2, "variants": [1]}]]
-    scene = imported(dressed(glb, materials, mappings))
+    scene = imported(with_variants(glb, materials, mappings))
     day, night = (scene.variants[name]["materials"]["own"]["terms"][1] for name in ("day", "night"))
     assert day["roughness_map"] == "roughness"
     assert "roughness_map" not in night

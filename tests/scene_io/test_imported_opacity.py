@@ -1,4 +1,4 @@
-"""Holes of imported materials: what files say of them, and what they mean."""
+"""Opacity of imported materials."""
 
 from __future__ import annotations
 
@@ -35,20 +35,20 @@ def opacity_of(*args: Any, **material: Any) -> Opacity | None:
     return scene.materials[0].opacity
 
 
-def test_alpha_is_not_looked_at_unless_the_material_asks_for_it() -> None:
+def test_alpha_is_ignored_for_opaque_materials() -> None:
     assert opacity_of(HALVES) is None
     assert opacity_of(HALVES, alphaMode="OPAQUE") is None
 
 
 @pytest.mark.parametrize(("mode", "cutoff"), [("MASK", 0.5), ("BLEND", None)])
-def test_alpha_of_the_base_colour_is_opacity(mode: str, cutoff: float | None) -> None:
+def test_alpha_of_the_base_color_is_opacity(mode: str, cutoff: float | None) -> None:
     opacity = opacity_of(HALVES, 0.9, alphaMode=mode)
     assert opacity is not None
     assert opacity.cutoff == cutoff
     assert opacity.alpha.tolist() == [[0, 180]]
 
 
-def test_a_material_that_is_there_everywhere_has_no_holes() -> None:
+def test_an_opaque_alpha_channel_has_no_holes() -> None:
     assert opacity_of(alphaMode="MASK") is None
     assert opacity_of(alphaMode="BLEND") is None
     assert opacity_of(HALVES + np.uint8([0, 0, 0, 55]), alphaMode="MASK", alphaCutoff=0.2) is None
@@ -57,7 +57,7 @@ def test_a_material_that_is_there_everywhere_has_no_holes() -> None:
     assert opacity_of(almost, alphaMode="BLEND") is None
 
 
-def test_one_value_is_kept_as_one_texel() -> None:
+def test_constant_opacity_is_stored_as_one_texel() -> None:
     opacity = opacity_of(factor=0.2, alphaMode="BLEND")
     assert opacity is not None
     assert opacity.alpha.tolist() == [[51]]
@@ -72,7 +72,7 @@ def test_one_value_is_kept_as_one_texel() -> None:
         {"alphaMode": "MASK", "pixels": HALVES * np.uint8([1, 1, 1, 0])},
     ],
 )
-def test_a_material_that_is_nowhere_is_said(material: dict[str, Any]) -> None:
+def test_a_fully_transparent_material_gives_a_warning(material: dict[str, Any]) -> None:
     scene = imported(**material)
     assert "transparent everywhere" in str(scene.warnings[0])
     opacity = scene.materials[0].opacity
@@ -81,7 +81,7 @@ def test_a_material_that_is_nowhere_is_said(material: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("cutoff", [-1.0, float("inf"), "half"])
-def test_a_bound_that_is_none_is_refused(cutoff: object) -> None:
+def test_an_invalid_cutoff_is_rejected(cutoff: object) -> None:
     with pytest.raises(Exception, match=r"alphaCutoff|JSON|number"):
         imported(HALVES, alphaMode="MASK", alphaCutoff=cutoff)
 
@@ -100,7 +100,7 @@ def of_library(folder: Path, library: str, image: Any = None) -> Opacity | None:
     return import_scene(folder / "thing.obj", "thing", LIGHT).materials[0].opacity
 
 
-def test_obj_libraries_say_it_in_three_ways(tmp_path: Path) -> None:
+def test_obj_libraries_define_opacity_in_three_ways(tmp_path: Path) -> None:
     for library in ("d 0.4", "Tr 0.6"):
         opacity = of_library(tmp_path, library)
         assert opacity is not None

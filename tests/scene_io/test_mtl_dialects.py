@@ -1,4 +1,4 @@
-"""What Ks means in the .mtl files of several programs, and what becomes of their bump maps."""
+"""Interpretation of Ks in .mtl files of several programs, and of bump maps."""
 
 from __future__ import annotations
 
@@ -169,36 +169,36 @@ def test_a_metal_of_blender_has_the_color_of_its_base(tmp_path: Path) -> None:
     ("library", "color"),
     [(GOLD_OF_OPENGL, [0.628281, 0.555802, 0.366065]), (MIRROR, [0.8] * 3), (REFLECTING, [0.6] * 3)],
 )
-def test_what_can_only_be_a_metal_is_read_as_it_stands(tmp_path: Path, library: str, color: list[float]) -> None:
+def test_unambiguous_metals_are_read_literally(tmp_path: Path, library: str, color: list[float]) -> None:
     scene = scene_of(tmp_path, library)
     assert scene.materials[0].terms[1]["model"] == "blinn_phong"
     assert scene.materials[0].terms[1]["color"] == color
     assert scene.warnings == ()
 
 
-def test_a_gray_below_that_of_plastic_is_read_as_it_stands(tmp_path: Path) -> None:
+def test_a_gray_below_that_of_plastic_is_read_literally(tmp_path: Path) -> None:
     scene = scene_of(tmp_path, MAYA.replace("Ks 0.50 0.50 0.50", "Ks 0.02 0.02 0.02"))
     assert params_of(scene.materials[0])["f0"] == [0.02] * 3
     assert scene.warnings == ()
 
 
-def test_materials_without_ks_are_matt(tmp_path: Path) -> None:
+def test_materials_without_ks_are_diffuse(tmp_path: Path) -> None:
     scene = scene_of(tmp_path, BLENDER_4.replace("Ks 0.500000 0.500000 0.500000", "Ks 0 0 0"))
     assert [term["model"] for term in scene.materials[0].terms] == ["lambert"]
     assert scene.warnings == ()
 
 
-def test_images_that_stand_alone_are_not_dimmed_by_numbers_that_are_not_there(tmp_path: Path) -> None:
+def test_images_without_colors_are_not_attenuated(tmp_path: Path) -> None:
     PIL.Image.new("RGB", (2, 2), (128, 128, 128)).save(tmp_path / "x.png")
     without = "\n".join(line for line in BLENDER_4.splitlines() if not line.startswith(("Kd", "Ks", "Ns")))
     material = material_of(tmp_path, without + "\nmap_Kd x.png\nmap_Ks x.png\n")
-    assert material.terms[0]["color"] == pytest.approx([1.0] * 3, abs=0.09)  # but by what is reflected above it
+    assert material.terms[0]["color"] == pytest.approx([1.0] * 3, abs=0.09)  # except by the reflection above it
     assert material.terms[0]["texture"] == "diffuse"
     assert material.terms[1]["texture"] == "specular"
     assert params_of(material) == {"roughness": 0.5, "f0": [0.08] * 3}
 
 
-def test_one_remark_tells_of_all_materials(tmp_path: Path) -> None:
+def test_one_warning_covers_all_materials(tmp_path: Path) -> None:
     (tmp_path / "m.mtl").write_text(MAYA + MAYA.replace("newmtl M", "newmtl N"))
     (tmp_path / "thing.obj").write_text(TRIANGLE + "usemtl N\nf 3/3 2/2 1/1\n")
     (import_warning,) = import_scene(tmp_path / "thing.obj", "thing", LIGHT).warnings
@@ -206,12 +206,12 @@ def test_one_remark_tells_of_all_materials(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("line", ["Ka spectral x.rfl", "illum on", "Pc -1", "aniso nan"])
-def test_small_print_refuses_no_file(tmp_path: Path, line: str) -> None:
+def test_invalid_optional_statements_are_ignored(tmp_path: Path, line: str) -> None:
     assert len(material_of(tmp_path, f"{MIRROR}{line}\n").terms) == 2
 
 
 def image(kind: str) -> bytes:
-    """A tangent-space normal map of a ripple, or the heights of it in gray."""
+    """A tangent-space normal map of a ripple, or its heights in gray."""
     x = np.linspace(0, 4 * np.pi, 64)
     slope = np.broadcast_to(0.4 * np.cos(x), (64, 64))
     normals = np.stack([-slope, np.zeros_like(slope), np.ones_like(slope)], axis=-1)
@@ -224,7 +224,7 @@ def image(kind: str) -> bytes:
 
 
 @pytest.mark.parametrize("keyword", ["map_Bump -bm 1.000000", "map_bump", "bump", "norm"])
-def test_a_bump_map_that_holds_normals_is_a_normal_map(tmp_path: Path, keyword: str) -> None:
+def test_a_bump_map_of_normals_is_a_normal_map(tmp_path: Path, keyword: str) -> None:
     (tmp_path / "tiles.png").write_bytes(image("normals"))
     scene = scene_of(tmp_path, f"newmtl M\nKd 1 1 1\n{keyword} tiles.png\n")
     assert scene.materials[0].normal_map is not None
@@ -232,7 +232,7 @@ def test_a_bump_map_that_holds_normals_is_a_normal_map(tmp_path: Path, keyword: 
 
 
 @pytest.mark.parametrize(("option", "strength"), [("", 1.0), ("-bm 0.5", 0.5), ("-bm strong", 1.0)])
-def test_a_normal_map_is_as_strong_as_the_file_says(tmp_path: Path, option: str, strength: float) -> None:
+def test_a_normal_map_has_the_strength_in_the_file(tmp_path: Path, option: str, strength: float) -> None:
     (tmp_path / "tiles.png").write_bytes(image("normals"))
     material = material_of(tmp_path, f"newmtl M\nKd 1 1 1\nmap_Bump {option} tiles.png\n")
     assert material.normal_map is not None
@@ -240,7 +240,7 @@ def test_a_normal_map_is_as_strong_as_the_file_says(tmp_path: Path, option: str,
 
 
 @pytest.mark.parametrize(
-    ("line", "words"),
+    ("line", "message"),
     [
         ("map_Bump heights.png", ("'heights.png'", "heights")),
         ("map_Bump C:\\art\\tiles_nrm.png", ("tiles_nrm.png", "left out")),
@@ -252,16 +252,16 @@ def test_a_normal_map_is_as_strong_as_the_file_says(tmp_path: Path, option: str,
         (f"map_Ns {'deep/' * 40}gloss.png", ("gloss.png'", "not used")),
     ],
 )
-def test_a_lost_map_is_wrong_and_named(tmp_path: Path, line: str, words: tuple[str, ...]) -> None:
+def test_a_missing_map_is_a_named_error(tmp_path: Path, line: str, message: tuple[str, ...]) -> None:
     (tmp_path / "heights.png").write_bytes(image("heights"))
     (tmp_path / "broken.png").write_bytes(b"no image")
     scene = scene_of(tmp_path, f"newmtl M\nKd 1 1 1\n{line}\n")
     assert scene.materials[0].normal_map is None
     (import_warning,) = scene.warnings
     assert import_warning.severity == "unsupported"
-    assert all(word in import_warning for word in words)
+    assert all(word in import_warning for word in message)
 
 
-def test_a_map_of_ambient_light_is_not_missed(tmp_path: Path) -> None:
+def test_an_ambient_map_is_ignored(tmp_path: Path) -> None:
     (import_warning,) = scene_of(tmp_path, "newmtl M\nKd 1 1 1\nmap_Ka x.png\n").warnings
     assert import_warning.severity == "ignored"

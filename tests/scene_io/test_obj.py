@@ -1,4 +1,4 @@
-"""OBJ and MTL: faces, normals, materials, and the files beside them."""
+"""OBJ and MTL: faces, normals, materials, and referenced files."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def png(*color: int) -> bytes:
     return encoded.getvalue()
 
 
-def test_polygons_become_fans_that_face_the_same_way() -> None:
+def test_polygons_become_fans_with_the_same_orientation() -> None:
     mesh = only_mesh(SQUARE + "f 1 2 3 4\n")
     np.testing.assert_array_equal(
         mesh.positions[mesh.faces][:, :, :2], [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]]
@@ -45,20 +45,20 @@ def test_polygons_become_fans_that_face_the_same_way() -> None:
     np.testing.assert_allclose(mesh.normals, [[0, 0, 1]] * 6, atol=1e-6)
 
 
-def test_coordinates_run_from_the_top_and_normals_are_the_files() -> None:
+def test_uvs_start_at_the_top_and_normals_are_kept() -> None:
     mesh = only_mesh(SQUARE + COORDINATES + "vn 0 0 2\nvn 0 3 4\nf 1/1/1 2/2/1 3/3/2\n")
     np.testing.assert_array_equal(mesh.uvs, [[0, 1], [1, 1], [1, 0]])
     np.testing.assert_allclose(mesh.normals, [[0, 0, 1], [0, 0, 1], [0, 0.6, 0.8]], atol=1e-6)
 
 
-def test_numbers_below_zero_count_back_from_their_line() -> None:
+def test_negative_indices_count_back() -> None:
     first = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n"
     second = "v 5 0 0\nv 6 0 0\nv 5 1 0\nf -3 -2 -1\n"
     mesh = only_mesh(first + second)
     np.testing.assert_array_equal(mesh.positions[:, 0], [0, 1, 0, 5, 6, 5])
 
 
-def test_lines_may_go_on_and_come_from_anywhere() -> None:
+def test_continued_lines_and_all_line_endings_are_read() -> None:
     mesh = only_mesh("# made by hand\r\n" + SQUARE + "s off\r\nf 1 2 \\\r\n 3 4\r\n")
     assert len(mesh.faces) == 2
 
@@ -71,7 +71,7 @@ def test_a_cube_is_flat_and_a_fine_ball_is_round() -> None:
     np.testing.assert_allclose(normals, np.repeat(cross[:, None], 3, axis=1), atol=1e-12)
     points, ball = _ball(24)
     normals = creased_normals(points[ball], ball)
-    # facets of 15 by 7.5 degrees: the mean of what meets at a corner lies within half a facet of the radius
+    # facets of 15 by 7.5 degrees: the mean normal at a vertex lies within half a facet of the radius
     assert (normals * points[ball].reshape(-1, 3)).sum(1).min() > np.cos(np.radians(7.5))
 
 
@@ -84,7 +84,7 @@ def _ball(steps: int) -> tuple[np.ndarray, np.ndarray]:
     return points, np.concatenate([np.stack([a, b, c], -1), np.stack([b, d, c], -1)])
 
 
-def test_objects_and_materials_are_meshes_of_their_own(tmp_path: Path) -> None:
+def test_objects_and_materials_are_separate_meshes(tmp_path: Path) -> None:
     (tmp_path / "m.mtl").write_text(
         "newmtl red\nKd 1 0 0\nKs .2 0 0\nNs 90\n\nnewmtl metal\nKd .9 .8 .7\nPm 1\nPr .3\n"
     )
@@ -102,7 +102,7 @@ def test_objects_and_materials_are_meshes_of_their_own(tmp_path: Path) -> None:
     assert scene.warnings == ()
 
 
-def test_images_beside_the_material_file_are_read(tmp_path: Path) -> None:
+def test_images_next_to_the_material_file_are_read(tmp_path: Path) -> None:
     (tmp_path / "maps").mkdir()
     (tmp_path / "maps" / "old wood.png").write_bytes(png(255, 0, 0))
     (tmp_path / "m.mtl").write_text(
@@ -120,7 +120,7 @@ def test_images_beside_the_material_file_are_read(tmp_path: Path) -> None:
     assert len(scene.warnings) == 1
 
 
-def test_a_map_of_roughness_scales_the_width_and_its_mean_is_what_terms_say(tmp_path: Path) -> None:
+def test_a_roughness_map_scales_the_width_and_terms_have_its_mean(tmp_path: Path) -> None:
     encoded = io.BytesIO()
     PIL.Image.fromarray(np.array([[51, 153]], np.uint8)).save(encoded, "PNG")
     (tmp_path / "rough.png").write_bytes(encoded.getvalue())
@@ -134,37 +134,37 @@ def test_a_map_of_roughness_scales_the_width_and_its_mean_is_what_terms_say(tmp_
     np.testing.assert_allclose(get_texture_values(half.textures["roughness"]), [[[0.5], [1.5]]], rtol=1e-6)
 
 
-def shining(tmp_path: Path, library: str, faces: str) -> Scene:
+def emissions_of(tmp_path: Path, library: str, faces: str) -> Scene:
     (tmp_path / "m.mtl").write_text(library)
     path = tmp_path / "thing.obj"
     path.write_text(SQUARE + COORDINATES + "mtllib m.mtl\n" + faces)
     return import_scene(path, "thing", LIGHT)
 
 
-def test_emission_is_the_radiance_of_a_light_times_the_mean_of_its_image_on_it(tmp_path: Path) -> None:
+def test_emission_is_radiance_times_image_mean(tmp_path: Path) -> None:
     encoded = io.BytesIO()
     PIL.Image.fromarray(np.array([[[255, 255, 0], [0, 255, 0]]], np.uint8)).save(encoded, "PNG")
     (tmp_path / "glow.png").write_bytes(encoded.getvalue())
     library = "newmtl number\nKe 4 2 0\nnewmtl both\nKe 4 2 6\nmap_Ke glow.png\nnewmtl image\nKe 0\nmap_Ke glow.png\n"
     faces = "".join(f"usemtl {name}\nf 1/1 2/2 3/3\n" for name in ("number", "both", "image"))
-    emissions = {light.name: light.fields["emission"] for light in shining(tmp_path, library, faces).lights}
+    emissions = {light.name: light.fields["emission"] for light in emissions_of(tmp_path, library, faces).lights}
     assert emissions == {"number": [4, 2, 0], "both": [1, 2, 0], "image": [0.25, 1, 0]}  # a quarter lies on the left
 
 
-def test_a_shining_material_without_a_surface_is_no_light(tmp_path: Path) -> None:
-    scene = shining(tmp_path, "newmtl lamp\nKe 1\n", "f 1 2 3\nusemtl lamp\nf 1 1 2\n")
+def test_an_emissive_material_without_surface_is_no_light(tmp_path: Path) -> None:
+    scene = emissions_of(tmp_path, "newmtl lamp\nKe 1\n", "f 1 2 3\nusemtl lamp\nf 1 1 2\n")
     assert scene.lights == ()
     assert any("'lamp' shines, but no surface" in warning for warning in scene.warnings)
 
 
-def test_more_than_sixty_four_shining_materials_are_refused(tmp_path: Path) -> None:
+def test_more_than_sixty_four_emissive_materials_are_rejected(tmp_path: Path) -> None:
     library = "".join(f"newmtl m{k}\nKe 1\n" for k in range(65))
     faces = "".join(f"usemtl m{k}\nf 1 2 3\n" for k in range(65))
     with pytest.raises(SceneError, match="more than 64 lights"):
-        shining(tmp_path, library, faces)
+        emissions_of(tmp_path, library, faces)
 
 
-def test_what_is_not_there_is_a_warning(tmp_path: Path) -> None:
+def test_missing_files_give_a_warning(tmp_path: Path) -> None:
     path = tmp_path / "thing.obj"
     path.write_text(SQUARE + "mtllib none.mtl\nusemtl a\nf 1 2 3\nl 1 2\n")
     words = ["none.mtl", "kind 'l'", "not described"]
@@ -173,7 +173,7 @@ def test_what_is_not_there_is_a_warning(tmp_path: Path) -> None:
     assert len(warnings) == len(words)
 
 
-def test_an_archive_holds_the_scene_with_its_files() -> None:
+def test_an_archive_contains_the_scene_with_its_files() -> None:
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("__MACOSX/._thing.obj", b"litter")
@@ -193,7 +193,7 @@ def test_real_objects_are_imported(shared_data: Path) -> None:
         np.testing.assert_allclose(np.linalg.norm(scene.meshes[0].normals, axis=1), 1, atol=1e-4)
 
 
-def test_a_gltf_file_may_name_files_beside_it(tmp_path: Path) -> None:
+def test_a_gltf_file_may_reference_other_files(tmp_path: Path) -> None:
     positions = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
     (tmp_path / "a mesh.bin").write_bytes(positions.tobytes())
     text = """{"asset":{"version":"2.0"},"buffers":[{"uri":"a%20mesh.bin","byteLength":36}],

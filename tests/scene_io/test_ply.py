@@ -1,4 +1,4 @@
-"""PLY, text and binary, against arrays that are known."""
+"""PLY, text and binary, against known arrays."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def imported(data: bytes) -> Scene:
 
 @pytest.mark.parametrize("data", [text(), binary("<"), binary(">")], ids=["text", "little", "big"])
 @pytest.mark.parametrize("mixed", [False, True])
-def test_all_formats_say_the_same(data: bytes, mixed: bool) -> None:
+def test_all_formats_give_the_same_mesh(data: bytes, mixed: bool) -> None:
     if mixed:  # a triangle after the quad: rows of different lengths
         data = {b"asc": text(True), b"bin": binary("<", True)}[data.split()[2][:3]]
     (mesh,) = imported(data).meshes
@@ -31,7 +31,7 @@ def test_all_formats_say_the_same(data: bytes, mixed: bool) -> None:
     np.testing.assert_allclose(mesh.normals, [[0, 0, 1]] * len(expected), atol=1e-6)
 
 
-def test_normals_coordinates_and_colours_are_understood() -> None:
+def test_normals_uvs_and_colors_are_read() -> None:
     header = "ply\nformat ascii 1.0\nelement vertex 3\n" + "".join(
         f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz", "s", "t")
     )

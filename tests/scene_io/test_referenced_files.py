@@ -1,4 +1,4 @@
-"""A scene file and the files that were uploaded with it."""
+"""A scene file and the files uploaded with it."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ LIGHT = Environment("white", np.ones((2, 4, 3), np.float32))
 TRIANGLE = b"mtllib ../looks/red.mtl\nusemtl Red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
 
-def kept(folder: Path, **files: bytes) -> dict[str, Path]:
+def uploaded(folder: Path, **files: bytes) -> dict[str, Path]:
     for name, content in files.items():
         (folder / name).write_bytes(content)
     return {name: folder / name for name in files}
 
 
-def test_names_are_looked_up_from_the_scenes_folder_not_from_the_disk(tmp_path: Path) -> None:
-    (path,) = kept(tmp_path, companion=b"newmtl Red\nKd 1 0 0\n").values()
+def test_names_are_resolved_in_the_upload_not_on_disk(tmp_path: Path) -> None:
+    (path,) = uploaded(tmp_path, companion=b"newmtl Red\nKd 1 0 0\n").values()
     sent = UploadedFiles({"room\\looks\\Red.MTL": path}, "room/meshes/triangle.obj")
     scene = import_scene(TRIANGLE, "test", LIGHT, sent)
     assert scene.materials[0].terms[0]["color"] == [1, 0, 0]
     assert scene.warnings == ()
 
 
-def test_a_file_that_was_not_sent_is_missing_even_where_the_disk_has_it(tmp_path: Path) -> None:
-    kept(tmp_path, companion=b"newmtl Red\nKd 1 0 0\n")
+def test_a_file_that_was_not_uploaded_is_missing_even_if_it_is_on_disk(tmp_path: Path) -> None:
+    uploaded(tmp_path, companion=b"newmtl Red\nKd 1 0 0\n")
     sent = UploadedFiles({}, "meshes/triangle.obj")
     missing = import_scene(TRIANGLE.replace(b"../looks/red.mtl", b"companion"), "test", LIGHT, sent)
     assert any("is not beside the scene" in warning for warning in missing.warnings)
@@ -44,19 +44,21 @@ def test_a_file_that_was_not_sent_is_missing_even_where_the_disk_has_it(tmp_path
 
 
 @pytest.mark.parametrize("image", ["../images/red.png", "looks/red.png"])
-def test_images_lie_where_the_material_file_says_or_else_where_the_scene_would(tmp_path: Path, image: str) -> None:
-    """In a folder of the material file's own both readings are found in the wild."""
+def test_images_are_relative_to_the_material_file_or_to_the_scene(tmp_path: Path, image: str) -> None:
+    """Real files use both for material files in a subfolder."""
     picture = io.BytesIO()
     Image.new("RGB", (2, 2), (255, 0, 0)).save(picture, "PNG")
-    files = kept(tmp_path, scene=b"", looks=f"newmtl Red\nKd 1 1 1\nmap_Kd {image}\n".encode(), png=picture.getvalue())
+    files = uploaded(
+        tmp_path, scene=b"", looks=f"newmtl Red\nKd 1 1 1\nmap_Kd {image}\n".encode(), png=picture.getvalue()
+    )
     lies = {"../images/red.png": "room/images/red.png", "looks/red.png": "room/looks/red.png"}[image]
     sent = UploadedFiles({"room/looks/red.mtl": files["looks"], lies: files["png"]}, "room/triangle.obj")
     scene = import_scene(TRIANGLE.replace(b"../looks", b"looks"), "test", LIGHT, sent)
     np.testing.assert_allclose(get_texture_values(scene.materials[0].textures["diffuse"])[0, 0], [1, 0, 0], atol=1e-3)
 
 
-def test_together_they_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_total_size_of_files_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(referenced_files, "MAX_BYTES", 5)
-    files = kept(tmp_path, a=b"1234", b=b"12")
+    files = uploaded(tmp_path, a=b"1234", b=b"12")
     with pytest.raises(SceneError, match="scale them down"):
         UploadedFiles(files, "scene.obj")

@@ -1,4 +1,4 @@
-"""Several processes write one store: threads stand for them, each with a writer of its own, as processes have."""
+"""Concurrent writers of one store: threads represent processes, each with its own writer."""
 
 import threading
 from pathlib import Path
@@ -10,7 +10,7 @@ from relume.store import StoreWriter, create_store, open_store, publish
 NUM_WRITERS, NUM_GROUPS = 8, 12
 
 
-def test_writers_that_make_a_group_at_the_same_moment_all_succeed(tmp_path: Path) -> None:
+def test_concurrent_creation_of_a_group_succeeds(tmp_path: Path) -> None:
     create_store(tmp_path / "staging", {})
     errors: list[BaseException] = []
     together = threading.Barrier(NUM_WRITERS)

@@ -1,4 +1,4 @@
-"""A store keeps what was written, gives the same files for the same input, and never turns damage into zeros."""
+"""Stores: values are read back, equal input gives equal files, and damage never becomes zeros."""
 
 import hashlib
 import json
@@ -28,7 +28,7 @@ def verify_manifest(path: Path) -> None:
 
 def bits() -> np.ndarray:
     values = np.random.default_rng(5).integers(0, 256, (ROWS, 7), dtype=np.uint8)
-    values[32:64] = 0  # a shard in full shadow
+    values[32:64] = 0  # a shard of zeros
     return values
 
 
@@ -54,7 +54,7 @@ def tree_hash(folder: Path) -> str:
     return digest.hexdigest()
 
 
-def test_reopened_store_gives_what_was_written(tmp_path: Path) -> None:
+def test_a_reopened_store_has_the_written_values(tmp_path: Path) -> None:
     reader = open_store(build(tmp_path))
     assert reader.attributes["num_lights"] == 7
     assert reader.shape(SPEC.path) == (ROWS, 7)
@@ -63,9 +63,7 @@ def test_reopened_store_gives_what_was_written(tmp_path: Path) -> None:
     np.testing.assert_array_equal(reader.read("views/front/depth"), np.linspace(0, 1, 5000, dtype=np.float32))
 
 
-def test_arrays_that_nobody_announced_have_shards_of_some_chunks(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_arrays_without_a_plan_have_shards_of_several_chunks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(schema, "UNANNOUNCED_CHUNK_BYTES", 4000)
     values = np.random.default_rng(1).random((70_000, 1), np.float32)
     create_store(tmp_path / "s", {}).write_whole("depth", values)
@@ -121,7 +119,7 @@ def test_flipped_byte_is_damage(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("keep", [0, 10, -1])
-def test_cut_shard_is_damage_on_opening_and_on_reading(tmp_path: Path, keep: int) -> None:
+def test_a_truncated_shard_is_damage_on_opening_and_on_reading(tmp_path: Path, keep: int) -> None:
     store = build(tmp_path)
     reader = open_store(store)
     shards(store)[2].write_bytes(shards(store)[2].read_bytes()[:keep])
@@ -141,7 +139,7 @@ def test_missing_shard_is_damage_not_zeros(tmp_path: Path) -> None:
         open_store(store)
 
 
-def test_a_store_deleted_under_a_reader_is_gone_not_damaged(tmp_path: Path) -> None:
+def test_a_store_deleted_under_a_reader_is_deleted_not_damaged(tmp_path: Path) -> None:
     store = build(tmp_path)
     opened, fresh = open_store(store), open_store(store)
     opened.read(SPEC.path, 0, 32)
@@ -164,7 +162,7 @@ def test_unfinished_bake_is_not_published(tmp_path: Path) -> None:
 
 
 def edit_json(path: Path, **changes: object) -> None:
-    """Change metadata and the manifest's size with it, as somebody who means harm would."""
+    """Change metadata and its size in the manifest, as an attacker would."""
     store = next(parent for parent in path.parents if (parent / "manifest.json").exists())
     path.write_text(json.dumps({**json.loads(path.read_text()), **changes}))
     manifest = json.loads((store / "manifest.json").read_text())
@@ -173,7 +171,7 @@ def edit_json(path: Path, **changes: object) -> None:
     (store / "manifest.json").write_text(json.dumps(manifest))
 
 
-def test_other_schema_version_is_refused(tmp_path: Path) -> None:
+def test_another_schema_version_is_rejected(tmp_path: Path) -> None:
     store = build(tmp_path)
     edit_json(store / "zarr.json", attributes={"schema_version": 99})
     with pytest.raises(SchemaVersionError, match="99"):
@@ -194,7 +192,7 @@ def test_other_schema_version_is_refused(tmp_path: Path) -> None:
         {"codecs": [{"name": "bytes"}]},
     ],
 )
-def test_absurd_metadata_is_refused_before_anything_is_allocated(tmp_path: Path, changes: dict[str, object]) -> None:
+def test_absurd_metadata_is_rejected_before_allocation(tmp_path: Path, changes: dict[str, object]) -> None:
     store = build(tmp_path)
     edit_json(store / SPEC.path / "zarr.json", **changes)
     with pytest.raises(StoreError):
@@ -213,9 +211,7 @@ def test_absurd_metadata_is_refused_before_anything_is_allocated(tmp_path: Path,
         None,
     ],
 )
-def test_what_names_other_codecs_than_relumes_is_not_handed_to_them(
-    tmp_path: Path, field: str, names: list[str] | None
-) -> None:
+def test_unknown_codecs_are_not_used(tmp_path: Path, field: str, names: list[str] | None) -> None:
     store = build(tmp_path)
     document = json.loads((store / SPEC.path / "zarr.json").read_text())
     configuration = document["codecs"][0]["configuration"]
@@ -228,7 +224,7 @@ def test_what_names_other_codecs_than_relumes_is_not_handed_to_them(
 @pytest.mark.parametrize(
     "text", ["", "[]", "{", '{"files": 3}', '{"files": [{"path": "../x", "bytes": 1}]}', "[" * 9999]
 )
-def test_unreadable_manifest_is_refused(tmp_path: Path, text: str) -> None:
+def test_an_unreadable_manifest_is_rejected(tmp_path: Path, text: str) -> None:
     store = build(tmp_path)
     (store / "manifest.json").write_text(text)
     with pytest.raises(StoreError):
@@ -242,7 +238,7 @@ def test_array_paths_stay_inside_the_store(tmp_path: Path, path: str) -> None:
         writer.write_whole(path, np.zeros(3, np.float32))
 
 
-def test_rows_that_cut_a_shard_are_refused(tmp_path: Path) -> None:
+def test_partial_shards_are_rejected(tmp_path: Path) -> None:
     writer = create_store(tmp_path, {})
     writer.create_array(SPEC)
     with pytest.raises(StoreError, match="cut a shard"):
@@ -253,7 +249,7 @@ def test_rows_that_cut_a_shard_are_refused(tmp_path: Path) -> None:
         StoreWriter(tmp_path).write("other", bits(), 0)
 
 
-def test_objects_are_refused(tmp_path: Path) -> None:
+def test_object_arrays_are_rejected(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="numbers only"):
         create_store(tmp_path, {}).write_whole("x", np.array([{}], dtype=object))
 

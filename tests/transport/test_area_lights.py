@@ -1,4 +1,4 @@
-"""Lamps in narrow lobes against a fine quadrature over their surface, and the strata that stand for parts of it."""
+"""Area lights in narrow lobes against a fine quadrature over their surface, and the strata of their samples."""
 
 from __future__ import annotations
 
@@ -29,11 +29,15 @@ PANEL = LightGeometry("rectangle", (0.1, 1.4, -0.8), (0.1, -1.0, 0.3), rotation=
 MESH = LightGeometry("mesh", material="Lamp")
 SIDE = 10
 ROOM = {"ggx": {"roughness": 0.1}, "cook_torrance": {"sigma": 0.1}, "ward_anisotropic": {}}
-FINE = {"ggx": 150, "cook_torrance": 80, "ward_anisotropic": 80}  # a side; of the first 0.3 % off, of others 0.04 %
+FINE = {
+    "ggx": 150,
+    "cook_torrance": 80,
+    "ward_anisotropic": 80,
+}  # points per side; error 0.3 % for the first, 0.04 % for others
 
 
 def floor_under(light, *, is_visible=True):
-    """A floor that is seen from above, and all of a lamp's samples seen, or none."""
+    """A floor with the camera above; all samples of an area light are visible, or none."""
     x, z = (a.ravel() for a in np.meshgrid(np.linspace(-1, 1, SIDE), np.linspace(-1.2, 1.2, SIDE)))
     position = np.stack([x, 0 * x, z], axis=1)
     normal, tangent = (np.tile(np.array(axis, np.float32), (len(x), 1)) for axis in ([0, 1, 0], [1, 0, 0]))
@@ -51,7 +55,7 @@ def curves_of(model, params):
 
 
 def by_quadrature(term, bands, receivers, fine):
-    """What a floor gets of `PANEL`, the mean over many places of it at their exact angles. (n, 3)"""
+    """Radiance of a floor under `PANEL`: the mean over many positions at exact angles. (n, 3)"""
     corner, (e, f) = rectangle(PANEL)
     step = (np.arange(fine) + 0.5) / fine
     positions = corner + (step[:, None, None] * e + step[:, None] * f).reshape(-1, 3)
@@ -77,8 +81,8 @@ def error(actual, expected):
 
 
 @pytest.mark.parametrize("model", ROOM)
-def test_lamps_have_no_grain_in_narrow_lobes(model):
-    """Samples without extent err by 37 % in the first of these."""
+def test_area_lights_have_no_noise_in_narrow_lobes(model):
+    """Samples without extent have an error of 37 % in the first case."""
     term, bands = curves_of(model, ROOM[model])
     receivers = floor_under(prepare_local_lights(PANEL))
     expected = by_quadrature(term, bands, receivers, FINE[model])
@@ -89,14 +93,14 @@ def test_lamps_have_no_grain_in_narrow_lobes(model):
         assert error(np.einsum("njc,cj->nc", transport.astype(float), bands[active]), expected) < 0.01
 
 
-def test_a_lamp_that_nobody_sees_gives_nothing():
+def test_an_occluded_light_gives_nothing():
     term, bands = curves_of("ggx", {})
     hidden = floor_under(prepare_local_lights(PANEL), is_visible=False)
     assert not Shader(term, contract(term, bands, None), NO_LIGHTS, hidden).project(0, SIDE**2).any()
 
 
-def test_beside_other_light_a_lamp_is_found_less_finely():
-    """To a thousandth of all; the other light is in none of it."""
+def test_with_other_light_an_area_light_is_sampled_coarser():
+    """Within 0.1 % of all light; the other light is in neither."""
     term, bands = curves_of("ggx", ROOM["ggx"])
     contraction, receivers = contract(term, bands, None), floor_under(prepare_local_lights(PANEL))
     beside = np.full((SIDE**2, 3), 2.0, np.float32)
@@ -119,8 +123,8 @@ def panel_in(columns, rows, begin=0.0, end=1.0):
 @pytest.mark.parametrize(
     ("columns", "rows", "roughness", "max_error"), [(1, 1, 0.1, 0.01), (4, 1, 0.1, 0.02), (24, 16, 0.3, 0.05)]
 )
-def test_a_mesh_shines_as_the_panel_that_it_is(columns, rows, roughness, max_error):
-    """Parts of several pieces overlap and leave gaps, of which a narrower lobe would see something."""
+def test_a_mesh_light_equals_the_panel(columns, rows, roughness, max_error):
+    """Strata of several pieces overlap and leave gaps that a narrower lobe would resolve."""
     term, bands = curves_of("ggx", {"roughness": roughness})
     mesh = prepare_local_lights(MESH, make_emissive_triangles(panel_in(columns, rows), False))
     expected, actual = (
@@ -130,8 +134,8 @@ def test_a_mesh_shines_as_the_panel_that_it_is(columns, rows, roughness, max_err
     assert error(actual, expected) < max_error
 
 
-def test_what_a_wall_leaves_of_a_lamp_is_mirrored():
-    """A fifth of a panel behind an opening, against a panel as wide as that; with quarters as many samples 43 % off."""
+def test_a_partly_occluded_light_is_reflected():
+    """A fifth of a panel behind an opening, against a panel of that width; 43 % off with a quarter of the samples."""
     term, bands = curves_of("ggx", {"roughness": 0.1})
     wall = np.concatenate([panel_in(1, 1, -2.5, 0), panel_in(1, 1, 1, 3.3)]).reshape(-1, 3)
     wall += 1e-3 * np.array(PANEL.direction)
@@ -151,8 +155,8 @@ def test_what_a_wall_leaves_of_a_lamp_is_mirrored():
 
 
 @pytest.mark.parametrize(("num_pieces", "num"), [(1, 64), (2, 256), (50, 256), (1000, 256), (3, 4), (1, 1)])
-def test_every_cell_row_and_column_has_its_samples(num_pieces, num):
-    """However samples are shifted within their cells, each N-th of u and, unshifted, of v has one."""
+def test_every_stratum_row_and_column_has_samples(num_pieces, num):
+    """For any shift within strata, each N-th of u and, without shift, of v has one sample."""
     strata = make_strata(split_axes(num_pieces, num), 1)
     uv = strata.corner + strata.size * strata.uv
     for axis in range(2):
@@ -160,8 +164,8 @@ def test_every_cell_row_and_column_has_its_samples(num_pieces, num):
     assert len(np.unique(strata.corner, axis=0)) == num
 
 
-def test_what_does_not_lie_flat_is_asked_sample_by_sample():
-    """A box of twelve triangles: none of its coarse parts is a quadrilateral."""
+def test_strata_that_are_not_flat_use_single_samples():
+    """A box of twelve triangles: none of its coarse strata is a quadrilateral."""
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
     sides = [corners, corners[:, [1, 2, 0]], corners[:, [2, 0, 1]]]
     faces = [f for side in sides for f in (side, side[::-1] + np.cross(*np.diff(side, axis=0)[:2]))]

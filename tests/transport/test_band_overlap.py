@@ -1,4 +1,4 @@
-"""The shares of a triangle in the bands, against a triangle cut into very many."""
+"""Overlap of a triangle with the bands, against a finely subdivided triangle."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ def deposit_all(overlap, weight, out):
 
 
 @nb.njit
-def mean_of_all(overlap, bands, falls, channel):
+def mean_of_all(overlap, bands, decreases, channel):
     low, middle, high, rise, fall = overlap
     mean, top = np.float32(0), np.int64(low) - 1
     for band in range(top + 1, np.int64(high) + 1, NUM):
-        mean += mean_over_bands(falls, channel, band, low, middle, high, rise, fall)
+        mean += mean_over_bands(decreases, channel, band, low, middle, high, rise, fall)
         top = band + NUM - 1
     return mean + bands[channel, top]
 
 
-def shares_of(corners, weight=(1, 1, 1)):
-    """The triangle shared out to all bands, three weights at once. (3, J)"""
+def fractions_of(corners, weight=(1, 1, 1)):
+    """A triangle distributed to all bands, with three weights at once. (3, J)"""
     out = np.zeros((3, NUM_BANDS + NUM), np.float32)
     deposit_all(overlap(*np.float32(corners)), np.float32(weight), out)
     assert not out[:, NUM_BANDS:].any()
@@ -39,7 +39,7 @@ def shares_of(corners, weight=(1, 1, 1)):
 
 
 def fine_values(a, b, c, fine=FINE):
-    """The linear angle at the middles of fine² congruent triangles."""
+    """The linear angle at the centers of fine² congruent triangles."""
     i, j = np.meshgrid(np.arange(fine), np.arange(fine), indexing="ij")
     up = i + j < fine
     down = i + j < fine - 1
@@ -49,7 +49,7 @@ def fine_values(a, b, c, fine=FINE):
 
 
 def fine_below(corners):
-    """Share below the end of each band. (J,)"""
+    """Fraction below the end of each band. (J,)"""
     values = fine_values(*corners)
     return np.searchsorted(values, np.arange(1, NUM_BANDS + 1)) / len(values)
 
@@ -68,22 +68,22 @@ def fine_below(corners):
         (255.0, 256.0, 255.5),
     ],
 )
-def test_shares_are_those_of_a_fine_division(corners):
-    np.testing.assert_allclose(np.cumsum(shares_of(corners)[0]), fine_below(corners), atol=2.5 / FINE)
+def test_fractions_equal_a_fine_subdivision(corners):
+    np.testing.assert_allclose(np.cumsum(fractions_of(corners)[0]), fine_below(corners), atol=2.5 / FINE)
 
 
 def test_random_triangles_in_any_order_of_corners():
     rng = np.random.default_rng(1)
     for extent in (1, 6, 40, 250):
         for corners in rng.uniform(0, 256 - extent) + rng.uniform(0, extent, (25, 3)):
-            shares = [shares_of(corners[order])[0] for order in ([0, 1, 2], [2, 0, 1], [1, 0, 2], [2, 1, 0])]
+            shares = [fractions_of(corners[order])[0] for order in ([0, 1, 2], [2, 0, 1], [1, 0, 2], [2, 1, 0])]
             np.testing.assert_array_equal(shares, np.broadcast_to(shares[0], (4, NUM_BANDS)))
             np.testing.assert_allclose(np.cumsum(shares[0]), fine_below(corners), atol=2.5 / FINE)
 
 
-def test_shares_are_not_negative_and_sum_to_one():
+def test_fractions_are_not_negative_and_sum_to_one():
     for corners in np.random.default_rng(2).uniform(0, 256, (200, 3)):
-        shares = shares_of(corners)[0]
+        shares = fractions_of(corners)[0]
         assert shares.min() > -1e-6
         assert shares.sum() == pytest.approx(1, abs=1e-6)
         inside = (np.arange(1, NUM_BANDS + 1) > corners.min()) & (np.arange(NUM_BANDS) < corners.max())
@@ -93,7 +93,7 @@ def test_shares_are_not_negative_and_sum_to_one():
 @pytest.mark.parametrize("value", [0.0, 0.5, 1.0, 17.25, 128.0, 255.9, 255.99998])
 def test_triangle_at_one_angle_lies_in_its_band(value):
     for corners in ([value] * 3, [value, value, value - 5e-5], [value, value - 5e-5, value - 5e-5]):
-        shares = shares_of(np.maximum(corners, 0))[0]
+        shares = fractions_of(np.maximum(corners, 0))[0]
         assert shares.min() >= 0
         assert shares.sum() == pytest.approx(1, abs=1e-6)
         near = [min(int(value), NUM_BANDS - 1), max(int(value) - 1, 0)]
@@ -101,19 +101,21 @@ def test_triangle_at_one_angle_lies_in_its_band(value):
         assert shares[sorted(set(near))].sum() == pytest.approx(1, abs=1e-6)
 
 
-def test_weights_of_three_channels_and_means_are_the_shares():
+def test_weights_of_three_channels_and_means_equal_the_fractions():
     rng = np.random.default_rng(4)
     for corners in rng.uniform(0, 256, (30, 3)):
-        shares = shares_of(corners)[0]
-        np.testing.assert_allclose(shares_of(corners, (2, 0.5, 0)), [2 * shares, 0.5 * shares, 0 * shares], rtol=1e-6)
+        shares = fractions_of(corners)[0]
+        np.testing.assert_allclose(
+            fractions_of(corners, (2, 0.5, 0)), [2 * shares, 0.5 * shares, 0 * shares], rtol=1e-6
+        )
         bands = np.pad(rng.uniform(0, 1, (3, NUM_BANDS)), ((0, 0), (0, NUM)), mode="edge").astype(np.float32)
-        falls = -np.diff(bands, axis=1, prepend=bands[:, :1])
+        decreases = -np.diff(bands, axis=1, prepend=bands[:, :1])
         for channel in range(3):
-            mean = mean_of_all(overlap(*np.float32(corners)), bands, falls, channel)
+            mean = mean_of_all(overlap(*np.float32(corners)), bands, decreases, channel)
             assert mean == pytest.approx(float(bands[channel, :NUM_BANDS] @ shares), rel=2e-6)
 
 
-def test_middle_is_the_middle_whatever_the_size_of_the_angles():
+def test_the_center_is_accurate_for_angles_of_any_size():
     for corners in np.random.default_rng(3).uniform(0, 256, (200, 3)):
         low, middle, high, *_ = overlap(*np.float32(corners))
         assert [low, middle, high] == sorted(np.float32(corners))

@@ -1,4 +1,4 @@
-"""Which groups of lights points see wholly, and what is left to be shaded one by one."""
+"""Groups of lights that are completely visible from points, and the remaining single lights."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def lights():
 
 @pytest.mark.parametrize("num_points", [1, 48, 64])
 @pytest.mark.parametrize("num_lights", [5, 64, 603])
-def test_bits_turned_over_and_back_are_the_same(num_points, num_lights):
+def test_transposing_bits_twice_restores_them(num_points, num_lights):
     visible = np.random.default_rng(1).random((num_points, num_lights)) < 0.5
     rows = np.packbits(visible, axis=1, bitorder="little")
     words = np.empty(num_lights, np.uint64)
@@ -31,7 +31,7 @@ def test_bits_turned_over_and_back_are_the_same(num_points, num_lights):
     np.testing.assert_array_equal(back, rows)
 
 
-def test_groups_are_lights_below_one_node(lights):
+def test_groups_are_lights_of_one_tree_node(lights):
     groups = lights.groups
     assert len(np.unique(groups.light_index)) == len(groups.light_index) > 0.8 * lights.num_lights
     for first, end in zip(groups.first[:-1], groups.first[1:], strict=True):
@@ -41,8 +41,8 @@ def test_groups_are_lights_below_one_node(lights):
         assert set.intersection(*above)
 
 
-def test_a_group_is_as_bright_as_its_lights_from_every_side(lights):
-    """Σ E cos θ, luminance, for normals that face all of it: the mean direction is that of the light."""
+def test_a_group_has_the_irradiance_of_its_lights(lights):
+    """Σ E cos θ in luminance, for normals that face all lights: the mean direction equals that of the light."""
     groups, normals = lights.groups, np.random.default_rng(2).normal(size=(50, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     alone = luminance(lights.irradiance)[groups.light_index] * (normals @ lights.direction[groups.light_index].T)
@@ -51,7 +51,7 @@ def test_a_group_is_as_bright_as_its_lights_from_every_side(lights):
     np.testing.assert_allclose(brightness, expected, atol=1e-5 * np.abs(expected).max())
 
 
-def test_lights_of_groups_that_are_wholly_seen_are_taken(lights):
+def test_completely_visible_groups_are_selected(lights):
     groups, rng = lights.groups, np.random.default_rng(3)
     visible = rng.random((lights.num_lights, 48)) < 0.8
     words = (visible * (np.uint64(1) << np.arange(48, dtype=np.uint64))).sum(axis=1, dtype=np.uint64)

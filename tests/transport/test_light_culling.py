@@ -1,4 +1,4 @@
-"""Lights that are left out because a dormant curve is nothing all over them: only such."""
+"""Light culling: only lights on which a fixed curve is zero are omitted."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def around(directions, radius, count):
 
 @pytest.mark.parametrize("angle", list(Angle))
 @pytest.mark.parametrize("wo_z", [0.02, 0.3, 0.9, 1.0])
-def test_no_direction_within_reach_has_a_smaller_angle(angle, wo_z):
+def test_no_direction_within_the_radius_has_a_smaller_angle(angle, wo_z):
     wi = ref.unit(RNG.normal(size=(2000, 3)) * [1, 1, 0.6])
     wo = np.array([np.sqrt(1 - wo_z**2), 0, wo_z])
     radius = RNG.choice([0.003, 0.03, 0.2, 0.9], size=2000)
@@ -55,7 +55,7 @@ def test_every_corner_of_a_light_lies_within_its_radius():
 
 
 @pytest.mark.parametrize("support", [np.inf, 0.5, 0.1])
-def test_list_holds_the_seen_lights_in_order(support):
+def test_the_list_has_the_visible_lights_in_order(support):
     lights = tessellate_environment(studio(), 150)
     receivers = ref.only_above(ref.make_random_receivers(9, lights.num_lights, seed=7), lights)
     capacity = 9 * lights.num_lights
@@ -92,6 +92,6 @@ def test_two_angles_of_the_half_vector_bound_the_third(pair):
     assert list(kinds) == [*given, Angle.THETA_H]
     reached = half[(first <= 0.5) & (second <= 0.2)]
     assert reached.max() <= support[-1] + 1e-3
-    assert reached.max() > 0.9 * support[-1]  # no closer bound is wanted
+    assert reached.max() > 0.9 * support[-1]  # no tighter bound is needed
     kinds, _ = with_half_angle(given, np.array([1.6, np.inf, 0.2], np.float32))
-    assert list(kinds) == list(given)  # the free curve may become anything
+    assert list(kinds) == list(given)  # the free curve can take any value

@@ -1,4 +1,4 @@
-"""Lobes narrower than a light triangle, and than a band: chrome in even light is even, and as bright as the light."""
+"""Lobes narrower than a light triangle and a band: chrome in uniform light is uniform with the light's radiance."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def lights():
 
 
 def shown(document, lights, normal, wo):
-    """All curves, those of the outgoing angle too. (n, 3)"""
+    """All curves, including those of the outgoing angle. (n, 3)"""
     term = TERMS[document["model"]]
     bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.depends_on_view}
     visible = np.full((len(normal), -(-lights.num_lights // 8)), 255, np.uint8)
@@ -32,7 +32,7 @@ def shown(document, lights, normal, wo):
 
 
 @pytest.mark.parametrize("roughness", [0.03, 0.05, 0.08, 0.12])
-def test_chrome_in_even_light_is_even(roughness, lights):
+def test_chrome_in_uniform_light_is_uniform(roughness, lights):
     rng = np.random.default_rng(12)
     normal = rng.normal(size=(600, 3)).astype(np.float32)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""What cells send by direction: the numbers of materials, and the table of a cell."""
+"""Directional outgoing light of patches: reflectance matrices of materials, and the table of a patch."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ PLAIN = {"color": [1.0, 0.5, 0.0], "texture": None, "curves": {}}
 
 
 def by_cosine(u, v):
-    """Directions by the cosine, of places in the unit square. (num, 3)"""
+    """Cosine-distributed directions of points in the unit square. (num, 3)"""
     r, phi = np.sqrt(u), 2 * np.pi * v
     return np.stack([r * np.cos(phi), r * np.sin(phi), np.sqrt(1 - r * r)], axis=-1)
 
 
 def over_hemisphere(num, seed):
-    """Directions by the cosine, drawn. (num, 3)"""
+    """Random cosine-distributed directions. (num, 3)"""
     return by_cosine(*np.random.default_rng(seed).random((2, num)))
 
 
 @pytest.fixture(scope="module")
 def sides():
-    """Directions in and as many out, and the functions of each as rows, which are read one after another.
+    """Incident and outgoing directions, and the functions of each as rows, which are read sequentially.
 
-    Pairs are Kronecker's sequence of the root of x⁵ = x + 1: each is worth many that are drawn.
+    Pairs are a Kronecker sequence of the root of x⁵ = x + 1: each replaces many random ones.
     """
     u = (np.arange(1, NUM_PAIRS + 1)[:, None] * 1.1673039782614187 ** -np.arange(1.0, 5)) % 1
     wi, wo = by_cosine(u[:, 0], u[:, 1]), by_cosine(u[:, 2], u[:, 3])
@@ -43,15 +43,15 @@ def sides():
     ("model", "params"),
     [("blinn_phong", {"exponent": 12.0}), ("ggx", {"roughness": 0.6, "f0": 0.8}), ("ward_anisotropic", {})],
 )
-def test_what_a_term_sends_on_is_its_double_integral(model, params, sides):
-    """F_jk by a mean over both directions, as near as one of a million that are drawn."""
+def test_reflectance_matrices_are_double_integrals(model, params, sides):
+    """F_jk by a mean over both directions, as accurate as a million random samples."""
     document = {**PLAIN, "model": model, "params": params}
     wi, wo, h_i, h_o = sides
     value = np.ascontiguousarray(np.pi**2 * eval_brdf(document, wi, wo)[:, 0])
     matrix, table = reflectance_matrix(document), recurrence(OUTGOING_DEGREE)
     for pair, (j, k) in enumerate(PAIRS):
         drawn = value * h_i[table.cosine[k]] * h_o[table.cosine[j]]
-        if table.order[j]:  # the same of cosine and sine parts; where a term is not isotropic, their mean
+        if table.order[j]:  # equal for cosine and sine parts; their mean for anisotropic terms
             drawn = (drawn + value * h_i[table.sine[k]] * h_o[table.sine[j]]) / 2
         deviation = drawn.std() / np.sqrt(1_000_000)
         assert matrix[0, pair] == pytest.approx(drawn.mean(), abs=5 * deviation + 2e-3)
@@ -59,8 +59,8 @@ def test_what_a_term_sends_on_is_its_double_integral(model, params, sides):
     assert not matrix[2].any()
 
 
-def test_a_table_holds_what_its_functions_send():
-    """Of the directions of a cosine's rays, the sum is known without the table."""
+def test_a_table_equals_the_sum_of_its_functions():
+    """For the directions of cosine rays, the sum is known without the table."""
     rng = np.random.default_rng(5)
     vectors = rng.normal(size=(3, 3, NUM_OUTGOING)).astype(np.float32) / np.arange(1, NUM_OUTGOING + 1)
     even = np.zeros((NO_PATCH + 1, 3), np.float32)
@@ -76,8 +76,8 @@ def test_a_table_holds_what_its_functions_send():
     np.testing.assert_array_equal(ref.evaluate_outgoing(sent, 1, wo[0]), even[1])
 
 
-def sent_of_one_direction(roughness):
-    """What metal sends of light from one direction, 50 of them, and how fast that falls."""
+def reflect_one_direction(roughness):
+    """Outgoing light of metal for one direction, 50 directions of it, and its decay."""
     metal = {**PLAIN, "model": "ggx", "color": [1, 1, 1], "params": {"roughness": roughness, "f0": 0.9}}
     plain = np.ones((2, 50, 3), np.float32)
     made = ReflectanceOperator.from_materials((pack_reflectance([metal]),), np.zeros(50, np.uint16), plain)
@@ -89,12 +89,12 @@ def sent_of_one_direction(roughness):
     return radiance_from_patch(even, np.arange(50), frame, leaving, falls), falls
 
 
-def test_narrow_lobes_see_fewer_rings_about_what_metals_send_and_no_sharper_ones():
+def test_narrow_lobes_suppress_ringing_of_metals():
     def lowest(sent, table):
         light = sent.isotropic[:50, None, 0] + sent.scale[:, :1] * table[..., 0]
         return light.min(axis=1) / light.max(axis=1)
 
-    outgoing = {roughness: sent_of_one_direction(roughness) for roughness in (0.01, 0.1, 0.3, 0.6)}
+    outgoing = {roughness: reflect_one_direction(roughness) for roughness in (0.01, 0.1, 0.3, 0.6)}
     for sent, _ in outgoing.values():
         assert np.all(lowest(sent, sent.smooth) > lowest(sent, sent.table))
     sharp, rough = outgoing[0.01][0], outgoing[0.3][0]
@@ -102,11 +102,11 @@ def test_narrow_lobes_see_fewer_rings_about_what_metals_send_and_no_sharper_ones
     assert np.median(lowest(sharp, sharp.smooth)) > np.median(lowest(rough, rough.smooth)) - 0.02
     np.testing.assert_allclose(
         outgoing[0.3][1], WINDOW_DECAY, rtol=0.04
-    )  # from there on all is as the highlight has it
+    )  # from there on the highlight limits the decay
     np.testing.assert_allclose(outgoing[0.6][1], WINDOW_DECAY, rtol=1e-6)
 
 
-def test_even_light_is_sent_evenly():
+def test_uniform_light_is_reflected_uniformly():
     radiance = np.zeros((NO_PATCH + 1, 3), np.float32)
     radiance[:4] = 3
     assert isotropic(radiance).table.shape[0] == 0

@@ -1,15 +1,15 @@
-"""Why lights are triangles: as many points make a highlight break into dots (figure 4, Ben-Artzi 2006).
+"""Triangle lights against point lights, with which highlights break into dots (figure 4, Ben-Artzi 2006).
 
-Both take their light from the same triangles: a point has all of it in one direction and its angle in one band, a
-triangle spreads it over the bands it overlaps. A ball of narrow highlight (cook_torrance, σ = 0.05) under a sky with a
-sun, root mean square of the error relative to each pixel's own radiance (`python -m pytest -s` prints it):
+Both have the light of the same triangles: a point has it in one direction and one band, a triangle spreads it over the
+bands it overlaps. Root mean square error relative to each pixel's radiance for a ball with a narrow highlight
+(cook_torrance, σ = 0.05) under an environment with a sun (`python -m pytest -s` prints it):
 
     lights   triangles   points
        500     0.04       0.6
      1 000     0.02       0.25
 
-Most triangles are spent on the sun; where the sky is reflected their distance is wider than the highlight, and points
-leave gaps there. Points will do where the highlight is wider than that (the paper, section 5.1).
+Most triangles lie in the sun; elsewhere their distance is larger than the highlight, and points leave gaps. Points
+suffice for wider highlights (the paper, section 5.1).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ TERM = TERMS["cook_torrance"]
 BANDS = {curve.name: curve_bands(DOCUMENT, curve) for curve in TERM.curves}
 
 
-def sky_with_sun(height):
+def environment_with_sun(height):
     d = texel_directions(height, 2 * height).astype(float)
     radiance = 0.6 + 0.4 * d[..., 1:2] * [0.5, 0.8, 1.0] + 0.1 * np.sin(3 * d[..., :1])
     towards = ref.unit(np.float64([-1, 1.5, 1.5]))
@@ -38,7 +38,7 @@ def sky_with_sun(height):
 
 
 def ball(size=16):
-    """Points of a ball seen from afar, one a pixel, up to 66° from the middle."""
+    """Points of a distant ball, one per pixel, up to 66° from the center."""
     y, x = (np.stack(np.meshgrid(np.arange(size), np.arange(size), indexing="ij")) + 0.5) / size * 2 - 1
     inside = x**2 + y**2 < 0.83
     normal = np.stack([x, -y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))], axis=-1)[inside]
@@ -48,13 +48,13 @@ def ball(size=16):
 
 
 @pytest.fixture(scope="module")
-def truth():
-    return ref.integrate_texels(DOCUMENT, sky_with_sun(128), ball())
+def reference():
+    return ref.integrate_texels(DOCUMENT, environment_with_sun(128), ball())
 
 
 def errors(reference, num_lights):
-    """Error of triangles and of points, relative to each pixel."""
-    lights = tessellate_environment(sky_with_sun(256), num_lights)
+    """Error of triangles and of points relative to each pixel."""
+    lights = tessellate_environment(environment_with_sun(256), num_lights)
     receivers = ref.only_above(ball(), lights)
     projector = Projector(TERM, contract(TERM, BANDS, None), lights, receivers)
     triangles = projector.project(0, len(receivers.normal))[:, 0]
@@ -62,11 +62,11 @@ def errors(reference, num_lights):
     return [float(np.sqrt(np.mean((image / reference - 1) ** 2))) for image in (triangles, points)]
 
 
-def test_triangles_are_right_where_points_break_into_dots(reference):
+def test_triangles_are_accurate_where_points_break_into_dots(reference):
     few, many = errors(reference, 500), errors(reference, 1000)
     for num_lights, (triangles, points) in ((500, few), (1000, many)):
         print(f"{num_lights} lights: triangles {triangles:.3f}, points {points:.3f}")  # noqa: T201
         assert points > 8 * triangles
     assert few[0] < 0.09
     assert many[0] < 0.04
-    assert many[1] > 3 * few[0]  # twice as many points do not make up for it
+    assert many[1] > 3 * few[0]  # twice as many points do not suffice

@@ -1,4 +1,4 @@
-"""The projector against its twin, against all texels, and against itself: which curve is free must not matter."""
+"""The projector against NumPy, against all texels, and against itself: the choice of the free curve must not matter."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from relume.transport.projector import Projector
 from relume.transport.term_contraction import contract
 
 NUM_POINTS = 40
-# every curve that enters the transport, and every pair of a term's
+# every curve of the transport, and every pair of curves of a term
 CURVES = [(model, c.name) for model, term in ANALYTIC.items() for c in term.curves if not c.depends_on_view]
-# what an angle may be off and still count as linear, in bands: docs/direct-light.md#algorithm
+# tolerance of the linear approximation of an angle, in bands: docs/direct-light.md#algorithm
 TOLERANCE_BANDS, TOLERANCE_SHARE = 0.12, 0.015
 
 
@@ -40,8 +40,8 @@ def default_bands(model, **params):
     return {curve.name: curve_bands(document, curve) for curve in TERMS[model].curves}
 
 
-def coloured_bands(model, seed=0):
-    """Wavy curves, different in each channel, nowhere flat and nowhere zero."""
+def colored_bands(model, seed=0):
+    """Wavy curves, different in each channel, nowhere constant and nowhere zero."""
     rng = np.random.default_rng(seed)
     bands = {}
     for curve in TERMS[model].curves:
@@ -58,20 +58,20 @@ def project(model, bands, active, lights, receivers):
 
 
 def image(model, bands, active, lights, receivers):
-    """Σ_j c_j T_j with any curve free, or none. (n, 3)"""
+    """Σ_j c_j T_j with any free curve, or none. (n, 3)"""
     transport = project(model, bands, active, lights, receivers)
     return transport[:, 0] if active is None else np.einsum("njc,cj->nc", transport, bands[active])
 
 
 def relative(actual, expected):
-    """Largest difference in units of the largest value."""
+    """Largest difference relative to the largest value."""
     return np.abs(actual - expected).max() / np.abs(expected).max()
 
 
 @pytest.mark.parametrize(("model", "curve"), CURVES)
-@pytest.mark.parametrize("bands_of", [default_bands, coloured_bands])
-def test_any_curve_may_be_the_free_one(model, curve, bands_of, lights, receivers):
-    """T_A · c_A with B dormant = T_B · c_B with A dormant = no curve free (eqs. 23 and 26, for all terms)."""
+@pytest.mark.parametrize("bands_of", [default_bands, colored_bands])
+def test_any_curve_can_be_free(model, curve, bands_of, lights, receivers):
+    """T_A · c_A with B fixed = T_B · c_B with A fixed = no free curve (eqs. 23 and 26, for all terms)."""
     bands = bands_of(model)
     none = image(model, bands, None, lights, receivers)
     assert relative(image(model, bands, curve, lights, receivers), none) < 2e-6
@@ -80,28 +80,28 @@ def test_any_curve_may_be_the_free_one(model, curve, bands_of, lights, receivers
 
 
 @pytest.mark.parametrize(("model", "curve"), CURVES)
-def test_transport_is_linear_in_each_dormant_curve(model, curve, lights, receivers):
-    first, second = coloured_bands(model, 1), coloured_bands(model, 2)
+def test_transport_is_linear_in_each_fixed_curve(model, curve, lights, receivers):
+    first, second = colored_bands(model, 1), colored_bands(model, 2)
     for fixed in {c.name for c in TERMS[model].curves if not c.depends_on_view} - {curve}:
         parts = [
             project(model, {**first, fixed: curve_set[fixed]}, curve, lights, receivers)
             for curve_set in (first, second)
         ]
         combined = {**first, fixed: 2 * first[fixed] + 3 * second[fixed]}
-        # thousands of leaves about a pole, each rounded to float32
+        # thousands of subdivided triangles around a pole, each rounded to float32
         assert relative(project(model, combined, curve, lights, receivers), 2 * parts[0] + 3 * parts[1]) < 6e-6
 
 
 @pytest.mark.parametrize(("model", "curve"), CURVES)
 def test_transport_of_a_curve_does_not_depend_on_its_own_bands(model, curve, lights, receivers):
-    bands_a, bands_b = coloured_bands(model, 1), coloured_bands(model, 2)
+    bands_a, bands_b = colored_bands(model, 1), colored_bands(model, 2)
     first = project(model, bands_a, curve, lights, receivers)
     np.testing.assert_array_equal(first, project(model, {**bands_a, curve: bands_b[curve]}, curve, lights, receivers))
 
 
 @pytest.mark.parametrize("curve", CURVES)
-def test_shares_of_every_triangle_sum_to_one(curve, lights):
-    """With nothing dormant but ones, all bands of one light together are its power · q · cos θi: Σ_j Δ_{m,j} = 1."""
+def test_band_fractions_of_every_triangle_sum_to_one(curve, lights):
+    """With constant fixed curves of one, all bands of a light sum to its power · q · cos θi: Σ_j Δ_{m,j} = 1."""
     model, name = curve
     term = TERMS[model]
     ones = {c.name: np.ones((3, c.num_bands)) for c in term.curves}
@@ -111,7 +111,7 @@ def test_shares_of_every_triangle_sum_to_one(curve, lights):
     )
     point, light = (
         index.ravel() for index in np.meshgrid(np.arange(8), light_indices, indexing="ij")
-    )  # each pair alone
+    )  # each pair separately
     only = np.arange(lights.num_lights) == light[:, None]
     visible = np.packbits(only, axis=1, bitorder="little")
     frame = base.wo[point], base.normal[point], base.tangent[point]
@@ -124,7 +124,7 @@ def test_shares_of_every_triangle_sum_to_one(curve, lights):
     np.testing.assert_allclose(sums, lights.irradiance[light].astype(float) * shading, rtol=1e-5, atol=1e-12)
 
 
-def test_flat_curves_are_left_out_and_multiply(lights, receivers):
+def test_constant_curves_are_factored_out(lights, receivers):
     for model in ANALYTIC:
         names = [c.name for c in TERMS[model].curves if not c.depends_on_view]
         flat = {c.name: np.full((3, c.num_bands), 0.5) * [[1], [2], [3]] for c in TERMS[model].curves}
@@ -135,8 +135,8 @@ def test_flat_curves_are_left_out_and_multiply(lights, receivers):
             assert relative(image(model, flat, name, lights, receivers), expected) < 2e-6
 
 
-def test_a_curve_that_becomes_flat_changes_nothing_suddenly(lights, receivers):
-    """Flat to the last bit and flat but for 1e-9 are the same curve; so are their images, whichever curve is free."""
+def test_nearly_constant_curves_equal_constant_ones(lights, receivers):
+    """Constant curves and curves constant within 1e-9 give the same images, whichever curve is free."""
     for model in ("cook_torrance", "ggx", "ashikhmin_shirley"):
         bands = default_bands(model)
         names = [c.name for c in TERMS[model].curves if not c.depends_on_view]
@@ -151,10 +151,10 @@ def test_a_curve_that_becomes_flat_changes_nothing_suddenly(lights, receivers):
 
 
 @pytest.mark.parametrize(("model", "curve"), CURVES)
-def test_leaving_out_lights_that_a_dormant_curve_never_sees_loses_nothing(model, curve, lights, receivers):
-    """A curve that ends early against the same one kept alive far out by a tail too small to see."""
+def test_culled_lights_have_no_effect(model, curve, lights, receivers):
+    """A curve that ends early against the same one with a negligible tail that prevents culling."""
     for fixed in {c.name for c in TERMS[model].curves if not c.depends_on_view} - {curve}:
-        bands = coloured_bands(model)
+        bands = colored_bands(model)
         ends = bands[fixed].shape[1] // 6
         bands[fixed][:, ends:] = 0
         raised = {**bands, fixed: bands[fixed] + 1e-8 * bands[fixed].max()}
@@ -166,17 +166,17 @@ def test_leaving_out_lights_that_a_dormant_curve_never_sees_loses_nothing(model,
 
 
 @pytest.mark.parametrize(("start", "stop"), [(0, 0), (0, 1), (3, 17), (0, 48), (1, 49), (47, 130), (100, 131)])
-def test_a_range_gives_the_rows_of_the_whole(start, stop, lights):
+def test_a_range_equals_the_rows_of_the_whole(start, stop, lights):
     receivers = ref.only_above(ref.make_random_receivers(131, lights.num_lights, seed=5), lights)
     bands = default_bands("cook_torrance")
     whole = project("cook_torrance", bands, "theta_h", lights, receivers)
     term = TERMS["cook_torrance"]
     projector = Projector(term, contract(term, bands, "theta_h"), lights, receivers)
-    for _ in range(2):  # its scratch memory keeps nothing
+    for _ in range(2):  # scratch memory keeps no state
         np.testing.assert_array_equal(projector.project(start, stop), whole[start:stop])
 
 
-def test_hidden_lights_give_nothing_and_seen_ones_add_up(lights, receivers):
+def test_hidden_lights_give_nothing_and_visible_ones_add_up(lights, receivers):
     bands, rng = default_bands("cook_torrance"), np.random.default_rng(6)
     some = receivers.visible & rng.integers(0, 256, receivers.visible.shape).astype(np.uint8)
     parts = [
@@ -194,9 +194,9 @@ def test_hidden_lights_give_nothing_and_seen_ones_add_up(lights, receivers):
 
 
 @pytest.mark.parametrize("model", ANALYTIC)
-def test_against_the_twin_with_exact_angles(model, lights, receivers):
+def test_the_projector_equals_numpy_with_exact_angles(model, lights, receivers):
     receivers = receivers.subset(np.arange(0, NUM_POINTS, 2))
-    for bands in (default_bands(model), coloured_bands(model)):
+    for bands in (default_bands(model), colored_bands(model)):
         actual = image(model, bands, None, lights, receivers)
         exact = ref.project(TERMS[model], bands, None, lights, receivers, depth=4)[:, 0]
         assert relative(actual, exact) < 0.01
@@ -208,7 +208,7 @@ def many_lights():
     return tessellate_environment(studio(), 1400)
 
 
-# one curve of each angle: with ones for bands, models that share an angle differ by their quotients only
+# one curve of each angle: with bands of one, models with a common angle differ in their quotients only
 FINE_CURVES = {TERMS[model].curve(name).angle: (model, name) for model, name in reversed(CURVES)}
 CREASED = (Angle.ALPHA, Angle.BETA, Angle.TILT_X, Angle.TILT_Y)
 
@@ -216,11 +216,11 @@ CREASED = (Angle.ALPHA, Angle.BETA, Angle.TILT_X, Angle.TILT_Y)
 @pytest.mark.parametrize(
     ("angle", "model", "name"), [(angle, *curve_keys) for angle, curve_keys in sorted(FINE_CURVES.items())]
 )
-def test_bands_hold_what_exact_angles_put_there_within_the_tolerance(angle, model, name, many_lights):
-    """No light is moved along the curve by more than angles may bend and still count as linear.
+def test_bands_equal_exact_angles_within_the_tolerance(angle, model, name, many_lights):
+    """Light moves along the curve by at most the tolerance of the linear approximation.
 
-    The light below each band's edge lies between the twin's below the edge less the tolerance and the twin's below the
-    edge plus it. The angles of Ashikhmin and Shirley, and tilts, have a crease through their pole: twice as much there.
+    The light below each band edge lies between the reference below the edge minus and plus the tolerance. The angles of
+    Ashikhmin and Shirley, and tilts, have a crease through their pole: twice the tolerance there.
     """
     lights = many_lights
     receivers = ref.only_above(ref.make_random_receivers(5, lights.num_lights, seed=2), lights)
@@ -240,7 +240,7 @@ def test_bands_hold_what_exact_angles_put_there_within_the_tolerance(angle, mode
         below, total = below / below[-1], below[-1]
         reached = np.cumsum(transport[row])[:-1] / total
         low, high = (below[np.searchsorted(gamma[order], edges + way * tolerance)] for way in (-1, 1))
-        # of all light: pieces of the twin are of finite size, shares follow chords, and division ends at a pole
+        # of all light: pieces of the reference are finite, fractions follow chords, and subdivision ends at a pole
         slack = 6e-3 if angle in CREASED else 2e-3
         assert (low - slack <= reached).all()
         assert (reached <= high + slack).all()
@@ -264,16 +264,16 @@ SMOOTH = [
 
 
 @pytest.fixture(scope="module")
-def of_texels():
-    """An environment, and the triangles that stand for it."""
+def texels_and_triangles():
+    """An environment and its triangles."""
     radiance = studio(48)
     return radiance, tessellate_environment(radiance, 1000)
 
 
 @pytest.mark.parametrize(("document", "bound"), SMOOTH, ids=lambda v: v["model"] if isinstance(v, dict) else None)
-def test_triangles_stand_for_all_texels(document, bound, of_texels):
+def test_triangles_represent_all_texels(document, bound, texels_and_triangles):
     """Against the reflection integral over every texel, by brute force."""
-    radiance, lights = of_texels
+    radiance, lights = texels_and_triangles
     receivers = ref.only_above(ref.make_random_receivers(60, lights.num_lights, seed=4, horizon=0.3), lights)
     term = TERMS[document["model"]].normalized(document)
     bands = {curve.name: curve_bands(document, curve) for curve in term.curves}
@@ -283,7 +283,7 @@ def test_triangles_stand_for_all_texels(document, bound, of_texels):
 
 
 def test_extreme_directions_stay_finite(lights):
-    """The viewer at the horizon, straight above, opposite to a light: no band is infinite or negative."""
+    """View directions at the horizon, at normal incidence, opposite to a light: no band is infinite or negative."""
     normal = np.tile(np.float32([0, 1, 0]), (4, 1))
     wo = np.float32([[1, 0, 0], [0, 1, 0], -lights.direction[0], [np.sqrt(1 - 1e-12), 1e-6, 0]])
     tangent = np.tile(np.float32([1, 0, 0]), (4, 1))

@@ -1,4 +1,4 @@
-"""Smooth light: told by harmonics, brought to points by precomputed matrices, which are kept by local PCA."""
+"""Low-frequency light: spherical harmonics, transferred to probes by precomputed matrices, compressed by local PCA."""
 
 from dataclasses import replace
 
@@ -36,7 +36,7 @@ BROUGHT = harmonics(TILES.centroids) * TILES.solid_angles[:, None]
 def transfer_matrices_numpy(
     points: SurfacePoints, visible: NDArray[np.uint8], directions: F32, solid_angles: F64
 ) -> F64:
-    """Do as `transfer_matrices`, of the whole in-basis, in plain NumPy: its oracle.
+    """Reference of `transfer_matrices` for the whole hemispherical basis, in plain NumPy.
 
     Args:
         points, visible, directions, solid_angles: as there.
@@ -51,7 +51,7 @@ def transfer_matrices_numpy(
 
 
 def lights_of(radiance):
-    """Triangles that shadows were asked for in the middles of."""
+    """Triangles with shadow rays through their centers."""
     return replace(
         integrate_environment(TILES, RotatedEnvironment.from_radiance(radiance)),
         direction=TILES.centroids.astype(np.float32),
@@ -59,7 +59,7 @@ def lights_of(radiance):
 
 
 def points_on_a_ball(num, seed=3):
-    """Points, and bits at random."""
+    """Points with random bits."""
     rng = np.random.default_rng(seed)
     normal = rng.normal(size=(num, 3)).astype(np.float32)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -78,7 +78,7 @@ def test_harmonics_are_orthonormal_over_the_sphere():
     np.testing.assert_allclose((values * weight[:, None]).T @ values, np.eye(NUM_HARMONICS), atol=1e-3)
 
 
-def test_matrices_are_those_of_the_oracle():
+def test_matrices_equal_their_reference():
     points, visible = points_on_a_ball(40)
     actual = matrices_of(points, visible)
     exact = transfer_matrices_numpy(points, visible, TILES.centroids.astype(np.float32), TILES.solid_angles)
@@ -86,7 +86,7 @@ def test_matrices_are_those_of_the_oracle():
     assert np.abs(actual - exact).max() < 1e-5 * np.abs(exact).max()
 
 
-def test_light_of_few_harmonics_arrives_as_from_all_triangles():
+def test_low_frequency_light_equals_that_of_all_triangles():
     points, visible = points_on_a_ball(40)
     smooth = np.random.default_rng(2).normal(size=(NUM_HARMONICS, 3))
     lights = replace(lights_of(WHITE), irradiance=(BROUGHT @ smooth).astype(np.float32))
@@ -95,8 +95,8 @@ def test_light_of_few_harmonics_arrives_as_from_all_triangles():
     assert relative_rmse(actual, exact) < 1e-5
 
 
-@pytest.mark.parametrize("has_bright_light", [0.0, 300.0], ids=["overcast", "a lamp in it"])
-def test_light_that_is_divided_arrives_as_if_it_were_not(has_bright_light):
+@pytest.mark.parametrize("has_bright_light", [0.0, 300.0], ids=["overcast", "a bright light in it"])
+def test_split_light_equals_whole_light(has_bright_light):
     radiance = WHITE * np.linspace(2, 0.5, 128, dtype=np.float32)[:, None, None]
     radiance[32:36, 56:60] += has_bright_light
     lights, (points, visible) = lights_of(radiance), points_on_a_ball(200)
@@ -116,17 +116,17 @@ def test_light_that_is_divided_arrives_as_if_it_were_not(has_bright_light):
         assert relative_rmse(harmonics_alone, exact) > 0.3
 
 
-def test_no_light_is_divided_into_nothing():
+def test_black_light_is_split_into_nothing():
     divided = split_frequencies(lights_of(0 * WHITE), BROUGHT)
     assert not divided.low_frequency.any()
     assert divided.residual.num_lights == len(divided.residual_triangles) == 0
 
 
-def test_clusters_keep_matrices_of_points_that_they_were_not_found_from(monkeypatch):
+def test_clusters_represent_matrices_of_other_points(monkeypatch):
     monkeypatch.setattr("relume.transport.sh_transfer._MAX_FITTED_POINTS", 1500)
     monkeypatch.setattr("relume.transport.sh_transfer._POINTS_PER_BATCH", 700)
     points, _ = points_on_a_ball(3000)
-    visible = TILES.centroids[:, 1] > 0.3 * points.normal[:, :1]  # shadows that change slowly from point to point
+    visible = TILES.centroids[:, 1] > 0.3 * points.normal[:, :1]  # shadows that vary slowly between points
     matrices = matrices_of(points, np.packbits(visible, axis=1, bitorder="little"))
     clustered = ClusteredTransfer.fit(len(matrices), lambda rows: matrices[rows], np.random.default_rng(1))
     rows = np.arange(5, 3000, 7)
@@ -137,7 +137,7 @@ def test_clusters_keep_matrices_of_points_that_they_were_not_found_from(monkeypa
     assert relative_rmse(mean.incident_coefficients(smooth, rows), exact) > 0.15
 
 
-def test_few_rows_reach_where_many_do():
+def test_few_rows_have_the_accuracy_of_many():
     rows = np.random.default_rng(4).normal(size=(6, 40)).astype(np.float32) * np.array([[9], [7], [5], [3], [2], [1]])
     wide, tall = (
         leading_components(rows, 3),
@@ -146,7 +146,7 @@ def test_few_rows_reach_where_many_do():
     np.testing.assert_allclose(np.abs(np.sum(wide * tall, axis=1)), 1, atol=1e-4)
 
 
-def test_chosen_lights_are_seen_as_among_all():
+def test_selected_lights_keep_their_visibility():
     visible = np.random.default_rng(6).integers(0, 256, (20, 9), dtype=np.uint8)
     rows, lights = np.array([3, 0, 19]), np.array([0, 7, 8, 22, 23, 40, 55, 56, 70])
     bits = np.unpackbits(visible, axis=1, bitorder="little")[rows][:, lights]
@@ -154,7 +154,7 @@ def test_chosen_lights_are_seen_as_among_all():
     np.testing.assert_array_equal(actual, bits)
 
 
-def test_rays_that_go_alike_bring_what_listed_ones_do():
+def test_shared_directions_equal_listed_rays():
     points, _ = points_on_a_ball(50)
     pattern, rng = make_pattern(64, 0, 11), np.random.default_rng(7)
     links = rng.integers(0, 30, (50, 64)).astype(np.uint16)
@@ -171,6 +171,6 @@ def test_rays_that_go_alike_bring_what_listed_ones_do():
         assert relative_rmse(actual, exact) < 1e-5
 
 
-def test_glossy_rays_do_not_go_alike():
+def test_glossy_rays_have_no_shared_directions():
     with pytest.raises(ValueError, match="elsewhere"):
         weighted_basis(make_pattern(64, 8, 11), 0, DEGREE)

@@ -1,4 +1,4 @@
-"""Public functions of three or more parameters name each of them in their docstring, or say where they are named."""
+"""Public functions with three or more parameters document each of them, or refer to a documentation."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ def _functions(node: ast.AST) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef
             yield child
 
 
-def _unnamed(function: ast.FunctionDef | ast.AsyncFunctionDef) -> list[str]:
-    """Parameters that its docstring does not name; none of a function that has fewer than three, or whose docstring
-    says where they are named: "See `PROTOCOL`."."""
+def _undocumented(function: ast.FunctionDef | ast.AsyncFunctionDef) -> list[str]:
+    """Parameters without a mention in the docstring; none for a function with fewer than three, or whose docstring
+    refers to another: "See `PROTOCOL`.".
+    """
     arguments = function.args
     names = [argument.arg for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)]
     names = [name for name in names if name not in ("self", "cls")]
@@ -34,24 +35,24 @@ def _unnamed(function: ast.FunctionDef | ast.AsyncFunctionDef) -> list[str]:
     return [name for name in names if not re.search(rf"\b{name}\b", said)] if len(names) >= 3 else []
 
 
-def _lacking(room: str) -> list[str]:
-    """What docstrings in a folder, or one file, leave out; a line for each function."""
-    path = ROOT / room
+def _missing_parameters(package: str) -> list[str]:
+    """Missing parameters of docstrings in a folder or file; a line for each function."""
+    path = ROOT / package
     files = [path] if path.is_file() else [f for f in sorted(path.rglob("*.py")) if ".venv" not in str(f)]
     return [
         f"{file.relative_to(ROOT)}:{function.lineno} {function.name}: {', '.join(unnamed)}"
         for file in files
         for function in _functions(ast.parse(file.read_text(encoding="utf-8")))
-        if (unnamed := _unnamed(function))
+        if (unnamed := _undocumented(function))
     ]
 
 
-@pytest.mark.parametrize("room", ROOMS)
-def test_docstrings_name_every_parameter(room: str) -> None:
-    assert _lacking(room) == []
+@pytest.mark.parametrize("package", ROOMS)
+def test_docstrings_name_every_parameter(package: str) -> None:
+    assert _missing_parameters(package) == []
 
 
-def test_parameters_that_are_not_named_are_found() -> None:
+def test_undocumented_parameters_are_detected() -> None:
     (module,) = ast.parse('def f(a, b, *, c):\n    """Of a, and of bc."""').body
     assert isinstance(module, ast.FunctionDef)
-    assert _unnamed(module) == ["b", "c"]
+    assert _undocumented(module) == ["b", "c"]

@@ -1,7 +1,7 @@
-"""Rooms: folders hold what belongs together, and import each other in one direction.
+"""Packages and modules of a folder import each other in one direction.
 
-Children of a folder, its folders and modules alike, are rooms; an import anywhere below one room of anything below
-another is an arrow. Arrows may not go round.
+Each folder's direct children, packages and modules alike, are nodes of a graph; an import from anywhere below one
+node to anywhere below another is an edge. The graph of every folder must be acyclic.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("relume", "worker/relume_worker", "server/relume_server", "cli/relume_cli")
-Arrows = dict[str, set[str]]
+Graph = dict[str, set[str]]
 
 
 def modules() -> dict[str, Path]:
@@ -27,17 +27,17 @@ def modules() -> dict[str, Path]:
     }
 
 
-def statements(outer: ast.AST) -> Iterator[ast.AST]:
-    """All statements inside another, or a file; expressions, which are most of a tree, import nothing."""
+def nested_statements(outer: ast.AST) -> Iterator[ast.AST]:
+    """All nested statements of a statement or a file; expressions, which are most of a tree, import nothing."""
     for field in ("body", "handlers", "orelse", "finalbody", "cases"):
         for inner in getattr(outer, field, ()):
             yield inner
-            yield from statements(inner)
+            yield from nested_statements(inner)
 
 
-def imported(path: Path, module_paths: dict[str, Path]) -> Iterator[str]:
-    """Modules of ours that a file imports, anywhere in it."""
-    for node in statements(ast.parse(path.read_text(encoding="utf-8"))):
+def imported_modules(path: Path, module_paths: dict[str, Path]) -> Iterator[str]:
+    """Modules of the repository that a file imports, anywhere in it."""
+    for node in nested_statements(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in module_paths)
         elif isinstance(node, ast.ImportFrom) and node.module in module_paths:
@@ -46,32 +46,32 @@ def imported(path: Path, module_paths: dict[str, Path]) -> Iterator[str]:
                 yield inner if inner in module_paths else node.module
 
 
-def rooms_of(importer: str, imported_module: str) -> tuple[str, str] | None:
-    """The rooms on both ends of an arrow; None where one module contains the other."""
+def siblings_of(importer: str, imported_module: str) -> tuple[str, str] | None:
+    """Sibling nodes of an import; None if one module contains the other."""
     ours, theirs = importer.split("."), imported_module.split(".")
-    for depth, (ours_name, theirs_name) in enumerate(zip(ours, theirs, strict=False), start=1):
-        if ours_name != theirs_name:
+    for depth, (importer_part, imported_part) in enumerate(zip(ours, theirs, strict=False), start=1):
+        if importer_part != imported_part:
             return ".".join(ours[:depth]), ".".join(theirs[:depth])
     return None
 
 
-def arrows() -> Arrows:
-    return {room: set(targets) for room, targets in _all_arrows().items()}
+def edges() -> Graph:
+    return {room: set(targets) for room, targets in _all_edges().items()}
 
 
 @cache
-def _all_arrows() -> Arrows:
-    """They cost seconds to find."""
+def _all_edges() -> Graph:
+    """Cached: finding them takes seconds."""
     module_paths, graph = modules(), defaultdict(set)
     for name, path in module_paths.items():
-        for target in imported(path, module_paths):
-            if (pair := rooms_of(name, target)) is not None:
+        for target in imported_modules(path, module_paths):
+            if (pair := siblings_of(name, target)) is not None:
                 graph[pair[0]].add(pair[1])
     return dict(graph)
 
 
-def circle_in(graph: Arrows) -> list[str] | None:
-    """Rooms of one circle, in order; None where there is none."""
+def find_cycle(graph: Graph) -> list[str] | None:
+    """Nodes of one cycle, in order; None if there is none."""
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
@@ -80,20 +80,20 @@ def circle_in(graph: Arrows) -> list[str] | None:
     return None
 
 
-def test_rooms_import_each_other_in_one_direction() -> None:
-    assert circle_in(arrows()) is None
+def test_imports_have_one_direction() -> None:
+    assert find_cycle(edges()) is None
 
 
-def test_files_of_tests_have_names_of_their_own() -> None:
+def test_test_modules_have_unique_names() -> None:
     """Test folders are no packages: of two files of one name, pytest would import the first for both."""
     count = Counter(path.name for path in (ROOT / "tests").rglob("test_*.py"))
     assert [name for name, times in count.items() if times > 1] == []
 
 
-def test_a_circle_would_be_found() -> None:
+def test_a_cycle_is_detected() -> None:
     graph = {"a": {"b"}, "b": {"c"}, "c": set[str]()}
-    assert circle_in(graph) is None
+    assert find_cycle(graph) is None
     graph["c"].add("a")
-    assert circle_in(graph) is not None
-    assert {"relume", "relume_worker"} <= arrows()["relume_server"]
-    assert "relume_server.schemas" in arrows()["relume_server.api"]
+    assert find_cycle(graph) is not None
+    assert {"relume", "relume_worker"} <= edges()["relume_server"]
+    assert "relume_server.schemas" in edges()["relume_server.api"]

@@ -1,4 +1,4 @@
-"""Kernels that count no references must not return arrays: docs/adr/0009-numba-and-embree.md."""
+"""Kernels without reference counting must not return arrays: docs/adr/0009-numba-and-embree.md."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def kernels(source: str) -> Iterator[ast.FunctionDef]:
 
 
 def returns_arrays(kernel: ast.FunctionDef) -> bool:
-    """Whether something is returned that is indexed elsewhere, or a slice."""
+    """True if the returned value is indexed elsewhere, or a slice."""
     indexed = {
         node.value.id
         for node in ast.walk(kernel)
@@ -39,7 +39,7 @@ def test_kernels_without_references_return_no_arrays() -> None:
     assert [f"{path.name}: {kernel.name}" for path, kernel in kernels_found if returns_arrays(kernel)] == []
 
 
-def test_a_returned_array_is_seen() -> None:
+def test_a_returned_array_is_detected() -> None:
     source = "@nb.njit(**UNCOUNTED)\ndef f(a, k):\n    b = a[k]\n    b[0] = 1\n    return {}\n"
     returned = {"b": True, "a": True, "b[1:]": True, "b[0]": False, "(k, b)": True, "k": False, "(k, b[0])": False}
     for text, is_array in returned.items():

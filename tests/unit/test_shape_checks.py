@@ -1,4 +1,4 @@
-"""Annotated shapes are checked in calls of tests."""
+"""Annotated shapes are checked in tests."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def zeros(*shape: int) -> F32:
     return np.zeros(shape, np.float32)
 
 
-def test_true_shapes_pass() -> None:
+def test_matching_shapes_pass() -> None:
     call = with_checks(weighted_mean)  # type: ignore[arg-type]
     assert call(zeros(4, 3))[1] == 1
     assert call(zeros(4, 3), weight=zeros(4) + 1)[1] == 1
@@ -36,7 +36,7 @@ def test_true_shapes_pass() -> None:
         ((zeros(3, 3) + np.nan,), "return"),
     ],
 )
-def test_untrue_shapes_fail(arrays: tuple[F32, ...], name: str) -> None:
+def test_mismatched_shapes_fail(arrays: tuple[F32, ...], name: str) -> None:
     with pytest.raises(ShapeError, match=f"weighted_mean: {name} is"):
         with_checks(weighted_mean)(*arrays)  # type: ignore[arg-type]
 

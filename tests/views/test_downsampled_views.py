@@ -1,4 +1,4 @@
-"""A bake with fewer pixels shows the others as the whole bake does."""
+"""A downsampled bake gives the same pixels as the whole bake."""
 
 import numpy as np
 import pytest
@@ -12,15 +12,15 @@ from relume.views.downsampled import DownsampledStore
 
 @pytest.mark.parametrize("step", [2, 3, 7])
 @pytest.mark.parametrize("view", ["front", "left"])
-def test_every_pixel_that_is_left_is_that_of_the_whole_picture(transfer, view, step):
+def test_remaining_pixels_equal_those_of_the_whole_image(transfer, view, step):
     look = make_look(transfer)
     whole = render_image(transfer, view, look)
     small = render_image(transfer.downsampled(view, step), view, look)
     np.testing.assert_allclose(small, whole[::step, ::step], rtol=2e-5, atol=1e-6)
 
 
-def test_a_panel_shines_on_every_pixel_that_is_left_as_on_the_whole_picture(gathered):
-    """Which places of a panel a point asks is its seed's to say, and a thinned bake keeps the seeds of gather rays."""
+def test_area_lights_on_remaining_pixels_equal_the_whole_image(gathered):
+    """The seed of a point selects its samples of an area light; a downsampled bake keeps these seeds."""
     panel = {"kind": "rectangle", "position": [0.5, 1.2, 0.5], "direction": [-1, -1, -1], "size": [0.6, 0.4]}
 
     def change(document):
@@ -35,13 +35,13 @@ def test_a_panel_shines_on_every_pixel_that_is_left_as_on_the_whole_picture(gath
     np.testing.assert_allclose(small, whole[::3, ::3], rtol=2e-5, atol=1e-6)
 
 
-def test_a_small_picture_is_at_least_as_wide_as_asked(transfer):
+def test_a_small_image_has_at_least_the_requested_width(transfer):
     look = make_look(transfer)
     widths = {width: render_small(transfer, "front", look, width).shape[1] for width in (10, 20, 32, 40, 64, 500)}
     assert widths == {10: 11, 20: 22, 32: 32, 40: 64, 64: 64, 500: 64}
 
 
-def test_nothing_is_kept_of_it_beside_the_store(baked):
+def test_downsampled_views_store_nothing(baked):
     fresh = open_transfer(baked, Cache(1 << 30))
     before = sorted(baked.rglob("*"))
     small = fresh.downsampled("front", 4)
@@ -49,7 +49,7 @@ def test_nothing_is_kept_of_it_beside_the_store(baked):
     assert sorted(baked.rglob("*")) == before
 
 
-def test_arrays_of_other_views_and_of_no_view_stay(transfer):
+def test_arrays_of_other_views_are_unchanged(transfer):
     store = DownsampledStore(transfer.store, 1, 4)
     np.testing.assert_array_equal(store.read("views/0/pixel", 5, 9), transfer.store.read("views/0/pixel", 5, 9))
     assert store.shape("lights/irradiance") == transfer.store.shape("lights/irradiance")

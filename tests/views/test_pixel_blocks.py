@@ -1,4 +1,4 @@
-"""What samples between chosen ones take of them: the nearest, by place and normal, in the squares about their own."""
+"""Interpolation from selected samples: the nearest by position and normal, in the surrounding pixel blocks."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ STEP, NUM, SOFT = 4, 3, 0.5
 
 
 def squared_distances(view, material, selected):
-    """From every sample to every chosen one; infinite beyond the squares that are looked in. (n, chosen)"""
+    """Squared distances from every sample to every selected one; infinite beyond the searched blocks. (n, selected)"""
     rows = view.rows(material)
     y, x = np.divmod(view.pixel[rows].astype(np.int64), view.width)
     normal = view.surface_points(material).normal.astype(np.float64)
@@ -21,7 +21,7 @@ def squared_distances(view, material, selected):
     return squared
 
 
-def test_samples_take_the_nearest_about_them(transfer):
+def test_samples_use_the_nearest_selected_sample(transfer):
     view = transfer.views["front"]
     for material in range(len(transfer.material_names)):
         selected = one_per_block(view, material, STEP)

@@ -1,4 +1,4 @@
-"""Samples to pixels and pixels to bytes, against NumPy and the shared-exponent packer of `relume.core.color`."""
+"""Resolve samples to pixels and encode pixels, against NumPy and the packer of `rgb9e5`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from relume.views.view import View
 
 
 def make_view(width=100, height=70, seed=0):
-    """A view of one to four samples a pixel, in no order, without a store behind it."""
+    """A view with one to four samples per pixel, unordered, without a store."""
     rng = np.random.default_rng(seed)
     count = rng.integers(1, 5, width * height)
     pixel = np.repeat(np.arange(width * height), count).astype(np.uint32)
@@ -43,7 +43,7 @@ def radiance(view):
 
 
 @pytest.mark.parametrize("gain", [0.0, 1.0, 2.5, (2.0, 0.0, 0.5)])
-def test_whole_picture_is_the_weighted_sum(view, radiance, gain):
+def test_the_whole_image_is_the_weighted_sum(view, radiance, gain):
     pixels = resolve(view, radiance, [(0, 0, view.width, view.height)], gain, view.throughput).reshape(
         view.height, view.width, 3
     )
@@ -51,7 +51,7 @@ def test_whole_picture_is_the_weighted_sum(view, radiance, gain):
 
 
 @pytest.mark.parametrize("count", [1, 3, 4])
-def test_tiles_come_one_after_another_row_major_and_clipped(view, radiance, count):
+def test_tiles_are_consecutive_row_major_and_clipped(view, radiance, count):
     tiles = view.all_tiles[::-1][:count]
     whole = ref.resolve(view, radiance.T.astype(float))
     expected = np.concatenate([whole[y : y + h, x : x + w].reshape(-1, 3) for x, y, w, h in tiles])
@@ -60,7 +60,7 @@ def test_tiles_come_one_after_another_row_major_and_clipped(view, radiance, coun
     np.testing.assert_allclose(payload, expected, rtol=2e-6)
 
 
-def test_tiles_cover_the_picture_once():
+def test_tiles_cover_the_image_once():
     for width, height in [(64, 64), (65, 63), (16, 200), (130, 128)]:
         view = make_view(width, height)
         coverage = np.zeros((height, width), int)
@@ -77,7 +77,7 @@ def test_no_tiles_are_no_bytes(view, radiance):
     assert encode(view, radiance, [], "rgb9e5", 1.0, view.throughput) == b""
 
 
-def test_packed_payload_is_the_packed_picture(view, radiance):
+def test_the_packed_payload_is_the_packed_image(view, radiance):
     tiles = view.all_tiles
     pixels = resolve(view, radiance, tiles, 1.0, view.throughput)
     words = np.frombuffer(encode(view, radiance, tiles, "rgb9e5", 1.0, view.throughput), "<u4")
@@ -87,7 +87,7 @@ def test_packed_payload_is_the_packed_picture(view, radiance):
 
 
 @pytest.mark.parametrize("form", ["jpeg", "", "F32", "../x"])
-def test_other_formats_are_refused(view, radiance, form):
+def test_other_formats_are_rejected(view, radiance, form):
     with pytest.raises(ParameterError, match="'rgb9e5' or 'f32'"):
         encode(view, radiance, view.all_tiles, form, 1.0, view.throughput)
 
@@ -97,7 +97,7 @@ def packed(rgb):
     return np.array([pack_rgb9e5(*pixel) for pixel in rgb], np.uint32)
 
 
-def test_kernel_packs_bit_for_bit_as_the_twin():
+def test_the_packing_kernel_equals_numpy_bit_for_bit():
     rng = np.random.default_rng(2)
     random = np.exp(rng.uniform(-25, 14, (20_000, 1)) + rng.normal(size=(20_000, 3)))
     # rounding to even or up
@@ -128,7 +128,7 @@ HOSTILE = [
 ]
 
 
-def test_hostile_values_pack_as_the_twin_says_and_never_as_garbage():
+def test_invalid_values_are_packed_like_numpy():
     rgb = np.array(np.meshgrid(HOSTILE, HOSTILE, HOSTILE), np.float32).reshape(3, -1).T
     words = packed(rgb)
     np.testing.assert_array_equal(words, rgb9e5_pack(rgb))
@@ -137,7 +137,7 @@ def test_hostile_values_pack_as_the_twin_says_and_never_as_garbage():
     assert back.max() <= 65408
 
 
-def test_hostile_radiance_in_one_sample_stays_in_its_pixel(view, radiance):
+def test_invalid_radiance_of_a_sample_stays_in_its_pixel(view, radiance):
     hurt = radiance.copy()
     hurt[0, 17], hurt[1, 17], hurt[2, 17] = np.nan, np.inf, -1e30
     whole = [(0, 0, view.width, view.height)]

@@ -116,7 +116,7 @@ def test_the_fixed_camera_kernel_equals_the_reference(bake, small_btf, rotation,
 
 
 def test_an_image_equals_that_of_the_values_before_compression(bake, small_btf):
-    """The same positions and lights, with each texel's own values instead of its cluster's."""
+    """At equal positions and lights, with each texel's own values instead of its cluster's."""
     look = covered(bake, small_btf.record, scale=1.0)
     lights, receivers = incident_light(bake, look)
     uv = np.array(receivers.uv)

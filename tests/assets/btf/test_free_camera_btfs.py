@@ -81,7 +81,7 @@ def terms_of(look_of):
     return [[dict(term) for term in look_of.materials["Floor"].terms]]
 
 
-def arrived_light(surface):
+def incident_light(surface):
     return IncidentTexelLight(vectors_of(surface, TO_LIGHT), TexelLight())
 
 
@@ -115,7 +115,7 @@ def test_the_free_camera_kernel_equals_the_reference(moving, small_btf):
     look_of = covered(moving, small_btf.record, (0.5, 1.0, 2.0), scale=SCALE, rotation=ROTATION)
     covers, view, surface = find_btf_materials(terms_of(look_of)).available, sight(moving), moving.stored_scene
     gbuffer, out = view.gbuffer, np.full((len(view.gbuffer.directions), 3), MEAN, np.float32)
-    shade_texels(covers, surface, moving.positions, view, arrived_light(surface), out)
+    shade_texels(covers, surface, moving.positions, view, incident_light(surface), out)
     rays = np.flatnonzero(gbuffer.hits.face >= 0)
     num_pixels = len(gbuffer.directions) - len(gbuffer.owner)
     assert len(gbuffer.owner)
@@ -228,7 +228,7 @@ def test_two_textures_on_one_material_are_summed(moving, small_btf):
             surface,
             moving.positions,
             view,
-            arrived_light(surface),
+            incident_light(surface),
             out,
         )
         images.append(out - 10)

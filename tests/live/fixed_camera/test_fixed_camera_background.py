@@ -7,7 +7,7 @@ import pytest
 from session_edits import BUDGET, bake_corner_scene, make_look, relative_rmse, run_until_exact
 from shadow_catcher_scenes import (
     CAMERA,
-    CENTRE,
+    CENTER,
     POINT_LIGHT,
     RADIUS,
     SIZE,
@@ -43,7 +43,7 @@ def direct_bake(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def indirect_bake(tmp_path_factory):
-    """The same with indirect light."""
+    """A bake with indirect light, opened."""
     return bake_corner_scene(ball_scene(studio()), "gather", tmp_path_factory.mktemp("reflecting"))
 
 
@@ -64,7 +64,7 @@ def ground_points(transfer):
     """Points of the ground at the centers of its inner pixels. (n, 3)"""
     towards = directions(transfer)[inner(transfer, "Ground")].astype(float)
     camera_position = CAMERA.to_world[:3, 3]
-    height = camera_position[1] - (CENTRE[1] - RADIUS)
+    height = camera_position[1] - (CENTER[1] - RADIUS)
     return camera_position + towards * (height / -towards[:, 1])[:, None]
 
 
@@ -76,8 +76,8 @@ def unoccluded_fraction(points, environment, degrees=0.0):
     light = light * np.repeat(texel_solid_angles(height, 2 * height), 2 * height)[:, None]
     shares = []
     for point in points:
-        along = w @ (CENTRE - point)
-        nearest = np.sum((CENTRE - point) ** 2) - along**2
+        along = w @ (CENTER - point)
+        nearest = np.sum((CENTER - point) ** 2) - along**2
         is_free = (along < 0) | (nearest > RADIUS**2)
         shares.append(light[is_free].sum(0) / light.sum(0))
     return np.array(shares)
@@ -117,8 +117,8 @@ def distance_to_ray(points):
     """Distance of the ball's center to the ray from each point to the light. (n,)"""
     light_position = np.array(POINT_LIGHT["position"])
     towards = (light_position - points) / np.linalg.norm(light_position - points, axis=1, keepdims=True)
-    along = np.einsum("nc,nc->n", towards, CENTRE - points)
-    return np.sqrt(np.sum((CENTRE - points) ** 2, axis=1) - along**2)
+    along = np.einsum("nc,nc->n", towards, CENTER - points)
+    return np.sqrt(np.sum((CENTER - points) ** 2, axis=1) - along**2)
 
 
 def test_the_ground_has_the_shadow_of_its_light(direct_bake):
@@ -176,7 +176,7 @@ def test_the_border_of_the_ground_has_no_seam():
     scene = ball_scene(studio())
     rim = scene.meshes[-1].positions[1:]
     assert np.abs(unoccluded_fraction(rim.astype(float), studio()) - 1).max() < 1e-3
-    assert rim[:, 1].max() < CENTRE[1] - RADIUS < rim[:, 1].min() + 1e-3
+    assert rim[:, 1].max() < CENTER[1] - RADIUS < rim[:, 1].min() + 1e-3
 
 
 def test_indirect_light_colors_the_ground(indirect_bake, direct_bake):

@@ -18,7 +18,7 @@ RED = "/materials/Red/terms/0/color"
 
 
 def colored(transfer, color, **transport):
-    """The look with another colour of the red wall."""
+    """The look with another color of the red wall."""
 
     def change(document):
         document["materials"]["Red"]["terms"][0]["color"] = list(color)

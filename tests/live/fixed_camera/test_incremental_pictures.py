@@ -182,7 +182,7 @@ def test_images_track_the_rounding_of_float32_sums(common, is_exact):
 
 
 def test_local_edit_of_a_peaked_curve_is_exact_where_non_linear_approximation_is_not(transfer):
-    """Figure 5: 20 of 256 wavelet terms. The constant peak costs nothing; non-linear approximation spends its terms on it."""
+    """Figure 5: 20 of 256 wavelet terms. The constant peak costs nothing; in non-linear approximation it takes most."""
     wave = 3 + 2 * np.sin(np.linspace(0, 25, 156))
 
     def drawn(rise):

@@ -104,7 +104,7 @@ def showing(show):
 
 
 def room(*, has_sides=True, lights=(), emitter=None):
-    """A floor below an emitter that faces down, seen from the side."""
+    """A floor below an emitter that faces down, with a camera at the side."""
     floor = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
     emitter = emitter or quad("lamp", [[-0.3, 1, -0.3], [0.3, 1, -0.3], [0.3, 1, 0.3], [-0.3, 1, 0.3]], 1)
     grey = ({"model": "lambert", "color": [0.5, 0.5, 0.5]},)

@@ -57,7 +57,7 @@ def shown(transfer, change=lambda document: None):
 
 
 def through_the_mirror(scene):
-    """The same scene from behind the mirror without the mirror: the image that the mirror shows."""
+    """View the scene from behind the removed mirror: the image that the mirror shows."""
     flip = np.diag([1.0, 1.0, -1.0, 1.0])
     flip[2, 3] = -2.0
     to_world = (

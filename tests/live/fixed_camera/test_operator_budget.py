@@ -202,7 +202,7 @@ def test_subsampled_operators_include_indirect_light(gathered, monkeypatch):
 
 
 def with_budget(images):
-    """The same images with another budget."""
+    """Copy the images with another budget."""
     copied = copy.copy(images)
     copied.cache = Cache(1 << 28)
     return copied

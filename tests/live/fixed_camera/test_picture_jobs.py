@@ -1,4 +1,4 @@
-"""Pending jobs of a picture: eviction, sharing, cancelling, and results of outdated looks."""
+"""Pending jobs of a picture: eviction, sharing, cancellation, and results of outdated looks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from relume.operators.linear_operator import operator_bytes
 
 
 def test_an_eviction_during_a_drag_recovers(transfer):
-    """Half of a change is shown when another session takes the cache; the rest follows after the operator is frozen again."""
+    """Half of a change is shown when another session takes the cache; the rest follows after freezing again."""
     rows = transfer.views["front"].rows(2)
     cache = Cache(operator_bytes(rows.stop - rows.start, 256) + 200_000)  # one operator, and the images
     picture = open_exact_picture(transfer, BALL + "theta_h", cache=cache)

@@ -90,7 +90,7 @@ def fixed(tmp_path_factory):
 
 
 def test_visible_fractions_equal_those_of_all_shadow_rays(sunlit):
-    """Where all targets agree at a pixel and its neighbors, the prediction agrees, too."""
+    """The prediction agrees wherever all targets of a pixel and its neighbors agree."""
     picture = picture_of(sunlit, look_of(sunlit))
     picture.image()
     gbuffer, solid = picture._current_gbuffer(), sunlit.occlusion_mesh

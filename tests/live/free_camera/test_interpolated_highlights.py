@@ -331,7 +331,7 @@ def test_prefiltered_environment_and_bright_light_sum_to_the_whole(degrees):
 
 
 def test_a_surface_interpolates_its_own_probes_only():
-    """Two balls that almost touch, and a ground: probes of the other ball have the same normals at the same distance."""
+    """Two balls that almost touch, and a ground: probes of the other ball are as near, with the same normals."""
     balls = [sphere(f"ball {k}", [0.102 * k, 0.05, 0], 0.05, 0, 24) for k in range(2)]
     ground = quad("ground", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 1)
     materials = [Material(name, ({"model": "lambert", "color": [1, 1, 1]},)) for name in ("Balls", "Ground")]

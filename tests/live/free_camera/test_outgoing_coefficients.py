@@ -67,8 +67,8 @@ def test_a_diffuse_surface_has_one_coefficient():
 @pytest.mark.parametrize("azimuth", [5, 13, 22, 30])  # one azimuth in each quadrant, of which only one is integrated
 @pytest.mark.parametrize("model", ANALYTIC)
 def test_coefficients_are_the_integrals_of_the_term(model, azimuth):
-    """With a finer quadrature than the one under test; highlights that the latter cannot resolve are blurred by the same
-    functions.
+    """With a finer quadrature than the one under test; highlights that the latter cannot resolve are blurred by the
+    same functions.
     """
     term = document(model)
     coefficients = outgoing_coefficients(term)

@@ -9,7 +9,7 @@ STEP, WIDTH, HEIGHT = 4, 48, 32
 
 
 def make_gbuffer(width, height):
-    """Two materials that meet in the center, one curved, under a strip of background, seen from above."""
+    """Two materials that meet in the center, one curved, under a strip of background, viewed along −Z."""
     y, x = np.divmod(np.arange(width * height), width)
     u, v = (x + 0.5) / width * WIDTH, (y + 0.5) / height * HEIGHT
     along = np.maximum(u - WIDTH / 2, 0)
