@@ -95,8 +95,8 @@ def shade_pieces(term, lights, receivers, row, light_pieces):
     wo = frame @ receivers.wo[row].astype(float)
     wi = lights.direction[visible].astype(float) @ frame.T
     shading = term.quotients(*wi.T, *(np.full(len(visible), o) for o in wo)).T * wi[:, 2:]
-    middles, fractions = light_pieces
-    return lights.irradiance[visible].astype(float) * shading, fractions[visible], middles[visible] @ frame.T, wo
+    centers, fractions = light_pieces
+    return lights.irradiance[visible].astype(float) * shading, fractions[visible], centers[visible] @ frame.T, wo
 
 
 def project(term, bands, active, lights, receivers, depth=5):

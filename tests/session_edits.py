@@ -38,14 +38,14 @@ def run_until_exact(picture):
         advance = picture.advance(None)
         if picture.next_job() is None and advance.exact:
             return picture
-        picture.run_next_job(lambda share: None, lambda: False)
+        picture.run_next_job(lambda fraction: None, lambda: False)
     raise AssertionError(f"the picture still waits for {picture.next_job()}")
 
 
 def run_next_job(picture):
     """Run the pending job and return it."""
     need = picture.next_job()
-    picture.install(need, need.run(lambda share: None, lambda: False))
+    picture.install(need, need.run(lambda fraction: None, lambda: False))
     return need
 
 

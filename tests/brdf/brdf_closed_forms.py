@@ -143,7 +143,7 @@ def sheen(wi, wo, roughness):
     """KHR_materials_sheen, D and V as the specification's appendix writes them."""
     alpha = roughness**2
     sine2 = 1 - half_vector(wi, wo)[..., 2] ** 2
-    fibres = (2 + 1 / alpha) * sine2 ** (0.5 / alpha) / (2 * np.pi)
+    fibers = (2 + 1 / alpha) * sine2 ** (0.5 / alpha) / (2 * np.pi)
 
     def exponent(x):
         smooth_fit, rough_fit = (
@@ -156,7 +156,7 @@ def sheen(wi, wo, roughness):
     def shadowing_lambda(cosine):
         return np.where(cosine < 0.5, np.exp(exponent(cosine)), np.exp(2 * exponent(0.5) - exponent(1 - cosine)))
 
-    return fibres / ((1 + shadowing_lambda(wi[..., 2]) + shadowing_lambda(wo[..., 2])) * 4 * wi[..., 2] * wo[..., 2])
+    return fibers / ((1 + shadowing_lambda(wi[..., 2]) + shadowing_lambda(wo[..., 2])) * 4 * wi[..., 2] * wo[..., 2])
 
 
 CLOSED_FORMS = {

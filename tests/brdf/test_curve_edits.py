@@ -21,8 +21,8 @@ def document(model, params, drawn, name="theta_h"):
 
 def handles_of(bands, angles=ANGLES):
     """Handles without displacement."""
-    middles = (np.arange(len(bands)) + 0.5) * (90 / len(bands))
-    values = np.interp(angles, middles, bands)
+    centers = (np.arange(len(bands)) + 0.5) * (90 / len(bands))
+    values = np.interp(angles, centers, bands)
     return [[float(x), float(v), float(v)] for x, v in zip(angles, values, strict=True)]
 
 
@@ -37,32 +37,32 @@ def test_handles_without_displacement_change_no_bit(model, params):
         np.testing.assert_array_equal(curve_values(term, curve, gamma), curve_values(plain, curve, gamma))
 
 
-@pytest.mark.parametrize("share", [1e-3, -1e-3])
+@pytest.mark.parametrize("fraction", [1e-3, -1e-3])
 @pytest.mark.parametrize("index", range(5))
 @pytest.mark.parametrize(("model", "params"), CASES)
-def test_a_small_displacement_stays_local_and_bounded(model, params, index, share):
+def test_a_small_displacement_stays_local_and_bounded(model, params, index, fraction):
     curve = TERMS[model].curve("theta_h")
     before = generated_bands({"model": model, "params": params}, curve)
     handles = handles_of(before[0])
-    handles[index][2] = handles[index][1] * (1 + share)
+    handles[index][2] = handles[index][1] * (1 + fraction)
     after = curve_bands(document(model, params, {"handles": handles})[0], curve)
     change = after - before
-    assert (np.abs(change) <= abs(share) * before * (1 + 1e-9)).all()
+    assert (np.abs(change) <= abs(fraction) * before * (1 + 1e-9)).all()
     assert np.abs(change).max() <= abs(handles[index][2] - handles[index][1]) * (1 + 1e-9)
-    middles = (np.arange(256) + 0.5) * (90 / 256)
+    centers = (np.arange(256) + 0.5) * (90 / 256)
     low, high = handles[max(0, index - 1)][0], handles[min(4, index + 1)][0]
-    beyond = (middles < low) | (middles > high)
+    beyond = (centers < low) | (centers > high)
     np.testing.assert_array_equal(after[:, beyond], before[:, beyond])
-    at = int(np.argmin(np.abs(middles - handles[index][0])))
-    assert change[0, at] == pytest.approx(share * before[0, at], rel=0.1)
+    at = int(np.argmin(np.abs(centers - handles[index][0])))
+    assert change[0, at] == pytest.approx(fraction * before[0, at], rel=0.1)
 
 
 def test_a_curve_passes_through_its_handles():
     params = {"sigma": 0.1}
     curve = TERMS["cook_torrance"].curve("theta_h")
     before = generated_bands({"model": "cook_torrance", "params": params}, curve)[0]
-    middles = (np.arange(256) + 0.5) * (90 / 256)
-    angles = middles[[0, 10, 40, 120, 255]]
+    centers = (np.arange(256) + 0.5) * (90 / 256)
+    angles = centers[[0, 10, 40, 120, 255]]
     for becomes in ([0.0, 50.0, 20.0, 0.0, 3.0], [1e6, 0.0, 1e6, 1e-3, 0.0]):
         handles = [[x, v, y] for (x, v, _), y in zip(handles_of(before, angles), becomes, strict=True)]
         after = curve_bands(document("cook_torrance", params, {"handles": handles})[0], curve)[0]

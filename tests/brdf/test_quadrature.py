@@ -63,7 +63,7 @@ def test_equal_channels_are_evaluated_once():
     ],
 )
 def test_isotropic_terms_are_recognized(term, expected):
-    turned = [[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]]
-    same = np.allclose(eval_brdf(term, WI, WO), eval_brdf(term, WI @ turned, WO @ turned), rtol=1e-5)
+    rotated = [[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]]
+    same = np.allclose(eval_brdf(term, WI, WO), eval_brdf(term, WI @ rotated, WO @ rotated), rtol=1e-5)
     assert same == expected
     assert is_isotropic(term) == expected

@@ -94,8 +94,8 @@ def test_thin_glass_attenuates_by_tint_and_reflection_without_refraction():
     first, behind = trace_ray_paths(scene_with(pane, material=glass(tint=tint)), directions)
     assert first.is_visible.all()
     np.testing.assert_array_equal(behind.directions, directions.astype(np.float32))
-    wanted = (1 - fresnel(-directions[:, 2], 1.5, 0.0))[:, None] * tint
-    np.testing.assert_allclose(behind.transmittance, wanted, rtol=1e-4)
+    expected = (1 - fresnel(-directions[:, 2], 1.5, 0.0))[:, None] * tint
+    np.testing.assert_allclose(behind.transmittance, expected, rtol=1e-4)
     np.testing.assert_allclose(behind.hits.distance, 4 / -directions[:, 2], rtol=1e-4)
 
 
@@ -258,7 +258,7 @@ def test_a_free_camera_shows_thin_glass_like_a_fixed_view(tinted, tmp_path):
     pane_alone = make_tiny_scene(back, pane, camera=camera, environment=studio(), materials=materials)
     bake = opened(pane_alone, "probes", tmp_path)
     look = make_look(bake)
-    moving = render_image(bake, "front", look)
+    free_bake = render_image(bake, "front", look)
     still = reference_image(pane_alone, "front", look, SIZE, 0)
     session = FreeCameraPicture(bake, "front")
     session.set_look(look)
@@ -268,4 +268,4 @@ def test_a_free_camera_shows_thin_glass_like_a_fixed_view(tinted, tmp_path):
     assert session.inspect(46, 24)["position"][2] == pytest.approx(0, abs=1e-3)
     assert session.inspect(20, 24)["material"] == "White"
     inside = (slice(17, 31), slice(38, 54))
-    np.testing.assert_allclose(moving[inside].mean(axis=(0, 1)), still[inside].mean(axis=(0, 1)), rtol=0.08)
+    np.testing.assert_allclose(free_bake[inside].mean(axis=(0, 1)), still[inside].mean(axis=(0, 1)), rtol=0.08)

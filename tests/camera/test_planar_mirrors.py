@@ -117,9 +117,9 @@ def static(tmp_path_factory):
     """A static view of a free camera."""
     recipe = Recipe("probes", ("front",), (64, 32), 400, num_probes=300, num_patches=1024, gather_rays=64)
     target = tmp_path_factory.mktemp("resting") / "probes.zarr"
-    moving = open_bake(bake_in_process(METHODS["probes"], hall(), recipe, target), Cache(1 << 30))
-    builder, camera = StaticViewBuilder(moving.light_transport, hall()), moving.views["front"].camera
-    return builder.make_static_view(camera, (64, 32), True, lambda share: None, lambda: False)
+    free_bake = open_bake(bake_in_process(METHODS["probes"], hall(), recipe, target), Cache(1 << 30))
+    builder, camera = StaticViewBuilder(free_bake.light_transport, hall()), free_bake.views["front"].camera
+    return builder.make_static_view(camera, (64, 32), True, lambda fraction: None, lambda: False)
 
 
 @pytest.mark.parametrize("bake", ["lit", pytest.param("static", marks=pytest.mark.slow)])

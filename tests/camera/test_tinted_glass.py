@@ -61,9 +61,9 @@ def test_a_polished_metal_below_tinted_glass_shows_the_tint_in_every_pixel(tmp_p
 def test_reflecting_glass_tints_the_metal_below(tmp_path):
     scene = floor_under(pane("pane", 1), material=POLISHED, tints=[GREEN])
     picture, look = rendered(scene, tmp_path, method="gather")
-    wanted = reference_image(scene, "front", look, SIZE, 256, reflects=True).mean(axis=(0, 1))
+    expected = reference_image(scene, "front", look, SIZE, 256, reflects=True).mean(axis=(0, 1))
     of_pixels = (picture / picture.max(axis=2, keepdims=True)).reshape(-1, 3)
-    np.testing.assert_allclose(of_pixels.mean(axis=0), wanted / wanted.max(), atol=0.04)
+    np.testing.assert_allclose(of_pixels.mean(axis=0), expected / expected.max(), atol=0.04)
     assert np.ptp(of_pixels, axis=0).max() < 0.1
 
 
@@ -100,10 +100,10 @@ def test_a_diffuse_floor_below_two_tints_follows_a_rotated_environment(degrees, 
     picture, _ = rendered(scene, tmp_path, lambda d: d["environment"].update(rotation=degrees))
     samples = sample_view(scene, build_scene_buffers(scene), "front", SIZE)
     axes = samples.surface.points.position.T
-    middle = np.stack([np.bincount(samples.pixel, samples.weight * axis) for axis in axes], axis=1)
-    wanted = below_two_tints(middle, radiance, degrees)
-    assert relative_rmse(picture.reshape(-1, 3), wanted) < 0.04
-    np.testing.assert_allclose(picture.mean(axis=(0, 1)), wanted.mean(axis=0), rtol=0.03)
+    center = np.stack([np.bincount(samples.pixel, samples.weight * axis) for axis in axes], axis=1)
+    expected = below_two_tints(center, radiance, degrees)
+    assert relative_rmse(picture.reshape(-1, 3), expected) < 0.04
+    np.testing.assert_allclose(picture.mean(axis=(0, 1)), expected.mean(axis=0), rtol=0.03)
 
 
 def test_light_beside_the_glass_is_not_tinted(tmp_path):
@@ -133,8 +133,8 @@ def test_a_sample_is_split_by_its_tints():
     np.testing.assert_array_equal(form.alpha_sample, [0, *PASS_TINT_GROUPS[[0, 0, 0, 1, 1, 2, 2]]])
     np.testing.assert_array_equal(form.num_parts, [1, 2, 2, 3, 2, 3, 2, 3])
     red, green, blue = (np.array(tint, np.float32) for tint in (RED, GREEN, BLUE))
-    wanted = [np.ones(3), 1 - green, 1 - blue, 1 - red, green, red - blue, blue, blue]
-    np.testing.assert_allclose(form.channel_weights / form.num_parts[:, None], wanted, atol=1e-6)
+    expected = [np.ones(3), 1 - green, 1 - blue, 1 - red, green, red - blue, blue, blue]
+    np.testing.assert_allclose(form.channel_weights / form.num_parts[:, None], expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("material", [POLISHED, WHITE], ids=["polished", "matt"])

@@ -63,8 +63,8 @@ def test_edges_have_more_samples_than_smooth_regions(still_samples):
     assert 2 <= count.max() <= 8
     several = np.zeros(count.shape, bool)
     for index in range(3):
-        share = weight_by_pixel(samples, samples.material == index).reshape(count.shape)
-        several |= (share > 0.01) & (share < 0.99)
+        fraction = weight_by_pixel(samples, samples.material == index).reshape(count.shape)
+        several |= (fraction > 0.01) & (fraction < 0.99)
     assert (count[several] >= 2).all()
     assert (count > 1).mean() < 0.25
     assert (count[-6:-1, 1:-1] == 1).all()  # the floor in the foreground
@@ -150,12 +150,12 @@ def test_a_sample_lies_in_the_center_of_its_part_of_the_pixel():
     within = samples.surface.points.position[rim, :2] / pixel_size * (1, -1) + np.array(SIZE) / 2 - corner
     steps = (np.arange(fine) + 0.5) / fine
     at = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    centred = (corner[:, None] + at - np.array(SIZE) / 2) * pixel_size
-    inside = (np.sum(centred**2, axis=-1) < 0.731**2)[..., None]
-    middle = np.sum(inside * at, axis=1) / inside.sum(axis=1)
+    centered = (corner[:, None] + at - np.array(SIZE) / 2) * pixel_size
+    inside = (np.sum(centered**2, axis=-1) < 0.731**2)[..., None]
+    center = np.sum(inside * at, axis=1) / inside.sum(axis=1)
     assert len(rim) > 50
-    assert np.abs(np.mean(within - middle, axis=0)).max() < 0.04
-    assert np.abs(within - middle).mean() < 0.15
+    assert np.abs(np.mean(within - center, axis=0)).max() < 0.04
+    assert np.abs(within - center).mean() < 0.15
 
 
 def test_positions_are_offset_toward_the_viewer():
@@ -228,8 +228,8 @@ def test_distant_checkers_become_gray_and_near_ones_stay():
     values = near.surface.specular[near.material == 0][:, 0]
     assert ((values < 0.02) | (values > 0.98)).mean() > 0.5
     far = sampled(flat_scene(Material("M", WHITE, {"specular": checker(64, 64)}), repeat=20.0))
-    grey = far.surface.specular[far.material == 0]
-    assert np.abs(grey - 0.5).max() < 0.05
+    gray = far.surface.specular[far.material == 0]
+    assert np.abs(gray - 0.5).max() < 0.05
 
 
 def test_mip_levels_preserve_the_mean_and_small_footprints_the_texels():
@@ -265,8 +265,8 @@ def test_mapped_normals_are_unit_outward_and_follow_the_map(strength):
     normal = samples.surface.points.normal[samples.material == 0]
     np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1, atol=1e-5)
     assert (normal[:, 2] > 0).all()
-    middle = normal[np.abs(samples.pixel[samples.material == 0].astype(int) - 24 * 64 - 32) < 3]
-    np.testing.assert_allclose(middle, np.tile(lean / np.linalg.norm(lean), (len(middle), 1)), atol=0.02)
+    center = normal[np.abs(samples.pixel[samples.material == 0].astype(int) - 24 * 64 - 32) < 3]
+    np.testing.assert_allclose(center, np.tile(lean / np.linalg.norm(lean), (len(center), 1)), atol=0.02)
 
 
 def test_rough_normal_map_keeps_frames_unit_and_on_the_outer_side():

@@ -37,12 +37,12 @@ print(Path(sys.argv[1]).read_text().count("<heap nr="))
 
 @pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "mallopt"), reason="only glibc has arenas")
 @pytest.mark.parametrize(
-    ("how", "asked", "max_arenas"), [("shared", None, 2), ("alone", None, None), ("shared", "5", 5)]
+    ("how", "requested", "max_arenas"), [("shared", None, 2), ("alone", None, None), ("shared", "5", 5)]
 )
-def test_threads_limit_malloc_arenas(tmp_path, how: str, asked: str | None, max_arenas: int | None) -> None:
+def test_threads_limit_malloc_arenas(tmp_path, how: str, requested: str | None, max_arenas: int | None) -> None:
     environment = {key: value for key, value in os.environ.items() if key != "MALLOC_ARENA_MAX"}
-    if asked is not None:
-        environment["MALLOC_ARENA_MAX"] = asked
+    if requested is not None:
+        environment["MALLOC_ARENA_MAX"] = requested
     command = [sys.executable, "-c", COUNT, str(tmp_path / "info.xml"), how]
     count = int(subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout)
     assert count == max_arenas if max_arenas is not None else count > 5

@@ -15,7 +15,7 @@ def two_threads(monkeypatch):
     monkeypatch.setenv("RELUME_THREADS", "2")
 
 
-def shares(kernel):
+def fractions(kernel):
     parallel_for_chunks(kernel, 1000)
 
 
@@ -50,7 +50,7 @@ def of_frames():
     return {threading.current_thread().name.rsplit("_", 1)[0], "kernels-frame"}
 
 
-@pytest.mark.parametrize("run", [shares, ranges])
+@pytest.mark.parametrize("run", [fractions, ranges])
 def test_frames_follow_ups_and_long_work_have_separate_threads(run):
     assert names_of(run) <= of_frames()
     with low_priority():
@@ -67,7 +67,7 @@ def test_frames_follow_ups_and_long_work_have_separate_threads(run):
         assert long.submit(names_of, run).result() == {"kernels-long"}
 
 
-@pytest.mark.parametrize("run", [shares, ranges])
+@pytest.mark.parametrize("run", [fractions, ranges])
 def test_concurrent_frames_use_separate_threads(run):
     assert len(run_frame(names_of_meeting_threads)) == 2
     barrier = threading.Barrier(2)
@@ -92,7 +92,7 @@ def test_a_failure_does_not_affect_the_next_frame():
 
     with pytest.raises(ZeroDivisionError), low_priority():
         parallel_for_chunks(fails, 1000)
-    assert names_of(shares) <= of_frames()
+    assert names_of(fractions) <= of_frames()
 
 
 def test_frames_are_computed_by_the_caller_and_another_thread():
@@ -125,7 +125,7 @@ def test_nested_kernels_do_not_wait():
 def test_frames_have_priority():
     def niceness():
         values = []
-        shares(lambda start, stop: values.append(os.getpriority(os.PRIO_PROCESS, 0)))
+        fractions(lambda start, stop: values.append(os.getpriority(os.PRIO_PROCESS, 0)))
         return values
 
     of_frames = max(niceness())

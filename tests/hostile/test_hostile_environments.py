@@ -102,22 +102,22 @@ def _exr_claiming(width: int, height: int, tile: tuple[int, int] | None) -> byte
 def test_environment_allocates_nothing_for_missing_data(
     tile: tuple[int, int] | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked: list[str] = []
-    monkeypatch.setattr(oiio.ImageInput, "read_image", lambda *_: asked.append("pixels"))
+    requested: list[str] = []
+    monkeypatch.setattr(oiio.ImageInput, "read_image", lambda *_: requested.append("pixels"))
     with pytest.raises(SceneError):
         read_environment(_exr_claiming(16_384, 8_192, tile), "sky")
-    assert asked == []
+    assert requested == []
 
 
 @pytest.mark.parametrize(("size", "tile"), [((1_024, 512), (16_384, 16_384)), ((1_024, 512), (1, 1))])
 def test_environment_refuses_tiles_that_cannot_be_in_the_file(
     size: tuple[int, int], tile: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked: list[str] = []
-    monkeypatch.setattr(oiio.ImageInput, "read_image", lambda *_: asked.append("pixels"))
+    requested: list[str] = []
+    monkeypatch.setattr(oiio.ImageInput, "read_image", lambda *_: requested.append("pixels"))
     with pytest.raises(SceneError):
         read_environment(_exr_claiming(*size, tile), "sky")
-    assert asked == []
+    assert requested == []
 
 
 def test_environment_refuses_a_large_hdr_of_a_few_bytes() -> None:

@@ -20,8 +20,8 @@ def test_invalid_scene_file_is_refused(client: TestClient) -> None:
 def test_referenced_files_are_bounded_and_their_names_are_not_paths(client: TestClient, settings: Any) -> None:
     obj = b"mtllib ../../relume.db\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
     beside = [("companions", (f"{number}.png", b"")) for number in range(901)]
-    refused = client.post("/api/scenes", files=[("scene", ("a.obj", obj)), *beside])
-    assert parse_problem(refused)["type"] == "urn:relume:problem:parameter"
+    rejected = client.post("/api/scenes", files=[("scene", ("a.obj", obj)), *beside])
+    assert parse_problem(rejected)["type"] == "urn:relume:problem:parameter"
     climbing = [("scene", ("a/b/c.obj", obj)), ("companions", ("../../../../tmp/x", b"newmtl Red\n"))]
     taken = client.post("/api/scenes", files=climbing).json()
     assert ["relume.db' is not beside" in warning["text"] for warning in taken["warnings"]] == [True]
@@ -188,16 +188,16 @@ def test_every_refusal_is_a_problem(client: TestClient, method: str, path: str, 
     [("DELETE", f"/api/scenes/{IDS}/cameras/a%00b"), ("GET", "/api/audit?who=%00"), ("GET", f"/api/shares/{IDS}%00")],
 )
 def test_null_characters_never_reach_the_database(client: TestClient, method: str, path: str) -> None:
-    refused = parse_problem(client.request(method, path))
-    assert (refused["status"], refused["parameter"]) == (422, "the address")
+    rejected = parse_problem(client.request(method, path))
+    assert (rejected["status"], rejected["parameter"]) == (422, "the address")
 
 
 @pytest.mark.parametrize("path", ["/api/models/albedo", "/api/models/zernike-fit"])
 def test_names_in_invalid_unicode_are_refused(client: TestClient, path: str) -> None:
     body = b'{"terms": [{"model": "lambert", "\\ud800": 1}]}'
-    refused = parse_problem(client.post(path, content=body, headers={"Content-Type": "application/json"}))
-    assert refused["status"] == 422
-    assert "is 'unknown'" in refused["detail"]
+    rejected = parse_problem(client.post(path, content=body, headers={"Content-Type": "application/json"}))
+    assert rejected["status"] == 422
+    assert "is 'unknown'" in rejected["detail"]
 
 
 @pytest.mark.parametrize(
@@ -208,15 +208,15 @@ def test_names_in_invalid_unicode_are_refused(client: TestClient, path: str) -> 
     ],
 )
 def test_unreadable_bodies_are_a_problem(client: TestClient, content: bytes, kind: str, message: str) -> None:
-    refused = parse_problem(client.post("/api/environments", content=content, headers={"Content-Type": kind}))
-    assert refused["type"] == "urn:relume:problem:invalid-request"
-    if refused["status"] == 400:
-        assert message in refused["detail"]
+    rejected = parse_problem(client.post("/api/environments", content=content, headers={"Content-Type": kind}))
+    assert rejected["type"] == "urn:relume:problem:invalid-request"
+    if rejected["status"] == 400:
+        assert message in rejected["detail"]
 
 
 def test_text_instead_of_a_file_is_refused_with_a_message(client: TestClient) -> None:
-    refused = parse_problem(client.post("/api/scenes", files={"scene": (None, b"text")}))
-    assert refused["detail"] == "/scene is a text; give a file, with a file name in its part of the form"
+    rejected = parse_problem(client.post("/api/scenes", files={"scene": (None, b"text")}))
+    assert rejected["detail"] == "/scene is a text; give a file, with a file name in its part of the form"
 
 
 def test_missing_data_directory_is_a_problem_without_a_traceback(client: TestClient, settings: Any) -> None:

@@ -277,7 +277,7 @@ def test_unknown_resume_token_is_a_new_session(client: TestClient, baked: Baked,
 
 def test_a_null_character_in_the_address_of_a_session_is_refused(client: TestClient, baked: Baked) -> None:
     path = f"/api/bakes/{baked.bake}/session?room_prefix=%00"
-    with pytest.raises(WebSocketDenialResponse) as refused, client.websocket_connect(path, ["relume.v2"]):
+    with pytest.raises(WebSocketDenialResponse) as rejected, client.websocket_connect(path, ["relume.v2"]):
         pass
-    assert refused.value.status_code == 422
-    assert "null character" in refused.value.json()["detail"]
+    assert rejected.value.status_code == 422
+    assert "null character" in rejected.value.json()["detail"]

@@ -70,9 +70,9 @@ def sample_lut(table: U16, light: F32) -> F64:
 def lights(num: int, stops: tuple[float, float] = (-10, 8)) -> np.ndarray:
     """Colors with luminances uniform in stops around middle gray, from gray to saturated. (num, 3)"""
     rng = np.random.default_rng(5)
-    grey, tint = 0.18 * 2 ** rng.uniform(*stops, (num, 1)), 3 * rng.dirichlet([0.6] * 3, num)
+    gray, tint = 0.18 * 2 ** rng.uniform(*stops, (num, 1)), 3 * rng.dirichlet([0.6] * 3, num)
     share = rng.uniform(0, 1, (num, 1))
-    return (grey * (share + (1 - share) * tint)).astype(np.float32)
+    return (gray * (share + (1 - share) * tint)).astype(np.float32)
 
 
 def by_ocio(light: np.ndarray, transform: ocio.Transform) -> np.ndarray:
@@ -112,12 +112,12 @@ def test_a_table_equals_the_view_within_display_precision(view, mean, max_error)
     with using_config(STUDIO):
         table, shown = get_config().table(view), tone_map(light[None], 0.0, view, use_table=True)[0]
     np.testing.assert_allclose(shown, sample_lut(table, light), atol=2e-5)
-    off = 255 * np.abs(sample_lut(table, light) - display_values(light, view))
-    assert off.mean() < mean
-    assert np.quantile(off, 0.999) < max_error
-    assert off.max() < 15  # a saturated color at the edge of the display's gamut
-    greys = np.repeat(np.geomspace(1e-4, 100, 500, dtype=np.float32)[:, None], 3, axis=1)
-    assert 255 * np.abs(sample_lut(table, greys) - display_values(greys, view)).max() < 0.2
+    difference = 255 * np.abs(sample_lut(table, light) - display_values(light, view))
+    assert difference.mean() < mean
+    assert np.quantile(difference, 0.999) < max_error
+    assert difference.max() < 15  # a saturated color at the edge of the display's gamut
+    grays = np.repeat(np.geomspace(1e-4, 100, 500, dtype=np.float32)[:, None], 3, axis=1)
+    assert 255 * np.abs(sample_lut(table, grays) - display_values(grays, view)).max() < 0.2
 
 
 def test_exported_light_is_unchanged_by_its_chromaticities():
@@ -128,8 +128,8 @@ def test_exported_light_is_unchanged_by_its_chromaticities():
     assert len(spaces) > 15
     for space in spaces:
         exported = space.convert_image(light[None])[0]
-        wanted = by_ocio(light, ocio.ColorSpaceTransform("lin_rec709_scene", space.name))
-        np.testing.assert_allclose(exported, wanted, atol=1e-6, err_msg=space.name)
+        expected = by_ocio(light, ocio.ColorSpaceTransform("lin_rec709_scene", space.name))
+        np.testing.assert_allclose(exported, expected, atol=1e-6, err_msg=space.name)
         back = to_rec_709(space.chromaticities)
         back = np.eye(3) if back is None else back
         np.testing.assert_allclose(exported @ back.T, light, atol=3e-5, err_msg=space.name)
@@ -166,11 +166,11 @@ def test_images_are_exported_only_in_linear_spaces(name):
 def test_unusable_configs_report_the_reason(tmp_path):
     blind = b"ocio_profile_version: 1\nroles: {default: raw}\ncolorspaces: []\n"
     bad = {"text": b"hello", "empty": b"", "blind.ocio": blind, "bytes.ocio": b"\xf7" * 99, "a.ocioz": b"PK\3\4"}
-    asked = r"^RELUME_OCIO is .* give (the path|a config that has displays)"
+    requested = r"^RELUME_OCIO is .* give (the path|a config that has displays)"
     for name, text in bad.items():
         (tmp_path / name).write_bytes(text)
     for source in [str(tmp_path / name) for name in (*bad, "gone.ocio", "")] + ["ocio://palace"]:
-        with pytest.raises(ParameterError, match=asked) as raised:
+        with pytest.raises(ParameterError, match=requested) as raised:
             Config(source)
         assert "\n" not in str(raised.value)
 
@@ -186,13 +186,13 @@ def test_an_old_config_logs_the_matching_space(tmp_path, caplog):
     with using_config(str(path), "scene_linear"):
         config = get_config()
         assert (config.working, config.displays, config.spaces) == ("lin", {"Monitor": ("Film", "Broken")}, ("lin",))
-        grey = np.full((1, 1, 3), 0.25, np.float32)
-        np.testing.assert_allclose(tone_map(grey, 0.0, OcioView("Monitor", "Film")), 0.5, atol=1e-5)
+        gray = np.full((1, 1, 3), 0.25, np.float32)
+        np.testing.assert_allclose(tone_map(gray, 0.0, OcioView("Monitor", "Film")), 0.5, atol=1e-5)
         with pytest.raises(ParameterError, match="log says which"):
             config.table(OcioView("Monitor", "Broken"))
         assert str(Path("gone.cube")) in caplog.text
         for view in (OcioView("Monitor", "film"), OcioView("Film", "Film")):
             with pytest.raises(ParameterError, match="one of"):
-                tone_map(grey, 0.0, view)
+                tone_map(gray, 0.0, view)
     with pytest.raises(ParameterError, match="RELUME_OCIO"):
-        tone_map(grey, 0.0, VIEW)
+        tone_map(gray, 0.0, VIEW)

@@ -33,11 +33,11 @@ def filmic_numpy(x):
     return srgb_encode(x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14))
 
 
-TWINS = {"agx": agx_numpy, "filmic": filmic_numpy, "none": srgb_encode}
+REFERENCES = {"agx": agx_numpy, "filmic": filmic_numpy, "none": srgb_encode}
 
 
 def test_names_are_those_of_look_documents():
-    assert set(TONE_MAPS) == set(get_args(ToneMap)) == set(TWINS)
+    assert set(TONE_MAPS) == set(get_args(ToneMap)) == set(REFERENCES)
 
 
 @pytest.mark.parametrize("name", TONE_MAPS)
@@ -48,13 +48,13 @@ def test_tone_map_equals_numpy(name, exposure):
     shown = tone_map(image, exposure, name)
     assert shown.dtype == np.float32
     assert shown.shape == image.shape
-    np.testing.assert_allclose(shown, TWINS[name](image.astype(np.float64) * 2**exposure), atol=2e-5)
+    np.testing.assert_allclose(shown, REFERENCES[name](image.astype(np.float64) * 2**exposure), atol=2e-5)
 
 
 @pytest.mark.parametrize("name", TONE_MAPS)
 def test_grays_stay_gray_and_monotonic(name):
-    grey = np.geomspace(1e-4, 100, 200, dtype=np.float32)
-    shown = tone_map(np.repeat(grey[None, :, None], 3, axis=2), 0.0, name)[0]
+    gray = np.geomspace(1e-4, 100, 200, dtype=np.float32)
+    shown = tone_map(np.repeat(gray[None, :, None], 3, axis=2), 0.0, name)[0]
     np.testing.assert_allclose(shown - shown[:, :1], 0, atol=1e-3)
     assert (np.diff(shown[:, 0]) >= 0).all()
     assert shown[0, 0] < 0.03

@@ -135,8 +135,8 @@ def test_an_image_of_a_session_is_not_deleted_before_the_session(client, uploade
 def test_images_derived_from_a_metallic_map_are_deleted_with_it(client):
     image = upload(client, png(3, 2), "metal.png").json()
     url, terms = f"{URL}/{image['id']}", [{"model": "lambert", "texture": None}, {"model": "ggx", "texture": None}]
-    asked = {"scene": 16 * "0", "material": "Ball", "terms": terms}
-    made = client.post(f"{url}/metalness", json=asked)
+    requested = {"scene": 16 * "0", "material": "Ball", "terms": terms}
+    made = client.post(f"{url}/metalness", json=requested)
     assert made.status_code == 201, made.text
     textures = [term["texture"] for term in made.json()["terms"]]
     listed = {entry["texture"]: (entry["metalness"], entry["base"]) for entry in client.get(URL).json()}
@@ -145,7 +145,7 @@ def test_images_derived_from_a_metallic_map_are_deleted_with_it(client):
         ({"terms": terms[:1]}, "add what is missing"),
         ({"terms": [{**terms[0], "texture": "diffuse"}, terms[1]]}, "import the scene again"),
     ):
-        response = client.post(f"{url}/metalness", json={**asked, **changed})
+        response = client.post(f"{url}/metalness", json={**requested, **changed})
         assert 400 <= response.status_code < 500
         assert message in response.json()["detail"]
     look = {"materials": {"Ball": {"terms": made.json()["terms"]}}}
@@ -186,8 +186,8 @@ def test_a_material_preview_shows_its_images(client, uploaded):
         (scene, "Tray", "image:0"),
         ("0" * 16, "Tray", None),
     ):
-        asked = {"material": material, "terms": [{"model": "lambert", "texture": texture}]}
-        assert client.post(f"/api/scenes/{scene_id}/ball", json=asked).status_code in (404, 422)
+        requested = {"material": material, "terms": [{"model": "lambert", "texture": texture}]}
+        assert client.post(f"/api/scenes/{scene_id}/ball", json=requested).status_code in (404, 422)
 
 
 def test_a_session_equals_a_render_and_undo_restores_it(client, uploaded):

@@ -111,15 +111,15 @@ def test_free_cameras_use_the_triplanar_mapping_of_fixed_views(corner, named, tm
     faces = [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))]
     box = mesh("box", corners, faces, 0, normals=corners / np.sqrt(3))
     scene = make_tiny_scene(box, camera=corner.cameras[0], materials=corner.materials[:1])
-    moving = open_small_bake(scene, "probes", tmp_path)
-    actual = overridden_textures(moving.stored_scene, moving.positions, (ProbeMapOverrides((named, None)),))
+    free_bake = open_small_bake(scene, "probes", tmp_path)
+    actual = overridden_textures(free_bake.stored_scene, free_bake.positions, (ProbeMapOverrides((named, None)),))
     camera_positions = np.random.default_rng(2).normal(size=(60, 3)).astype(np.float32)
     directions = -camera_positions / np.linalg.norm(camera_positions, axis=1, keepdims=True)
     geometry = build_scene_buffers(scene)
     hits = trace_rays(geometry.embree, -4 * directions, directions)
     assert len(set(hits.face // 2)) == 6
-    share = np.column_stack([1 - hits.uv.sum(axis=1), hits.uv])
-    places = np.einsum("nk,nkc->nc", share, actual.uvs[actual.uv_faces[hits.face]])
+    fraction = np.column_stack([1 - hits.uv.sum(axis=1), hits.uv])
+    places = np.einsum("nk,nkc->nc", fraction, actual.uvs[actual.uv_faces[hits.face]])
     expected = surface_at(geometry, hits, directions, scene.materials, 1e-3).uv
     np.testing.assert_allclose(places, expected[:, :2], atol=1e-3)
     assert (actual.uv_scale[hits.face] == 1).all()

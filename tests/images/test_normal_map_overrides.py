@@ -247,10 +247,10 @@ def test_free_cameras_show_the_normal_map(plain, named, tmp_path):
 def test_meshes_without_tangents_get_the_tangents_of_imports(named, tmp_path):
     scene = corner([Material("Floor", ({"model": "lambert"},)), Material("Wall", ({"model": "lambert"},))])
     none = replace(scene, meshes=tuple(replace(m, tangents=0 * m.tangents) for m in scene.meshes))
-    moving = open_small_bake(none, "probes", tmp_path)
-    assert len(moving.stored_scene.tangents) == 0
+    free_bake = open_small_bake(none, "probes", tmp_path)
+    assert len(free_bake.stored_scene.tangents) == 0
     actual = overridden_textures(
-        moving.stored_scene, moving.positions, (ProbeMapOverrides(normals=NormalMap(named)), NO_OVERRIDES)
+        free_bake.stored_scene, free_bake.positions, (ProbeMapOverrides(normals=NormalMap(named)), NO_OVERRIDES)
     ).tangents
     expected = np.concatenate([mesh.tangents for mesh in with_tangents(scene).meshes])
     normals = np.concatenate([mesh.normals for mesh in scene.meshes])

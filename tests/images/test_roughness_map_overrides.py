@@ -89,8 +89,8 @@ def test_pictures_equal_those_of_a_scene_with_the_roughness_map(bakes, plain, na
     """
     bare, baked = bakes
     mean, (max_error, usual) = mean_roughness(named), (4e-3, 1e-5) if bare.method == "direct" else (0.03, 0.01)
-    turned = {"environment": {"map": None, "rotation": 40.0}}
-    for roughness, others in ((mean, {}), (0.3, turned)):
+    rotated = {"environment": {"map": None, "rotation": 40.0}}
+    for roughness, others in ((mean, {}), (0.3, rotated)):
         actual = shown(bare, rough(plain, named, mean), rough(plain, named, roughness, **others))
         expected = shown(baked, rough(plain, True, roughness, **others))
         assert relative_rmse(actual, expected) < max_error

@@ -108,8 +108,8 @@ def test_triangles_have_the_moments_of_their_light(num_lights):
         across = np.linalg.svd(mean[None])[2][1:]
         at, corner = (d @ across.T / (d @ mean)[:, None] for d in (directions[inside], corners))
         centre = weight[inside] @ at / weight[inside].sum()
-        off = at - centre
-        spread = (weight[inside] * off.T) @ off / weight[inside].sum()
+        difference = at - centre
+        spread = (weight[inside] * difference.T) @ difference / weight[inside].sum()
         spread += weight[inside] @ extent[inside] / weight[inside].sum() / 12 * np.eye(2)
         middle = corner.mean(axis=0)
         size = np.sqrt(np.trace(spread))
@@ -249,14 +249,14 @@ def test_invalid_counts_are_rejected(requested):
 def test_a_rotated_environment_equals_its_rotated_image(columns):
     radiance = studio()  # 64 texels wide
     tiles = choose_tiles(radiance, 200)
-    turned = integrate_environment(tiles, RotatedEnvironment.from_radiance(radiance), 360 * columns / 64)
+    rotated = integrate_environment(tiles, RotatedEnvironment.from_radiance(radiance), 360 * columns / 64)
     rolled = integrate_environment(tiles, RotatedEnvironment.from_radiance(np.roll(radiance, -columns, axis=1)))
     # a texel center that rounding moves across an edge changes two tiles; most tiles have none there
-    same = np.isclose(turned.irradiance, rolled.irradiance, rtol=1e-5, atol=1e-9).all(axis=1)
+    same = np.isclose(rotated.irradiance, rolled.irradiance, rtol=1e-5, atol=1e-9).all(axis=1)
     assert same.mean() > 0.9
-    np.testing.assert_allclose(turned.direction[same], rolled.direction[same], atol=1e-5)
+    np.testing.assert_allclose(rotated.direction[same], rolled.direction[same], atol=1e-5)
     np.testing.assert_allclose(
-        turned.irradiance.sum(axis=0, dtype=float), rolled.irradiance.sum(axis=0, dtype=float), rtol=1e-5
+        rotated.irradiance.sum(axis=0, dtype=float), rolled.irradiance.sum(axis=0, dtype=float), rtol=1e-5
     )
 
 

@@ -60,7 +60,7 @@ def test_discrete_values_switch_halfway_and_stay_valid():
 
 def test_keyframes_are_equally_spaced_and_integers_stay_integers():
     keys = [look(transport={"bounces": k}) for k in (0, 8, 2)]
-    assert [interpolate_looks(keys, share)["transport"]["bounces"] for share in (0.0, 0.25, 0.5, 0.75, 1.0)] == [
+    assert [interpolate_looks(keys, fraction)["transport"]["bounces"] for fraction in (0.0, 0.25, 0.5, 0.75, 1.0)] == [
         0,
         4,
         8,
@@ -93,9 +93,9 @@ def of_map(color, f0, sigma):
 def test_a_path_across_the_map_passes_through_its_materials():
     """Linear in reflectance and in the logarithm of roughness, also from and to materials off the map."""
     ends = [look(materials={"Ball": {"terms": of_map(*end)}}) for end in ((0.9, 0.02, 0.05), (0.1, 0.5, 0.45))]
-    for share, end in ((0.0, ends[0]), (1.0, ends[1])):
-        assert ball(interpolate_looks(ends, share, "map"))[1]["params"] == ball(end)[1]["params"]
-    nearly = [ball(interpolate_looks(ends, share, "map")) for share in (1e-9, 1 - 1e-9)]
+    for fraction, end in ((0.0, ends[0]), (1.0, ends[1])):
+        assert ball(interpolate_looks(ends, fraction, "map"))[1]["params"] == ball(end)[1]["params"]
+    nearly = [ball(interpolate_looks(ends, fraction, "map")) for fraction in (1e-9, 1 - 1e-9)]
     for actual, end in zip(nearly, ends, strict=True):
         np.testing.assert_allclose([t["color"] for t in actual], [t["color"] for t in ball(end)], atol=1e-6)
     between = interpolate_looks(ends, 0.5, "map")

@@ -87,10 +87,10 @@ def test_patch_may_build_on_its_own_operations_without_touching_its_values(defau
         {"op": "test", "path": f"{CURVES}/theta_h/points/1/0", "value": 45},
         {"op": "replace", "path": f"{CURVES}/theta_h/points/0/1", "value": 3},
     ]
-    sent = copy.deepcopy(patch)
+    outgoing = copy.deepcopy(patch)
     edited = apply_patch(default, patch, default)
     assert edited["materials"]["Teapot"]["terms"][1]["curves"]["theta_h"]["points"] == [[0, 3], [45, 0.5], [90, 0]]
-    assert patch == sent
+    assert patch == outgoing
 
 
 def test_removed_values_return_to_the_default(default):

@@ -39,8 +39,8 @@ def test_no_other_vectors_of_that_number_are_better():
     error = relative_rms(best.synthesis(best.analysis(curves)), curves)
     rng = np.random.default_rng(1)
     for _ in range(20):
-        turned, _ = np.linalg.qr(best.vectors.T + 0.02 * rng.normal(size=best.vectors.T.shape))
-        other = replace(best, vectors=turned.T)
+        rotated, _ = np.linalg.qr(best.vectors.T + 0.02 * rng.normal(size=best.vectors.T.shape))
+        other = replace(best, vectors=rotated.T)
         assert relative_rms(other.synthesis(other.analysis(curves)), curves) > error
 
 

@@ -65,9 +65,9 @@ def test_functions_are_sorted_by_polynomial_degree():
     functions = project(wi)
     for degree in range(DEGREE + 1):
         monomial = wi[:, 0] ** degree
-        share = np.einsum("n,nk,n->k", monomial, functions, weight)
-        np.testing.assert_allclose(share[num_functions(degree) :], 0, atol=1e-6)
-        assert np.abs(share[num_functions(degree - 1) :]).max() > 1e-3
+        fraction = np.einsum("n,nk,n->k", monomial, functions, weight)
+        np.testing.assert_allclose(fraction[num_functions(degree) :], 0, atol=1e-6)
+        assert np.abs(fraction[num_functions(degree - 1) :]).max() > 1e-3
 
 
 def test_light_below_the_horizon_contributes_nothing():

@@ -59,11 +59,11 @@ def test_local_lights_of_an_opened_bake_pass_through_holes(scene, direct):
     points = make_surface_points(np.stack([x, np.full_like(x, 1e-3), z], axis=1), np.tile([0, 1, 0], (2000, 1)))
     geometry = build_scene_buffers(scene)
     prepared = prepare_local_lights(POINT_LIGHT)
-    wanted = trace_light_visibility(
+    expected = trace_light_visibility(
         geometry.embree, geometry.epsilon, prepared, make_light_strata(prepared, 64), points
     )
     visible = direct.local.shadows(POINT_LIGHT, points).visible
-    np.testing.assert_array_equal(visible, wanted)
+    np.testing.assert_array_equal(visible, expected)
     assert 0.3 < (visible & 1).mean() < 0.9
 
 
@@ -71,11 +71,11 @@ def test_local_lights_of_an_opened_bake_pass_through_holes(scene, direct):
 def test_pictures_of_alpha_tested_surfaces_equal_the_reference(scene, method, tmp_path):
     bake = opened(scene, method, tmp_path)
     look = make_look(bake)
-    wanted = reference_image(
+    expected = reference_image(
         scene, "front", look, (48, 36), 0 if method == "direct" else 1024, reflects=method == "gather"
     )
     picture = render_image(bake, "front", look)
-    assert relative_rmse(picture, wanted) < 0.03
+    assert relative_rmse(picture, expected) < 0.03
     whole = [Material(material.name, material.terms) for material in scene.materials]
     without = make_tiny_scene(*scene.meshes, camera=scene.cameras[0], environment=studio(), materials=whole)
     assert relative_rmse(picture, reference_image(without, "front", look, (48, 36), 0)) > 0.15
@@ -88,8 +88,8 @@ def test_a_free_camera_and_the_browser_use_alpha_testing(scene, tmp_path):
     np.testing.assert_array_equal(holes.image >= 0, bake.stored_scene.face_material == 1)
     assert constants(bake)["has_alpha_test"]
     look = make_look(bake)
-    wanted = reference_image(scene, "front", look, (48, 36), 0)
-    assert relative_rmse(render_image(bake, "front", look), wanted) < 0.2
+    expected = reference_image(scene, "front", look, (48, 36), 0)
+    assert relative_rmse(render_image(bake, "front", look), expected) < 0.2
 
 
 def test_bakes_of_opaque_surfaces_store_no_opacity(scene, tmp_path):

@@ -23,12 +23,12 @@ def baked(scene, folder, num_points):
 
 def error_of_a_whole_image(transfer, scene):
     look, view = looks.validate(transfer.default_look, transfer.default_look), transfer.views["front"]
-    moving = FreeCameraPicture(transfer, "front")
-    moving.set_look(look)
-    moving.set_camera(view.camera, SIZE)
-    moving.advance(None)
+    free_bake = FreeCameraPicture(transfer, "front")
+    free_bake.set_look(look)
+    free_bake.set_camera(view.camera, SIZE)
+    free_bake.advance(None)
     exact = render_image(transfer, "front", look, static_views=StaticViewBuilder(transfer.light_transport, scene))
-    return relative_rmse(moving.image(), exact)
+    return relative_rmse(free_bake.image(), exact)
 
 
 def test_a_bake_stores_the_error_of_its_images(corner, tmp_path):

@@ -44,7 +44,7 @@ from relume.transport.projector import Projector
 from relume.transport.shading_points import GatherRays, ShadingPoints
 from relume.transport.term_contraction import contract
 
-NUM_CELLS = 90
+NUM_PATCHES = 90
 CURVES = [(model, c.name) for model, term in ANALYTIC.items() for c in term.curves if not c.depends_on_view]
 PLAIN = {"texture": None, "params": {}, "curves": {}}
 REFLECTANCES = (
@@ -67,13 +67,13 @@ def lights():
 @pytest.fixture(scope="module")
 def patches(lights):
     rng = np.random.default_rng(4)
-    normal = ref.unit(rng.normal(size=(NUM_CELLS, 4, 3))).astype(np.float32)
-    visible = rng.integers(0, 256, (NUM_CELLS, 4, (lights.num_lights + 7) // 8)).astype(np.uint8)
-    links = rng.integers(0, NUM_CELLS, (NUM_CELLS, 16)).astype(np.uint16)
-    material = rng.integers(0, 2, NUM_CELLS).astype(np.uint16)
+    normal = ref.unit(rng.normal(size=(NUM_PATCHES, 4, 3))).astype(np.float32)
+    visible = rng.integers(0, 256, (NUM_PATCHES, 4, (lights.num_lights + 7) // 8)).astype(np.uint8)
+    hits = rng.integers(0, NUM_PATCHES, (NUM_PATCHES, 16)).astype(np.uint16)
+    material = rng.integers(0, 2, NUM_PATCHES).astype(np.uint16)
     points = patch_sample_points(normal, normal)
     return PatchLight(
-        points, visible, links, make_pattern(4, 0, 9), material, rng.random((2, NUM_CELLS, 3), np.float32)
+        points, visible, hits, make_pattern(4, 0, 9), material, rng.random((2, NUM_PATCHES, 3), np.float32)
     )
 
 
@@ -85,11 +85,11 @@ def outgoing_from_patches(patches, lights, first=1, last=24, reflectances=REFLEC
     ).outgoing_light(patches)
 
 
-def radiance_by_bin(sent):
+def radiance_by_bin(outgoing):
     """All outgoing radiance in every direction bin. (patches, bins, 3)"""
-    radiance = np.repeat(sent.isotropic[:NUM_CELLS, None].astype(float), SIDE * SIDE, axis=1)
-    has = sent.lobe[:NUM_CELLS] >= 0
-    radiance[has] += (sent.scale[:, None] * sent.table)[sent.lobe[:NUM_CELLS][has]]
+    radiance = np.repeat(outgoing.isotropic[:NUM_PATCHES, None].astype(float), SIDE * SIDE, axis=1)
+    has = outgoing.lobe[:NUM_PATCHES] >= 0
+    radiance[has] += (outgoing.scale[:, None] * outgoing.table)[outgoing.lobe[:NUM_PATCHES][has]]
     return radiance
 
 
@@ -99,14 +99,14 @@ def receivers(patches, lights):
     rng = np.random.default_rng(5)
     dark = ref.make_random_receivers(30, lights.num_lights, seed=6)
     pattern = make_pattern(20, 13, 7)
-    links = rng.integers(0, NUM_CELLS, (30, 33)).astype(np.uint16)
+    hits = rng.integers(0, NUM_PATCHES, (30, 33)).astype(np.uint16)
     for p in range(30):
         wo = ref.frames(dark)[p] @ dark.wo[p]
         for ray in range(33):
             below = local_ray(pattern, ray, lattice_offsets(pattern, 50 + p), *wo.astype(np.float32))[2] <= 0
             if below or rng.random() < 0.1:
-                links[p, ray] = NO_PATCH
-    rays = GatherRays(links, pattern, outgoing_from_patches(patches, lights))
+                hits[p, ray] = NO_PATCH
+    rays = GatherRays(hits, pattern, outgoing_from_patches(patches, lights))
     points = dark.points._replace(seed=np.arange(50, 80, dtype=np.uint32))
     return ShadingPoints(points, dark.wo, np.zeros_like(dark.visible), (rays,))
 
@@ -133,13 +133,13 @@ def image_numpy(model, bands, receivers):
     for p, frame in enumerate(ref.frames(receivers)):
         wo = frame @ receivers.wo[p].astype(float)
         shift = lattice_offsets(rays.pattern, receivers.points.seed[p])
-        for ray, cell in enumerate(rays.gather_hits[p]):
-            if cell == NO_PATCH:
+        for ray, patch in enumerate(rays.gather_hits[p]):
+            if patch == NO_PATCH:
                 continue
             wi = np.array(local_ray(rays.pattern, ray, shift, *wo.astype(np.float32)))
             weight = ray_weight(rays.pattern, *wi.astype(np.float32), *wo.astype(np.float32))
             is_narrow = 2 * rays.pattern.num_cosine * weight < np.pi
-            value = weight * ref.evaluate_outgoing(rays.outgoing, cell, -(wi @ frame), is_narrow=is_narrow)
+            value = weight * ref.evaluate_outgoing(rays.outgoing, patch, -(wi @ frame), is_narrow=is_narrow)
             value = value * term.quotients(*wi.astype(float), *wo)
             for curve in term.curves:
                 if not curve.depends_on_view:
@@ -407,7 +407,7 @@ def test_the_displayed_paths_can_change_in_a_session(gathered, monkeypatch):
             picture.advance(None)
             need = picture.next_job()
             assert isinstance(need, SparsePreview)
-            picture.install(need, need.run(lambda share: None, lambda: False))
+            picture.install(need, need.run(lambda fraction: None, lambda: False))
             picture.advance(None)
             preview = picture.image()
             exact = run_until_exact(picture).image()
@@ -439,7 +439,7 @@ def test_a_rotation_is_previewed_with_its_indirect_light(gathered, monkeypatch):
     picture.advance(None)
     still, need = picture.image(), picture.next_job()
     assert isinstance(need, SparsePreview)
-    picture.install(need, need.run(lambda share: None, lambda: False))
+    picture.install(need, need.run(lambda fraction: None, lambda: False))
     assert not picture.advance(None).exact
     preview, exact = picture.image(), run_until_exact(picture).image()
     assert relative_rmse(preview, exact) < 0.7 * relative_rmse(still, exact)

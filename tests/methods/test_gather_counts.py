@@ -34,8 +34,8 @@ def corner():
     return make_tiny_scene(*parts, camera=make_camera("front", [0, 0.7, 2.4], [0, 0.5, -0.5], 0.5))
 
 
-def recipe_of(method: str, **asked: int) -> Recipe:
-    return Recipe(method, ("front",), SIZE, 60, num_probes=300, **asked)
+def recipe_of(method: str, **requested: int) -> Recipe:
+    return Recipe(method, ("front",), SIZE, 60, num_probes=300, **requested)
 
 
 @pytest.mark.parametrize("method", GATHERING)
@@ -43,8 +43,8 @@ def test_a_store_has_the_requested_counts(corner, tmp_path: Path, method: str) -
     recipe = recipe_of(method, num_patches=200, gather_rays=100)
     path = bake_in_process(METHODS[method], corner, recipe, tmp_path / "s.zarr")
     store = open_store(path)
-    links = "views/0/gather_hits" if method == "gather" else "probes/gather_hits"
-    assert store.shape(links)[1] == 100
+    hits = "views/0/gather_hits" if method == "gather" else "probes/gather_hits"
+    assert store.shape(hits)[1] == 100
     assert 150 <= store.shape("patches/material")[0] <= 200
     if method == "gather":
         usual = bake_in_process(METHODS[method], corner, recipe_of(method), tmp_path / "t.zarr")
@@ -68,7 +68,7 @@ def test_the_plan_uses_the_requested_counts(corner, method: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("method", "asked", "message"),
+    ("method", "requested", "message"),
     [
         *((method, {"num_patches": 63}, "give 64 to") for method in GATHERING),
         *((method, {"gather_rays": bad}, "give 16 to 4,096") for method in GATHERING for bad in (0, 15, 4097, -1)),
@@ -78,9 +78,9 @@ def test_the_plan_uses_the_requested_counts(corner, method: str) -> None:
         ("direct", {"gather_rays": 100}, "leave them out"),
     ],
 )
-def test_invalid_counts_of_a_recipe_are_rejected(corner, method: str, asked: dict[str, int], message: str) -> None:
+def test_invalid_counts_of_a_recipe_are_rejected(corner, method: str, requested: dict[str, int], message: str) -> None:
     with pytest.raises(PlanError, match=message):
-        METHODS[method].plan(corner, recipe_of(method, **asked))
+        METHODS[method].plan(corner, recipe_of(method, **requested))
 
 
 def test_recipes_survive_serialization_and_older_ones_are_read() -> None:

@@ -65,7 +65,7 @@ def test_an_object_outside_the_view_can_be_edited(tmp_path):
         picture.set_look(validate(look, transfer.default_look))
         while not picture.advance(None).exact or picture.next_job() is not None:
             if picture.next_job() is not None:
-                picture.run_next_job(lambda share: None, lambda: False)
+                picture.run_next_job(lambda fraction: None, lambda: False)
         images.append(picture.image())
     assert np.isfinite(images).all()
     assert images[1].sum() < images[0].sum()

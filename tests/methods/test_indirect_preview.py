@@ -22,16 +22,16 @@ def light_in(transfer, look):
     return illumination_from_look(look, transfer.material_names, has_bounces=True)
 
 
-def turned(transfer):
+def rotated(transfer):
     return light_in(transfer, make_look(transfer, lambda document: document["environment"].update(rotation=77.0)))
 
 
 def mean_outgoing(transfer, light):
     """Exact mean outgoing radiance of patches after all bounces."""
-    cells, on_cells, paths = transfer.patches, transfer.indirect._direct_light, light.paths
-    reflecting = cells.reflectance_operator(light.reflectances)
-    incident = on_cells.incident_light(light, reflecting, is_preview=False)
-    return solve_indirect(cells, reflecting, incident, paths.first, paths.last).mean_to_others(cells)
+    patches, on_patches, paths = transfer.patches, transfer.indirect._direct_light, light.paths
+    reflecting = patches.reflectance_operator(light.reflectances)
+    incident = on_patches.incident_light(light, reflecting, is_preview=False)
+    return solve_indirect(patches, reflecting, incident, paths.first, paths.last).mean_to_others(patches)
 
 
 def blue_wall(document):
@@ -45,11 +45,11 @@ def one_bounce(document):
 def test_previewed_light_is_not_reused_as_exact(store, monkeypatch):
     monkeypatch.setattr(transfers, "PREVIEW_WIDTH", 4)
     expected = open_transfer(store, Cache(BUDGET))
-    exact = expected.indirect.exact(turned(expected)).isotropic
+    exact = expected.indirect.exact(rotated(expected)).isotropic
     again = open_transfer(store, Cache(BUDGET))
-    rough = again.indirect.preview(turned(again))
+    rough = again.indirect.preview(rotated(again))
     assert np.abs(rough - exact).max() > 1e-3 * exact.max()  # the small map differs
-    np.testing.assert_array_equal(again.indirect.exact(turned(again)).isotropic, exact)
+    np.testing.assert_array_equal(again.indirect.exact(rotated(again)).isotropic, exact)
 
 
 @pytest.mark.parametrize("edit", [blue_wall, one_bounce])

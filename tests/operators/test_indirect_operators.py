@@ -27,7 +27,7 @@ from relume.transport.projector import Projector
 from relume.transport.shading_points import GatherRays, ShadingPoints
 from relume.transport.term_contraction import contract
 
-NUM_CELLS, NUM_POINTS, NUM_RAYS = 90, 150, 33
+NUM_PATCHES, NUM_POINTS, NUM_RAYS = 90, 150, 33
 NONE = tessellate_environment(np.ones((8, 16, 3), np.float32), 40).empty()
 
 
@@ -36,19 +36,19 @@ def receivers():
     """Points that hit neighboring patches, so that their rows are smooth; a tenth of the rays hits nothing."""
     rng = np.random.default_rng(5)
     dark = ref.make_random_receivers(NUM_POINTS, 8, seed=6)
-    middle = np.linspace(0, NUM_CELLS, NUM_POINTS)[:, None]
-    links = np.clip(middle + 12 * rng.normal(size=(NUM_POINTS, NUM_RAYS)), 0, NUM_CELLS - 1).astype(np.uint16)
-    links[rng.random(links.shape) < 0.1] = NO_PATCH
-    rays = GatherRays(links, make_pattern(NUM_RAYS, 0, 7), isotropic(light(1)))
+    center = np.linspace(0, NUM_PATCHES, NUM_POINTS)[:, None]
+    hits = np.clip(center + 12 * rng.normal(size=(NUM_POINTS, NUM_RAYS)), 0, NUM_PATCHES - 1).astype(np.uint16)
+    hits[rng.random(hits.shape) < 0.1] = NO_PATCH
+    rays = GatherRays(hits, make_pattern(NUM_RAYS, 0, 7), isotropic(light(1)))
     return ShadingPoints(dark.points, dark.wo, np.empty((NUM_POINTS, 0), np.uint8), (rays,))
 
 
 def light(seed):
     """Radiance of patches: smooth with one step."""
-    at = np.arange(NUM_CELLS)[:, None] / NUM_CELLS
+    at = np.arange(NUM_PATCHES)[:, None] / NUM_PATCHES
     phase = np.random.default_rng(seed).random((2, 3))
     radiance = np.zeros((NO_PATCH + 1, 3), np.float32)
-    radiance[:NUM_CELLS] = 2 + np.sin(6 * (at + phase[0])) + (at > phase[1])
+    radiance[:NUM_PATCHES] = 2 + np.sin(6 * (at + phase[0])) + (at > phase[1])
     return radiance
 
 
@@ -66,7 +66,7 @@ def image_by_rows(term, bands, receivers, radiance):
     tiles, samples = tile_layout(NUM_POINTS)
     image = np.ones((tiles, 3, samples), np.float32)
     rows = freeze(term, bands, receivers)
-    rows.add(haar(radiance[:NUM_CELLS]).astype(np.float32), image)
+    rows.add(haar(radiance[:NUM_PATCHES]).astype(np.float32), image)
     assert rows.num_bytes == row_bytes(NUM_POINTS, num_channels(term, bands))
     return image.transpose(0, 2, 1).reshape(-1, 3)[:NUM_POINTS] - 1
 
@@ -86,8 +86,8 @@ def test_rows_are_filtered_like_rays(receivers, times):
 
 
 def freeze(term, bands, receivers, is_canceled=lambda: False):
-    expected = expected_light(light(1)[:NUM_CELLS])
-    return precompute_rows(term, bands, receivers, receivers.rays[0], expected, lambda share: None, is_canceled)
+    expected = expected_light(light(1)[:NUM_PATCHES])
+    return precompute_rows(term, bands, receivers, receivers.rays[0], expected, lambda fraction: None, is_canceled)
 
 
 @pytest.mark.parametrize("model", list(ANALYTIC))
@@ -123,7 +123,7 @@ def test_black_light_gives_black_and_can_be_the_expected_light(receivers):
     black = np.zeros((NO_PATCH + 1, 3), np.float32)
     term = TERMS["lambert"]
     assert not image_by_rows(term, bands_of(term), receivers, black).any()
-    assert np.all(expected_light(black[:NUM_CELLS]) > 0)
+    assert np.all(expected_light(black[:NUM_PATCHES]) > 0)
 
 
 def test_points_without_hits_have_empty_rows(receivers):

@@ -72,7 +72,7 @@ def lights():
 def frozen_of(model, active, lights, receivers, **options):
     document = {"model": model, "params": {}}
     bands = {curve.name: curve_bands(document, curve) for curve in TERMS[model].curves}
-    progress = options.get("progress", lambda share: None)
+    progress = options.get("progress", lambda fraction: None)
     is_canceled = options.get("is_canceled", lambda: False)
     return bands, precompute(TERMS[model], bands, active, lights, receivers, progress, is_canceled)
 
@@ -165,9 +165,9 @@ def test_cache_returns_what_it_has():
 def test_operators_larger_than_the_budget_are_rejected_before_any_work():
     cache = Cache(1000)
     small = cache.get("small", LinearOperator, 480, lambda: operator(480))
-    with pytest.raises(MemoryBudgetError) as refused:
+    with pytest.raises(MemoryBudgetError) as rejected:
         cache.get("large", LinearOperator, 1001, lambda: pytest.fail("made"))
-    assert (refused.value.needed_bytes, refused.value.allowed_bytes) == (1001, 1000)
+    assert (rejected.value.needed_bytes, rejected.value.allowed_bytes) == (1001, 1000)
     assert cache.get_cached("small", LinearOperator) is small
 
 

@@ -58,7 +58,7 @@ def frozen_along(document, parameter, lights, receivers):
     linearised = linearize(document, parameter)
     assert linearised is not None
     assert linearised.num_columns <= MAX_NODES
-    frozen = linearised.precompute(term, bands_of(document), lights, receivers, lambda share: None, lambda: False)
+    frozen = linearised.precompute(term, bands_of(document), lights, receivers, lambda fraction: None, lambda: False)
     return linearised, frozen
 
 
@@ -70,7 +70,9 @@ def uniform_response(document, parameter, lights, receivers):
     """Radiance of the samples if the lobe moved by the parameter were uniform over all directions. (n, 3)"""
     term, bands = TERMS[document["model"]].normalized(document), bands_of(document)
     uniform = {c.name: solid_angles(c) / solid_angles(c).sum() for c in curves_of_parameter(term, parameter)}
-    bands |= {name: np.repeat((bands[name] @ share)[:, None], len(share), axis=1) for name, share in uniform.items()}
+    bands |= {
+        name: np.repeat((bands[name] @ fraction)[:, None], len(fraction), axis=1) for name, fraction in uniform.items()
+    }
     return Projector(term, contract(term, bands, None), lights, receivers).project(0, len(receivers.normal))[:, 0]
 
 
@@ -137,7 +139,7 @@ def test_cancelling_stops_the_freeze(lights, receivers):
     document = {"model": "ggx", "params": {}}
     linearised = linearize(document, "f0")
     with pytest.raises(CancelledError):
-        linearised.precompute(TERMS["ggx"], bands_of(document), lights, receivers, lambda share: None, lambda: True)
+        linearised.precompute(TERMS["ggx"], bands_of(document), lights, receivers, lambda fraction: None, lambda: True)
 
 
 def products(model, parameter, values):

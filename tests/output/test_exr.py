@@ -138,9 +138,9 @@ def test_layer_names_are_plain_short_and_different(names):
 def test_the_image_of_a_light_contains_that_light_only():
     look = look_with(lights={"Key": POINT, "Fill": POINT, "Off": POINT | {"enabled": False}})
     for layer in light_and_path_layers(look, has_indirect=False):
-        shining = [name for name, light in layer.look.lights.items() if any(light.gain)]
-        shining += ["environment"] if any(layer.look.environment.gain) else []
-        assert shining == [layer.source]
+        emissive = [name for name, light in layer.look.lights.items() if any(light.gain)]
+        emissive += ["environment"] if any(layer.look.environment.gain) else []
+        assert emissive == [layer.source]
 
 
 def test_attributes_describe_the_origin_of_the_image(tmp_path):

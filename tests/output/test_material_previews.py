@@ -15,11 +15,11 @@ def term(model: str, **given: object) -> dict[str, object]:
 
 def test_the_center_of_a_diffuse_ball_is_the_light_of_its_hemisphere() -> None:
     size = 33
-    middle = render_preview([term("lambert")], size)[size // 2, size // 2]
+    center = render_preview([term("lambert")], size)[size // 2, size // 2]
     cosine = np.maximum(_lights().direction[:, 2].astype(float), 0)
     expected = (cosine[:, None] * _lights().irradiance).sum(axis=0) / np.pi
     # the pixel is as wide as 3.6 degrees of the ball
-    np.testing.assert_allclose(middle, expected, rtol=0.05)
+    np.testing.assert_allclose(center, expected, rtol=0.05)
 
 
 def test_highlight_adds_to_the_body_and_corners_stay_empty() -> None:

@@ -123,9 +123,9 @@ def test_projected_points_are_weighted_means_of_single_points(model, is_active, 
     rng, num = np.random.default_rng(2), 70
     lights = tessellate_environment(rng.random((16, 32, 3), np.float32), 40)
     points = ref.make_random_receivers(num, lights.num_lights, seed=3)
-    links = rng.integers(0, 50, (num, 24)).astype(np.uint16)
+    hits = rng.integers(0, 50, (num, 24)).astype(np.uint16)
     radiance = rng.random((1 << 16, 3), np.float32)
-    alone = GatherRays(links, make_pattern(16, 8, 5), isotropic(radiance))
+    alone = GatherRays(hits, make_pattern(16, 8, 5), isotropic(radiance))
     weights = csr_array(rng.random((num, num)) * (rng.random((num, num)) < 0.1) + np.eye(num)).astype(np.float32)
     term = TERMS[model]
     curve = next(c for c in ANALYTIC[model].curves if not c.depends_on_view)

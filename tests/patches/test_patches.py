@@ -19,14 +19,14 @@ from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.scene.examples.cornell import cornell_box
 from relume.scene.model import Material, Texture, TextureEncoding
 
-NUM_CELLS = 1200
+NUM_PATCHES = 1200
 
 
 @pytest.fixture(scope="module")
 def box():
     scene = cornell_box()
     geometry = build_scene_buffers(scene)
-    return scene, geometry, choose_patches(scene, geometry, ("front",), (400, 400), NUM_CELLS)
+    return scene, geometry, choose_patches(scene, geometry, ("front",), (400, 400), NUM_PATCHES)
 
 
 def points_of(patches, count, first=0):
@@ -63,9 +63,9 @@ def test_each_point_is_located_in_its_patch(num_patches, num_points):
     tree, members = grow_tree(keys, np.ones(len(keys), np.float32), side, 6, num_patches)
     assert sorted(np.concatenate(members)) == list(range(num_points))
     assert len(members) == pytest.approx(num_patches, abs=4)
-    for cell, rows in enumerate(members):
+    for patch, rows in enumerate(members):
         assert len(set(side[rows])) == 1
-        assert {patch_of(tree, side[row], keys[row]) for row in rows} == {cell}
+        assert {patch_of(tree, side[row], keys[row]) for row in rows} == {patch}
 
 
 def test_hits_just_below_a_plane_are_located_on_it():
@@ -122,11 +122,11 @@ def test_points_lie_on_reachable_surfaces(box):
     for name in ("Tall block", "Short block"):
         mesh = next(mesh for mesh in scene.meshes if mesh.name == name)
         top = mesh.positions[mesh.positions[:, 1] == mesh.positions[:, 1].max()][:, [0, 2]].astype(float)
-        centre = top.mean(axis=0)
-        along = np.unique(np.round(top - centre, 5), axis=0)
+        center = top.mean(axis=0)
+        along = np.unique(np.round(top - center, 5), axis=0)
         u, v = along[0] + along[1], along[0] + along[2]
         position = patches.position.reshape(-1, 3).astype(float)
-        at = np.abs((position[:, [0, 2]] - centre) @ np.linalg.inv(np.array([u, v]) / 2))
+        at = np.abs((position[:, [0, 2]] - center) @ np.linalg.inv(np.array([u, v]) / 2))
         low = position[:, 1] < mesh.positions[:, 1].max() - 1e-3
         assert not np.any(low & (at < 0.999).all(axis=1))
 
@@ -134,8 +134,8 @@ def test_points_lie_on_reachable_surfaces(box):
 def test_patches_are_small_along_contacts(box):
     """Distance to the nearest other patch on the floor: next to the tall block, and far from all blocks."""
     scene, _, patches = box
-    centre = patches.position.mean(axis=1).astype(float)
-    floor = centre[centre[:, 1] < 1e-3][:, [0, 2]]
+    center = patches.position.mean(axis=1).astype(float)
+    floor = center[center[:, 1] < 1e-3][:, [0, 2]]
     tall = next(mesh for mesh in scene.meshes if mesh.name == "Tall block").positions
     foot = tall[tall[:, 1] == 0][:, [0, 2]].astype(float)
     spacing = np.sort(np.linalg.norm(floor[:, None] - floor[None], axis=2), axis=1)[:, 1]
@@ -148,7 +148,7 @@ def test_patches_are_small_where_a_polished_floor_reflects_them(box):
     """More points lie at the base of the blocks, which the floor reflects, than with a diffuse floor."""
     plain, _, patches = box
     polished = cornell_box(is_floor_glossy=True)
-    mirrored = choose_patches(polished, build_scene_buffers(polished), ("front",), (400, 400), NUM_CELLS)
+    mirrored = choose_patches(polished, build_scene_buffers(polished), ("front",), (400, 400), NUM_PATCHES)
     blocks = [k for k, material in enumerate(plain.materials) if material.name.endswith("block")]
 
     def fraction_of_points(patches):
@@ -173,15 +173,15 @@ def test_lobes_have_the_cosine_of_their_exponent():
 
 def test_patches_are_deterministic(box):
     scene, geometry, patches = box
-    again = choose_patches(scene, geometry, ("front",), (400, 400), NUM_CELLS)
+    again = choose_patches(scene, geometry, ("front",), (400, 400), NUM_PATCHES)
     np.testing.assert_array_equal(again.position, patches.position)
     np.testing.assert_array_equal(again.tree.value, patches.tree.value)
 
 
 def test_consecutive_patches_are_neighbors_in_space(box):
-    centre = box[2].position.mean(axis=1)
-    step = np.linalg.norm(np.diff(centre, axis=0), axis=1)
-    anywhere = np.linalg.norm(centre[np.random.default_rng(1).permutation(len(centre))] - centre, axis=1)
+    center = box[2].position.mean(axis=1)
+    step = np.linalg.norm(np.diff(center, axis=0), axis=1)
+    anywhere = np.linalg.norm(center[np.random.default_rng(1).permutation(len(center))] - center, axis=1)
     assert np.median(step) < 0.15 * np.median(anywhere)
 
 

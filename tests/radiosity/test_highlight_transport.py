@@ -27,28 +27,28 @@ from relume.radiosity.reflectance_operator import IncidentLight
 from relume.raytrace.gather_rays import make_pattern
 
 PLAIN = {"texture": None, "curves": {}}
-NUM_CELLS = 12
+NUM_PATCHES = 12
 
 
 def metal(roughness, color=(1.0, 1.0, 1.0)):
     return {**PLAIN, "model": "ggx", "color": list(color), "params": {"roughness": roughness, "f0": 0.9}}
 
 
-MATT = {**PLAIN, "model": "lambert", "color": [0.3, 0.2, 0.1], "params": {}}
+DIFFUSE = {**PLAIN, "model": "lambert", "color": [0.3, 0.2, 0.1], "params": {}}
 
 
 def patches_with_normals(normal):
     rng = np.random.default_rng(4)
-    visible = rng.integers(0, 256, (NUM_CELLS, 4, 6)).astype(np.uint8)
-    links = np.zeros((NUM_CELLS, 4 * 5), np.uint16)
-    material, white = np.zeros(NUM_CELLS, np.uint16), np.ones((2, NUM_CELLS, 3), np.float32)
+    visible = rng.integers(0, 256, (NUM_PATCHES, 4, 6)).astype(np.uint8)
+    hits = np.zeros((NUM_PATCHES, 4 * 5), np.uint16)
+    material, white = np.zeros(NUM_PATCHES, np.uint16), np.ones((2, NUM_PATCHES, 3), np.float32)
     points = patch_sample_points(normal, normal)
-    return PatchLight(points, visible, links, make_pattern(5, 0, 9), material, white)
+    return PatchLight(points, visible, hits, make_pattern(5, 0, 9), material, white)
 
 
 def flat(spread=0.0):
     rng = np.random.default_rng(7)
-    normals = np.repeat(ref.unit(rng.normal(size=(NUM_CELLS, 1, 3))), 4, axis=1)
+    normals = np.repeat(ref.unit(rng.normal(size=(NUM_PATCHES, 1, 3))), 4, axis=1)
     return ref.unit(normals + spread * rng.normal(size=normals.shape)).astype(np.float32)
 
 
@@ -64,9 +64,9 @@ def mean_over_bins(document, wi):
     wo = directions_at(x, y)
     weight = np.where(x * x + y * y < 1, wo[..., 2] * (1 + wo[..., 2]) ** 2, 1e-12)
     value = eval_brdf(document, wi, wo) * weight[..., None]
-    squares = SIDE, 8, SIDE, 8
+    bins = SIDE, 8, SIDE, 8
     return (
-        (value.reshape(*squares, 3).sum(axis=(1, 3)) / weight.reshape(squares).sum(axis=(1, 3))[..., None])
+        (value.reshape(*bins, 3).sum(axis=(1, 3)) / weight.reshape(bins).sum(axis=(1, 3))[..., None])
         .reshape(SIDE * SIDE, 3)
         .T
     )
@@ -84,18 +84,18 @@ def test_tables_are_means_over_bins(roughness):
 @pytest.mark.parametrize("roughness", [0.03, 0.1])
 def test_tables_of_lobes_narrower_than_bins_preserve_energy(roughness):
     """A mirror at normal incidence reflects 0.9, wherever the lobe lies in a bin."""
-    sent = lobe_table(json.dumps(metal(roughness)))[:60] @ bin_solid_angles()
-    np.testing.assert_allclose(sent, 0.9, rtol=0.02)
+    outgoing = lobe_table(json.dumps(metal(roughness)))[:60] @ bin_solid_angles()
+    np.testing.assert_allclose(outgoing, 0.9, rtol=0.02)
 
 
 def test_reflection_symmetries_permute_bins_like_directions():
     rng = np.random.default_rng(1)
     wo = ref.unit(rng.normal(size=(500, 3))) * [1, 1, np.sign(1)]
     wo[:, 2] = np.abs(wo[:, 2])
-    for mirroring, squares in enumerate(reflected_bins()):
+    for mirroring, bins in enumerate(reflected_bins()):
         moved = wo * [-1 if mirroring & 1 else 1, -1 if mirroring & 2 else 1, 1]
         moved = moved[:, [1, 0, 2]] if mirroring & 4 else moved
-        np.testing.assert_array_equal(squares[bin_index(wo)], bin_index(moved))
+        np.testing.assert_array_equal(bins[bin_index(wo)], bin_index(moved))
 
 
 def expected(patches, lights, documents, patch):
@@ -119,7 +119,7 @@ def expected(patches, lights, documents, patch):
 @pytest.mark.parametrize("spread", [0.0, 0.1])
 def test_patches_reflect_lights_with_their_highlights(lights, spread):
     patches, documents = patches_with_normals(flat(spread)), [metal(0.5, (0.5, 0.8, 0.3))]
-    reflectances = (pack_reflectance([MATT, *documents]),)
+    reflectances = (pack_reflectance([DIFFUSE, *documents]),)
     lobes = patches.highlight_tables(reflectances, patches.reflectance_operator(reflectances))
     actual = outgoing_in_highlights(patches, lobes, DirectLobes(lights, patches.visibility_bits(lobes.rows)))
     area = bin_solid_angles()
@@ -148,19 +148,19 @@ def test_rays_of_local_lights_are_reflected_like_lights():
     lobes = patches.highlight_tables(reflectances, patches.reflectance_operator(reflectances))
     actual = outgoing_in_highlights(patches, lobes, DirectLobes(rays=[_OneRay()]))
     exact = mean_over_bins(unpack_lobes(reflectances[0])[0], _LOCAL) * [[1], [2], [3]]
-    for patch in range(NUM_CELLS):
+    for patch in range(NUM_PATCHES):
         assert np.linalg.norm(actual[patch] - exact) < 0.03 * np.linalg.norm(exact)
 
 
 def test_highlights_are_not_counted_twice(lights):
     """With a table, basis functions and the isotropic part represent only diffuse terms."""
     patches = patches_with_normals(flat())
-    glossy, matt = ((pack_reflectance(terms),) for terms in ([MATT, metal(0.3)], [MATT]))
-    reflecting, plain = patches.reflectance_operator(glossy), patches.reflectance_operator(matt)
+    glossy, diffuse = ((pack_reflectance(terms),) for terms in ([DIFFUSE, metal(0.3)], [DIFFUSE]))
+    reflecting, plain = patches.reflectance_operator(glossy), patches.reflectance_operator(diffuse)
     rows = reflecting.rows
     incident = IncidentLight(patches.irradiance(lights), patches.incident_coefficients(rows, lights, 6))
     lobes = patches.highlight_tables(glossy, reflecting)
-    actual = first_bounce(reflecting, incident, (lobes, np.zeros((NUM_CELLS, 3, SIDE * SIDE), np.float32)))
+    actual = first_bounce(reflecting, incident, (lobes, np.zeros((NUM_PATCHES, 3, SIDE * SIDE), np.float32)))
     held = plain.reflectance * reflecting.energy_scale
     np.testing.assert_allclose(actual.isotropic, held / np.pi * incident.irradiance, atol=1e-5)
     assert not actual.coefficients.any()

@@ -26,9 +26,9 @@ def crosses(triangles, start, end):
     with np.errstate(divide="ignore", invalid="ignore"):
         from_corner = start[:, None] - a
         u = np.einsum("ntc,ntc->nt", from_corner, across) / determinant
-        turned = np.cross(from_corner, e)
-        v = np.einsum("nc,ntc->nt", along, turned) / determinant
-        t = np.einsum("ntc,tc->nt", turned, f) / determinant
+        rotated = np.cross(from_corner, e)
+        v = np.einsum("nc,ntc->nt", along, rotated) / determinant
+        t = np.einsum("ntc,tc->nt", rotated, f) / determinant
         return ((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t < 1)).any(axis=1)
 
 
@@ -66,8 +66,8 @@ def test_visibility_bits_equal_segment_intersections(surfaces, light):
         ]
         direction, distance = np.array([f[:3] for f in actual]), np.array([f[3] for f in actual])
         end = position + direction * np.minimum(distance, 100)[:, None]
-        asked = (np.einsum("nc,nc->n", direction, normal) > 0) & (np.array([f[4] for f in actual]) > 0)
-        wrong += np.sum(bits[:, k] != (asked & ~crosses(triangles, position.astype(float), end)))
+        requested = (np.einsum("nc,nc->n", direction, normal) > 0) & (np.array([f[4] for f in actual]) > 0)
+        wrong += np.sum(bits[:, k] != (requested & ~crosses(triangles, position.astype(float), end)))
     assert wrong <= 2e-3 * bits.size, "but for rays that graze an edge"
     assert 0.05 < bits.mean() < 0.95
 

@@ -77,7 +77,7 @@ def fence():
     return make_tiny_scene(*wires, floor, wall, camera=camera, environment=studio(64))
 
 
-def lids():
+def close_tiles():
     """Tiles close above a floor: contact shadows a few pixels wide, between the first traced samples."""
     floor = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
     tiles = [
@@ -98,7 +98,7 @@ def first_of(lights, count):
     [
         (demo_scene, 1000, 2.0, PICTURE_CHANGE),
         (still_life, 300, 1.5, PICTURE_CHANGE),
-        (lids, 1000, 2.0, HARDEST_CHANGE),
+        (close_tiles, 1000, 2.0, HARDEST_CHANGE),
         (fence, 1000, 2.0, HARDEST_CHANGE),
     ],
 )
@@ -117,8 +117,8 @@ def test_predicted_bits_equal_full_tracing(scene, num_lights, saving, bound):
 
 def predict_numpy(visible, facing, position, lights):
     """Bits and number of rays, sample by sample, from the results of a full trace."""
-    neighbours, power = find_neighbors(lights.direction), luminance(lights.irradiance)
-    beside, strong = np.split(neighbours.neighbors, neighbours.first[1:-1]), power > 5e-3 * power.sum()
+    neighbors, power = find_neighbors(lights.direction), luminance(lights.irradiance)
+    beside, strong = np.split(neighbors.neighbors, neighbors.first[1:-1]), power > 5e-3 * power.sum()
     bits, rays = np.zeros_like(visible), 0
     for start in range(0, len(visible), 64):
         rows = np.arange(start, min(start + 64, len(visible)))

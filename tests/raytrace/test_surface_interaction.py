@@ -36,13 +36,13 @@ def test_other_points_are_unchanged():
 
 def test_a_point_of_a_sliver_stays_in_it():
     """In a triangle narrower than the minimum distance, the distance is a tenth of its height."""
-    thin = 1e-6
+    subsampled = 1e-6
     geometry = build_scene_buffers(
         make_tiny_scene(
-            mesh("sliver", [[0, 0, 0], [0, 0, 2], [0, thin, 1]], [[0, 1, 2]], 0),
+            mesh("sliver", [[0, 0, 0], [0, 0, 2], [0, subsampled, 1]], [[0, 1, 2]], 0),
             camera=make_camera("c", [1, 1, 1], [0, 1, 1], 1.0),
         )
     )
     hits = Hits(np.zeros(1, np.int32), np.array([[0.5, 0.0]], np.float32), np.ones(1, np.float32))
     height = surface_at(geometry, hits, INWARD).points.position[0, 1]
-    assert 0 < height < thin
+    assert 0 < height < subsampled

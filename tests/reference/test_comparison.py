@@ -120,10 +120,10 @@ def test_the_error_map_is_gray_for_noise_and_colored_for_differences() -> None:
     reference = estimate(16, 0.02)
     shown = error_map(frame, reference, compare(frame, reference)[1]).astype(int)
     warm, cold = shown[..., 0] - shown[..., 2] > 60, shown[..., 2] - shown[..., 0] > 60
-    grey = shown.max(axis=-1) == shown.min(axis=-1)
+    gray = shown.max(axis=-1) == shown.min(axis=-1)
     assert warm[:20].all()
     assert cold[40:].all()
-    assert grey[24:36].mean() > 0.95
+    assert gray[24:36].mean() > 0.95
 
 
 def sun_environment() -> np.ndarray:
@@ -178,9 +178,9 @@ def test_frames_under_a_small_sun_are_judged_correctly(roughness: float) -> None
     ball = (slice(8, 22), slice(8, 19))
     shifted[ball] = np.roll(frame[ball], 1, axis=1)
     change, noise = np.abs(luminance(shifted) - luminance(frame)), luminance(reference.means).std(axis=0, ddof=1) / 4
-    off = (change > 6 * noise) & (change > 0.5 * luminance(frame))
+    difference = (change > 6 * noise) & (change > 0.5 * luminance(frame))
     differs = compare(shifted, reference)[1]
-    assert off.sum() > 20
-    assert differs[off].mean() > 0.85
+    assert difference.sum() > 20
+    assert differs[difference].mean() > 0.85
     differs[ball] = False
     assert differs.mean() < 0.01

@@ -229,11 +229,11 @@ def test_a_rotation_equals_a_shifted_map() -> None:
     radiance = studio(16)
     camera = make_camera("front", [0.3, 1.1, 3], [0, 0.45, 0], 0.8)
     ball = sphere("ball", [0, 0.5, 0], 0.5, 0, num_rings=10)
-    turned = image_of(
+    rotated = image_of(
         make_tiny_scene(ball, camera=camera, environment=radiance), (32, 24), 0, environment={"rotation": 90.0}
     )
     shifted = make_tiny_scene(ball, camera=camera, environment=np.roll(radiance, -8, axis=1))
-    np.testing.assert_allclose(turned, image_of(shifted, (32, 24), 0), rtol=2e-3, atol=1e-4)
+    np.testing.assert_allclose(rotated, image_of(shifted, (32, 24), 0), rtol=2e-3, atol=1e-4)
 
 
 def test_the_reference_reports_progress_and_can_be_cancelled() -> None:

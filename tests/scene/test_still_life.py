@@ -122,7 +122,7 @@ def test_pearls_touch_the_ground_but_not_each_other(meshes: dict[str, Mesh]) -> 
 def test_nothing_reaches_into_a_pearl(meshes: dict[str, Mesh]) -> None:
     balls = _balls(meshes["Pearls"])
     for name in ("Teapot", "Tray", "Handles", "Bowl", "Cloth", "Table"):
-        distance, _ = cKDTree(meshes[name].positions).query([centre for centre, _ in balls])
+        distance, _ = cKDTree(meshes[name].positions).query([center for center, _ in balls])
         assert (distance - [radius for _, radius in balls]).min() > -2e-4, name
 
 

@@ -35,11 +35,11 @@ def test_an_image_of_one_color_is_dropped(pixels) -> None:
 
 def test_triangles_emit_the_mean_of_their_part_of_the_image() -> None:
     below = image([[[0, 0, 0]] * 4] * 2 + [[[255, 255, 255]] * 4] * 2)
-    shares = average_over_faces(
+    fractions = average_over_faces(
         below, FLOOR
     )  # three quarters of the first triangle lie below, one quarter of the other
-    np.testing.assert_allclose(shares, [[0.75] * 3, [0.25] * 3], atol=0.13)
-    assert shares.mean() == pytest.approx(0.5)
+    np.testing.assert_allclose(fractions, [[0.75] * 3, [0.25] * 3], atol=0.13)
+    assert fractions.mean() == pytest.approx(0.5)
 
 
 def test_faces_are_in_scene_order_and_others_emit_uniformly() -> None:
@@ -50,6 +50,6 @@ def test_faces_are_in_scene_order_and_others_emit_uniformly() -> None:
     plain = Material("plain", ())
     scene = make_tiny_scene(wall, FLOOR, camera=make_camera("v", (0, 1, 2), (0, 0, 0), 0.7), materials=[lit, plain])
     assert has_emission_images(scene)
-    shares = relative_emission(scene)
-    assert shares.tolist()[:2] == [1, 1]
-    assert shares[2] == pytest.approx(0.2158, abs=1e-3)
+    fractions = relative_emission(scene)
+    assert fractions.tolist()[:2] == [1, 1]
+    assert fractions[2] == pytest.approx(0.2158, abs=1e-3)

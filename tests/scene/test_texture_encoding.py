@@ -32,8 +32,8 @@ def test_normals_are_scaled_rotated_and_normalized() -> None:
     np.testing.assert_allclose(x, np.array([0.5, 0, 1]) / np.hypot(0.5, 1), atol=5e-3)
     np.testing.assert_allclose(up, [0, 0, 1], atol=5e-3)
     assert np.linalg.norm(none) == pytest.approx(1)
-    turned = decode(pixels, TextureEncoding("normal", (0.5, 0.5, 1.0), np.pi / 2))[0, 0]
-    np.testing.assert_allclose(turned[:2], [x[1], -x[0]], atol=1e-6)
+    rotated = decode(pixels, TextureEncoding("normal", (0.5, 0.5, 1.0), np.pi / 2))[0, 0]
+    np.testing.assert_allclose(rotated[:2], [x[1], -x[0]], atol=1e-6)
 
 
 def test_pixels_without_an_encoding_are_values() -> None:

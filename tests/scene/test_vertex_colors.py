@@ -24,10 +24,10 @@ def test_lookups_interpolate_between_vertex_colors() -> None:
     for corners, max_error in ((calm, 0.006), (gaudy, 0.1)):
         image, places, white = draw_color_image(corners.astype(np.float32))
         pyramid = MipMap(Texture(np.ascontiguousarray(image[..., :3]), WRAP, TextureEncoding("srgb")))
-        share = rng.dirichlet([1, 1, 1], (50, 40))
-        uv = np.einsum("nkc,ncd->nkd", share, places).reshape(-1, 2).astype(np.float32)
+        fraction = rng.dirichlet([1, 1, 1], (50, 40))
+        uv = np.einsum("nkc,ncd->nkd", fraction, places).reshape(-1, 2).astype(np.float32)
         sampled = pyramid.sample(uv, np.zeros(len(uv), np.float32))
-        expected = np.einsum("nkc,ncd->nkd", share, corners[..., :3]).reshape(-1, 3)
+        expected = np.einsum("nkc,ncd->nkd", fraction, corners[..., :3]).reshape(-1, 3)
         assert np.abs(sampled - expected).max() < max_error
         assert np.sqrt(np.mean((sampled - expected) ** 2)) < 0.012
         np.testing.assert_array_equal(pyramid.sample(white[None], np.zeros(1, np.float32)), [[1, 1, 1]])

@@ -39,9 +39,9 @@ def test_instance_transforms_are_relative_to_their_node() -> None:
             SCALE=[[1, 1, 1], [2, 3, 1]],
         )
     )
-    turned, scaled = scene.meshes
+    rotated, scaled = scene.meshes
     assert [mesh.name for mesh in scene.meshes] == ["tree", "tree 2"]
-    np.testing.assert_allclose(turned.positions, QUAD[:, [1, 0, 2]] * [-1, 1, 1] + [1, 2, 8], atol=1e-6)
+    np.testing.assert_allclose(rotated.positions, QUAD[:, [1, 0, 2]] * [-1, 1, 1] + [1, 2, 8], atol=1e-6)
     np.testing.assert_allclose(scaled.positions, QUAD * [2, 3, 1] + [0, 0, 5], atol=1e-6)
     assert scene.warnings == ()
 

@@ -90,8 +90,8 @@ def test_a_coat_is_a_second_highlight_that_attenuates_the_base() -> None:
     for under, plain in ((lambert, bare[0]), (below, bare[1])):
         assert under["color"] == plain["color"]
         transmitted = np.array(under["curves"]["theta_o"]["factors"])
-        middle = np.cos((np.arange(len(transmitted)) + 0.5) * np.pi / 2 / len(transmitted))
-        np.testing.assert_allclose(transmitted, 1 - 0.5 * schlick(middle, 0.04), atol=2e-3)
+        center = np.cos((np.arange(len(transmitted)) + 0.5) * np.pi / 2 / len(transmitted))
+        np.testing.assert_allclose(transmitted, 1 - 0.5 * schlick(center, 0.04), atol=2e-3)
 
 
 def test_anisotropy_stretches_along_the_rotated_tangent() -> None:

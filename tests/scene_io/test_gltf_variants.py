@@ -81,8 +81,8 @@ def test_another_texture_becomes_its_mean_with_a_warning() -> None:
     glb = Glb()
     first, second = glb.texture([[[255, 0, 0], [0, 255, 0]]]), glb.texture([[[255, 255, 255], [0, 0, 0]]])
     red = plain("Red", 1, 1, 1, baseColorTexture={"index": first})
-    grey = plain("Grey", 1, 0.5, 1, baseColorTexture={"index": second})
-    scene = imported(with_variants(glb, [red, grey], [[{"material": 1, "variants": [0]}]]))
+    gray = plain("Grey", 1, 0.5, 1, baseColorTexture={"index": second})
+    scene = imported(with_variants(glb, [red, gray], [[{"material": 1, "variants": [0]}]]))
     lambert = scene.variants["day"]["materials"]["Red"]["terms"][0]
     np.testing.assert_allclose(lambert["color"], np.array([0.5, 0.25, 0.5]) * DIELECTRIC_TRANSMISSION, atol=1e-6)
     assert lambert["texture"] is None

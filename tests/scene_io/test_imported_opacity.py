@@ -106,9 +106,9 @@ def test_obj_libraries_define_opacity_in_three_ways(tmp_path: Path) -> None:
         assert opacity is not None
         assert (opacity.alpha.tolist(), opacity.cutoff) == ([[102]], None)
     assert of_library(tmp_path, "d 1") is None
-    grey = np.array([[[10, 10, 10], [250, 250, 250]]])
+    gray = np.array([[[10, 10, 10], [250, 250, 250]]])
     for library in ("map_d holes.png", "d 0\nmap_d holes.png"):
-        of_grey = of_library(tmp_path, library, grey)
+        of_grey = of_library(tmp_path, library, gray)
         assert of_grey is not None
         assert of_grey.alpha.tolist() == [[10, 250]]
     of_alpha = of_library(tmp_path, "map_d holes.png", HALVES)

@@ -28,19 +28,19 @@ def uploaded(folder: Path, **files: bytes) -> dict[str, Path]:
 
 def test_names_are_resolved_in_the_upload_not_on_disk(tmp_path: Path) -> None:
     (path,) = uploaded(tmp_path, companion=b"newmtl Red\nKd 1 0 0\n").values()
-    sent = UploadedFiles({"room\\looks\\Red.MTL": path}, "room/meshes/triangle.obj")
-    scene = import_scene(TRIANGLE, "test", LIGHT, sent)
+    outgoing = UploadedFiles({"room\\looks\\Red.MTL": path}, "room/meshes/triangle.obj")
+    scene = import_scene(TRIANGLE, "test", LIGHT, outgoing)
     assert scene.materials[0].terms[0]["color"] == [1, 0, 0]
     assert scene.warnings == ()
 
 
 def test_a_file_that_was_not_uploaded_is_missing_even_if_it_is_on_disk(tmp_path: Path) -> None:
     uploaded(tmp_path, companion=b"newmtl Red\nKd 1 0 0\n")
-    sent = UploadedFiles({}, "meshes/triangle.obj")
-    missing = import_scene(TRIANGLE.replace(b"../looks/red.mtl", b"companion"), "test", LIGHT, sent)
+    outgoing = UploadedFiles({}, "meshes/triangle.obj")
+    missing = import_scene(TRIANGLE.replace(b"../looks/red.mtl", b"companion"), "test", LIGHT, outgoing)
     assert any("is not beside the scene" in warning for warning in missing.warnings)
     with pytest.raises(SceneError, match="outside the folder"):
-        import_scene(TRIANGLE.replace(b"../looks", b"../../../etc"), "test", LIGHT, sent)
+        import_scene(TRIANGLE.replace(b"../looks", b"../../../etc"), "test", LIGHT, outgoing)
 
 
 @pytest.mark.parametrize("image", ["../images/red.png", "looks/red.png"])
@@ -52,8 +52,8 @@ def test_images_are_relative_to_the_material_file_or_to_the_scene(tmp_path: Path
         tmp_path, scene=b"", looks=f"newmtl Red\nKd 1 1 1\nmap_Kd {image}\n".encode(), png=picture.getvalue()
     )
     lies = {"../images/red.png": "room/images/red.png", "looks/red.png": "room/looks/red.png"}[image]
-    sent = UploadedFiles({"room/looks/red.mtl": files["looks"], lies: files["png"]}, "room/triangle.obj")
-    scene = import_scene(TRIANGLE.replace(b"../looks", b"looks"), "test", LIGHT, sent)
+    outgoing = UploadedFiles({"room/looks/red.mtl": files["looks"], lies: files["png"]}, "room/triangle.obj")
+    scene = import_scene(TRIANGLE.replace(b"../looks", b"looks"), "test", LIGHT, outgoing)
     np.testing.assert_allclose(get_texture_values(scene.materials[0].textures["diffuse"])[0, 0], [1, 0, 0], atol=1e-3)
 
 

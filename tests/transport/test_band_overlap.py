@@ -15,17 +15,17 @@ NUM_BANDS = 256
 
 @nb.njit
 def deposit_all(overlap, weight, out):
-    low, middle, high, rise, fall = overlap
+    low, center, high, rise, fall = overlap
     for band in range(0, NUM_BANDS, NUM):
-        deposit(out, band, low, middle, high, rise, fall, weight[0], weight[1], weight[2])
+        deposit(out, band, low, center, high, rise, fall, weight[0], weight[1], weight[2])
 
 
 @nb.njit
 def mean_of_all(overlap, bands, decreases, channel):
-    low, middle, high, rise, fall = overlap
+    low, center, high, rise, fall = overlap
     mean, top = np.float32(0), np.int64(low) - 1
     for band in range(top + 1, np.int64(high) + 1, NUM):
-        mean += mean_over_bands(decreases, channel, band, low, middle, high, rise, fall)
+        mean += mean_over_bands(decreases, channel, band, low, center, high, rise, fall)
         top = band + NUM - 1
     return mean + bands[channel, top]
 
@@ -76,46 +76,46 @@ def test_random_triangles_in_any_order_of_corners():
     rng = np.random.default_rng(1)
     for extent in (1, 6, 40, 250):
         for corners in rng.uniform(0, 256 - extent) + rng.uniform(0, extent, (25, 3)):
-            shares = [fractions_of(corners[order])[0] for order in ([0, 1, 2], [2, 0, 1], [1, 0, 2], [2, 1, 0])]
-            np.testing.assert_array_equal(shares, np.broadcast_to(shares[0], (4, NUM_BANDS)))
-            np.testing.assert_allclose(np.cumsum(shares[0]), fine_below(corners), atol=2.5 / FINE)
+            fractions = [fractions_of(corners[order])[0] for order in ([0, 1, 2], [2, 0, 1], [1, 0, 2], [2, 1, 0])]
+            np.testing.assert_array_equal(fractions, np.broadcast_to(fractions[0], (4, NUM_BANDS)))
+            np.testing.assert_allclose(np.cumsum(fractions[0]), fine_below(corners), atol=2.5 / FINE)
 
 
 def test_fractions_are_not_negative_and_sum_to_one():
     for corners in np.random.default_rng(2).uniform(0, 256, (200, 3)):
-        shares = fractions_of(corners)[0]
-        assert shares.min() > -1e-6
-        assert shares.sum() == pytest.approx(1, abs=1e-6)
+        fractions = fractions_of(corners)[0]
+        assert fractions.min() > -1e-6
+        assert fractions.sum() == pytest.approx(1, abs=1e-6)
         inside = (np.arange(1, NUM_BANDS + 1) > corners.min()) & (np.arange(NUM_BANDS) < corners.max())
-        assert not shares[~inside].any()
+        assert not fractions[~inside].any()
 
 
 @pytest.mark.parametrize("value", [0.0, 0.5, 1.0, 17.25, 128.0, 255.9, 255.99998])
 def test_triangle_at_one_angle_lies_in_its_band(value):
     for corners in ([value] * 3, [value, value, value - 5e-5], [value, value - 5e-5, value - 5e-5]):
-        shares = fractions_of(np.maximum(corners, 0))[0]
-        assert shares.min() >= 0
-        assert shares.sum() == pytest.approx(1, abs=1e-6)
+        fractions = fractions_of(np.maximum(corners, 0))[0]
+        assert fractions.min() >= 0
+        assert fractions.sum() == pytest.approx(1, abs=1e-6)
         near = [min(int(value), NUM_BANDS - 1), max(int(value) - 1, 0)]
-        assert shares[near].max() == pytest.approx(1, abs=1e-5) or value == int(value)
-        assert shares[sorted(set(near))].sum() == pytest.approx(1, abs=1e-6)
+        assert fractions[near].max() == pytest.approx(1, abs=1e-5) or value == int(value)
+        assert fractions[sorted(set(near))].sum() == pytest.approx(1, abs=1e-6)
 
 
 def test_weights_of_three_channels_and_means_equal_the_fractions():
     rng = np.random.default_rng(4)
     for corners in rng.uniform(0, 256, (30, 3)):
-        shares = fractions_of(corners)[0]
+        fractions = fractions_of(corners)[0]
         np.testing.assert_allclose(
-            fractions_of(corners, (2, 0.5, 0)), [2 * shares, 0.5 * shares, 0 * shares], rtol=1e-6
+            fractions_of(corners, (2, 0.5, 0)), [2 * fractions, 0.5 * fractions, 0 * fractions], rtol=1e-6
         )
         bands = np.pad(rng.uniform(0, 1, (3, NUM_BANDS)), ((0, 0), (0, NUM)), mode="edge").astype(np.float32)
         decreases = -np.diff(bands, axis=1, prepend=bands[:, :1])
         for channel in range(3):
             mean = mean_of_all(overlap(*np.float32(corners)), bands, decreases, channel)
-            assert mean == pytest.approx(float(bands[channel, :NUM_BANDS] @ shares), rel=2e-6)
+            assert mean == pytest.approx(float(bands[channel, :NUM_BANDS] @ fractions), rel=2e-6)
 
 
 def test_the_center_is_accurate_for_angles_of_any_size():
     for corners in np.random.default_rng(3).uniform(0, 256, (200, 3)):
-        low, middle, high, *_ = overlap(*np.float32(corners))
-        assert [low, middle, high] == sorted(np.float32(corners))
+        low, center, high, *_ = overlap(*np.float32(corners))
+        assert [low, center, high] == sorted(np.float32(corners))

@@ -68,10 +68,10 @@ def test_a_table_equals_the_sum_of_its_functions():
     frame = np.tile(np.eye(3, dtype=np.float32)[:2], (3, 1, 1))
     sent = radiance_from_patch(even, np.array([0, 2, 3]), frame, vectors.astype(np.float32))
     wo = over_hemisphere(4_000, 3)
-    for row, cell in enumerate((0, 2, 3)):
-        exact = even[cell] + project(wo)[:, :NUM_OUTGOING] @ vectors[row].T
-        radiance = np.array([ref.evaluate_outgoing(sent, cell, w) for w in wo])
-        assert np.linalg.norm(radiance - exact) < 0.12 * np.linalg.norm(exact - even[cell])
+    for row, patch in enumerate((0, 2, 3)):
+        exact = even[patch] + project(wo)[:, :NUM_OUTGOING] @ vectors[row].T
+        radiance = np.array([ref.evaluate_outgoing(sent, patch, w) for w in wo])
+        assert np.linalg.norm(radiance - exact) < 0.12 * np.linalg.norm(exact - even[patch])
         assert np.abs(radiance.mean(axis=0) - exact.mean(axis=0)).max() < 0.01
     np.testing.assert_array_equal(ref.evaluate_outgoing(sent, 1, wo[0]), even[1])
 
@@ -82,9 +82,9 @@ def reflect_one_direction(roughness):
     plain = np.ones((2, 50, 3), np.float32)
     made = ReflectanceOperator.from_materials((pack_reflectance([metal]),), np.zeros(50, np.uint16), plain)
     vectors = np.repeat(project(over_hemisphere(50, 6))[:, None, :NUM_OUTGOING], 3, axis=1).astype(np.float32)
-    of_cells, leaving = made.apply(IncidentLight(plain[0], vectors))
+    of_patches, leaving = made.apply(IncidentLight(plain[0], vectors))
     even = np.zeros((NO_PATCH + 1, 3), np.float32)
-    even[:50] = of_cells
+    even[:50] = of_patches
     frame, falls = np.tile(np.eye(3, dtype=np.float32)[:2], (50, 1, 1)), decay_of(made.roughening)
     return radiance_from_patch(even, np.arange(50), frame, leaving, falls), falls
 

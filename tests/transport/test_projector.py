@@ -231,12 +231,12 @@ def test_bands_equal_exact_angles_within_the_tolerance(angle, model, name, many_
     tolerance = (TOLERANCE_BANDS + TOLERANCE_SHARE * edges) * (2 if angle in CREASED else 1)
     divided = ref.pieces(lights, 4)
     for row in range(len(transport)):
-        power, shares, wi, wo = ref.shade_pieces(term, lights, receivers, row, divided)
+        power, fractions, wi, wo = ref.shade_pieces(term, lights, receivers, row, divided)
         gamma = angles_numpy(angle, wi, np.broadcast_to(wo, wi.shape), term.curve(name).axes).ravel() * (
             num_bands / (np.pi / 2)
         )
         order = np.argsort(gamma)
-        below = np.concatenate([[0], np.cumsum((power[:, :1] * shares).ravel()[order])])
+        below = np.concatenate([[0], np.cumsum((power[:, :1] * fractions).ravel()[order])])
         below, total = below / below[-1], below[-1]
         reached = np.cumsum(transport[row])[:-1] / total
         low, high = (below[np.searchsorted(gamma[order], edges + way * tolerance)] for way in (-1, 1))

@@ -157,17 +157,17 @@ def test_selected_lights_keep_their_visibility():
 def test_shared_directions_equal_listed_rays():
     points, _ = points_on_a_ball(50)
     pattern, rng = make_pattern(64, 0, 11), np.random.default_rng(7)
-    links = rng.integers(0, 30, (50, 64)).astype(np.uint16)
-    links[rng.random(links.shape) < 0.1] = NO_PATCH
+    hits = rng.integers(0, 30, (50, 64)).astype(np.uint16)
+    hits[rng.random(hits.shape) < 0.1] = NO_PATCH
     even = np.zeros((NO_PATCH + 1, 3), np.float32)
     even[:30] = rng.random((30, 3))
     lobed = np.array([2, 7, 8, 29])
     frame = np.linalg.qr(rng.normal(size=(30, 3, 2)))[0].transpose(0, 2, 1).astype(np.float32)
     some = radiance_from_patch(even, lobed, frame[lobed], rng.normal(size=(4, 3, NUM_OUTGOING)).astype(np.float32))
-    rows, squares = np.array([1, 4, 30, 49]), outgoing_bins(points, links, pattern, frame)
-    for sent in (isotropic(even), some):
-        actual = shared_direction_coefficients(links, squares, rows, weighted_basis(pattern, 0, DEGREE), sent)
-        exact = ray_incident_coefficients(points, [GatherRays(links, pattern, sent)], DEGREE)[rows]
+    rows, bins = np.array([1, 4, 30, 49]), outgoing_bins(points, hits, pattern, frame)
+    for outgoing in (isotropic(even), some):
+        actual = shared_direction_coefficients(hits, bins, rows, weighted_basis(pattern, 0, DEGREE), outgoing)
+        exact = ray_incident_coefficients(points, [GatherRays(hits, pattern, outgoing)], DEGREE)[rows]
         assert relative_rmse(actual, exact) < 1e-5
 
 

@@ -55,12 +55,12 @@ def small_btf(tmp_path_factory):
     synthetic_btf = SyntheticBtf(MESH, SIZE, GRID, BOUND, cords(tmp_path_factory.mktemp("geometry")))
     values = ValueFile(rendered, ubo_grid(), (SIZE, SIZE))
     small = TileGeometry(synthetic_btf.tile(), ubo_grid(), (SIZE, SIZE), GRID, 1)
-    values.fill(small.get_view, lambda share: None, lambda: False)
+    values.fill(small.get_view, lambda fraction: None, lambda: False)
     partial_folder = folder / "begun"  # resumes near its end
     shutil.copytree(rendered, partial_folder)
     with STORE.with_search_folder(folder):
         yield Cords(
             folder,
-            synthesize_btf(folder, synthetic_btf, "Cords", lambda share: None, lambda: False, partial_folder),
+            synthesize_btf(folder, synthetic_btf, "Cords", lambda fraction: None, lambda: False, partial_folder),
             values,
         )

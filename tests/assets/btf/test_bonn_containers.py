@@ -73,7 +73,7 @@ def with_invalid_number(number):
     return {"channels": [(u, v), *others]}
 
 
-def turned(row, theta, phi):
+def rotated(row, theta, phi):
     other = ANGLES.copy()
     other[row] = theta, phi
     return {"views": other, "lights": other}
@@ -96,11 +96,11 @@ SHORT = random_factors(99)
         (with_invalid_number(np.nan), "no numbers"),
         (with_invalid_number(np.inf), "no numbers"),
         (with_invalid_number(6e4) | {"model": 12}, "no numbers"),
-        (turned(9, 90.0, 0.0), "below the horizon"),
-        (turned(9, np.nan, 0.0), "below the horizon"),
-        (turned(9, 70.5, np.inf), "below the horizon"),
-        (turned(9, 70.5, 200.0), "evenly on rings"),
-        (turned(9, 60.0, 288.0), "rings"),
+        (rotated(9, 90.0, 0.0), "below the horizon"),
+        (rotated(9, np.nan, 0.0), "below the horizon"),
+        (rotated(9, 70.5, np.inf), "below the horizon"),
+        (rotated(9, 70.5, 200.0), "evenly on rings"),
+        (rotated(9, 60.0, 288.0), "rings"),
         ({"lights": np.concatenate([ANGLES[:5], ANGLES[5:] * [1.05, 1]])}, "not the same"),
         ({"views": np.tile(ANGLES, (50, 1))}, "view directions"),
     ],
@@ -127,14 +127,14 @@ def test_declared_sizes_are_checked_before_allocation(tmp_path):
     """Every aligned number of the first kilobytes is replaced by the largest possible value."""
     path, file = container(tmp_path / "a.btf")
     whole = encode_container(file)
-    refused = 0
+    rejected = 0
     for at in range(len(file.signature), 400, 4):
         path.write_bytes(whole[:at] + struct.pack("<I", 2**32 - 1) + whole[at + 4 :])
         try:
             MatrixBtf(path)
         except MaterialError:
-            refused += 1
-    assert refused >= 20
+            rejected += 1
+    assert rejected >= 20
 
 
 def test_the_command_line_imports_a_container(tmp_path, capsys):

@@ -165,7 +165,7 @@ def test_the_command_line_imports_a_zip(tmp_path, capsys):
 def test_a_rejected_zip_leaves_no_files(tmp_path):
     path = zipped(tmp_path / "a.zip", lambda files: files.update({FIRST: files[FIRST][:60]}))
     with pytest.raises(MaterialError, match="cannot be read"):
-        import_btf(tmp_path / "btfs", path, "Cloth", 0.1, lambda share: None, lambda: False)
+        import_btf(tmp_path / "btfs", path, "Cloth", 0.1, lambda fraction: None, lambda: False)
     assert not list((tmp_path / "btfs" / "making").iterdir())
 
 
@@ -175,5 +175,5 @@ def test_an_image_of_one_texel_is_accepted(tmp_path):
             files[name] = make_image(DIRECTIONS[1], DIRECTIONS[2], (1, 1))[0]
 
     path = zipped(tmp_path / "a.zip", of_one_texel)
-    record = import_btf(tmp_path / "btfs", path, "Cloth", 0.1, lambda share: None, lambda: False)
+    record = import_btf(tmp_path / "btfs", path, "Cloth", 0.1, lambda fraction: None, lambda: False)
     assert record.size == (1, 1)

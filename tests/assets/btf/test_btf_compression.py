@@ -30,7 +30,7 @@ class Facets:
         return ((lit * cosines[:, None]).T[..., None] * self._gain).astype(np.float32)
 
 
-def compressed(images, bound=0.01, progress=lambda share: None, is_canceled=lambda: False, begun=None):
+def compressed(images, bound=0.01, progress=lambda fraction: None, is_canceled=lambda: False, begun=None):
     return compress(images, bound, progress, is_canceled, begun)
 
 
@@ -74,12 +74,12 @@ def test_the_average_is_the_mean_of_all_texels_and_coarser_levels_are_means():
 
 
 def test_progress_rises_to_the_end_and_a_cancelled_one_stops():
-    shares = []
-    compressed(Facets(kinds=3), progress=shares.append)
-    assert shares == sorted(shares)
-    assert shares[-1] > 0.9
+    fractions = []
+    compressed(Facets(kinds=3), progress=fractions.append)
+    assert fractions == sorted(fractions)
+    assert fractions[-1] > 0.9
     with pytest.raises(CancelledError):
-        compressed(Facets(kinds=3), is_canceled=lambda: len(shares) > 0)
+        compressed(Facets(kinds=3), is_canceled=lambda: len(fractions) > 0)
 
 
 def counted(images):
@@ -90,12 +90,12 @@ def counted(images):
 
 
 def test_a_resumed_compression_gives_the_same_result(tmp_path):
-    images, asked = Facets(kinds=9), []
+    images, requested = Facets(kinds=9), []
     expected = compressed(images)
     with pytest.raises(CancelledError):
         compressed(
             images,
-            is_canceled=lambda: asked.append(0) or len(asked) > 40,
+            is_canceled=lambda: requested.append(0) or len(requested) > 40,
             begun=PartialCompression(tmp_path / "a", {"bound": 0.01}),
         )
     (tmp_path / "a" / "view-3.npz").write_bytes(b"PK\x03\x04 half written")

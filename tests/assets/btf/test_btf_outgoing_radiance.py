@@ -20,8 +20,8 @@ def test_kernels_equal_their_references(small_btf, components):
     expected = np.stack([sample_btf_numpy(btf, some, direction) for some, direction in zip(positions, wo, strict=True)])
     np.testing.assert_allclose(values_by_light, expected, atol=3e-6 * expected.max())
     axes, texel = np.array([[[0.6, 0.8], [-0.8, 0.6]], [[0.0, 1.0], [1.0, 0.0]]]), np.arange(40) % 2
-    turned = np.column_stack([np.einsum("nij,nj->ni", axes[texel], wo[:, :2]), wo[:, 2]])
-    reference = [outgoing_radiance_numpy(btf, expected[p], wi[None])[0] for p, wi in zip(texel, turned, strict=True)]
+    rotated = np.column_stack([np.einsum("nij,nj->ni", axes[texel], wo[:, :2]), wo[:, 2]])
+    reference = [outgoing_radiance_numpy(btf, expected[p], wi[None])[0] for p, wi in zip(texel, rotated, strict=True)]
     np.testing.assert_allclose(
         outgoing_radiance(btf, values_by_light[:2], axes, texel, wo), reference, atol=3e-6 * expected.max()
     )

@@ -131,22 +131,22 @@ def test_a_damaged_btf_does_not_hide_others_from_lists(small_btf, tmp_path, capl
 
 @pytest.mark.slow
 def test_a_resumed_creation_gives_the_same_result(tmp_path):
-    asked = []
+    requested = []
 
     def after_some():
-        asked.append(0)
-        return len(asked) > 20
+        requested.append(0)
+        return len(requested) > 20
 
     wanted, (at_once, resumed) = SyntheticBtf("corduroy", 8, 1, 0.02), (tmp_path / "at once", tmp_path / "resumed")
-    whole = synthesize_btf(at_once, wanted, "Corduroy", lambda share: None, lambda: False)
+    whole = synthesize_btf(at_once, wanted, "Corduroy", lambda fraction: None, lambda: False)
     with pytest.raises(CancelledError):
-        synthesize_btf(resumed, wanted, "Corduroy", lambda share: None, after_some)
+        synthesize_btf(resumed, wanted, "Corduroy", lambda fraction: None, after_some)
     (begun,) = (resumed / "making").iterdir()
     done = int((begun / "done").read_text())
     assert 5 < done < 81
-    shares = []
-    record = synthesize_btf(resumed, wanted, "Corduroy", shares.append, lambda: False)
-    assert shares[0] == pytest.approx(0.8 * done / 81)
+    fractions = []
+    record = synthesize_btf(resumed, wanted, "Corduroy", fractions.append, lambda: False)
+    assert fractions[0] == pytest.approx(0.8 * done / 81)
     assert record.id == whole.id
     for array in [*btf_store._ARRAYS, "packed"]:
         resumed_array, complete_array = (np.load(folder / record.id / f"{array}.npy") for folder in (resumed, at_once))
@@ -173,7 +173,7 @@ def test_values_of_another_btf_are_not_reused(tmp_path):
 )
 def test_invalid_recipes_are_rejected(tmp_path, wanted, message):
     with pytest.raises(ParameterError, match=message):
-        synthesize_btf(tmp_path, wanted, "x", lambda share: None, lambda: False)
+        synthesize_btf(tmp_path, wanted, "x", lambda fraction: None, lambda: False)
 
 
 def test_command_line_creates_and_rest_lists_shows_and_deletes(tmp_path, capsys):
@@ -198,9 +198,9 @@ def test_command_line_creates_and_rest_lists_shows_and_deletes(tmp_path, capsys)
         resumes, bake = client.app.state.services.live.resumes, "0123456789abcdef"
         shows = LookState({"materials": {"Ball": {"terms": []}}}, {"materials": {"Ball": json.loads(terms)}}, 0)
         token = resumes.open(bake, shows, VisibleViews(["front"], "front"))
-        refused = client.delete(f"/api/materials/btf/{listed['id']}")
-        assert refused.status_code == 409
-        assert f"a session of bake {bake}" in refused.json()["detail"]
+        rejected = client.delete(f"/api/materials/btf/{listed['id']}")
+        assert rejected.status_code == 409
+        assert f"a session of bake {bake}" in rejected.json()["detail"]
         resumes.close(token, time.monotonic())
         assert resumes.take(token, bake, time.monotonic()) is not None
         looks = [{"materials": {"Ball": json.loads(terms)}}]
@@ -209,8 +209,8 @@ def test_command_line_creates_and_rest_lists_shows_and_deletes(tmp_path, capsys)
         row = {"id": "f" * 16, "request": request, "state": "running", "done": 0, "created": 0.0, "client": ""}
         with client.app.state.services.bakes.ledger.sessions.begin() as rows:
             rows.add(RenderRow(**row, is_first=False, **of_another))
-        refused = client.delete(f"/api/materials/btf/{listed['id']}")
-        assert (refused.status_code, "by render ffff" in refused.json()["detail"]) == (409, True)
+        rejected = client.delete(f"/api/materials/btf/{listed['id']}")
+        assert (rejected.status_code, "by render ffff" in rejected.json()["detail"]) == (409, True)
         client.delete(f"/api/renders/{row['id']}")
         assert client.delete(f"/api/materials/btf/{listed['id']}").status_code == 204
         assert client.get(f"/api/materials/btf/{listed['id']}").status_code == 404

@@ -146,7 +146,7 @@ def test_light_is_rotated_with_the_rings(bake, small_btf):
     rings = texels.btf.grid
     before, after = (texture_light_rows(level_texels, *incident, 0, 40) for level_texels in (texels, half))
     tables = np.random.default_rng(3).random((5, rings.num_directions), np.float32)
-    turned = np.einsum("tl,ncl->nct", rotated_tables(rings, tables, np.pi), before)
-    np.testing.assert_allclose(turned, np.einsum("tl,ncl->nct", tables, after), rtol=1e-4)
+    rotated = np.einsum("tl,ncl->nct", rotated_tables(rings, tables, np.pi), before)
+    np.testing.assert_allclose(rotated, np.einsum("tl,ncl->nct", tables, after), rtol=1e-4)
     between = rotated_tables(rings, tables, 0.3)
     np.testing.assert_allclose(between @ np.ones(81), tables.sum(axis=1), rtol=1e-4)  # energy is preserved

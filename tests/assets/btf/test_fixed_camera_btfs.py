@@ -75,7 +75,7 @@ def bake(tmp_path_factory):
     return opened(floor(), tmp_path_factory.mktemp("floor"))
 
 
-def settled(record, **params):
+def exact_picture(record, **params):
     document = {"model": "measured_btf", "data": record.data, "params": params}
     return TERMS["measured_btf"].normalized(document)
 
@@ -93,7 +93,7 @@ def incident_light(bake, look, footprint=0.0):
 def test_the_fixed_camera_kernel_equals_the_reference(bake, small_btf, rotation, footprint):
     """The floor's texture: x to the right, y away from the camera, v = 0 at z = −1."""
     look = covered(bake, small_btf.record, scale=3.0, rotation=rotation)
-    texels = settled(small_btf.record, scale=3.0, rotation=rotation).texels
+    texels = exact_picture(small_btf.record, scale=3.0, rotation=rotation).texels
     lights, receivers = incident_light(bake, look, footprint / (3 * texels.btf.size[0]))
     rows = texel_rows(texels, lights, receivers, 0, len(receivers.uv))
     turn, (height, width) = np.radians(rotation), texels.btf.size
@@ -120,7 +120,7 @@ def test_an_image_equals_that_of_the_values_before_compression(bake, small_btf):
     look = covered(bake, small_btf.record, scale=1.0)
     lights, receivers = incident_light(bake, look)
     uv = np.array(receivers.uv)
-    (height, width), texels = small_btf.values.size, settled(small_btf.record, scale=1.0).texels
+    (height, width), texels = small_btf.values.size, exact_picture(small_btf.record, scale=1.0).texels
     flat = replace(texels.btf, height=np.zeros((1, 1), np.float32))  # no parallax
     texels = replace(texels, btf=flat)
     # at texel centers, so that no filter is included
@@ -164,7 +164,7 @@ def test_a_distant_btf_is_the_mean_of_its_texels(bake, small_btf):
     lights, receivers = incident_light(bake, covered(bake, small_btf.record))
     uv = np.array(receivers.uv)
     uv[:, 2] = 5
-    texels = settled(small_btf.record).texels
+    texels = exact_picture(small_btf.record).texels
     rows = texel_rows(texels, lights, replace(receivers, uv=uv), 0, len(uv))
     uv[:, :2] += 0.37
     other = texel_rows(texels, lights, replace(receivers, uv=uv), 0, len(uv))
@@ -219,7 +219,7 @@ def test_other_methods_show_btfs_and_follow_edits(small_btf, tmp_path, method):
         look = covered(bake, small_btf.record, (red, 1, 1), scale=3.0)
         live.set_look(look, active_pointer="/materials/Floor/terms/0/color")
         while (job := live.next_job()) is not None:
-            live.install(job, job.run(lambda share: None, lambda: False))
+            live.install(job, job.run(lambda fraction: None, lambda: False))
         live.advance(None)
         live.set_look(look)
         run_until_exact(live)
@@ -252,13 +252,13 @@ def test_reference_paths_start_at_sampled_positions(bake, small_btf):
     )
     materials, rng = np.zeros(num, np.int64), np.random.default_rng(5)
     covers = _sample_btf_surfaces(kinds, points, materials, 1)
-    _, share, _ = _sample_directions(kinds, [[cosine_lobe()]], points, materials, covers, rng)
+    _, fraction, _ = _sample_directions(kinds, [[cosine_lobe()]], points, materials, covers, rng)
     z, turn = (np.arange(40) + 0.5) / 40, (np.arange(80) + 0.5) * np.pi / 40
     flat = np.sqrt(1 - z**2)[:, None]
     wi = np.stack([flat * np.cos(turn), flat * np.sin(turn), np.broadcast_to(z[:, None], (40, 80))], axis=-1)
     expected = 2 * np.pi * covers[0, 0].evaluate(np.full(3200, 7), wi.reshape(-1, 3)).mean(axis=0) * term["color"]
-    error = share.std(axis=0) / np.sqrt(num)
-    assert (np.abs(share.mean(axis=0) - expected) < 4 * error).all()
+    error = fraction.std(axis=0) / np.sqrt(num)
+    assert (np.abs(fraction.mean(axis=0) - expected) < 4 * error).all()
     assert (error < 0.04 * expected).all()
     mean = _sample_directions(kinds, [[cosine_lobe()]], points, materials, {}, rng)[1].mean(axis=0)
     assert np.linalg.norm(mean - expected) > 8 * np.linalg.norm(error)  # the mean over all texels is different

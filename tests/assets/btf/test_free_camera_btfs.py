@@ -59,14 +59,14 @@ def node_light_numpy(
 
 
 @pytest.fixture(scope="module")
-def moving(tmp_path_factory):
+def free_bake(tmp_path_factory):
     return opened(floor(), tmp_path_factory.mktemp("moving"), "probes")
 
 
-def sight(moving, pixel_angle=0.0):
+def sight(free_bake, pixel_angle=0.0):
     camera_position = CAMERA.to_world[:3, 3].astype(np.float32)
     return TextureFootprint(
-        camera_position, pixel_angle, trace_primary(moving.stored_scene, moving.embree, CAMERA, SIZE)
+        camera_position, pixel_angle, trace_primary(free_bake.stored_scene, free_bake.embree, CAMERA, SIZE)
     )
 
 
@@ -102,26 +102,26 @@ def shade_ray_numpy(cover, d, position):
     column, row = SCALE * np.array([width * across @ position, -height * up @ position]) - 0.5
     numbers = np.zeros(tables.step.shape)
     for down, beside in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        share = abs(1 - beside - column % 1) * abs(1 - down - row % 1)
+        fraction = abs(1 - beside - column % 1) * abs(1 - down - row % 1)
         number = int((np.floor(row) + down) % height * width + (np.floor(column) + beside) % width)
-        numbers += share * tables.step * tables.weight[:, number].astype(float)
+        numbers += fraction * tables.step * tables.weight[:, number].astype(float)
     light = pack_lanes(project(axes @ TO_LIGHT))
     view, of_view, _ = interpolation_weights_numpy(cover.texels.btf.grid, -(axes @ d)[None])
 
     return np.einsum("a,ack,k->c", of_view[0], factors(numbers, tables.axes)[view[0]], light)
 
 
-def test_the_free_camera_kernel_equals_the_reference(moving, small_btf):
-    look_of = covered(moving, small_btf.record, (0.5, 1.0, 2.0), scale=SCALE, rotation=ROTATION)
-    covers, view, surface = find_btf_materials(terms_of(look_of)).available, sight(moving), moving.stored_scene
+def test_the_free_camera_kernel_equals_the_reference(free_bake, small_btf):
+    look_of = covered(free_bake, small_btf.record, (0.5, 1.0, 2.0), scale=SCALE, rotation=ROTATION)
+    covers, view, surface = find_btf_materials(terms_of(look_of)).available, sight(free_bake), free_bake.stored_scene
     gbuffer, out = view.gbuffer, np.full((len(view.gbuffer.directions), 3), MEAN, np.float32)
-    shade_texels(covers, surface, moving.positions, view, incident_light(surface), out)
+    shade_texels(covers, surface, free_bake.positions, view, incident_light(surface), out)
     rays = np.flatnonzero(gbuffer.hits.face >= 0)
     num_pixels = len(gbuffer.directions) - len(gbuffer.owner)
     assert len(gbuffer.owner)
     for ray in rays[::61]:
-        middle = ray if ray < num_pixels else gbuffer.owner[ray - num_pixels]
-        texel_of = middle if gbuffer.hits.face[middle] >= 0 else ray  # across an edge: as at the pixel center
+        center = ray if ray < num_pixels else gbuffer.owner[ray - num_pixels]
+        texel_of = center if gbuffer.hits.face[center] >= 0 else ray  # across an edge: as at the pixel center
         d = gbuffer.directions[texel_of].astype(np.float64)
         position = (view.camera_position + gbuffer.hits.distance[texel_of] * d + [1, 0, 1]) / 2
         more = [0.5, 1.0, 2.0] * shade_ray_numpy(covers[0], d, position)
@@ -131,14 +131,14 @@ def test_the_free_camera_kernel_equals_the_reference(moving, small_btf):
     assert out.max() > 2 * MEAN
 
 
-def test_light_around_a_node_equals_the_reference(moving):
+def test_light_around_a_node_equals_the_reference(free_bake):
     """For probes whose tangents have any azimuth."""
-    rng, surface = np.random.default_rng(2), moving.stored_scene
+    rng, surface = np.random.default_rng(2), free_bake.stored_scene
     turn = rng.uniform(0, 2 * np.pi, len(surface.probes.normal))
     n, t = surface.probes.normal, surface.probes.tangent
     tangent = (np.cos(turn)[:, None] * t + np.sin(turn)[:, None] * np.cross(n, t)).astype(np.float32)
     surface = replace(surface, probes=surface.probes._replace(tangent=tangent))
-    vectors = rng.normal(size=moving.vectors_shape).astype(np.float32)
+    vectors = rng.normal(size=free_bake.vectors_shape).astype(np.float32)
     light, num = TexelLight(), len(surface.lattice_nodes.normal)
     light.around_nodes(surface, vectors, np.arange(num, dtype=np.uint8) % 2)
     actual = light.around_nodes(surface, vectors, np.ones(num, np.uint8))
@@ -153,29 +153,29 @@ def test_light_around_a_node_equals_the_reference(moving):
         np.testing.assert_allclose(actual.tangent[vertex], along)
 
 
-def test_changed_light_is_not_taken_from_the_cache(moving):
+def test_changed_light_is_not_taken_from_the_cache(free_bake):
     """Cached light of the previous look is not shown."""
     surface, light, every = (
-        moving.stored_scene,
+        free_bake.stored_scene,
         TexelLight(),
-        np.ones(len(moving.stored_scene.lattice_nodes.normal), np.uint8),
+        np.ones(len(free_bake.stored_scene.lattice_nodes.normal), np.uint8),
     )
-    dark, bright = np.zeros(moving.vectors_shape, np.float32), np.ones(moving.vectors_shape, np.float32)
+    dark, bright = np.zeros(free_bake.vectors_shape, np.float32), np.ones(free_bake.vectors_shape, np.float32)
     assert light.around_nodes(surface, bright, every).vectors.any()
     assert not light.around_nodes(surface, dark, every).vectors.any()
 
 
-def test_compressed_outgoing_coefficients_are_accurate(moving, small_btf):
+def test_compressed_outgoing_coefficients_are_accurate(free_bake, small_btf):
     """For each texel and direction, except for rounding and for colors of narrow lobes."""
-    cover = find_btf_materials(terms_of(covered(moving, small_btf.record))).available[0]
-    whole, tables, squares = cover.texels.btf, cover.tables, np.zeros(2)
+    cover = find_btf_materials(terms_of(covered(free_bake, small_btf.record))).available[0]
+    whole, tables, bins = cover.texels.btf, cover.tables, np.zeros(2)
     integrals = filtered_factors(whole.grid)
     mean = np.einsum("vlc,lk->vck", whole.average, integrals)
     for texel in range(0, tables.weight.shape[1], 29):
         expected = np.einsum("vlc,lk->vck", whole.texel_brdf(texel), integrals)
         represented = mean + factors(tables.step * tables.weight[:, texel], tables.axes)
-        squares += np.sum((represented - expected) ** 2), np.sum(expected**2)
-    assert squares[0] < 0.05**2 * squares[1]
+        bins += np.sum((represented - expected) ** 2), np.sum(expected**2)
+    assert bins[0] < 0.05**2 * bins[1]
 
 
 def test_large_tables_omit_the_finest_level(small_btf, monkeypatch):
@@ -198,35 +198,35 @@ def test_a_diffuse_surface_has_a_single_coefficient():
     assert np.abs(np.delete(coefficients, CONSTANT)).max() < 0.02 * coefficients[CONSTANT]
 
 
-def test_a_free_camera_equals_a_fixed_view(moving, small_btf, tmp_path, monkeypatch):
-    look_of = covered(moving, small_btf.record, scale=SCALE)
+def test_a_free_camera_equals_a_fixed_view(free_bake, small_btf, tmp_path, monkeypatch):
+    look_of = covered(free_bake, small_btf.record, scale=SCALE)
     expected = render_image(opened(floor(), tmp_path), "front", look_of)
-    actual = render_image(moving, "front", look_of)
+    actual = render_image(free_bake, "front", look_of)
     monkeypatch.setattr(frame, "find_btf_materials", lambda *_, **__: BtfMaterials([], []))
-    mean = render_image(moving, "front", look_of)
+    mean = render_image(free_bake, "front", look_of)
     size = np.linalg.norm(expected)
     assert np.linalg.norm(actual - expected) < 0.03 * size < 0.1 * size < np.linalg.norm(mean - expected)
 
 
-def test_a_btf_is_weighted_next_to_other_terms(moving, small_btf, tmp_path):
-    terms = [*terms_of(covered(moving, small_btf.record, color=(0.6, 0.3, 0.2), scale=SCALE))[0], GRAY]
+def test_a_btf_is_weighted_next_to_other_terms(free_bake, small_btf, tmp_path):
+    terms = [*terms_of(covered(free_bake, small_btf.record, color=(0.6, 0.3, 0.2), scale=SCALE))[0], GRAY]
     document = {"materials": {"Floor": {"terms": terms}}}
     fixed = opened(floor(), tmp_path)
     expected = render_image(fixed, "front", validate(document, fixed.default_look))
-    actual = render_image(moving, "front", validate(document, moving.default_look))
+    actual = render_image(free_bake, "front", validate(document, free_bake.default_look))
     assert np.linalg.norm(actual - expected) < 0.04 * np.linalg.norm(expected)
 
 
-def test_two_textures_on_one_material_are_summed(moving, small_btf):
-    terms = terms_of(covered(moving, small_btf.record, scale=SCALE))
-    view, surface = sight(moving), moving.stored_scene
+def test_two_textures_on_one_material_are_summed(free_bake, small_btf):
+    terms = terms_of(covered(free_bake, small_btf.record, scale=SCALE))
+    view, surface = sight(free_bake), free_bake.stored_scene
     images = []
     for times in (1, 2):
         out = np.full((len(view.gbuffer.directions), 3), 10.0, np.float32)
         shade_texels(
             find_btf_materials([terms[0] * times]).available,
             surface,
-            moving.positions,
+            free_bake.positions,
             view,
             incident_light(surface),
             out,

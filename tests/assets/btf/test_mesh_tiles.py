@@ -33,9 +33,9 @@ def test_each_material_of_a_flat_mesh_reflects_as_on_its_own(striped):
     tile = read_tile(striped, None)
     values = TileGeometry(tile, ubo_grid(), (8, 8), 1, 1).get_view(30).reshape(81, 8, 8, 3)
     sums = [sum(np.array(term["color"]) for term in terms if term["model"] == "lambert") for terms in tile.materials]
-    for half, matt in zip((values[:, :, :4], values[:, :, 4:]), sums, strict=True):
-        assert matt.max() > 0.3
-        expected = matt / np.pi * directions(ubo_grid())[:, None, None, 2:]
+    for half, diffuse in zip((values[:, :, :4], values[:, :, 4:]), sums, strict=True):
+        assert diffuse.max() > 0.3
+        expected = diffuse / np.pi * directions(ubo_grid())[:, None, None, 2:]
         # lights have an extent, and the specular part comes on top
         np.testing.assert_allclose(half.mean(axis=(1, 2)), expected[:, 0, 0], rtol=0.15, atol=0.02)
     assert values[:, :, :4, 0].mean() > 2 * values[:, :, 4:, 0].mean()
@@ -44,8 +44,8 @@ def test_each_material_of_a_flat_mesh_reflects_as_on_its_own(striped):
 def test_interpolated_directions_preserve_energy(striped):
     """A diffuse surface has the same albedo from all directions: means over directions are lower."""
     albedo, rings = 0.5, ubo_grid()
-    matt = read_tile(striped, None)._replace(materials=(({"model": "lambert", "color": [albedo] * 3},),) * 2)
-    values = TileGeometry(matt, rings, (8, 8), 3, 1).get_view(30).mean(axis=(1, 2), dtype=np.float64)
+    diffuse = read_tile(striped, None)._replace(materials=(({"model": "lambert", "color": [albedo] * 3},),) * 2)
+    values = TileGeometry(diffuse, rings, (8, 8), 3, 1).get_view(30).mean(axis=(1, 2), dtype=np.float64)
     k = np.arange(4000)
     lights = polar(np.arccos(1 - (k + 0.5) / len(k)), k * np.pi * (3 - 5**0.5))
     index, weight, left = interpolation_weights_numpy(rings, lights)
@@ -81,7 +81,7 @@ def test_meshes_that_do_not_tile_are_rejected(tmp_path, text, period, error, mes
     path.write_text(text)
     with pytest.raises(error, match=message):
         synthesize_btf(
-            tmp_path / "kept", SyntheticBtf(MESH, 8, 1, 0.1, path, period), "x", lambda share: None, lambda: False
+            tmp_path / "kept", SyntheticBtf(MESH, 8, 1, 0.1, path, period), "x", lambda fraction: None, lambda: False
         )
     assert not (tmp_path / "kept").exists()
 

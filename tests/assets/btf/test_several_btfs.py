@@ -74,7 +74,7 @@ def run_to_the_end(picture):
         picture.advance(None)
         if (job := picture.next_job()) is None:
             return picture
-        picture.install(job, job.run(lambda share: None, lambda: False))
+        picture.install(job, job.run(lambda fraction: None, lambda: False))
     raise AssertionError("it never rests")
 
 
@@ -119,16 +119,16 @@ def test_frames_show_the_mean_until_the_tables_are_ready(opened, records, monkey
         picture.advance(None)
         mean = picture.image()
         while not isinstance(job := picture.next_job(), TablesJob):
-            picture.install(job, job.run(lambda share: None, lambda: False))
+            picture.install(job, job.run(lambda fraction: None, lambda: False))
             picture.advance(None)
             mean = picture.image()
     image = run_to_the_end(picture).image()
     alone = FreeCameraPicture(opened, "front")
     alone.set_look(look_of(opened, records))
     alone.advance(None)
-    wanted = alone.image()
-    size = np.linalg.norm(wanted)
-    assert np.linalg.norm(image - wanted) < 0.02 * size < 0.05 * size < np.linalg.norm(mean - wanted)
+    expected = alone.image()
+    size = np.linalg.norm(expected)
+    assert np.linalg.norm(image - expected) < 0.02 * size < 0.05 * size < np.linalg.norm(mean - expected)
 
 
 @pytest.mark.parametrize("opened", ["probes"], indirect=True)

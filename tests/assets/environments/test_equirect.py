@@ -63,8 +63,8 @@ def test_written_maps_are_read_back(tmp_path: Path, suffix: str) -> None:
 def test_gray_and_alpha_channels_are_read(tmp_path: Path) -> None:
     gray = read_environment(written(tmp_path / "grey.exr", np.full((2, 4, 1), 0.5)), "grey")
     np.testing.assert_array_equal(gray.radiance, np.full((2, 4, 3), 0.5, np.float32))
-    colour = np.broadcast_to(np.array([1.0, 2.0, 3.0, 0.25]), (2, 4, 4))
-    alpha = read_environment(written(tmp_path / "alpha.exr", colour), "alpha")
+    color = np.broadcast_to(np.array([1.0, 2.0, 3.0, 0.25]), (2, 4, 4))
+    alpha = read_environment(written(tmp_path / "alpha.exr", color), "alpha")
     np.testing.assert_array_equal(alpha.radiance[0, 0], [1, 2, 3])
 
 

@@ -34,16 +34,16 @@ def test_rec_709_primaries_change_nothing():
 
 def test_a_map_in_other_primaries_has_the_same_radiance(tmp_path):
     """Written with the inverse matrix; texels that are not numbers are black as before."""
-    wanted = dusk()
-    other = wanted @ np.linalg.inv(np.array(OF_2020)).T
+    expected = dusk()
+    other = expected @ np.linalg.inv(np.array(OF_2020)).T
     other[3, 4] = np.nan
     other[5, 6] = [np.inf, 1, -np.inf]
     actual = read_environment(write_map(tmp_path / "a.exr", other, REC_2020), "dusk")
-    wanted[3, 4] = wanted[5, 6] = 0
-    np.testing.assert_allclose(actual.radiance, wanted, atol=2e-3 * wanted.max(), rtol=2e-3)
+    expected[3, 4] = expected[5, 6] = 0
+    np.testing.assert_allclose(actual.radiance, expected, atol=2e-3 * expected.max(), rtol=2e-3)
     assert [warning.severity for warning in actual.warnings] == ["unsupported"]
-    plain = read_environment(write_map(tmp_path / "b.exr", wanted, REC_709), "dusk")
-    np.testing.assert_array_equal(plain.radiance, wanted)
+    plain = read_environment(write_map(tmp_path / "b.exr", expected, REC_709), "dusk")
+    np.testing.assert_array_equal(plain.radiance, expected)
 
 
 def test_a_gray_map_is_unchanged(tmp_path):

@@ -67,8 +67,8 @@ def test_rest_imports_lists_shows_and_deletes(home, red, tmp_path):
     settings = Settings(data=tmp_path / "data", client=tmp_path / "client", allowed_hosts=["testserver"])
     with TestClient(create_app(settings)) as client:
         url = "/api/materials/measured"
-        refused = client.post(url, files={"material": ("some/cayman.brdf", b"no measurement")})
-        assert refused.json()["detail"].startswith("cayman.brdf is not a MERL file")
+        rejected = client.post(url, files={"material": ("some/cayman.brdf", b"no measurement")})
+        assert rejected.json()["detail"].startswith("cayman.brdf is not a MERL file")
         response = client.post(url, files={"material": ("some/red.binary", red.read_bytes())})
         assert response.status_code == 201, response.text
         made = response.json()

@@ -15,7 +15,7 @@ from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
 from relume.live.fixed_camera.view_images import ViewImages
 from relume.views.view import View
 
-COLOURS = np.eye(3)
+COLORS = np.eye(3)
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def maps(tmp_path_factory):
     folder = tmp_path_factory.mktemp("maps")
     with STORE.with_search_folder(tmp_path_factory.mktemp("shelf")) as library:
         white = dusk() / [1.0, 0.4, 0.2]
-        paths = [write_map(folder / f"{name}.exr", white * c) for name, c in zip("rgb", COLOURS, strict=True)]
+        paths = [write_map(folder / f"{name}.exr", white * c) for name, c in zip("rgb", COLORS, strict=True)]
         yield [store_environment(library, path, path.stem).map for path in paths]
 
 
@@ -46,7 +46,7 @@ def lit_by(maps, number, *, light_position=None, sigma=None, **environment):
     def change(document):
         document["environment"].update(map=maps[number], **environment)
         if light_position is not None:
-            emission = (3 * COLOURS[number]).tolist()
+            emission = (3 * COLORS[number]).tolist()
             document["lights"]["Lamp"] = {"kind": "point", "position": [light_position, 1.2, 0.9], "emission": emission}
         if sigma is not None:
             terms = [term for material in document["materials"].values() for term in material["terms"]]
@@ -127,9 +127,9 @@ def test_continuous_edits_never_mix_two_lights(opened, maps, seed):
     def any_look():
         number, light_position = int(rng.integers(3)), rng.uniform(-0.6, 0.6) if rng.random() < 0.6 else None
         sigma = rng.uniform(0.1, 0.4) if rng.random() < 0.3 else None
-        turned, scale = float(rng.choice([0.0, 0.0, 40.0])), float(rng.choice([1.0, 1.0, 0.5]))
+        rotated, scale = float(rng.choice([0.0, 0.0, 40.0])), float(rng.choice([1.0, 1.0, 0.5]))
         return make_look(
-            opened, lit_by(maps, number, light_position=light_position, sigma=sigma, rotation=turned, scale=scale)
+            opened, lit_by(maps, number, light_position=light_position, sigma=sigma, rotation=rotated, scale=scale)
         )
 
     looks = [any_look()]
@@ -141,7 +141,7 @@ def test_continuous_edits_never_mix_two_lights(opened, maps, seed):
             picture.set_look(looks[-1])
         if picture.next_job() is not None and rng.random() < 0.8:
             need = picture.next_job()
-            made = need.run(lambda share: None, lambda: False)
+            made = need.run(lambda fraction: None, lambda: False)
             if rng.random() < 0.4:  # the edit continues meanwhile
                 looks.append(any_look())
                 picture.set_look(looks[-1])

@@ -94,10 +94,10 @@ def test_the_picture_equals_the_numpy_reference(transfer, pictures) -> None:
 
 def test_a_free_camera_shows_the_emission_image(scene, tmp_path, pictures) -> None:
     recipe = Recipe("probes", ("front",), SIZE, 400, num_probes=2000)
-    moving = open_bake(bake_in_process(METHODS["probes"], scene, recipe, tmp_path / "probes.zarr"), Cache(1 << 30))
-    actual, (_, reference, ids) = render_image(moving, "front", make_look(moving)), pictures
+    free_bake = open_bake(bake_in_process(METHODS["probes"], scene, recipe, tmp_path / "probes.zarr"), Cache(1 << 30))
+    actual, (_, reference, ids) = render_image(free_bake, "front", make_look(free_bake)), pictures
     inner = (ids == 1) & np.roll(ids == 1, 1, 0) & np.roll(ids == 1, -1, 0) & np.roll(ids == 1, 1, 1)
     inner &= np.roll(ids == 1, -1, 1)
-    off = np.abs(actual - reference)[inner] / reference.max()
-    assert np.median(off) < 0.01  # one ray through the pixel center: edges of fields differ
+    difference = np.abs(actual - reference)[inner] / reference.max()
+    assert np.median(difference) < 0.01  # one ray through the pixel center: edges of fields differ
     assert np.corrcoef(actual[inner].ravel(), reference[inner].ravel())[0, 1] > 0.97

@@ -74,13 +74,13 @@ def unoccluded_fraction(points, environment, degrees=0.0):
     w = texel_directions(height, 2 * height).reshape(-1, 3).astype(float)
     light = lookup(environment, rotate_about_y(w, -degrees)) * np.maximum(w[:, 1:2], 0)
     light = light * np.repeat(texel_solid_angles(height, 2 * height), 2 * height)[:, None]
-    shares = []
+    fractions = []
     for point in points:
         along = w @ (CENTER - point)
         nearest = np.sum((CENTER - point) ** 2) - along**2
         is_free = (along < 0) | (nearest > RADIUS**2)
-        shares.append(light[is_free].sum(0) / light.sum(0))
-    return np.array(shares)
+        fractions.append(light[is_free].sum(0) / light.sum(0))
+    return np.array(fractions)
 
 
 def test_a_ground_without_objects_is_invisible(tmp_path):
@@ -124,10 +124,10 @@ def distance_to_ray(points):
 def test_the_ground_has_the_shadow_of_its_light(direct_bake):
     image = rendered(direct_bake, set_only_area_light, background(kind="color", color=[2.0, 1.0, 0.5]))
     miss = distance_to_ray(ground_points(direct_bake))
-    shares = image[inner(direct_bake, "Ground")] / [2.0, 1.0, 0.5]
-    assert (shares[miss < 0.97 * RADIUS] == 0).all()
+    fractions = image[inner(direct_bake, "Ground")] / [2.0, 1.0, 0.5]
+    assert (fractions[miss < 0.97 * RADIUS] == 0).all()
     assert (miss < 0.97 * RADIUS).sum() > 10
-    np.testing.assert_allclose(shares[miss > 1.03 * RADIUS], 1, rtol=1e-4)
+    np.testing.assert_allclose(fractions[miss > 1.03 * RADIUS], 1, rtol=1e-4)
 
 
 def set_only_blue_light(document):
@@ -142,11 +142,11 @@ def test_an_unlit_ground_shows_the_background(direct_bake):
     below = points - POINT_LIGHT["position"]
     is_outside = np.degrees(np.arctan2(np.hypot(below[:, 0], below[:, 2]), -below[:, 1])) > 20.5
     lit_by_spot = rendered(direct_bake, set_only_spot_light, behind)
-    shares = lit_by_spot[ground] / colour
+    fractions = lit_by_spot[ground] / colour
     assert 50 < is_outside.sum() < len(points) - 50
-    np.testing.assert_allclose(shares[is_outside], 1, rtol=1e-5)
+    np.testing.assert_allclose(fractions[is_outside], 1, rtol=1e-5)
     miss = np.where(is_outside, np.inf, distance_to_ray(points))
-    np.testing.assert_array_equal(shares[miss < 0.97 * RADIUS], 0)
+    np.testing.assert_array_equal(fractions[miss < 0.97 * RADIUS], 0)
     assert (miss < 0.97 * RADIUS).sum() > 5
     lit_by_ball = rendered(direct_bake, set_only_emissive_ball, behind)
     np.testing.assert_allclose(lit_by_ball[ground] / colour, 1, rtol=1e-5)
@@ -160,16 +160,16 @@ def test_an_unlit_ground_shows_the_background(direct_bake):
 def test_ratios_at_the_edge_of_a_cone_are_bounded(indirect_bake):
     """Otherwise single pixels would be thousands of times as bright as the background."""
     image = rendered(indirect_bake, set_only_spot_light, background(kind="color", color=[2.0, 1.0, 0.5]))
-    shares = image[inner(indirect_bake, "Ground")] / [2.0, 1.0, 0.5]
-    assert shares.max() <= MAX_CATCHER_RATIO * (1 + 1e-5)
-    assert np.median(shares) == pytest.approx(1, abs=0.01)
+    fractions = image[inner(indirect_bake, "Ground")] / [2.0, 1.0, 0.5]
+    assert fractions.max() <= MAX_CATCHER_RATIO * (1 + 1e-5)
+    assert np.median(fractions) == pytest.approx(1, abs=0.01)
 
 
 def test_a_light_of_one_channel_casts_a_shadow_in_that_channel(direct_bake):
-    shares = rendered(direct_bake, set_only_blue_light, background(kind="color", color=[1.0, 1.0, 1.0]))
-    shares = shares[inner(direct_bake, "Ground")]
-    np.testing.assert_allclose(shares[:, :2], 1, rtol=1e-5)
-    assert (shares[:, 2].min(), shares[:, 2].max()) == (0, pytest.approx(1, rel=1e-4))
+    fractions = rendered(direct_bake, set_only_blue_light, background(kind="color", color=[1.0, 1.0, 1.0]))
+    fractions = fractions[inner(direct_bake, "Ground")]
+    np.testing.assert_allclose(fractions[:, :2], 1, rtol=1e-5)
+    assert (fractions[:, 2].min(), fractions[:, 2].max()) == (0, pytest.approx(1, rel=1e-4))
 
 
 def test_the_border_of_the_ground_has_no_seam():
@@ -216,8 +216,8 @@ def test_the_background_is_the_map_a_color_or_blurred(direct_bake):
 
 def test_transparent_images_composite_over_any_background(tmp_path, direct_bake):
     """Over a color they equal that color as a background, in gray light: alpha has no color."""
-    grey = np.repeat(studio()[..., :1], 3, axis=-1)
-    transfer = bake_corner_scene(ball_scene(grey), "direct", tmp_path)
+    gray = np.repeat(studio()[..., :1], 3, axis=-1)
+    transfer = bake_corner_scene(ball_scene(gray), "direct", tmp_path)
     image = rendered(transfer, background(kind="transparent"))
     assert image.shape == (SIZE[1], SIZE[0], 4)
     behind = np.array([0.7, 0.4, 0.1])
@@ -286,7 +286,7 @@ def test_environment_intensity_multiplies_the_picture(direct_bake, kind, monkeyp
 
 def test_coverage_depends_on_the_ground_only(direct_bake, monkeypatch):
     """After any edit, a live picture has the alpha of a new picture of the same look, with minimal requests."""
-    picture, asked = Picture(direct_bake, "front", Cache(BUDGET)), []
+    picture, requested = Picture(direct_bake, "front", Cache(BUDGET)), []
     ask = Background._shadow_opacity
     transparent = background(kind="transparent")
     ball = [lambda d, c=c: d["materials"]["Ball"]["terms"][0].update(color=[c, 0.1, 0.1]) for c in (0.3, 0.6)]
@@ -305,10 +305,10 @@ def test_coverage_depends_on_the_ground_only(direct_bake, monkeypatch):
         picture.set_look(look)
         run_until_exact(picture)
         with monkeypatch.context() as patched:
-            patched.setattr(Background, "_shadow_opacity", lambda *given: asked.append(given) or ask(*given))
-            asked.clear()
+            patched.setattr(Background, "_shadow_opacity", lambda *given: requested.append(given) or ask(*given))
+            requested.clear()
             tiles = picture.encode_alpha([(0, 0, 40, 10), (0, 10, 15, 20), (15, 10, 25, 20)])
-        assert len(asked) == max_error
+        assert len(requested) == max_error
         alpha = picture.alpha(for_display=True)
         np.testing.assert_allclose(alpha, expected, atol=1e-6)  # lights are mixed, with other rounding
         shown = to_bytes(alpha)

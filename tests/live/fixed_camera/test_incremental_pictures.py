@@ -47,7 +47,7 @@ def test_a_long_session_of_random_edits_equals_a_full_evaluation(transfer, seed,
         picture.set_look(look)
         for _ in range(int(rng.integers(0, 4))):
             if picture.next_job() is not None:
-                picture.run_next_job(lambda share: None, lambda: False)
+                picture.run_next_job(lambda fraction: None, lambda: False)
             advance = picture.advance(int(rng.integers(1, 30)) if rng.random() < 0.8 else None)
         advance = picture.advance(int(rng.integers(1, 30)))
         inexact += not advance.exact

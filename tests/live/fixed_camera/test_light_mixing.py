@@ -41,7 +41,7 @@ def num_made(picture):
     made = 0
     while (need := picture.next_job()) is not None:
         made += not isinstance(need, SparsePreview)
-        picture.run_next_job(lambda share: None, lambda: False)
+        picture.run_next_job(lambda fraction: None, lambda: False)
         picture.advance(None)
     return made
 
@@ -155,7 +155,7 @@ def test_alternating_gains_and_curves_stay_exact(transfer, lit):
 def test_preparing_a_light_computes_its_image(transfer, lit):
     lit.prepare("/lights/Panel")
     while (need := lit.next_job()) is not None:
-        lit.install(need, need.run(lambda share: None, lambda: False))
+        lit.install(need, need.run(lambda fraction: None, lambda: False))
         assert lit.advance(None).exact
     look = look_with(transfer, changed("Panel", intensity=0.3))
     lit.set_look(look)

@@ -62,8 +62,12 @@ def test_picture_is_linear_in_the_gains_of_lights(transfer):
 
 
 def test_disabled_lights_do_not_change_the_picture(transfer):
-    off = {"A": POINT_LIGHT | {"enabled": False}, "B": SUN | {"intensity": 0.0}, "C": SPOT | {"color": [0, 0, 0]}}
-    np.testing.assert_array_equal(rendered(transfer, off), rendered(transfer, {}))
+    difference = {
+        "A": POINT_LIGHT | {"enabled": False},
+        "B": SUN | {"intensity": 0.0},
+        "C": SPOT | {"color": [0, 0, 0]},
+    }
+    np.testing.assert_array_equal(rendered(transfer, difference), rendered(transfer, {}))
 
 
 def test_curves_are_edited_under_local_lights_and_stay_exact(transfer):
@@ -107,8 +111,8 @@ def room(*, has_sides=True, lights=(), emitter=None):
     """A floor below an emitter that faces down, with a camera at the side."""
     floor = quad("floor", [[-1, 0, 1], [1, 0, 1], [1, 0, -1], [-1, 0, -1]], 0)
     emitter = emitter or quad("lamp", [[-0.3, 1, -0.3], [0.3, 1, -0.3], [0.3, 1, 0.3], [-0.3, 1, 0.3]], 1)
-    grey = ({"model": "lambert", "color": [0.5, 0.5, 0.5]},)
-    materials = [Material("Floor", grey), Material("Lamp", grey, double_sided=has_sides)]
+    gray = ({"model": "lambert", "color": [0.5, 0.5, 0.5]},)
+    materials = [Material("Floor", gray), Material("Lamp", gray, double_sided=has_sides)]
     cameras = [
         make_camera("below", [0, 0.3, 3], [0, 0.55, 0], 0.8),
         make_camera("above", [0, 2.0, 3], [0, 0.55, 0], 0.8),
@@ -149,8 +153,8 @@ def test_an_emissive_surface_is_visible_and_lights_the_floor(tmp_path, is_two_si
 def test_emitter_without_area_or_pixels_changes_nothing(tmp_path):
     nowhere = mesh("lamp", [[5, 1, 5]] * 3, [[0, 1, 2]], 1, np.tile([0.0, 1.0, 0.0], (3, 1)))
     transfer = baked(room(lights=[SHINING], emitter=nowhere), tmp_path)
-    shining, off = (rendered(transfer, lights, view="above") for lights in ({}, OFF))
-    np.testing.assert_allclose(shining, off, rtol=1e-5)
+    emissive, difference = (rendered(transfer, lights, view="above") for lights in ({}, OFF))
+    np.testing.assert_allclose(emissive, difference, rtol=1e-5)
 
 
 def test_patches_reflect_local_light(tmp_path):
@@ -172,10 +176,10 @@ def test_patches_reflect_local_light(tmp_path):
     assert shown["first_bounce"][ids == 1].mean() > 0.01
     parts = shown["direct"] + shown["first_bounce"] + shown["further_bounces"]
     np.testing.assert_allclose(shown["all"], parts, rtol=1e-3, atol=1e-5)
-    cells = transfer.patches
-    on_cells = LocalPatchLight(transfer.local, cells, transfer.cache, transfer.key, ())
-    irradiance = on_cells.irradiance(LightGeometry("spot", (0, 0.9, 0), (0, -1, 0), (10, 40)))
-    on_floor = cells.material == 0
+    patches = transfer.patches
+    on_patches = LocalPatchLight(transfer.local, patches, transfer.cache, transfer.key, ())
+    irradiance = on_patches.irradiance(LightGeometry("spot", (0, 0.9, 0), (0, -1, 0), (10, 40)))
+    on_floor = patches.material == 0
     position = transfer.store.read("patches/position").mean(axis=1)[on_floor]
     away = np.linalg.norm(position - [0, 0.9, 0], axis=1)
     cosine = 0.9 / away

@@ -109,7 +109,7 @@ def test_edits_use_the_merged_operator_until_the_exact_one_is_ready(transfer, wa
         expected = ref.full_evaluation(transfer, "front", make_look(transfer, change))
         assert relative_rmse(picture.image(), expected) < 0.5 * relative_rmse(before, expected)
     assert memory.get_cached((*exact.key, "roughly"), MergedLightOperator) is not None
-    picture.install(exact, exact.run(lambda share: None, lambda: False))
+    picture.install(exact, exact.run(lambda fraction: None, lambda: False))
     assert memory.get_cached((*exact.key, "roughly"), MergedLightOperator) is None
     assert isinstance(memory.get_cached(exact.key, LinearOperator), LinearOperator)
     assert picture.advance(None).exact == (pointer == "curves/theta_h")

@@ -70,7 +70,7 @@ def through_the_mirror(scene):
 
 
 @pytest.fixture(scope="module")
-def hung(tmp_path_factory):
+def mirror_bake(tmp_path_factory):
     return baked(room(metal()), tmp_path_factory.mktemp("mirrors"))
 
 
@@ -108,12 +108,12 @@ def test_a_chrome_ball_reflects_the_environment(tmp_path):
     on = root > 0.03
     normal = (camera_position + (-along - np.sqrt(np.maximum(root, 0)))[:, None] * rays) / 0.8
     cosine = -np.einsum("nc,nc->n", normal, rays)
-    turned = rays + 2 * cosine[:, None] * normal
-    wanted = lookup(scene.environment.radiance, unit(turned).astype(np.float32)) * np.stack(
+    rotated = rays + 2 * cosine[:, None] * normal
+    wanted = lookup(scene.environment.radiance, unit(rotated).astype(np.float32)) * np.stack(
         [schlick(np.clip(cosine, 0, 1), f0) for f0 in F0], axis=-1
     )
-    off = np.abs(picture.reshape(-1, 3) - wanted)[on]
-    assert np.median(off / wanted[on].clip(1e-3)) < 0.01
+    difference = np.abs(picture.reshape(-1, 3) - wanted)[on]
+    assert np.median(difference / wanted[on].clip(1e-3)) < 0.01
 
 
 def test_facing_mirrors_terminate(tmp_path):
@@ -136,19 +136,19 @@ def set_roughness(value):
     return change
 
 
-def test_a_roughened_mirror_is_a_lobe(hung, tmp_path):
+def test_a_roughened_mirror_is_a_lobe(mirror_bake, tmp_path):
     rough = baked(room(metal(0.3)), tmp_path)
     assert rough.views["front"].mirrored is None
-    away = np.abs(shown(hung, set_roughness(0.3)) - shown(rough))
+    away = np.abs(shown(mirror_bake, set_roughness(0.3)) - shown(rough))
     assert np.quantile(away, 0.9) < 1e-5  # except for pixels with more samples of their mirror image
 
 
-def test_a_mirror_stays_until_its_lobe_is_ready(hung):
-    picture = Picture(hung, "front", Cache(1 << 30))
-    sharp, wanted = run_until_exact(picture).image(), shown(hung, set_roughness(0.3))
-    is_mirror = hung.views["front"].material_ids() == 0
+def test_a_mirror_stays_until_its_lobe_is_ready(mirror_bake):
+    picture = Picture(mirror_bake, "front", Cache(1 << 30))
+    sharp, wanted = run_until_exact(picture).image(), shown(mirror_bake, set_roughness(0.3))
+    is_mirror = mirror_bake.views["front"].material_ids() == 0
     for time in ("first", "second"):
-        picture.set_look(make_look(hung, set_roughness(0.3)))
+        picture.set_look(make_look(mirror_bake, set_roughness(0.3)))
         step, at_once = picture.advance(None), picture.image()
         if time == "first":
             assert not step.exact
@@ -156,47 +156,47 @@ def test_a_mirror_stays_until_its_lobe_is_ready(hung):
         lobe = run_until_exact(picture).image()
         np.testing.assert_allclose(lobe, wanted, atol=1e-4)
         assert min(np.abs(at_once - other)[is_mirror].max() for other in (sharp, lobe)) < 1e-4
-        picture.set_look(make_look(hung))
+        picture.set_look(make_look(mirror_bake))
         picture.advance(None)
         np.testing.assert_allclose(picture.image()[is_mirror], sharp[is_mirror], atol=1e-4)
         run_until_exact(picture)
 
 
-def test_a_mirror_stays_while_new_light_is_computed(hung):
+def test_a_mirror_stays_while_new_light_is_computed(mirror_bake):
     def rough_and_turned(document):
         set_roughness(0.3)(document)
         document["environment"]["rotation"] = 90.0
 
-    picture = Picture(hung, "front", Cache(1 << 30))
+    picture = Picture(mirror_bake, "front", Cache(1 << 30))
     run_until_exact(picture)
     picture.prepare("/materials/Mirror/terms/0/params/roughness")  # the operator that the edit would use
     sharp = run_until_exact(picture).image()
-    picture.set_look(make_look(hung, rough_and_turned))
+    picture.set_look(make_look(mirror_bake, rough_and_turned))
     assert not picture.advance(None).exact
     np.testing.assert_array_equal(picture.image(), sharp)
-    np.testing.assert_allclose(run_until_exact(picture).image(), shown(hung, rough_and_turned), atol=1e-4)
+    np.testing.assert_allclose(run_until_exact(picture).image(), shown(mirror_bake, rough_and_turned), atol=1e-4)
 
 
-def test_mirror_and_lobe_are_blended(hung):
-    sharp, soft = shown(hung, set_roughness(0.03)), shown(hung, set_roughness(0.06))
-    half = shown(hung, set_roughness(0.05))
-    is_mirror = hung.views["front"].material_ids() == 0
+def test_mirror_and_lobe_are_blended(mirror_bake):
+    sharp, soft = shown(mirror_bake, set_roughness(0.03)), shown(mirror_bake, set_roughness(0.06))
+    half = shown(mirror_bake, set_roughness(0.05))
+    is_mirror = mirror_bake.views["front"].material_ids() == 0
     assert np.abs(half - (sharp + soft) / 2)[is_mirror].mean() < 0.1 * np.abs(sharp - soft)[is_mirror].mean()
 
 
-def test_a_drawn_highlight_is_a_lobe(hung):
+def test_a_drawn_highlight_is_a_lobe(mirror_bake):
     def draw(document):
         term = document["materials"]["Mirror"]["terms"][0]
         term["curves"] = {"theta_h": {"points": [[0, 0], [90, 0]], "channels": "rgb"}}
 
-    is_mirror = hung.views["front"].material_ids() == 0
+    is_mirror = mirror_bake.views["front"].material_ids() == 0
     inside = np.zeros_like(is_mirror)
     inside[10:-10, 20:-20] = is_mirror[10:-10, 20:-20]
-    assert shown(hung, draw)[inside].max() < 1e-6
+    assert shown(mirror_bake, draw)[inside].max() < 1e-6
 
 
-def test_mirror_color_and_fresnel_curve_multiply(hung):
-    plain = shown(hung)
+def test_mirror_color_and_fresnel_curve_multiply(mirror_bake):
+    plain = shown(mirror_bake)
 
     def edit(document):
         term = document["materials"]["Mirror"]["terms"][0]
@@ -205,41 +205,43 @@ def test_mirror_color_and_fresnel_curve_multiply(hung):
 
     _, cosine = angles(room(metal()))
     was = np.stack([schlick(cosine, f0) for f0 in F0], axis=-1)
-    is_mirror = hung.views["front"].material_ids() == 0
+    is_mirror = mirror_bake.views["front"].material_ids() == 0
     lit = is_mirror & (plain.min(axis=-1) > 0.01)
-    ratio = (shown(hung, edit) / np.maximum(plain, 1e-6))[lit]
+    ratio = (shown(mirror_bake, edit) / np.maximum(plain, 1e-6))[lit]
     np.testing.assert_allclose(np.median(ratio / (0.25 * np.array([0.5, 1, 2]) / was[lit]), axis=0), 1, rtol=0.01)
 
 
-def test_edits_of_a_mirror_end_at_the_render(hung):
-    picture = Picture(hung, "front", Cache(1 << 30))
+def test_edits_of_a_mirror_end_at_the_render(mirror_bake):
+    picture = Picture(mirror_bake, "front", Cache(1 << 30))
     for roughness in (0.03, 0.3, 0.045, 0.03):
-        look = make_look(hung, set_roughness(roughness))
+        look = make_look(mirror_bake, set_roughness(roughness))
         picture.set_look(look)
         run_until_exact(picture)
-        np.testing.assert_allclose(picture.image(), render_image(hung, "front", look), rtol=1e-4, atol=1e-5)
+        np.testing.assert_allclose(picture.image(), render_image(mirror_bake, "front", look), rtol=1e-4, atol=1e-5)
 
 
-def test_a_mirror_edit_sends_its_tiles_and_picking_hits_the_mirror(hung):
-    picture = Picture(hung, "front", Cache(1 << 30))
-    picture.set_look(make_look(hung))
+def test_a_mirror_edit_sends_its_tiles_and_picking_hits_the_mirror(mirror_bake):
+    picture = Picture(mirror_bake, "front", Cache(1 << 30))
+    picture.set_look(make_look(mirror_bake))
     run_until_exact(picture)
     picture.advance(None)
 
     def tinted(document):
         document["materials"]["Mirror"]["terms"][0]["color"] = [1, 0.5, 0.5]
 
-    picture.set_look(make_look(hung, tinted))
-    assert set(hung.views["front"].material_tiles[0]) <= set(picture.advance(None).tiles)
+    picture.set_look(make_look(mirror_bake, tinted))
+    assert set(mirror_bake.views["front"].material_tiles[0]) <= set(picture.advance(None).tiles)
     assert picture.inspect(SIZE[0] // 2, 4)["material"] == "Mirror"
 
 
-def test_mirrors_reflect_the_environment_for_any_background(hung):
+def test_mirrors_reflect_the_environment_for_any_background(mirror_bake):
     def colored(document):
         document["background"] = {"kind": "color", "color": [0, 1, 0], "blur": 10.0}
 
-    is_mirror = hung.views["front"].material_ids() == 0
-    np.testing.assert_allclose(shown(hung, colored)[is_mirror], shown(hung)[is_mirror], rtol=1e-3, atol=1e-4)
+    is_mirror = mirror_bake.views["front"].material_ids() == 0
+    np.testing.assert_allclose(
+        shown(mirror_bake, colored)[is_mirror], shown(mirror_bake)[is_mirror], rtol=1e-3, atol=1e-4
+    )
 
 
 def test_gather_pictures_have_mirrors_too(tmp_path):
@@ -249,14 +251,14 @@ def test_gather_pictures_have_mirrors_too(tmp_path):
     assert shown(transfer)[is_mirror].mean() > shown(direct)[is_mirror].mean()
 
 
-def test_an_area_light_is_visible_in_a_mirror(hung):
-    centre, side = np.array([0.0, 1.6, 0.5]), 0.6
+def test_an_area_light_is_visible_in_a_mirror(mirror_bake):
+    center, side = np.array([0.0, 1.6, 0.5]), 0.6
 
     def area_light(towards):
         def change(document):
             document["environment"]["intensity"] = 0
             document["lights"] = {
-                "Panel": {"kind": "rectangle", "position": centre.tolist(), "direction": [0, 0, towards],
+                "Panel": {"kind": "rectangle", "position": center.tolist(), "direction": [0, 0, towards],
                           "size": [side, side], "emission": [7, 7, 7]}
             }  # fmt: skip
 
@@ -266,19 +268,19 @@ def test_an_area_light_is_visible_in_a_mirror(hung):
     rays, cosine = angles(scene)
     camera_position = scene.cameras[0].to_world[:3, 3] * [1, 1, -1] + [0, 0, -2]  # behind the mirror
     directions = rays * [1, 1, -1]
-    offset = camera_position + directions * ((centre[2] - camera_position[2]) / directions[:, 2:]) - centre
+    offset = camera_position + directions * ((center[2] - camera_position[2]) / directions[:, 2:]) - center
     is_in = (np.abs(offset[:, :2]) < side / 2 - 0.05).all(axis=1).reshape(cosine.shape)
     is_out = (np.abs(offset[:, :2]) > side / 2 + 0.05).any(axis=1).reshape(cosine.shape)
-    is_mirror = hung.views["front"].material_ids() == 0
+    is_mirror = mirror_bake.views["front"].material_ids() == 0
     assert is_in.sum() > 20
-    picture = shown(hung, area_light(-1))
+    picture = shown(mirror_bake, area_light(-1))
     wanted = 7 * np.stack([schlick(cosine, f0) for f0 in F0], axis=-1)
     np.testing.assert_allclose(picture[is_in & is_mirror], wanted[is_in & is_mirror], rtol=0.01)
     assert np.median(picture[is_out & is_mirror]) < 0.1
-    assert np.abs(shown(hung, area_light(1))[is_in & is_mirror]).max() < 1  # it emits away from the mirror
+    assert np.abs(shown(mirror_bake, area_light(1))[is_in & is_mirror]).max() < 1  # it emits away from the mirror
 
 
-def test_dimming_an_area_light_dims_its_mirror_image(hung):
+def test_dimming_an_area_light_dims_its_mirror_image(mirror_bake):
     def area_light(emission, **fields):
         def change(document):
             document["lights"] = {
@@ -288,9 +290,9 @@ def test_dimming_an_area_light_dims_its_mirror_image(hung):
 
         return change
 
-    picture = Picture(hung, "front", Cache(1 << 30))
+    picture = Picture(mirror_bake, "front", Cache(1 << 30))
     for change in (area_light(7), area_light(2), area_light(2, enabled=False), area_light(3), lambda document: None):
-        look = make_look(hung, change)
+        look = make_look(mirror_bake, change)
         picture.set_look(look)
         run_until_exact(picture)
-        np.testing.assert_allclose(picture.image(), render_image(hung, "front", look), rtol=1e-4, atol=1e-4)
+        np.testing.assert_allclose(picture.image(), render_image(mirror_bake, "front", look), rtol=1e-4, atol=1e-4)

@@ -105,7 +105,7 @@ def test_a_subsampled_operator_is_used_if_16_bits_are_too_large(transfer, small,
     job = picture.next_job()
     assert isinstance(job, PrecomputeOperator)
     assert job.form.step > 1
-    assert isinstance(job.run(lambda share: None, lambda: False), SubsampledOperator)
+    assert isinstance(job.run(lambda fraction: None, lambda: False), SubsampledOperator)
     run_until_exact(picture)
     drags = [rough(0.35), rough(0.25)]
     if held == "curves/theta_h":
@@ -138,7 +138,7 @@ def test_edits_during_the_computation_of_an_operator_are_applied(transfer, small
     job = picture.next_job()
     look = bent([[0, 3.0], [20, 0.5], [90, 0]])
     picture.set_look(make_look(transfer, look), active_pointer=FLOOR + "curves/theta_h")
-    picture.install(job, job.run(lambda share: None, lambda: False))
+    picture.install(job, job.run(lambda fraction: None, lambda: False))
     assert picture.advance(None).fidelity == "incremental"
     assert relative_rmse(run_until_exact(picture).image(), shown_exactly(transfer, look)) < 1e-6
 
@@ -191,10 +191,10 @@ def test_subsampled_operators_include_indirect_light(gathered, monkeypatch):
     change, images = 1e-2 * np.ones((3, 256)), np.zeros((2, *job.target.live.ready.image.shape), np.float32)
     for form, image in zip((job.form, operator_budget.EXACT), images, strict=True):
         some = replace(job, form=form, key=form, target=job.target._replace(images=with_budget(picture._images)))
-        some.run(lambda share: None, lambda: False).add(analysis(change), image)
+        some.run(lambda fraction: None, lambda: False).add(analysis(change), image)
     assert relative_rmse(images[0], images[1]) < 0.05
     look = bent([[0, 9.0], [25, 1.5], [90, 0]])
-    picture.install(job, job.run(lambda share: None, lambda: False))
+    picture.install(job, job.run(lambda fraction: None, lambda: False))
     picture.set_look(make_look(gathered, look), active_pointer=FLOOR + "curves/theta_h")
     assert relative_rmse(run_until_exact(picture).image(), shown_exactly(gathered, look)) < 1e-6
     picture.set_look(make_look(gathered))

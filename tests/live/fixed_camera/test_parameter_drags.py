@@ -39,7 +39,7 @@ def exact(transfer, change):
 
 
 def make(picture, need):
-    picture.install(need, need.run(lambda share: None, lambda: False))
+    picture.install(need, need.run(lambda fraction: None, lambda: False))
 
 
 def prepare(picture, pointer):

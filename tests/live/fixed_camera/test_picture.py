@@ -163,16 +163,14 @@ def test_curves_of_each_channel_reach_their_channel(transfer):
         red(document)
         document["materials"]["Ball"]["terms"][0]["curves"] = {}
 
-    coloured, white = (
-        open_exact_picture(transfer, look=make_look(transfer, change)).image() for change in (red, plain)
-    )
+    colored, white = (open_exact_picture(transfer, look=make_look(transfer, change)).image() for change in (red, plain))
     alone = find_pure_ball_pixels(transfer)
     # lights below a billionth of a curve are omitted, and the curves of red omit others
     nothing = 1e-9 * white[alone].max()
-    np.testing.assert_allclose(coloured[alone][:, 1:], white[alone][:, 1:], rtol=1e-5, atol=nothing)
-    assert relative_rmse(coloured[alone][:, 0], white[alone][:, 0]) > 0.01
+    np.testing.assert_allclose(colored[alone][:, 1:], white[alone][:, 1:], rtol=1e-5, atol=nothing)
+    assert relative_rmse(colored[alone][:, 0], white[alone][:, 0]) > 0.01
     expected = ref.full_evaluation(transfer, "front", make_look(transfer, red))
-    assert relative_rmse(coloured, expected) < 1e-6
+    assert relative_rmse(colored, expected) < 1e-6
 
 
 def test_an_image_of_another_model_is_never_exact(transfer):

@@ -118,8 +118,8 @@ def test_highlighting_equals_the_probe(transfer):
     luminance = np.float64([0.2126, 0.7152, 0.0722])
     for y, x in np.argwhere(find_pure_ball_pixels(transfer))[::37]:
         probe = picture.inspect(int(x), int(y))
-        share = luminance @ probe["bands"][:, 10:40].sum(axis=1) / (luminance @ probe["radiance"])
-        assert brushed[y, x] == pytest.approx(share, abs=1e-4)
+        fraction = luminance @ probe["bands"][:, 10:40].sum(axis=1) / (luminance @ probe["radiance"])
+        assert brushed[y, x] == pytest.approx(fraction, abs=1e-4)
 
 
 def test_highlighting_needs_a_prepared_curve(transfer):

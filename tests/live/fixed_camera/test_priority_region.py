@@ -88,15 +88,15 @@ def test_interrupted_shading_resumes(transfer, monkeypatch):
     picture = opened(transfer, None)
     while isinstance(job := picture.next_job(), SparsePreview) or job.target.material.num_samples < 100:
         run_next_job(picture)
-    shaded, asked = [], []
+    shaded, requested = [], []
     monkeypatch.setattr(
         "relume.operators.shade.shade_rows", lambda *arguments: shaded.append(arguments[4:6]) or shade_rows(*arguments)
     )
     with pytest.raises(CancelledError):
-        job.run(lambda share: None, lambda: asked.append(1) or len(asked) > 2)
+        job.run(lambda fraction: None, lambda: requested.append(1) or len(requested) > 2)
     assert isinstance(job, Shade)
     assert shaded
-    job.run(lambda share: None, lambda: False)
+    job.run(lambda fraction: None, lambda: False)
     assert sorted(shaded) == sorted(set(shaded))
     assert sum(stop - start for start, stop in shaded) == job.target.material.num_samples
 

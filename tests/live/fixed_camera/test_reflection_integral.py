@@ -105,9 +105,9 @@ def test_frame_is_the_reflection_integral(scene, transfer, edit, bound):
         sample_pixels = np.unique(view.pixel[own][is_whole[view.pixel[own]]])[::11]
         assert len(sample_pixels) > 5
         rows = np.nonzero(np.isin(view.pixel[own], sample_pixels))[0]
-        shares = weight[own][rows] * reference_radiance(scene, transfer, material, rows, look)
+        fractions = weight[own][rows] * reference_radiance(scene, transfer, material, rows, look)
         pixels = np.zeros_like(image, np.float64)
-        np.add.at(pixels, view.pixel[own][rows], shares)
+        np.add.at(pixels, view.pixel[own][rows], fractions)
         actual.append(image[sample_pixels])
         expected.append(pixels[sample_pixels])
         assert relative_rmse(actual[-1], expected[-1]) < 3 * bound

@@ -209,8 +209,8 @@ def test_probe_and_highlighting_use_the_level_of_a_pixel(direct) -> None:
     np.testing.assert_allclose(radiance, image[y[::19], x[::19]], rtol=1e-5)
     summed = np.array([np.sum(probe["bands"], axis=1) for probe in probes])
     assert np.median(np.abs(summed - radiance) / radiance) < 1e-4  # edge pixels also contain other surfaces
-    share = picture.highlight_pixels(pointer, 0, 90)
-    assert np.median(share[y, x]) == pytest.approx(1, abs=1e-3)
+    fraction = picture.highlight_pixels(pointer, 0, 90)
+    assert np.median(fraction[y, x]) == pytest.approx(1, abs=1e-3)
 
 
 @pytest.mark.parametrize("damage", ["none of the material's", "not sorted"])

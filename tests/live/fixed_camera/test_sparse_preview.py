@@ -12,7 +12,7 @@ from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview, choose_samples
 
 
-def turned(degrees):
+def rotated(degrees):
     def change(document):
         document["environment"]["rotation"] = degrees
 
@@ -25,7 +25,7 @@ def picture(transfer):
 
 
 def make(picture, need):
-    picture.install(need, need.run(lambda share: None, lambda: False))
+    picture.install(need, need.run(lambda fraction: None, lambda: False))
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def few(monkeypatch):
 @pytest.mark.usefixtures("few")
 def test_a_rotation_is_previewed_at_once_and_then_shaded(transfer, picture):
     still = picture.image()
-    picture.set_look(make_look(transfer, turned(70)))
+    picture.set_look(make_look(transfer, rotated(70)))
     need = picture.next_job()
     assert isinstance(need, SparsePreview)
     assert not need.is_refinement
@@ -45,7 +45,7 @@ def test_a_rotation_is_previewed_at_once_and_then_shaded(transfer, picture):
     advance = picture.advance(None)
     assert advance.changed
     assert not advance.exact
-    expected = ref.full_evaluation(transfer, "front", make_look(transfer, turned(70)))
+    expected = ref.full_evaluation(transfer, "front", make_look(transfer, rotated(70)))
     preview_error = relative_rmse(picture.image(), expected)
     assert preview_error < 0.5 * relative_rmse(still, expected)
     assert preview_error > 1e-3
@@ -56,9 +56,9 @@ def test_a_rotation_is_previewed_at_once_and_then_shaded(transfer, picture):
 
 @pytest.mark.usefixtures("few")
 def test_a_continuous_rotation_is_followed(transfer, picture):
-    picture.set_look(make_look(transfer, turned(20)))
+    picture.set_look(make_look(transfer, rotated(20)))
     need = picture.next_job()
-    picture.set_look(make_look(transfer, turned(40)))
+    picture.set_look(make_look(transfer, rotated(40)))
     make(picture, need)
     assert picture.advance(None).changed
     assert isinstance(picture.next_job(), SparsePreview)
@@ -82,14 +82,14 @@ def test_preparing_the_rotation_selects_samples_only(transfer, picture):
 
 def test_an_empty_picture_is_shaded_without_preview(transfer):
     picture = Picture(transfer, "front", Cache(BUDGET))
-    picture.set_look(make_look(transfer, turned(70)))
+    picture.set_look(make_look(transfer, rotated(70)))
     assert not isinstance(picture.next_job(), SparsePreview)
     assert not picture.next_job().is_refinement
 
 
 def test_without_memory_there_is_no_preview(transfer):
     picture = run_until_exact(Picture(transfer, "front", Cache(200_000)))
-    picture.set_look(make_look(transfer, turned(70)))
+    picture.set_look(make_look(transfer, rotated(70)))
     assert not isinstance(picture.next_job(), SparsePreview)
 
 

@@ -41,10 +41,10 @@ def test_degrees_below_the_bound_are_omitted() -> None:
 @pytest.mark.parametrize("num", [1, 15, NUM_FUNCTIONS])
 def test_coefficients_of_any_size_survive_half_precision(size: float, num: int) -> None:
     coefficients = np.random.default_rng(SEED).normal(0, size, (50, 3, NUM_FUNCTIONS)).astype(np.float32)
-    sent = material_arrays._vector_arrays("vectors/4", coefficients, num)
-    scale, factor = sent["vectors/4/scale"][0]
+    outgoing = material_arrays._vector_arrays("vectors/4", coefficients, num)
+    scale, factor = outgoing["vectors/4/scale"][0]
     assert factor == num
-    numbers = sent["vectors/4"].astype(np.float64).reshape(50, -1)
+    numbers = outgoing["vectors/4"].astype(np.float64).reshape(50, -1)
     assert numbers.shape[1] - 3 * num in range(4)  # whole texels
     decoded = numbers[:, : 3 * num].reshape(50, 3, num) * float(scale)
     assert np.abs(decoded - coefficients[:, :, :num]).max() <= 1e-3 * np.abs(coefficients).max()

@@ -21,8 +21,8 @@ def camera(position, turn=0.0, yfov=0.7):
 def test_a_turntable_keeps_the_center_and_is_closed():
     cameras = turntable(camera([1, 1.5, 9]), np.array([1.0, 1, 3]), 12)
     np.testing.assert_array_equal(cameras[0].to_world, camera([1, 1.5, 9]).to_world)
-    middle = np.array([1.0, 1, 3, 1])
-    centers = np.array([np.linalg.inv(pose.to_world) @ middle for pose in cameras])
+    center = np.array([1.0, 1, 3, 1])
+    centers = np.array([np.linalg.inv(pose.to_world) @ center for pose in cameras])
     np.testing.assert_allclose(centers, np.tile(centers[0], (12, 1)), atol=1e-12)
     steps = [np.linalg.norm(cameras[k].to_world - cameras[k - 1].to_world) for k in range(12)]
     np.testing.assert_allclose(steps, steps[0])

@@ -43,5 +43,5 @@ def test_the_error_is_the_residual_of_a_projection(exponent):
         assert missed[degree] == pytest.approx(np.average(left, weights=cosine), abs=0.01)
     assert factorization_error(term).required_functions in (
         None,
-        *(num_functions(n) for n, share in enumerate(missed) if share <= BOUND),
+        *(num_functions(n) for n, fraction in enumerate(missed) if fraction <= BOUND),
     )

@@ -112,11 +112,11 @@ def test_visible_fractions_equal_those_of_all_shadow_rays(sunlit):
         for dx in (-1, 0, 1):
             around.append(np.roll(of_pixels, (dy, dx), axis=(0, 1)))
     is_even = (np.ptp(around, axis=0) == 0) & (np.arange(width) % (width - 1) > 0)
-    off = np.abs(fractions[: width * height].reshape(height, width) - of_pixels)
+    difference = np.abs(fractions[: width * height].reshape(height, width) - of_pixels)
     assert 0.1 < of_pixels.mean() < 0.9
     assert is_even.mean() > 0.8
-    assert (off[is_even] > 0).mean() < 1e-3
-    assert off[~is_even].mean() < 0.15
+    assert (difference[is_even] > 0).mean() < 1e-3
+    assert difference[~is_even].mean() < 0.15
     across = slice(width * height, None)
     assert np.abs(fractions[across] - expected[across]).mean() < 0.1
 
@@ -134,8 +134,8 @@ def test_a_hard_sun_casts_the_shadows_of_a_fixed_view(terms, tmp_path):
 
 def test_a_rotated_sun_casts_rotated_shadows(sunlit, tmp_path):
     """Shadows equal those of a bake of the rotated environment; the bake's own lights lie around the original sun."""
-    turned = scene(environment_with_sun(70.0))
-    baked = opened(turned, "direct", tmp_path)
+    rotated = scene(environment_with_sun(70.0))
+    baked = opened(rotated, "direct", tmp_path)
     expected = render_image(baked, "front", look_of(baked))
     look = look_of(sunlit, lambda document: document["environment"].update(rotation=70.0))
     by_pixels = error(picture_of(sunlit, look).image(), expected)
@@ -164,6 +164,6 @@ def test_hard_shadow_lights_and_probe_light_sum_to_the_whole(sunlit):
     together = apart.total[:, :, 0] + hard_light.gain * hard_light.vectors[:, :, 0]
     is_lit = whole.total[:, 0, 0] > 0.9 * together[:, 0]
     assert 0.2 < is_lit.mean() < 0.9
-    off = np.abs(whole.total[is_lit][:, :, 0] / together[is_lit] - 1).max(axis=1)
-    assert np.quantile(off, 0.99) < 0.02  # some lie in a penumbra
+    difference = np.abs(whole.total[is_lit][:, :, 0] / together[is_lit] - 1).max(axis=1)
+    assert np.quantile(difference, 0.99) < 0.02  # some lie in a penumbra
     assert (apart.total[:, 0, 0] < 0.3 * together[is_lit, 0].max()).all()

@@ -26,9 +26,9 @@ def beside(luminance, y, x):
             yield luminance[v, u]
 
 
-@pytest.mark.parametrize("share", [1.0, 0.05])
-def test_highlight_edges_are_the_pixels_with_the_largest_differences(monkeypatch, share):
-    monkeypatch.setattr(highlight_edges, "_MAX_EDGE_FRACTION", share)
+@pytest.mark.parametrize("fraction", [1.0, 0.05])
+def test_highlight_edges_are_the_pixels_with_the_largest_differences(monkeypatch, fraction):
+    monkeypatch.setattr(highlight_edges, "_MAX_EDGE_FRACTION", fraction)
     rng = np.random.default_rng(1)
     image = rng.exponential(size=(13, 17, 3)).astype(np.float32) ** 3
     is_asked = rng.random(13 * 17) > 0.2
@@ -37,7 +37,7 @@ def test_highlight_edges_are_the_pixels_with_the_largest_differences(monkeypatch
     jump = np.where(is_asked, jump, 0)
     expected = np.flatnonzero(jump > luminance.mean())
     assert 0 < len(expected) < is_asked.sum()
-    expected = np.sort(expected[np.argsort(-jump[expected])][: int(share * 13 * 17)])
+    expected = np.sort(expected[np.argsort(-jump[expected])][: int(fraction * 13 * 17)])
     np.testing.assert_array_equal(find_highlight_edges(image, is_asked), expected)
 
 
@@ -72,5 +72,5 @@ def test_highlight_edges_are_means_over_their_pixels(shiny, monkeypatch):
     without, reference = shown(shiny, 1), shown(shiny, FINER)
     changed = (actual != without).any(axis=2)
     assert 0 < changed.sum() <= 0.02 * changed.size
-    off, was_off = (np.sqrt(np.mean((image[changed] - reference[changed]) ** 2)) for image in (actual, without))
-    assert off < 0.3 * was_off
+    difference, was_off = (np.sqrt(np.mean((image[changed] - reference[changed]) ** 2)) for image in (actual, without))
+    assert difference < 0.3 * was_off

@@ -148,19 +148,19 @@ def test_wide_highlights_are_sums_of_the_brdf_over_lights(surface, term):
         CAMERA_POSITION,
         np.ones(num, np.uint8),
     )
-    off, size = [], []
+    difference, size = [], []
     for point in facing(surface, 0.4):
         n, t = surface.probes.normal[point], surface.probes.tangent[point, :3]
         to_local = np.stack([t, np.cross(n, t), n]).astype(np.float64)
         wo = to_local @ (CAMERA_POSITION - surface.probes.position[point])
         wi = towards @ to_local.T
-        sent = eval_brdf(term, wi, wo / np.linalg.norm(wo)) * np.maximum(wi[:, 2:], 0)
-        expected = np.unpackbits(bits[point], bitorder="little") @ (sent * light)
+        outgoing = eval_brdf(term, wi, wo / np.linalg.norm(wo)) * np.maximum(wi[:, 2:], 0)
+        expected = np.unpackbits(bits[point], bitorder="little") @ (outgoing * light)
         row = np.sqrt(1 - wo[2] / np.linalg.norm(wo)) * (lobes.albedo.shape[1] - 1)
         albedo = np.interp(row, np.arange(lobes.albedo.shape[1]), lobes.albedo[0, :, 0, 0])
-        off.append(albedo * actual[point] - expected)
+        difference.append(albedo * actual[point] - expected)
         size.append(expected)
-    assert np.sqrt(np.mean(np.square(off)) / np.mean(np.square(size))) < 0.03
+    assert np.sqrt(np.mean(np.square(difference)) / np.mean(np.square(size))) < 0.03
 
 
 @pytest.mark.parametrize("roughness", [0.02, 0.1, 0.25])

@@ -45,7 +45,7 @@ from relume.store.bake_protocol import Recipe
 
 GLOSSY = {"model": "blinn_phong", "color": [0.9, 0.6, 0.3], "params": {"exponent": 30.0}}
 BROAD_TERM = {"model": "ward_anisotropic", "color": [0.9, 0.6, 0.3], "params": {"alpha_x": 0.5, "alpha_y": 0.35}}
-SKIRTED = {"model": "ggx", "color": [0.9, 0.6, 0.3], "params": {"roughness": 0.6, "f0": 0.9}}
+TWO_LOBE_TERM = {"model": "ggx", "color": [0.9, 0.6, 0.3], "params": {"roughness": 0.6, "f0": 0.9}}
 NARROW = {"model": "blinn_phong", "color": [0.9, 0.6, 0.3], "params": {"exponent": 3000.0}}
 CAMERA = make_camera("front", [0, 0.5, 3], [0, 0, 0], 0.75)
 
@@ -90,10 +90,10 @@ def shiny_ball(tmp_path_factory):
 
 def test_highlights_of_few_probes_equal_a_fixed_view(shiny_ball, monkeypatch):
     """A few hundred probes under a bright light; without their lobes the highlights are patchy."""
-    moving, expected = shiny_ball
+    free_bake, expected = shiny_ball
 
     def error():
-        actual = picture_of(moving)
+        actual = picture_of(free_bake)
         return np.sqrt(np.mean((actual - expected) ** 2) / np.mean(expected**2))
 
     interpolated_error = error()
@@ -165,7 +165,8 @@ def environment_in_lobes_numpy(directions, shares, sigma, light, visibility):
     """Reference of the environment in lobes in plain NumPy. (3,)"""
     every = zip(directions, shares, np.broadcast_to(sigma, shares.shape), strict=True)
     return sum(
-        share * environment_in_lobe_numpy(direction, width, light, visibility) for direction, share, width in every
+        fraction * environment_in_lobe_numpy(direction, width, light, visibility)
+        for direction, fraction, width in every
     )
 
 
@@ -174,10 +175,10 @@ def environment_in_lobe_numpy(direction, sigma, light, visibility):
     level = np.clip(2 * np.log2(np.degrees(sigma) / 2) + 1, 0, len(light.environment.levels) - 1)
     rotated = rotate_about_y(direction[None], 360 * (0.5 - float(light.rotation)))
     total = np.zeros(3)
-    for k, share in ((int(level), 1 - level % 1), (int(np.ceil(level)), level % 1)):
+    for k, fraction in ((int(level), 1 - level % 1), (int(np.ceil(level)), level % 1)):
         first, height, width = light.environment.levels[k]
         radiance = light.environment.texels[first : first + height * width].reshape(height, width, 3)
-        total += share * lookup(radiance, rotated.astype(np.float32))[0]
+        total += fraction * lookup(radiance, rotated.astype(np.float32))[0]
     shown = visibility[0] * total
     for k, bright_light in enumerate(light.bright_lights.astype(np.float64)):
         towards, power, per = bright_light[:3], bright_light[3:6], 1 / (sigma**2 + bright_light[6])
@@ -186,15 +187,15 @@ def environment_in_lobe_numpy(direction, sigma, light, visibility):
     return shown * light.gain
 
 
-@pytest.mark.parametrize("term", [BROAD_TERM, GLOSSY, SKIRTED])
+@pytest.mark.parametrize("term", [BROAD_TERM, GLOSSY, TWO_LOBE_TERM])
 @pytest.mark.parametrize(("rotation", "is_fine"), [(0.0, False), (123.0, False), (123.0, True)])
 def test_probes_add_the_difference_to_the_lobe_of_pixels(shiny_ball, term, rotation, is_fine):
-    moving, _ = shiny_ball
-    surface, rng, light = moving.stored_scene, np.random.default_rng(7), lobe_environment(rotation)
+    free_bake, _ = shiny_ball
+    surface, rng, light = free_bake.stored_scene, np.random.default_rng(7), lobe_environment(rotation)
     num, camera_position = surface.probes.num_points, np.array([0.4, 1.5, 3.0], np.float32)
     visibility = rng.random((num, 3), np.float32)
     lobes = build_lobes([[{**term, "texture": "diffuse"}]])
-    assert (lobes.max_ratio[0] > 1) == (lobes.lobe_confidence == 1).all() == (term is not SKIRTED)
+    assert (lobes.max_ratio[0] > 1) == (lobes.lobe_confidence == 1).all() == (term is not TWO_LOBE_TERM)
     lit = rng.random((num, 3), np.float32)
     environment_light = rng.normal(1, 2, size=(num, 3, 3)).astype(np.float32)
     sent = np.zeros((num, 3, 3), np.float32)
@@ -225,7 +226,7 @@ def test_probes_add_the_difference_to_the_lobe_of_pixels(shiny_ball, term, rotat
             at(lobes.albedo) * shown,
         )
         expected = np.clip(environment_light[point], reference / max_ratio, reference * max_ratio)
-        held += int((expected != environment_light[point]).sum()) if term is not SKIRTED else 9
+        held += int((expected != environment_light[point]).sum()) if term is not TWO_LOBE_TERM else 9
         np.testing.assert_allclose(
             sent[point], expected - actual, rtol=2e-3, atol=3e-4 * max(1, np.abs(reference).max())
         )
@@ -276,10 +277,10 @@ def test_lobe_visibility_equals_the_visibility_bits(shiny_ball):
     assert not actual[is_needed == 0].any()
     for point in np.flatnonzero(is_needed)[::13]:
         towards, shares, sigma = two_lobes_numpy(lobes, surface, camera_position.astype(np.float64), point)
-        middle = shares @ towards
-        size = np.linalg.norm(middle)
+        center = shares @ towards
+        size = np.linalg.norm(center)
         variance = shares @ sigma**2 + 1 - size + listed.lights[:, 3].astype(np.float64)
-        weight = luminous / variance * np.maximum(1 - (1 - directions @ middle / size) / (8 * variance), 0) ** 8
+        weight = luminous / variance * np.maximum(1 - (1 - directions @ center / size) / (8 * variance), 0) ** 8
         expected = weight @ bits[point, :num_lights] / weight.sum()
         fractions = [expected, *(lobe_weights @ bits[point, :num_lights])]
         np.testing.assert_allclose(actual[point], fractions, atol=2e-3)

@@ -79,7 +79,7 @@ def gradients_along_lobe_numpy(
 
 
 @pytest.fixture(scope="module")
-def moving(tmp_path_factory):
+def free_bake(tmp_path_factory):
     material = Material("Ball", ({"model": "lambert", "color": [1.0, 1.0, 1.0]},))
     ball = sphere("ball", [0, 0, 0], 1, 0, 24)
     scene = make_tiny_scene(ball, camera=CAMERA, environment=studio(16, 20.0), materials=[material])
@@ -100,8 +100,8 @@ def distant_light(points):
 
 
 @pytest.mark.parametrize("terms", [[METAL], [METAL, COAT]])
-def test_gradients_equal_finite_differences(moving, terms):
-    surface, tables, lobes = moving.stored_scene, build_tables([terms]), build_lobes([terms])
+def test_gradients_equal_finite_differences(free_bake, terms):
+    surface, tables, lobes = free_bake.stored_scene, build_tables([terms]), build_lobes([terms])
     others, num = distant_light(surface.probes), surface.probes.num_points
     is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
     actual = gradients_along_lobe(surface, others, tables, lobes, CAMERA_POSITION, is_needed)
@@ -115,8 +115,8 @@ def test_gradients_equal_finite_differences(moving, terms):
     np.testing.assert_allclose(actual[::5][is_asked], expected[is_asked], rtol=2e-3, atol=2e-3 * largest)
 
 
-def test_gradients_are_zero_without_highlight_or_light(moving):
-    surface, num = moving.stored_scene, moving.stored_scene.probes.num_points
+def test_gradients_are_zero_without_highlight_or_light(free_bake):
+    surface, num = free_bake.stored_scene, free_bake.stored_scene.probes.num_points
     dull, everywhere = [{**METAL, "model": "lambert", "params": {}}], np.ones(num, np.uint8)
     others = distant_light(surface.probes)
     assert not gradients_along_lobe(
@@ -127,17 +127,17 @@ def test_gradients_are_zero_without_highlight_or_light(moving):
     ).any()
 
 
-def pixels(moving, gain):
+def pixels(free_bake, gain):
     """Pixels of a metal ball in that light, with gradients times a gain; and with probes at the pixels."""
-    surface, tables, lobes = moving.stored_scene, build_tables([[METAL]]), build_lobes([[METAL]])
-    gbuffer = trace_primary(surface, moving.embree, CAMERA, SIZE).pixel_centers(SIZE[0] * SIZE[1])
+    surface, tables, lobes = free_bake.stored_scene, build_tables([[METAL]]), build_lobes([[METAL]])
+    gbuffer = trace_primary(surface, free_bake.embree, CAMERA, SIZE).pixel_centers(SIZE[0] * SIZE[1])
     others, everywhere = distant_light(surface.probes), np.ones(surface.probes.num_points, np.uint8)
     outgoing = shade_probes(surface, np.zeros_like(others), others, tables, CAMERA_POSITION, everywhere).radiance
     gradients = np.float32(gain) * gradients_along_lobe(surface, others, tables, lobes, CAMERA_POSITION, everywhere)
     broad, turn = (interpolate_to_nodes(surface, gbuffer.is_visible, values) for values in (outgoing, gradients))
     dark, nothing = np.zeros((1, 3), np.float32), np.empty((0, 3), np.float32)
     no_environment = PrefilteredEnvironment(
-        moving.prefiltered(None), np.empty((0, 7), np.float32), rotation_of(0.0), dark[0]
+        free_bake.prefiltered(None), np.empty((0, 7), np.float32), rotation_of(0.0), dark[0]
     )
     mirrored = MirrorData(lobes, no_environment, np.zeros((len(turn), 3), np.float32), turn, False)
     shown = InterpolatedProbes(broad, np.ones((1, broad.shape[1]), bool), nothing)
@@ -158,9 +158,9 @@ def pixels(moving, gain):
     return radiance[hit][inside], expected[inside]
 
 
-def test_half_gradients_improve_values_between_probes(moving):
+def test_half_gradients_improve_values_between_probes(free_bake):
     def error(gain):
-        actual, expected = pixels(moving, gain)
+        actual, expected = pixels(free_bake, gain)
         return np.sqrt(np.mean((actual - expected) ** 2) / np.mean(expected**2))
 
     plain, half, whole = error(0), error(1), error(2)
@@ -169,9 +169,9 @@ def test_half_gradients_improve_values_between_probes(moving):
     assert half < whole
 
 
-def test_a_gradient_changes_pixels_within_bounds(moving):
-    plain, _ = pixels(moving, 0)
-    wild, _ = pixels(moving, 1e4)
+def test_a_gradient_changes_pixels_within_bounds(free_bake):
+    plain, _ = pixels(free_bake, 0)
+    wild, _ = pixels(free_bake, 1e4)
     ratio = wild[plain > 1e-3] / plain[plain > 1e-3]
     np.testing.assert_allclose([ratio.min(), ratio.max()], [0.875, 1.125], rtol=1e-3)
 

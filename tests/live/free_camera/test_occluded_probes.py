@@ -33,7 +33,7 @@ def scene():
 
 
 @pytest.fixture(scope="module")
-def moving(tmp_path_factory):
+def free_bake(tmp_path_factory):
     recipe = Recipe("probes", ("front",), SIZE, 100, num_probes=500)
     return open_bake(
         bake_in_process(METHODS["probes"], scene(), recipe, tmp_path_factory.mktemp("parted") / "s.zarr"),
@@ -46,12 +46,12 @@ def is_inside(position):
     return (np.abs(position[:, [0, 2]]) < 0.33).all(axis=1)
 
 
-def test_pixels_next_to_a_box_ignore_nodes_under_it(moving):
+def test_pixels_next_to_a_box_ignore_nodes_under_it(free_bake):
     """Nodes under the box have no weight in pixels of the floor, unless all three lie there."""
-    gbuffer = trace_primary(moving.stored_scene, moving.embree, CAMERA, SIZE)
+    gbuffer = trace_primary(free_bake.stored_scene, free_bake.embree, CAMERA, SIZE)
     before = gbuffer.weight.copy()
-    reweight(gbuffer, moving.has_occluded_neighbor, moving.occlusion_mesh)
-    surface = moving.stored_scene
+    reweight(gbuffer, free_bake.has_occluded_neighbor, free_bake.occlusion_mesh)
+    surface = free_bake.stored_scene
     position = surface.probes.position[surface.lattice_nodes.probe[:, 0]]
     on_floor = (gbuffer.hits.face >= 0) & (surface.face_material[gbuffer.hits.face] == 0)
     under = np.stack([is_inside(position[gbuffer.lattice_node[:, k]]) for k in range(3)], axis=1)
@@ -60,20 +60,20 @@ def test_pixels_next_to_a_box_ignore_nodes_under_it(moving):
     assert (before[is_mixed][under[is_mixed]] > 0.1).any()
     assert (gbuffer.weight[is_mixed][under[is_mixed]] == 0).all()
     np.testing.assert_allclose(gbuffer.weight[on_floor].sum(axis=1), 1, atol=1e-5)
-    is_far = on_floor & ~(moving.has_occluded_neighbor[gbuffer.lattice_node] > 0).any(axis=1)
+    is_far = on_floor & ~(free_bake.has_occluded_neighbor[gbuffer.lattice_node] > 0).any(axis=1)
     np.testing.assert_array_equal(gbuffer.weight[is_far], before[is_far])
     changed = (gbuffer.weight != before).any(axis=1)
     assert 0 < changed.mean() < 0.1
 
 
-def test_the_contact_line_equals_a_fixed_view(moving, monkeypatch, tmp_path):
+def test_the_contact_line_equals_a_fixed_view(free_bake, monkeypatch, tmp_path):
     recipe = Recipe("gather", ("front",), SIZE, 100)
     fixed = open_bake(bake_in_process(METHODS["gather"], scene(), recipe, tmp_path / "g.zarr"), Cache(1 << 30))
-    plain = validate(complete({}, moving.default_look), moving.default_look)
+    plain = validate(complete({}, free_bake.default_look), free_bake.default_look)
     expected = render_image(fixed, "front", plain)
 
     def error():
-        actual = render_image(moving, "front", plain)
+        actual = render_image(free_bake, "front", plain)
         return np.sqrt(np.mean((actual - expected) ** 2) / np.mean(expected**2))
 
     corrected = error()

@@ -30,10 +30,10 @@ def fit_two_lobes_numpy(x: F64, z: F64, area: F64, brdf_cosine: F64) -> F64:
         (5,)
     """
     weight, squared_weight = brdf_cosine * area / (brdf_cosine @ area), brdf_cosine**2 * area / (brdf_cosine**2 @ area)
-    middle = np.array([squared_weight @ x, squared_weight @ z])
-    variance = 2 - 2 * np.linalg.norm(middle)
-    angle, off = np.arctan2(*middle), _INITIAL_OFFSET * np.sqrt(variance)
-    towards = np.array([[np.sin(angle + side), np.cos(angle + side)] for side in (off, -off)])
+    center = np.array([squared_weight @ x, squared_weight @ z])
+    variance = 2 - 2 * np.linalg.norm(center)
+    angle, difference = np.arctan2(*center), _INITIAL_OFFSET * np.sqrt(variance)
+    towards = np.array([[np.sin(angle + side), np.cos(angle + side)] for side in (difference, -difference)])
     first, width = 0.5, variance / np.array([1.5, 0.75])
     for _ in range(_NUM_ITERATIONS):
         log_density = np.log(np.array([[first], [1 - first]]) / width[:, None] / (1 - np.exp(-2 / width[:, None])))
@@ -180,13 +180,13 @@ def test_two_lobes_are_as_wide_as_the_highlight_along_it_and_across(row, exponen
     mean = weight @ wi
     angle, length = np.arctan2(mean[0], mean[2]), np.linalg.norm(mean)
     u, v = wi @ [np.cos(angle), 0, -np.sin(angle)], wi[:, 1]
-    off = np.sin(np.arccos(lobes.cosine[0, row]) - angle)
-    share = np.array([lobes.first[0, row], 1 - lobes.first[0, row]])
-    variance = float(share @ lobes.sigma[0, row] ** 2)
+    difference = np.sin(np.arccos(lobes.cosine[0, row]) - angle)
+    fraction = np.array([lobes.first[0, row], 1 - lobes.first[0, row]])
+    variance = float(fraction @ lobes.sigma[0, row] ** 2)
     # at grazing angles a highlight is longer than two round lobes: the best fit is wider across
     assert (weight @ v**2) / length == pytest.approx(variance, rel=0.2)
-    assert (weight @ u**2) / length == pytest.approx(variance + share @ off**2, rel=0.1)
-    assert share @ off == pytest.approx(0, abs=0.03 * np.sqrt(variance))
+    assert (weight @ u**2) / length == pytest.approx(variance + fraction @ difference**2, rel=0.1)
+    assert fraction @ difference == pytest.approx(0, abs=0.03 * np.sqrt(variance))
 
 
 @pytest.mark.parametrize(
@@ -196,11 +196,11 @@ def test_two_lobes_are_as_wide_as_the_highlight_along_it_and_across(row, exponen
 def test_two_lobes_equal_their_reference_and_fit_better_than_one(model, params):
     even = lobes_module._isotropic_grid()
     value = even.quadrature.values(document(model, params=params))
-    sent = np.maximum(value.mean(axis=0) * even.z, 0).astype(np.float32)
-    fits = fit_two_lobes(even.x, even.z, even.area, sent)
+    outgoing = np.maximum(value.mean(axis=0) * even.z, 0).astype(np.float32)
+    fits = fit_two_lobes(even.x, even.z, even.area, outgoing)
     for row in (12, 24):
         x, z, area, of_row = (
-            np.asarray(core_weight, np.float64) for core_weight in (even.x[row], even.z[row], even.area, sent[row])
+            np.asarray(core_weight, np.float64) for core_weight in (even.x[row], even.z[row], even.area, outgoing[row])
         )
         np.testing.assert_allclose(fits[row], fit_two_lobes_numpy(x, z, area, of_row), rtol=2e-3, atol=2e-4)
         weight = of_row * area / (of_row @ area)
@@ -208,8 +208,8 @@ def test_two_lobes_equal_their_reference_and_fit_better_than_one(model, params):
         length = np.linalg.norm(towards)
 
         def density(cosine, sigma, x=x, z=z):
-            off = 1 - np.sqrt(1 - cosine**2) * x - cosine * z
-            return np.exp(-off / sigma**2) / (2 * np.pi * sigma**2 * (1 - np.exp(-2 / sigma**2)))
+            difference = 1 - np.sqrt(1 - cosine**2) * x - cosine * z
+            return np.exp(-difference / sigma**2) / (2 * np.pi * sigma**2 * (1 - np.exp(-2 / sigma**2)))
 
         core_weight, tail_weight, first, narrow, wide = map(float, fits[row])
         two = first * density(core_weight, narrow) + (1 - first) * density(tail_weight, wide)

@@ -28,9 +28,9 @@ def scene():
     """A floor of two faces, and a card standing on its center."""
     floor = quad("floor", [[-4, 0, -4], [-4, 0, 4], [4, 0, 4], [4, 0, -4]], 0)
     card = quad("card", [[-0.3, 0, 0.1], [0.3, 0, 0.1], [0.3, 0.5, 0.1], [-0.3, 0.5, 0.1]], 1)
-    grey = [Material(name, ({"model": "lambert", "color": [0.8, 0.8, 0.8]},)) for name in ("Floor", "Card")]
+    gray = [Material(name, ({"model": "lambert", "color": [0.8, 0.8, 0.8]},)) for name in ("Floor", "Card")]
     camera = make_camera("front", CAMERA_POSITION[0], [0, 0, 0], 0.5)
-    return make_tiny_scene(floor, card, camera=camera, environment=studio(32, 20.0), materials=grey)
+    return make_tiny_scene(floor, card, camera=camera, environment=studio(32, 20.0), materials=gray)
 
 
 def place_initial_probes(scene, num_points=1500):
@@ -62,8 +62,8 @@ def test_both_halves_of_narrow_strips_have_equal_grids():
     x = np.arange(8) * 0.02
     corners = [[[w, 0, -4], [w, 0, 4], [w + 0.02, 0, 4], [w + 0.02, 0, -4]] for w in x]
     strips = [quad(f"strip {k}", corners[k], 0) for k in range(len(x))]
-    grey = [Material("Strips", ({"model": "lambert", "color": [0.8, 0.8, 0.8]},))]
-    scene = make_tiny_scene(*strips, camera=make_camera("front", CAMERA_POSITION[0], [0, 0, 0], 0.5), materials=grey)
+    gray = [Material("Strips", ({"model": "lambert", "color": [0.8, 0.8, 0.8]},))]
+    scene = make_tiny_scene(*strips, camera=make_camera("front", CAMERA_POSITION[0], [0, 0, 0], 0.5), materials=gray)
     geometry = build_scene_buffers(scene)
     is_open = visible_sides(geometry, scene.cameras, 1)
     density = density_from_distance(geometry, np.array([[0.0, 1.0, 3.0]]), make_corner_grid(is_open))
@@ -96,10 +96,10 @@ def test_other_nodes_are_interpolated_linearly(scene):
     where = ((1 - u - v) * a + u * b + v * c)[is_floor]
     of_nodes = vertices.probe[lattice.node_index], vertices.weight[lattice.node_index]
     interpolated = np.einsum("npc,np->nc", placed.probes.position[of_nodes[0]], of_nodes[1])[is_floor]
-    off = np.linalg.norm((interpolated - where)[:, [0, 2]], axis=1) / placed.spacing
+    difference = np.linalg.norm((interpolated - where)[:, [0, 2]], axis=1) / placed.spacing
     assert len(where) > 2 * len(placed.probes.position)
-    assert np.quantile(off, 0.98) < 0.05
-    assert off.max() < 1  # except at nodes merged with those of another face
+    assert np.quantile(difference, 0.98) < 0.05
+    assert difference.max() < 1  # except at nodes merged with those of another face
     np.testing.assert_allclose(vertices.weight.sum(axis=1), 1, atol=1e-5)
 
 
@@ -134,8 +134,8 @@ def test_weights_reproduce_linear_light():
     weight = rng.random((200, 4))
     weight /= weight.sum(axis=1, keepdims=True)
     weights = make_weights_linear(weight, towards, normal)
-    off = [np.linalg.norm(np.einsum("vcp,vp->vc", towards[:, :2], w), axis=1) for w in (weight, weights)]
-    assert np.median(off[1] / off[0]) < 0.35
-    assert (off[1] < 1.01 * off[0]).all()
+    difference = [np.linalg.norm(np.einsum("vcp,vp->vc", towards[:, :2], w), axis=1) for w in (weight, weights)]
+    assert np.median(difference[1] / difference[0]) < 0.35
+    assert (difference[1] < 1.01 * difference[0]).all()
     assert weights.min() >= 0
     np.testing.assert_allclose(weights.sum(axis=1), 1)

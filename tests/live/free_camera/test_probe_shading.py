@@ -33,7 +33,7 @@ BROAD_WIDTHS = {"alpha_x": 0.45, "alpha_y": 0.3}  # a highlight that the basis c
 
 
 @pytest.fixture(scope="module")
-def moving(tmp_path_factory):
+def free_bake(tmp_path_factory):
     recipe = Recipe("probes", ("front",), (48, 36), 60, num_probes=1000)
     store = bake_in_process(METHODS["probes"], still_life(), recipe, tmp_path_factory.mktemp("moving") / "s.zarr")
     return open_bake(store, Cache(1 << 30))
@@ -116,79 +116,81 @@ def test_a_scene_without_area_is_rejected():
         place_probes(geometry, is_open, density, 100)
 
 
-def test_interpolation_weights_reproduce_the_position_of_a_pixel(moving):
-    view = moving.views["front"]
-    gbuffer = trace_primary(moving.stored_scene, moving.embree, view.camera, (96, 72))
+def test_interpolation_weights_reproduce_the_position_of_a_pixel(free_bake):
+    view = free_bake.views["front"]
+    gbuffer = trace_primary(free_bake.stored_scene, free_bake.embree, view.camera, (96, 72))
     hit = gbuffer.hits.face >= 0
     np.testing.assert_allclose(gbuffer.weight[hit].sum(axis=1), 1, atol=1e-5)
     assert gbuffer.weight[hit].min() > -1e-5
-    of_vertices = interpolate_to_nodes(moving.stored_scene, gbuffer.is_visible, moving.stored_scene.probes.position)
+    of_vertices = interpolate_to_nodes(
+        free_bake.stored_scene, gbuffer.is_visible, free_bake.stored_scene.probes.position
+    )
     interpolated = np.einsum("nk,nkc->nc", gbuffer.weight, of_vertices[gbuffer.lattice_node])
     expected = view.camera.to_world[:3, 3] + gbuffer.hits.distance[:, None] * gbuffer.directions
     apart = np.linalg.norm(interpolated - expected, axis=1)[hit]
     assert np.median(apart) < 0.03
-    vertices = moving.stored_scene.lattice_nodes
+    vertices = free_bake.stored_scene.lattice_nodes
     assert set(np.flatnonzero(gbuffer.is_visible)) == set(gbuffer.lattice_node[hit].ravel())
     taken = vertices.probe[gbuffer.is_visible > 0][vertices.weight[gbuffer.is_visible > 0] > 0]
     assert set(np.flatnonzero(gbuffer.is_needed)) == set(taken)
 
 
-def test_probe_radiance_equals_its_reference(moving):
+def test_probe_radiance_equals_its_reference(free_bake):
     """All light for terms without a highlight; for others without the environment, which does not ring below zero."""
     materials = [
         [{"model": "lambert", "color": [0.5, 0.4, 0.3], "params": {}, "texture": "diffuse"}],
         [{"model": "ward_anisotropic", "color": [0.9, 0.8, 0.7], "params": BROAD_WIDTHS, "texture": None}],
         [{"model": "blinn_phong", "color": [0.2, 0.1, 0.3], "params": {"exponent": 20.0}, "texture": None}],
     ]
-    names = len(moving.material_names)
+    names = len(free_bake.material_names)
     tables = build_tables([materials[k % 3] for k in range(names)])
     rng = np.random.default_rng(9)
-    num = moving.stored_scene.probes.num_points
+    num = free_bake.stored_scene.probes.num_points
     vectors, others = (rng.normal(size=(num, 3, 36)).astype(np.float32) for _ in range(2))
     camera_position, everywhere = np.array([0.3, 1.2, 2.0], np.float32), np.ones(num, np.uint8)
-    actual = shade_probes(moving.stored_scene, vectors, others, tables, camera_position, everywhere)
+    actual = shade_probes(free_bake.stored_scene, vectors, others, tables, camera_position, everywhere)
     for point in range(0, num, num // 60):
         for arrays, expected in zip(
             actual,
-            shade_probes_numpy(moving.stored_scene, vectors, others, tables, camera_position, point),
+            shade_probes_numpy(free_bake.stored_scene, vectors, others, tables, camera_position, point),
             strict=True,
         ):
             np.testing.assert_allclose(arrays[point], expected, atol=1e-4 * max(1.0, np.abs(expected).max()))
     assert actual.environment.any()
-    none = shade_probes(moving.stored_scene, vectors, others, tables, camera_position, np.zeros(num, np.uint8))
+    none = shade_probes(free_bake.stored_scene, vectors, others, tables, camera_position, np.zeros(num, np.uint8))
     assert not none.radiance.any()
     assert not none.environment.any()
-    has_highlight = (moving.stored_scene.material % 3 > 0) & (actual.radiance[:, 0].max(axis=1) > 0)
+    has_highlight = (free_bake.stored_scene.material % 3 > 0) & (actual.radiance[:, 0].max(axis=1) > 0)
     assert has_highlight.any()
     assert (
-        not shade_probes(moving.stored_scene, vectors, None, tables, camera_position, everywhere)
+        not shade_probes(free_bake.stored_scene, vectors, None, tables, camera_position, everywhere)
         .radiance[has_highlight]
         .any()
     )
 
 
-def test_textures_of_pixels_equal_those_of_bakes(moving):
+def test_textures_of_pixels_equal_those_of_bakes(free_bake):
     """White probes under a texture show the texture; with the filter of view samples."""
-    scene, view, size = still_life(), moving.views["front"], (96, 72)
-    surface = moving.stored_scene
-    gbuffer = trace_primary(surface, moving.embree, view.camera, size)
-    sent = np.zeros((len(surface.lattice_nodes.normal), 3, 3), np.float32)
-    sent[:, 1] = 1
+    scene, view, size = still_life(), free_bake.views["front"], (96, 72)
+    surface = free_bake.stored_scene
+    gbuffer = trace_primary(surface, free_bake.embree, view.camera, size)
+    outgoing = np.zeros((len(surface.lattice_nodes.normal), 3, 3), np.float32)
+    outgoing[:, 1] = 1
     angle = view.camera.yfov / size[1]
-    dark = np.zeros((len(moving.material_names), 3), np.float32)
+    dark = np.zeros((len(free_bake.material_names), 3), np.float32)
     mirrored = MirrorData(
         build_lobes([()] * len(dark)),
         PrefilteredEnvironment(
-            moving.prefiltered(None),
-            moving.bright_lights(EnvironmentKey(None, 0.0)),
+            free_bake.prefiltered(None),
+            free_bake.bright_lights(EnvironmentKey(None, 0.0)),
             rotation_of(0.0),
             np.zeros(3, np.float32),
         ),
-        np.zeros((len(sent), 3), np.float32),
-        np.zeros((len(sent), 4), np.float32),
+        np.zeros((len(outgoing), 3), np.float32),
+        np.zeros((len(outgoing), 4), np.float32),
         False,
     )
-    all_groups = InterpolatedProbes(sent, np.ones((len(dark), 3), bool), np.empty((0, 3), np.float32))
+    all_groups = InterpolatedProbes(outgoing, np.ones((len(dark), 3), bool), np.empty((0, 3), np.float32))
     image = shade_pixels(surface, gbuffer, angle, all_groups, dark, mirrored)
     textured = [k for k, material in enumerate(scene.materials) if "diffuse" in material.textures]
     assert textured
@@ -199,7 +201,7 @@ def test_textures_of_pixels_equal_those_of_bakes(moving):
         corners = surface.faces[gbuffer.hits.face[rows]]
         b = np.column_stack([1 - gbuffer.hits.uv[rows].sum(axis=1), gbuffer.hits.uv[rows]])
         uv = np.einsum("nk,nkc->nc", b, surface.uvs[corners]).astype(np.float32)
-        p, q = moving.light_transport.local.positions[corners], surface.uvs[corners]
+        p, q = free_bake.light_transport.local.positions[corners], surface.uvs[corners]
         normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
         area = np.linalg.norm(normal, axis=1)
         cosine = np.maximum(np.abs(np.einsum("nc,nc->n", normal, gbuffer.directions[rows])) / area, 0.05)
@@ -225,9 +227,9 @@ def test_the_background_equals_fixed_views(rotation):
     np.testing.assert_allclose(out[face < 0], expected[face < 0], atol=2e-3)
 
 
-def test_rays_pass_through_pixel_centers(moving):
+def test_rays_pass_through_pixel_centers(free_bake):
     camera = Camera("level", np.eye(4), math.radians(90))
-    gbuffer = trace_primary(moving.stored_scene, moving.embree, camera, (4, 2))
+    gbuffer = trace_primary(free_bake.stored_scene, free_bake.embree, camera, (4, 2))
     first, last = gbuffer.directions[0], gbuffer.directions[7]
     np.testing.assert_allclose(first * np.sign(first), np.abs(last), atol=1e-6)
     np.testing.assert_allclose(first / -first[2], [-1.5, 0.5, -1], atol=1e-5)
