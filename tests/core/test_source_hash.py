@@ -12,9 +12,9 @@ from relume.core.source_hash import code_hash, collect_sources
 def package(tmp_path):
     sources = {
         "__init__": "",
-        "trace/rays": "from package.light.lamp import Lamp\nimport package.errors\n",
-        "trace/shadows": "import numpy as np\nfrom other.light import lamp\n",
-        "light/lamp": "def of():\n    from package.scene import (\n        mesh,\n        model as described,\n    )\n",
+        "trace/rays": "from package.light.area import Area\nimport package.errors\n",
+        "trace/shadows": "import numpy as np\nfrom other.light import area\n",
+        "light/area": "def of():\n    from package.scene import (\n        mesh,\n        model as described,\n    )\n",
         "light/unused": "",
         "scene/__init__": "from package.shown.frame import Frame\n",
         "scene/mesh": "from package.trace import rays  # a circle\n",
@@ -35,7 +35,7 @@ def names(package, paths):
 
 
 def test_sources_include_direct_and_indirect_imports(package):
-    bake = {"trace/rays", "light/lamp", "scene/__init__", "scene/mesh", "scene/model", "errors"}
+    bake = {"trace/rays", "light/area", "scene/__init__", "scene/mesh", "scene/model", "errors"}
     shown = {"shown/frame", "shown/only_here"}
     assert names(package, collect_sources(["trace.rays"], package=package)) == bake | shown
     assert names(package, collect_sources(["trace"], package=package)) == bake | shown | {"trace/shadows"}
@@ -56,11 +56,11 @@ def test_the_hash_depends_on_imported_sources_only(package):
     first = current()
     (package / "light" / "unused.py").write_text("x = 1\n")
     assert current() == first
-    (package / "light" / "lamp.py").write_text("x = 1\n")
+    (package / "light" / "area.py").write_text("x = 1\n")
     second = current()
     assert second != first
-    (package / "light" / "lamp.py").rename(package / "light" / "light.py")
-    (package / "trace" / "rays.py").write_text("from package.light.light import Lamp\n")
+    (package / "light" / "area.py").rename(package / "light" / "light.py")
+    (package / "trace" / "rays.py").write_text("from package.light.light import Area\n")
     assert current() not in (first, second)
 
 

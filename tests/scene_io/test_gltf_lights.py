@@ -92,9 +92,9 @@ def test_material_without_emission_is_no_light() -> None:
 
 
 def test_equal_light_names_are_made_unique_and_ranges_give_a_warning() -> None:
-    point_light = {"type": "point", "name": "Lamp/1", "range": 3.0}
+    point_light = {"type": "point", "name": "Bulb/1", "range": 3.0}
     scene = imported(with_lights([point_light, point_light]))
-    assert [light.name for light in scene.lights] == ["Lamp-1", "Lamp-1 2"]
+    assert [light.name for light in scene.lights] == ["Bulb-1", "Bulb-1 2"]
     assert len([warning for warning in scene.warnings if "range" in warning]) == 2
 
 

@@ -152,9 +152,9 @@ def test_emission_is_radiance_times_image_mean(tmp_path: Path) -> None:
 
 
 def test_an_emissive_material_without_surface_is_no_light(tmp_path: Path) -> None:
-    scene = emissions_of(tmp_path, "newmtl lamp\nKe 1\n", "f 1 2 3\nusemtl lamp\nf 1 1 2\n")
+    scene = emissions_of(tmp_path, "newmtl bulb\nKe 1\n", "f 1 2 3\nusemtl bulb\nf 1 1 2\n")
     assert scene.lights == ()
-    assert any("'lamp' shines, but no surface" in warning for warning in scene.warnings)
+    assert any("'bulb' shines, but no surface" in warning for warning in scene.warnings)
 
 
 def test_more_than_sixty_four_emissive_materials_are_rejected(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from relume.live.fixed_camera.edit_pointers import (
     [
         ("/materials/a~1b~0c/terms/0/curves/theta_h", CurvePointer("a/b~c", 0, "theta_h")),
         ("/materials/Teapot/terms/15/params/ior", ParameterPointer("Teapot", 15, "ior")),
-        ("/lights/Lamp ~1 2", LightPointer("Lamp / 2")),
+        ("/lights/Key ~1 2", LightPointer("Key / 2")),
         ("/environment/rotation", EnvironmentPointer("rotation")),
     ],
 )
@@ -40,7 +40,7 @@ def test_a_pointer_survives_parsing_and_formatting(text, meant):
         "/materials/Teapot/terms/0/textures/diffuse",
         "/lights",
         "/lights/",
-        "/lights/Lamp/intensity",
+        "/lights/Key/intensity",
         "/environment",
         "/environment/radius",
         "/environment/rotation/0",
@@ -53,4 +53,4 @@ def test_pointers_to_nothing_are_rejected(text):
 
 def test_only_curves_are_recognized_as_curves():
     with pytest.raises(ParameterError, match="curve"):
-        parse_curve("/lights/Lamp")
+        parse_curve("/lights/Key")
