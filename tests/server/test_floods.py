@@ -156,7 +156,7 @@ FLOOD = """
 import json, sys
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
-with connect(sys.argv[1], subprotocols=["relume.v1"], max_size=None, proxy=None) as session:
+with connect(sys.argv[1], subprotocols=["relume.v2"], max_size=None, proxy=None) as session:
     session.send(json.dumps({"type": "open"}))
     try:
         while True:
