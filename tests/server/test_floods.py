@@ -146,7 +146,7 @@ def test_another_sessions_message_is_taken_before_a_flood_is(
             for _ in range(390):
                 flooding.send('{"type":"encoding","format":"hdr"}')
             other.send('{"type":"focus","view":"front"}')
-            while taken.count("stream") < 390:
+            while taken.count("encoding") < 390:
                 time.sleep(0.01)
     assert "focus" in taken[:200]
 
