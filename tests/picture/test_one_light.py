@@ -112,9 +112,9 @@ def test_colour_of_a_material_does_not_wait_for_light(transfer, maps):
 
 def test_environment_s_gain_comes_with_its_light(transfer, maps):
     """Beside a lamp the gain is part of the light, without one it multiplies the picture."""
-    picture = run_until_exact(start(transfer, make_look(transfer, lit_by(maps, 0, scale=4.0))))
+    picture = run_until_exact(start(transfer, make_look(transfer, lit_by(maps, 0, intensity=4.0))))
     before = picture.image()
-    picture.set_look(make_look(transfer, lit_by(maps, 0, lamp=0.6, scale=4.0)))
+    picture.set_look(make_look(transfer, lit_by(maps, 0, lamp=0.6, intensity=4.0)))
     picture.advance(None)
     np.testing.assert_array_equal(picture.image(), before)
 
@@ -127,8 +127,8 @@ def test_hand_that_never_waits_sees_one_light_at_a_time(opened, maps, seed):
     def any_look():
         number, lamp = int(rng.integers(3)), rng.uniform(-0.6, 0.6) if rng.random() < 0.6 else None
         sigma = rng.uniform(0.1, 0.4) if rng.random() < 0.3 else None
-        turned, scale = float(rng.choice([0.0, 0.0, 40.0])), float(rng.choice([1.0, 1.0, 0.5]))
-        return make_look(opened, lit_by(maps, number, lamp=lamp, sigma=sigma, rotation=turned, scale=scale))
+        turned, intensity = float(rng.choice([0.0, 0.0, 40.0])), float(rng.choice([1.0, 1.0, 0.5]))
+        return make_look(opened, lit_by(maps, number, lamp=lamp, sigma=sigma, rotation=turned, intensity=intensity))
 
     looks = [any_look()]
     picture, changes = run_until_exact(start(opened, looks[0])), 0
@@ -233,8 +233,8 @@ def test_an_old_preview_s_gain_does_not_come_back(transfer):
     picture = run_until_exact(start(transfer, look(), is_watched=True))
     picture.set_look(look(rotation=40.0))
     run_next_job(picture)
-    run_until_exact(picture).set_look(look(rotation=40.0, scale=4.0))
+    run_until_exact(picture).set_look(look(rotation=40.0, intensity=4.0))
     bright = run_until_exact(picture).image()
-    picture.set_look(look(rotation=60.0, scale=4.0))
+    picture.set_look(look(rotation=60.0, intensity=4.0))
     picture.advance(None)
     np.testing.assert_array_equal(picture.image(), bright)

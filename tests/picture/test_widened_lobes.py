@@ -62,7 +62,7 @@ def of_blocks(picture):
 
 
 def test_they_are_as_wide_as_all_bumps_together(scene, tmp_path):
-    fine = followed(scene, False)
+    fine = followed(scene, None)
     look = validate({}, default_look(fine.materials))
     width, height = SIZE
     many = reference_image(fine, "front", look, (FINER * width, FINER * height), 12)
@@ -85,5 +85,5 @@ def test_levels_reach_as_far_as_bumps_widen(scene):
     levels = levels_of_material(scene.materials[0])
     assert levels[0] == 1
     assert 1 < levels[-1] * 0.3 / (0.3**4 + 2 * SLOPES**2) ** 0.25 < 1.25  # some pixels cover steeper bumps than others
-    assert levels_of_material(followed(scene, False).materials[0]) == ()
+    assert levels_of_material(followed(scene, None).materials[0]) == ()
     assert levels_of_material(replace(scene.materials[0], normal_map=None)) == ()
