@@ -92,10 +92,10 @@ def test_pictures_equal_those_of_a_scene_with_the_roughness_map(bakes, plain, na
     rotated = {"environment": {"map": None, "rotation": 40.0}}
     for roughness, others in ((mean, {}), (0.3, rotated)):
         actual = shown(bare, rough(plain, named, mean), rough(plain, named, roughness, **others))
-        expected = shown(baked, rough(plain, True, roughness, **others))
+        expected = shown(baked, rough(plain, "roughness", roughness, **others))
         assert relative_rmse(actual, expected) < max_error
         assert np.median(np.abs(actual - expected) / expected) < usual
-        assert relative_rmse(shown(bare, rough(plain, True, roughness, **others)), expected) > 0.05
+        assert relative_rmse(shown(bare, rough(plain, "roughness", roughness, **others)), expected) > 0.05
 
 
 def test_roughness_levels_equal_the_bake(bakes, plain, named):
@@ -113,14 +113,14 @@ def test_roughness_levels_equal_the_bake(bakes, plain, named):
 
 def test_removing_the_roughness_map_restores_the_picture(bakes, plain, named):
     bare, _ = bakes
-    before = shown(bare, rough(plain, True, 0.4))
-    np.testing.assert_array_equal(shown(bare, rough(plain, named, 0.4), rough(plain, True, 0.4)), before)
+    before = shown(bare, rough(plain, "roughness", 0.4))
+    np.testing.assert_array_equal(shown(bare, rough(plain, named, 0.4), rough(plain, "roughness", 0.4)), before)
 
 
 def test_the_picture_is_unchanged_until_the_map_is_ready(bakes, plain, named):
     bare, _ = bakes
     picture = Picture(bare, "front", bare.cache)
-    picture.set_look(rough(plain, True, 0.4))
+    picture.set_look(rough(plain, "roughness", 0.4))
     before = run_until_exact(picture).image()
     picture.set_look(rough(plain, named, 0.41))
     advance = picture.advance(None)
@@ -136,7 +136,7 @@ def test_references_show_the_roughness_map(plain, named):
         for scene, follows in ((plain, named), (own, "roughness"))
     )
     assert relative_rmse(actual, expected) < 1e-3
-    assert relative_rmse(reference_image(plain, "front", rough(plain, True, mean), (16, 16), 0), expected) > 0.05
+    assert relative_rmse(reference_image(plain, "front", rough(plain, "roughness", mean), (16, 16), 0), expected) > 0.05
 
 
 def test_terms_of_a_material_share_one_map(plain, named):

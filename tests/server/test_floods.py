@@ -146,7 +146,7 @@ def test_another_sessions_message_is_taken_before_a_flood_is(
             for _ in range(390):
                 flooding.send('{"type":"encoding","format":"hdr"}')
             other.send('{"type":"focus","view":"front"}')
-            while taken.count("stream") < 390:
+            while taken.count("encoding") < 390:
                 time.sleep(0.01)
     assert "focus" in taken[:200]
 
@@ -156,7 +156,7 @@ FLOOD = """
 import json, sys
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
-with connect(sys.argv[1], subprotocols=["relume.v1"], max_size=None, proxy=None) as session:
+with connect(sys.argv[1], subprotocols=["relume.v2"], max_size=None, proxy=None) as session:
     session.send(json.dumps({"type": "open"}))
     try:
         while True:

@@ -41,7 +41,7 @@ def bake(client: TestClient, scene: dict[str, Any]) -> str:
     request = {"scene": scene["id"], "method": "probes", "size": SIZE, "lights": 100, "probes": 2000}
     done = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
     assert done["state"] == "ready", done["problem"]
-    assert done["recipe"]["points"] == 2000
+    assert done["recipe"]["probes"] == 2000
     return str(done["id"])
 
 
@@ -273,7 +273,7 @@ def test_a_scene_deleted_under_a_moving_view_leaves_what_moves(client: TestClien
             assert np.abs(picture - before).max() > 0.01
             session.wait_until_ready("the exact picture from here")  # given up: what it needs is gone
             problem = session.text("problem")["problem"]
-            assert problem["type"].endswith("not-made")
+            assert problem["type"].endswith("generation-failed")
             assert "the moving picture stays" in problem["detail"]
         session.send_message(type="inspect", view=view["name"], x=SIZE[0] // 2, y=SIZE[1] // 2)
         assert session.text("inspect")["material"] is not None

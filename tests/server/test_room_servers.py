@@ -93,7 +93,7 @@ def test_a_room_of_one_server_is_nowhere_else_until_nobody_is_in_it(
     with open_session(client, baked.bake, opening=ROOM_FIELDS) as ann:
         assert created(ann)
         look_around(client)
-        assert refusal(other, baked, ROOM_FIELDS) == refusal(other, baked, WATCH) == (404, "elsewhere")
+        assert refusal(other, baked, ROOM_FIELDS) == refusal(other, baked, WATCH) == (404, "other-server")
         apart = {"room": "apart" * 5}
         with open_session(other, baked.bake, opening=apart) as cleo, open_session(other, baked.bake) as dan:
             assert created(cleo)
@@ -119,7 +119,7 @@ def test_who_is_in_a_room_that_another_server_has_taken_is_sent_there(
             for server in (other, client):
                 look_around(server)
             assert ann.text("server_draining")["seconds"] == 0.2
-            assert refusal(client, baked, ROOM_FIELDS) == (404, "elsewhere")
+            assert refusal(client, baked, ROOM_FIELDS) == (404, "other-server")
             with open_session(other, baked.bake, opening=ROOM_FIELDS) as again:
                 hello = again.text("hello")
                 assert not hello["room"]["is_new"]
@@ -137,7 +137,7 @@ def test_a_server_that_takes_leave_gives_up_its_rooms_at_once(
         assert client.portal is not None
         client.portal.call(services(client).drain.start)
         ann.text("server_draining")
-        assert refusal(client, baked, ROOM_FIELDS) == (503, "leaving")
+        assert refusal(client, baked, ROOM_FIELDS) == (503, "draining")
         emptied(other)
         with open_session(other, baked.bake, opening=ROOM_FIELDS) as again:
             assert created(again)

@@ -39,7 +39,7 @@ def test_look_is_typed_whole() -> None:
     text = typescript.generate_look()
     assert "  lights: Record<string, PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook>;" in text
     assert "  texture: string | null;" in text
-    assert "  catcher?: boolean;" in text
+    assert "  shadow_catcher?: boolean;" in text
 
 
 DEFAULT = default_look([Material("White", ({"model": "lambert", "color": [1.0, 1.0, 1.0]},))])

@@ -112,9 +112,9 @@ def test_a_material_color_does_not_wait_for_light(transfer, maps):
 
 def test_the_gain_of_an_environment_appears_with_its_light(transfer, maps):
     """Next to local lights the gain is part of the light, without them it multiplies the picture."""
-    picture = run_until_exact(start(transfer, make_look(transfer, lit_by(maps, 0, scale=4.0))))
+    picture = run_until_exact(start(transfer, make_look(transfer, lit_by(maps, 0, intensity=4.0))))
     before = picture.image()
-    picture.set_look(make_look(transfer, lit_by(maps, 0, light_position=0.6, scale=4.0)))
+    picture.set_look(make_look(transfer, lit_by(maps, 0, light_position=0.6, intensity=4.0)))
     picture.advance(None)
     np.testing.assert_array_equal(picture.image(), before)
 
@@ -127,9 +127,10 @@ def test_continuous_edits_never_mix_two_lights(opened, maps, seed):
     def any_look():
         number, light_position = int(rng.integers(3)), rng.uniform(-0.6, 0.6) if rng.random() < 0.6 else None
         sigma = rng.uniform(0.1, 0.4) if rng.random() < 0.3 else None
-        rotated, scale = float(rng.choice([0.0, 0.0, 40.0])), float(rng.choice([1.0, 1.0, 0.5]))
+        rotated, intensity = float(rng.choice([0.0, 0.0, 40.0])), float(rng.choice([1.0, 1.0, 0.5]))
         return make_look(
-            opened, lit_by(maps, number, light_position=light_position, sigma=sigma, rotation=rotated, scale=scale)
+            opened,
+            lit_by(maps, number, light_position=light_position, sigma=sigma, rotation=rotated, intensity=intensity),
         )
 
     looks = [any_look()]
@@ -235,8 +236,8 @@ def test_the_gain_of_an_old_preview_is_discarded(transfer):
     picture = run_until_exact(start(transfer, look(), is_watched=True))
     picture.set_look(look(rotation=40.0))
     run_next_job(picture)
-    run_until_exact(picture).set_look(look(rotation=40.0, scale=4.0))
+    run_until_exact(picture).set_look(look(rotation=40.0, intensity=4.0))
     bright = run_until_exact(picture).image()
-    picture.set_look(look(rotation=60.0, scale=4.0))
+    picture.set_look(look(rotation=60.0, intensity=4.0))
     picture.advance(None)
     np.testing.assert_array_equal(picture.image(), bright)

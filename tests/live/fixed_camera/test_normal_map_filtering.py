@@ -64,7 +64,7 @@ def of_blocks(picture):
 
 
 def test_filtered_highlights_are_as_wide_as_all_bumps(scene, tmp_path):
-    fine = with_filtering(scene, False)
+    fine = with_filtering(scene, None)
     look = validate({}, default_look(fine.materials))
     width, height = SIZE
     many = reference_image(fine, "front", look, (FINER * width, FINER * height), 12)
@@ -87,5 +87,5 @@ def test_roughness_levels_cover_the_widening(scene):
     levels = levels_of_material(scene.materials[0])
     assert levels[0] == 1
     assert 1 < levels[-1] * 0.3 / (0.3**4 + 2 * SLOPES**2) ** 0.25 < 1.25  # some pixels cover steeper bumps than others
-    assert levels_of_material(with_filtering(scene, False).materials[0]) == ()
+    assert levels_of_material(with_filtering(scene, None).materials[0]) == ()
     assert levels_of_material(replace(scene.materials[0], normal_map=None)) == ()

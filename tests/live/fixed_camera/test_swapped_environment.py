@@ -62,7 +62,7 @@ def under(name, **more):
 def test_a_swap_is_reweighted_and_swapping_back_restores_the_picture(plain, map_name):
     picture = run_until_exact(Picture(plain, "front", Cache(BUDGET)))
     before = picture.image()
-    look = make_look(plain, under(map_name, rotation=30.0, scale=2.0))
+    look = make_look(plain, under(map_name, rotation=30.0, intensity=2.0))
     picture.set_look(look)
     assert picture.next_job().state == "shading"
     swapped = run_until_exact(picture).image()
