@@ -218,7 +218,7 @@ def test_bodies_that_cannot_be_read_are_a_kind_of_problem(
 
 def test_text_in_the_place_of_a_file_is_told_in_words(client: TestClient) -> None:
     refused = parse_problem(client.post("/api/scenes", files={"scene": (None, b"text")}))
-    assert refused["detail"] == "/scene is a text; give a file, with a file name in its part of the form"
+    assert refused["detail"] == "/scene is text; give a file, with a file name in its part of the form"
 
 
 def test_missing_data_directory_is_a_problem_not_a_trace(client: TestClient, settings: Any) -> None:

@@ -236,7 +236,7 @@ def test_steps_of_clients_alternate_and_each_client_has_a_quota(tmp_path: Path) 
         with pytest.raises(QuotaError, match=r"of yours .*RELUME_MAX_QUEUED_PER_USER"):
             submit("x", "ann")
         submit("b", "bob")
-        with pytest.raises(BusyError, match=r"renders wait or run as may, 3; .*RELUME_MAX_QUEUED\)"):
+        with pytest.raises(BusyError, match=r"limit of 3 unfinished renders is reached; .*RELUME_MAX_QUEUED\)"):
             submit("x", "cem")
         queue.start()
         wait_for(lambda: queue.get(last).state == "ready")

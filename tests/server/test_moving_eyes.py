@@ -360,7 +360,7 @@ def test_there_are_no_other_arrays_and_none_of_fixed_views(
     client: TestClient, bake: str, scene: dict[str, Any]
 ) -> None:
     missing = client.get(f"/api/bakes/{bake}/probes/lights")
-    assert (missing.status_code, "there are corners" in missing.json()["detail"]) == (404, True)
+    assert (missing.status_code, "choose from corners" in missing.json()["detail"]) == (404, True)
     request = {"scene": scene["id"], "size": SIZE, "lights": 100}
     fixed = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
     for path in ("probes", "probes/corners"):

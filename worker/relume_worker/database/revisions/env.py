@@ -1,4 +1,4 @@
-"""Runs revisions on the connection that `relume_worker.database.upgrading` hands over, inside its transaction."""
+"""Run revisions on the connection from `relume_worker.database.upgrading`, inside its transaction."""
 
 from alembic import context
 
