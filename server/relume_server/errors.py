@@ -281,8 +281,8 @@ def message_problem(error: ValidationError, text: str) -> Problem:
 
 
 OPENAPI_RESPONSES: dict[int | str, dict[str, Any]] = {
-    status: {"description": said, "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}}
-    for status, said in (("4XX", "Refused"), ("5XX", "Failed"))
+    status: {"description": description, "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}}
+    for status, description in (("4XX", "Refused"), ("5XX", "Failed"))
 }
 """The component is added by `relume_server.openapi`."""
 

@@ -227,7 +227,7 @@ def test_a_storage_that_does_not_answer_is_said_and_the_bake_can_go_on(
         with service.subscribe(service.submit(SCENE.id, RECIPE)) as changes:
             failed = list(changes)[-1]
         assert failed.state == "failed"
-        assert failed.problem == "the object storage cannot be used now; try again in a while"
+        assert failed.problem == "the object storage cannot be used now; try again later"
         with pytest.raises(StorageError) as failure:
             fetch_if_missing(service.store_path("0" * 16))
         assert make_problem(failure.value).status == 503

@@ -12,7 +12,7 @@ from relume_cli.terminal.progress import progress
 @contextmanager
 def transfer_bar(label: str) -> Iterator[Callable[[int], Callable[[int], None]]]:
     """Yield a function that starts a bar of so many bytes and returns a function that advances it."""
-    with progress(label) as tell:
+    with progress(label) as report:
 
         def start_report(num_bytes: int) -> Callable[[int], None]:
             done = 0
@@ -20,7 +20,7 @@ def transfer_bar(label: str) -> Iterator[Callable[[int], Callable[[int], None]]]
             def advance(num_copied: int) -> None:
                 nonlocal done
                 done += num_copied
-                tell(done / max(1, num_bytes), f"{bytes_text(done)} of {bytes_text(num_bytes)}")
+                report(done / max(1, num_bytes), f"{bytes_text(done)} of {bytes_text(num_bytes)}")
 
             return advance
 

@@ -290,5 +290,5 @@ def _state(job: RenderJob) -> str:
 
 def _body(job: RenderJob) -> RenderBody:
     request = job.request
-    asked = {name: getattr(request, name) for name in ("bake", "view", "name", "format", "size")}
-    return RenderBody.from_object(job, **asked, **format_timestamps(job))
+    request_fields = {name: getattr(request, name) for name in ("bake", "view", "name", "format", "size")}
+    return RenderBody.from_object(job, **request_fields, **format_timestamps(job))

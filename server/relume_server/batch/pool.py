@@ -15,7 +15,7 @@ from relume_server.batch.step import IsNeeded, ProgressCallback, Step
 
 MAX_STEPS = 500  # steps after which a process is replaced, whatever its size
 _PROGRAM_BYTES = 1 << 30  # compiled kernels, an open bake and Embree's trees: besides cached results
-_ASK_S = 0.1
+_POLL_S = 0.1
 _TRIES = 2
 
 
@@ -97,7 +97,7 @@ class ProcessPool:
                 while self._num_free_slots == 0 or ticket != min(self._waiting):
                     if self._is_closed or not is_needed():
                         raise CancelledError(f"the {step.kind} was stopped before it started")
-                    self._changed.wait(_ASK_S)
+                    self._changed.wait(_POLL_S)
                 self._num_free_slots -= 1
             finally:
                 self._waiting.remove(ticket)

@@ -38,7 +38,7 @@ _ERRORS_BY_KIND: Mapping[str, type[RelumeError]] = {
     "disk": _NoRoomError,
 }
 """Expected errors of a step, which do not end its process, by the last part of the problem's type."""
-_ASK_S = 0.1
+_POLL_S = 0.1
 _STOP_S = 1.0  # a kernel may run for longer than anyone wants to wait
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
@@ -91,7 +91,7 @@ class BatchProcess:
         self._send(asdict(step))
         while is_needed():
             with suppress(queue.Empty):
-                message = self._messages.get(timeout=_ASK_S)
+                message = self._messages.get(timeout=_POLL_S)
                 if message is None:
                     raise ProcessExitedError(f"the process of the {step.kind} ended")
                 if "share" not in message:

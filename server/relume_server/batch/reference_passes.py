@@ -166,13 +166,11 @@ def _look(request: ComparisonRequest, transfer: OpenBake) -> Any:
 
 def _render_pass(
     context: BatchContext, transfer: OpenBake, request: ComparisonRequest, look: Any, size: tuple[int, int],
-    index: int, report: Any,
-    is_canceled: Any, spp: int = SPP,
+    index: int, report: Any, is_canceled: Any, spp: int = SPP,
 ) -> ReferenceImage:  # fmt: skip
     return context.library.reference(
         scene_path(context.data, transfer.scene_id), comparison_camera(request, transfer)[0], look, size, spp, report,
-        is_canceled,
-        index, reflects=EditAxis.BOUNCES in transfer.axes, is_whole=request.paths == "all",
+        is_canceled, index, reflects=EditAxis.BOUNCES in transfer.axes, is_whole=request.paths == "all",
     )  # fmt: skip
 
 

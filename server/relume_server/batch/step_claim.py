@@ -31,7 +31,7 @@ def is_claimed_by(folder: Path, owner: str) -> bool:
         return False
 
 
-def cancelled_or_taken_over(folder: Path, owner: str, is_canceled: Callable[[], bool]) -> Callable[[], bool]:
+def canceled_or_taken_over(folder: Path, owner: str, is_canceled: Callable[[], bool]) -> Callable[[], bool]:
     """Return a check whether to end a step: canceled, or claimed by another owner. Steps poll thousands of times per
     second; the file is read ten times.
     """

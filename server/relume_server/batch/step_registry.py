@@ -13,7 +13,7 @@ from relume_server.batch.context import BatchContext
 from relume_server.batch.frames import pack, paint_frame
 from relume_server.batch.reference_passes import make_frame, make_pass, time_pass
 from relume_server.batch.step import Step
-from relume_server.batch.step_claim import cancelled_or_taken_over
+from relume_server.batch.step_claim import canceled_or_taken_over
 
 STEPS: Mapping[str, Callable[..., Mapping[str, Any]]] = {
     "BTF": btf_steps.run_btf_slice,
@@ -40,7 +40,7 @@ def do_step(context: BatchContext, step: Step, report: ProgressCallback, is_canc
     """
     if step.claim is not None:
         folder, owner = step.claim
-        is_canceled = cancelled_or_taken_over(Path(folder), owner, is_canceled)
+        is_canceled = canceled_or_taken_over(Path(folder), owner, is_canceled)
         if is_canceled():
             raise CancelledError("the job was taken over")
     return STEPS[step.kind](context, report, is_canceled, **step.values)

@@ -10,7 +10,7 @@ from pathlib import Path
 from relume.core.errors import CancelledError, ParameterError, RelumeError
 from relume.core.filesystem import atomic_write
 
-_ASK_S = 0.2
+_POLL_S = 0.2
 _MAX_OUTPUT_CHARS = 300  # characters of the program's output
 
 
@@ -47,7 +47,7 @@ def write_video(frames: Path, fps: int, target: Path, is_canceled: Callable[[], 
         with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:  # noqa: S603
             while True:
                 try:
-                    _, output = process.communicate(timeout=_ASK_S)
+                    _, output = process.communicate(timeout=_POLL_S)
                     break
                 except subprocess.TimeoutExpired:
                     if is_canceled():

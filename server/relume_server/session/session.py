@@ -133,8 +133,8 @@ def _enter_room(
 
 def _state(
     services: SessionServices, websocket: WebSocket, transfer: OpenBake, context: JoinContext,
-    saved: SavedSession | None,
-    document: dict[str, Any], room_entry: RoomEntry | None, audit_writer: AuditWriter | None,
+    saved: SavedSession | None, document: dict[str, Any], room_entry: RoomEntry | None,
+    audit_writer: AuditWriter | None,
 ) -> SessionState:  # fmt: skip
     """Create the state of a session: from a lost session, or with this look."""
     default = transfer.default_look
