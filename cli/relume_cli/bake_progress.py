@@ -35,7 +35,7 @@ def follow(changes: Subscription, label: str, interrupted: Callable[[], bool] = 
 def detail(status: BakeStatus) -> str:
     """Phase, rate and remaining time of a bake."""
     if status.state == "queued":
-        return "waiting" if status.queue_position == 0 else f"waiting, {status.queue_position} in the queue before it"
+        return "waiting" if status.queue_position == 0 else f"waiting, {status.queue_position} before it in the queue"
     if status.phase is None:
         return "starting"
     since_s = time.time() - (status.phase_since or time.time())

@@ -271,7 +271,7 @@ def test_a_turntable_is_numbered_frames_that_a_second_run_goes_on_with(
     assert main(turntable) == 1
     assert "--method probes" in capsys.readouterr().err
     assert main(["bake", "quad", "--view", "front", "--probes", "200", *TINY]) == 1
-    assert "method direct has none" in capsys.readouterr().err
+    assert "method direct has no probes" in capsys.readouterr().err
     assert main(["bake", "quad", "--view", "front", "--method", "probes", "--probes", "200", *TINY]) == 0
     assert main(turntable) == 0
     frames = [np.asarray(Image.open(folder / f"{k:04d}.png")) for k in range(3)]
@@ -308,7 +308,7 @@ def test_a_server_with_a_damaged_database_says_one_sentence(data: Path, capsys: 
         ("RELUME_FAIR_SHARES", '{"Ann": -1}', "RELUME_FAIR_SHARES.Ann is -1; give more than 0"),
         ("RELUME_TRUSTED_PROXIES", '["10.0.0.300"]', "RELUME_TRUSTED_PROXIES.0 is '10.0.0.300'; give an address"),
         ("RELUME_LOG_LEVEL", "loud", "RELUME_LOG_LEVEL is 'loud'; give 'debug', 'info', "),
-        ("RELUME_STORAGE", "s3://", "RELUME_STORAGE is 's3://'; give one that can be used (Generic URL error: "),
+        ("RELUME_STORAGE", "s3://", "RELUME_STORAGE is 's3://'; give one that works (Generic URL error: "),
         ("RELUME_STORAGE", "ftp://x", "RELUME_STORAGE is 'ftp://x'; give a URL such as s3://bucket/prefix"),
         ("RELUME_DATABASE", "postgresql://ann@127.0.0.1:9/x", "the database cannot be used (network error: "),
     ],

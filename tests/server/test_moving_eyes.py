@@ -74,7 +74,7 @@ def test_points_are_refused_where_no_eye_moves(client: TestClient, scene: dict[s
     assert client.post("/api/bakes", json=request | {"probes": recipe["probes"]}).json()["recipe"] == recipe
     refused = client.post("/api/bakes", json=request | {"probes": 777})
     assert (refused.status_code, refused.json()["type"]) == (422, "urn:relume:problem:plan")
-    assert f"777 probes were asked for; method {method} has none" in refused.json()["detail"]
+    assert f"method {method} has no probes; leave out the 777 probes" in refused.json()["detail"]
 
 
 @pytest.fixture

@@ -47,7 +47,7 @@ def test_a_bake_outlives_a_database_that_is_away(
                 service.bakes()
             assert is_unavailable(failure.value)
             assert make_problem(failure.value).status == 503
-            assert "try again in a while" in str(make_problem(failure.value).detail)
+            assert "try again later" in str(make_problem(failure.value).detail)
             time.sleep(1.5)  # every loop has met it
             own_cluster.start()
             assert list(changes)[-1].state == "ready"

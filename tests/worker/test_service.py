@@ -237,7 +237,7 @@ def test_a_bake_that_the_ledger_cannot_be_told_of_says_why_it_waits(
     with service, service.subscribe(service.submit(SCENE.id, RECIPE)) as changes:
         waiting = next(status for status in changes if status.problem)
         assert "disk is full" in (waiting.problem or "")
-        assert "goes on by itself" in (waiting.problem or "")
+        assert "resumes by itself" in (waiting.problem or "")
         assert service.bakes() == [waiting]
         has_room.set()
         assert list(changes)[-1].state == "ready"

@@ -41,5 +41,5 @@ def resolve_num_probes(method: str, requested: int | None) -> int:
         PlanError: a number is requested, and the method has no free camera.
     """
     if requested is not None and method not in FREE_CAMERA_METHODS:
-        raise PlanError(f"method {method} has none of the {requested} probes; leave probes out")
+        raise PlanError(f"method {method} has no probes; leave out the {requested} probes")
     return requested or Recipe.num_probes

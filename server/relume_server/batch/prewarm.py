@@ -98,7 +98,7 @@ class Prewarmer:
         if not is_needed():
             return
         try:
-            step = Step("first picture of a bake", values={"bake": bake})
+            step = Step("first image of a bake", values={"bake": bake})
             self._run_step(step, lambda share: None, is_needed)
             self._thumbnails.paint(bake, is_first=False)
         except CancelledError:  # the bake was opened, or the server is closing

@@ -116,7 +116,7 @@ class RenderQueue(JobQueue[RenderRequest]):
         frames = [(str(self.frame_path(job, k)), self.download_name(job, k)) for k in range(job.total)]
         video = str(self.video_path(job)) if job.request.format == "mp4" else None
         values = {"frames": frames, "archive": str(self.archive_path(job)), "video": video, "fps": job.request.fps}
-        self.run_in_process(job, "pack of a batch", values, lambda share: None)
+        self.run_in_process(job, "archive of a batch", values, lambda share: None)
         self.record_progress(job.id, job.total - 1)  # the lease may be lost by now
         self._report_bytes(job.id, folder_bytes(self.folder / job.id))
         return job.total
