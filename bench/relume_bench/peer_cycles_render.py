@@ -1,4 +1,4 @@
-"""Renders a scene with Blender's Cycles at rising sample counts; run by the peer's own interpreter, knows no relume.
+"""Render a scene with Blender's Cycles at increasing sample counts, in its own environment, without relume.
 
 python -I peer_cycles_render.py FOLDER     reads cycles.npz and cycles.json there, writes cycles_result.json and
                                            picture.npy

@@ -1,7 +1,7 @@
-"""Renders a scene with Mitsuba 3 at rising sample counts; run by the peer's own interpreter, knows nothing of relume.
+"""Render a scene with Mitsuba 3 at increasing sample counts, in its own environment, without relume.
 
 python -I peer_mitsuba_render.py FOLDER     reads scene.npz and job.json there, writes result.json, and picture.npy
-                                            or passes.npy (as many independent pictures as the job asks for)
+                                            or passes.npy (independent images, as many as in the job)
 """
 
 from __future__ import annotations

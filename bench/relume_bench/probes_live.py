@@ -121,7 +121,7 @@ def _measure_drags(folder: Path, tiny: bool) -> list[Figure]:
         for name, change in _DRAGS.items():
             first[f"{scene.name}_{name}"], errors[f"{scene.name}_{name}"] = _measure_drag(scene, change)
     error_texts = {
-        name: f"{100 * change_error:.1f} % of the change, {100 * image_error:.2f} % of the picture"
+        name: f"{100 * change_error:.1f} % of the change, {100 * image_error:.2f} % of the image"
         for name, (change_error, image_error) in errors.items()
     }
     return [
