@@ -51,9 +51,7 @@ class SyntheticBtf:
 
 @contextmanager
 def open_values_folder(tiny: bool) -> Iterator[Path]:
-    """Open the folder of values, named by the code that makes them; those of other code are deleted; trial runs store
-    nothing.
-    """
+    """Open the folder of values, named by the code that makes them; others are deleted; trial runs store nothing."""
     if tiny:
         with TemporaryDirectory() as trial:
             yield Path(trial)

@@ -66,9 +66,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 class _Received:
-    """Messages received since the last `clear`: sizes of frames by kind, total bytes, and whether the last frame had
-    all basis functions.
-    """
+    """Messages since the last `clear`: frame sizes by kind, total bytes, and whether the last one had all functions."""
 
     def __init__(self) -> None:
         self.clear()

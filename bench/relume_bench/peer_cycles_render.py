@@ -41,9 +41,7 @@ def material(index: int, colors: dict[str, Any]) -> Any:
 
 
 def environment(radiance: Any) -> None:
-    """The environment. Both maps have +X in the center and our +Z, Blender's −Y, to its right; Blender's rows go
-    upward.
-    """
+    """The environment. Both maps have +X in the center, our +Z is Blender's −Y; Blender's rows go upward."""
     height, width = radiance.shape[:2]
     image = bpy.data.images.new("sky", width, height, float_buffer=True, is_data=True)
     opaque = np.concatenate([radiance[::-1], np.ones((height, width, 1))], axis=2)

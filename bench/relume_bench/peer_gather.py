@@ -90,9 +90,7 @@ def _edit_s(transfer: FixedViewTransfer, num_frames: int) -> float:
 
 
 def _materials(scene: Scene) -> list[dict[str, Any]]:
-    """Materials for Cycles; its highlight has the floor's albedo, four times its color, and width, α² = 2/(s +
-    2).
-    """
+    """Materials for Cycles; its highlight has four times the albedo of the floor's color, and α² = 2/(s + 2)."""
     floor = GLOSSY_FLOOR[1]
     alpha = (2 / (floor["params"]["exponent"] + 2)) ** 0.5
     black = {"glossy": [0.0, 0.0, 0.0], "roughness": 0.0}

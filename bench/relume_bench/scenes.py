@@ -43,8 +43,7 @@ def environments() -> list[Environment]:
         return [read_environment(path, path.stem) for path in paths]
     return [
         studio(),
-        make_sun_environment("high sun (generated)", 0.8),
-        make_sun_environment("low sun (generated)", 0.15),
+        *(make_sun_environment(f"{name} sun (generated)", y) for name, y in (("high", 0.8), ("low", 0.15))),
     ]
 
 

@@ -20,17 +20,15 @@ def import_scene(
     file: Annotated[
         Path | None,
         typer.Argument(
-            metavar="FILE.glb", help="Scene: .glb, .gltf, .obj, .ply or .zip, with the files that it references."
+            metavar="FILE.glb", help="Scene: .glb, .gltf, .obj, .ply or .zip, with the files it references."
         ),
     ] = None,
     environment: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.hdr", help="Equirectangular .hdr or .exr file. [default: studio]"),
+        Path | None, typer.Option(metavar="FILE.hdr", help="Equirectangular .hdr or .exr file. [default: studio]")
     ] = None,
     name: Annotated[str | None, typer.Option(help="Name of the scene. [default: file name]")] = None,
     built_in: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Built-in scene instead of a file; see relume list built-ins."),
+        str | None, typer.Option(metavar="NAME", help="Built-in scene instead of a file; see relume list built-ins.")
     ] = None,
     ground: Annotated[bool, typer.Option("--ground", help="Add a ground plane that catches shadows.")] = False,
     as_json: Json = False,
@@ -65,7 +63,8 @@ def _summary_lines(scene: Scene) -> Iterator[str]:
     low = [min(float(mesh.positions[:, axis].min()) for mesh in scene.meshes) for axis in range(3)]
     high = [max(float(mesh.positions[:, axis].max()) for mesh in scene.meshes) for axis in range(3)]
     sides = " × ".join(f"{b - a:.3g}" for a, b in zip(low, high, strict=True))
-    yield f"  {scene.name}: {sum(len(mesh.faces) for mesh in scene.meshes):,} triangles in {len(scene.meshes):,} meshes"
+    num_triangles, num_meshes = sum(len(mesh.faces) for mesh in scene.meshes), len(scene.meshes)
+    yield f"  {scene.name}: {num_triangles:,} triangles in {num_meshes:,} mesh{'es' if num_meshes != 1 else ''}"
     yield f"  {sides} m, +Y is up"
     for material in scene.materials:
         yield f"  material {material.name}: {', '.join(_describe_material(material))}"
@@ -99,9 +98,7 @@ def _read_scene(file: Path | None, environment: Path | None, name: str | None, b
 
     if built_in_name is not None:
         if any(argument is not None for argument in (file, environment, name)):
-            raise ParameterError(
-                "--built-in", built_in_name, "it alone: a built-in scene has its own environment and name"
-            )
+            raise ParameterError("--built-in", built_in_name, "it alone: it has its own environment and name")
         return built_in(match_name(built_in_name, BUILT_IN))
     if file is None:
         raise PlanError("nothing to import; give a scene file, or --built-in NAME")

@@ -57,11 +57,7 @@ token.command("add")(tokens.token_add)
 token.command("list")(tokens.token_list)
 token.command("revoke")(tokens.token_revoke)
 app.add_typer(token, name="token")
-materials = typer.Typer(
-    help="Measured materials and BTFs.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-)
+materials = typer.Typer(help="Measured materials and BTFs.", no_args_is_help=True, rich_markup_mode=None)
 materials.command("import")(importing.material_import)
 materials.command("make-btf")(make_btf.material_make_btf)
 materials.command("export")(exporting.material_export)

@@ -20,8 +20,7 @@ Data = Annotated[
 ]
 SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="Scene: id, start of an id, or name.")]
 BakeName = Annotated[
-    str,
-    typer.Argument(metavar="BAKE", help="Bake: id or start of an id; or a scene, for its finest bake."),
+    str, typer.Argument(metavar="BAKE", help="Bake: id or start of an id; or a scene, for its finest bake.")
 ]
 View = Annotated[str | None, typer.Option("--view", metavar="NAME", help="View. [default: the first]")]
 Size = Annotated[str | None, typer.Option("--size", metavar="WxH", help="Width and height in pixels.")]

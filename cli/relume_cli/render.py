@@ -44,8 +44,7 @@ def render(
         ),
     ] = None,
     turntable: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Render N frames of a turntable: PNG files in a folder, or a video."),
+        int | None, typer.Option(metavar="N", help="Render N frames of a turntable: PNG files in a folder, or a video.")
     ] = None,
     rotate: Annotated[
         TurntableSubject | None,

@@ -13,8 +13,7 @@ from relume_cli.options import Data
 
 def worker(
     scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="tcp://…", help="Dask scheduler to join. [default: queue in the database]"),
+        str | None, typer.Option(metavar="tcp://…", help="Dask scheduler to join. [default: queue in the database]")
     ] = None,
     processes: Annotated[
         int | None, typer.Option(min=1, max=1024, help="Worker processes. [default: one per core]")

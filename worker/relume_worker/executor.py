@@ -221,9 +221,7 @@ async def _kill_workers(cluster: Any) -> None:
 
 @contextlib.contextmanager
 def _without_interrupts() -> Iterator[None]:
-    """Threads and processes started here never receive SIGINT: a terminal's Ctrl-C is for this process, which stops
-    them.
-    """
+    """Threads and processes started here never receive SIGINT: this process stops them after Ctrl-C."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

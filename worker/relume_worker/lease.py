@@ -62,9 +62,7 @@ def log_taken_over(noun: str, identity: str, previous_owner: str) -> None:
 
 
 def log_lost_lease(noun: str, identity: str) -> None:
-    """Log that this process was suspended, or cut off from the database, for longer than its lease. noun, identity: of
-    its job.
-    """
+    """Log that this process was suspended or cut off for longer than its lease. noun, identity: of its job."""
     log.warning(
         "%s %s was taken over by another process while this one was suspended: its work here is dropped",
         noun, identity, extra={"fields": {noun.lower(): identity}},

@@ -105,9 +105,7 @@ class Ledger:
             return list(session.scalars(query))
 
     def _queue_positions(self, rows: Sequence[BakeRow]) -> dict[str, int]:
-        """Number of bakes before each queued one: tiny ones never wait for others, and clients are scheduled as if
-        their shares were equal.
-        """
+        """Number of bakes before each queued one: tiny ones never wait for others; clients count with equal shares."""
         if not any(row.state == "queued" for row in rows):
             return {}
         query = select(BakeRow).where(BakeRow.state.in_(("queued", "running"))).order_by(BakeRow.queued)
@@ -179,9 +177,7 @@ class Ledger:
         return self.release(identity, owner)
 
     def release(self, identity: str, owner: str) -> bool:
-        """Give up the lease and leave the state: another owner may claim the bake at once. False if it was lost
-        before.
-        """
+        """Give up the lease and leave the state: another owner may claim the bake. False if it was lost before."""
         return self._change(identity, None, BakeRow.owner == owner, owner=None)
 
     def delete_bakes(self, ids: Sequence[str]) -> None:
@@ -316,9 +312,7 @@ def _is_owned(row: BakeRow, now: float) -> bool:
 
 
 def _fair_order(rows: Sequence[BakeRow]) -> list[str]:
-    """Ids in scheduling order: priority first, then each client's first, each one's second, …; `rows` are in order of
-    submission.
-    """
+    """Ids in scheduling order: priority first, then each client's first, each one's second, …; `rows` by submission."""
     counts = Counter[str]()
     ranks = []
     for row in sorted(rows, key=lambda row: row.state != "running"):

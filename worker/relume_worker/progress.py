@@ -113,9 +113,7 @@ class Progress:
             self._last = self._clock()
 
     def fields(self) -> dict[str, float | None]:
-        """Fields for the ledger: monotonic progress from 0 to 1, rays per second, and remaining seconds once a tenth of
-        the bake is done.
-        """
+        """Fields for the ledger: monotonic progress 0 to 1, rays per second, and remaining seconds, from a tenth on."""
         since_s, worked_s = self._clock() - self._last, self._last - self._began
         per_second = self._rate()
         if per_second:

@@ -1,6 +1,4 @@
-"""The bake service for server and command line. It owns the threads that run bakes; the ledger and the stores own
-everything that must survive them.
-"""
+"""Bake service for server and command line; the ledger and the stores own everything that must survive its threads."""
 
 from __future__ import annotations
 

@@ -58,7 +58,6 @@ def _import_btf(folder: Path, file: Path, name: str, bound: float, *, as_json: b
     from relume_worker.paths import btfs_path
 
     record = until_interrupted(
-        file.name,
-        lambda progress, is_canceled: import_btf(btfs_path(folder), file, name, bound, progress, is_canceled),
+        file.name, lambda progress, is_canceled: import_btf(btfs_path(folder), file, name, bound, progress, is_canceled)
     )
     print_btf(record, as_json=as_json)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from relume.core.errors import ParameterError
+from relume.core.errors import ParameterError, PlanError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,7 +28,7 @@ def exr_options(
 ) -> ExrOptions:
     """Collect the EXR options. Raises ParameterError for other formats, and for options that exclude each other."""
     if layers and light_groups:
-        raise ParameterError("--layers", "with --light-groups", "one of the two")
+        raise PlanError("--layers and --light-groups exclude each other; give one")
     if (layers or light_groups or full_float or color_space) and output.suffix.lower() != ".exr":
         allowed = "a file name that ends in .exr, for --layers, --light-groups, --float, --color-space"
         raise ParameterError("--output", str(output), allowed)

@@ -17,23 +17,16 @@ def reference(
     spp: Annotated[int, typer.Option(metavar="N", min=1, max=1 << 20, help="Samples per pixel.")],
     look: LookFile = None,
     view: View = None,
-    camera: Annotated[
-        Path | None, typer.Option(metavar="FILE.json", help="Camera to use instead of a view of the scene.")
-    ] = None,
+    camera: Annotated[Path | None, typer.Option(metavar="FILE.json", help="Camera instead of a view.")] = None,
     size: Size = None,
     paths: Annotated[
-        Literal["all", "method"],
-        typer.Option(help="All light paths, or only those that the bake's method simulates."),
+        Literal["all", "method"], typer.Option(help="All light paths, or only those that the bake's method simulates.")
     ] = "all",
     method: Annotated[
-        Literal["direct", "gather", "probes"] | None,
-        typer.Option(help="Only the light paths that this method simulates."),
+        Literal["direct", "gather", "probes"] | None, typer.Option(help="Only light paths that this method simulates.")
     ] = None,
     compare: Annotated[
-        bool,
-        typer.Option(
-            "--compare", help="Measure the error of the scene's finest bake, against all paths and its method's."
-        ),
+        bool, typer.Option("--compare", help="Measure the error of the scene's finest bake, by both kinds of paths.")
     ] = False,
     as_json: Json = False,
     data: Data = None,
@@ -42,7 +35,7 @@ def reference(
 
     Brute force: all texels of the environment, traced visibility and indirect light; nothing is baked.
     """
-    from relume.core.errors import ParameterError
+    from relume.core.errors import PlanError
     from relume_cli.pictures.files import check_display_view, check_output, save
     from relume_cli.reference.passes import (
         compare_passes,
@@ -55,11 +48,7 @@ def reference(
 
     check_output(output)
     if compare and (camera, size, method) != (None, None, None):
-        raise ParameterError(
-            "--compare",
-            "combined with --camera, --size or --method",
-            "it alone: the bake has its own camera, size and method",
-        )
+        raise PlanError("--compare excludes --camera, --size and --method; leave them out: the bake has its own")
     if compare:
         subject = find_bake_comparison(data, scene, look, view)
     else:

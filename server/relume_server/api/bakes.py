@@ -59,9 +59,7 @@ def submit_bake(request: BakeRequest, services: ServicesDep, caller: CallerDep) 
 
 
 def _check_quotas(scene: str, recipe: Recipe, caller: Caller, services: Services) -> None:
-    """Check that a caller may queue one more bake; existing and running bakes are free. Raises QuotaError,
-    NearlyFullError.
-    """
+    """Check that a caller may queue a bake; existing and running ones are free. Raises QuotaError, NearlyFullError."""
     with suppress(NotFoundError):
         if services.bakes.get(bake_id(scene, recipe)).state in ("queued", "running", "ready"):
             return
@@ -103,9 +101,7 @@ def get_bake(bake: Id, services: ServicesDep) -> BakeBody:
     responses={200: {"content": {"text/event-stream": {"schema": {"type": "string"}}}}},
 )
 async def bake_events(bake: Id, services: ServicesDep, caller: CallerDep) -> EventSourceResponse:
-    """Stream every change as a server-sent event `bake` with the body of GET; ends with the bake, or when the token
-    expires.
-    """
+    """Stream changes as server-sent events `bake` with the body of GET; ends with the bake, or with the token."""
     await run_in_threadpool(services.bakes.get, bake)
     return _Events(bake, services, caller)
 

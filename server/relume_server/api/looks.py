@@ -1,6 +1,4 @@
-"""/api/looks: saved looks. A change names the version that it replaces (If-Match); a new look may send If-None-Match:
-*.
-"""
+"""/api/looks: saved looks. A change names its version (If-Match); a new look may send If-None-Match: *."""
 
 from __future__ import annotations
 

@@ -156,9 +156,7 @@ async def get_thumbnail(scene: Id, services: ServicesDep, bake: Id | None = None
 
 
 def _thumbnail_bake(bakes: Sequence[BakeStatus]) -> str | None:
-    """Choose the bake for a scene's thumbnail: the coarsest with enough pixels, because it is rendered fastest;
-    otherwise the finest.
-    """
+    """Choose the bake for a thumbnail: the coarsest with enough pixels renders fastest; otherwise the finest."""
     ready_bakes = sorted((status for status in bakes if status.state == "ready"), key=lambda status: status.rank)
     large_bakes = [status for status in ready_bakes if status.recipe.size[0] >= MAX_WIDTH]
     return (large_bakes or ready_bakes[-1:])[0].id if ready_bakes else None

@@ -154,8 +154,8 @@ class AuthMiddleware:
 
 
 def _caller_bucket(caller: Caller) -> str:
-    """Rate-limit bucket of a caller: a user by authentication method, otherwise an address; a token may be named like
-    an address.
+    """Rate-limit bucket of a caller: user and authentication method (a token may be named like an address), or
+    address.
     """
     return f"{caller.auth_method} {caller.name}" if caller.name else f"address {bucket_name(caller.address)}"
 

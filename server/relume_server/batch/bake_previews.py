@@ -18,9 +18,7 @@ MAX_WIDTH = 320
 def render_first(
     context: BatchContext, report: ProgressCallback, is_canceled: CancelCheck, *, bake: str
 ) -> Mapping[str, Any]:
-    """Shade the scene's default look in every view of a fixed-camera bake; opened bakes find the term images next to
-    the store.
-    """
+    """Shade the default look in every view of a fixed-camera bake; term images are stored next to the store."""
     transfer = context.transfer(bake)
     look, num_views = looks.validate(transfer.default_look, transfer.default_look), len(transfer.views)
     for done, view in enumerate(transfer.views):

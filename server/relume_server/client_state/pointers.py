@@ -50,9 +50,7 @@ def check_parameter(pointer: str, document: Mapping[str, Any]) -> None:
             exists = False
     if not exists:
         raise ParameterError(
-            "parameter",
-            pointer,
-            "a parameter or light of this look, such as /materials/Teapot/terms/1/params/ior or /lights/Key",
+            "parameter", pointer, "one of this look, such as /lights/Key or /materials/A/terms/0/params/ior"
         )
 
 

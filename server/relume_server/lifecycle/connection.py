@@ -67,9 +67,7 @@ class Connection(HttpToolsProtocol):
         super().on_message_begin()
 
     def on_header(self, name: bytes, value: bytes) -> None:
-        """The parser has received a header. Raises ValueError, which uvicorn answers with 400, if there are too
-        many.
-        """
+        """The parser has received a header. Raises ValueError (uvicorn answers 400) if there are too many."""
         self._num_header_bytes += len(name) + len(value)
         if self._num_header_bytes > MAX_HEAD_BYTES or len(self.headers) >= MAX_HEADERS:
             raise ValueError("too many headers")

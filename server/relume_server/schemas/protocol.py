@@ -123,9 +123,7 @@ class InspectMessage(Message):
 
 
 class HighlightMessage(Message):
-    """client → server: show the pixels that an interval of a curve affects. Each visible view answers with a frame
-    "highlight".
-    """
+    """client → server: show the pixels that a curve's interval affects; each visible view answers "highlight"."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_by_name=True, validate_by_alias=True)
 
@@ -211,9 +209,7 @@ class Problem(BaseModel):
 
 
 class CameraInfo(Message):
-    """A camera that looks along its -Z. `to_world`: camera to world, 4 × 4, row by row, rigid, meters. `yfov`:
-    vertical, radians.
-    """
+    """A camera that looks along its -Z. `to_world`: 4 × 4, row by row, rigid, meters. `yfov`: vertical, radians."""
 
     to_world: list[float]
     yfov: float
@@ -233,9 +229,7 @@ class ViewInfo(Message):
 
 
 class FreeCameraError(Message):
-    """Error of free-camera images, measured in the bake: relative RMS over the surfaces visible to a few cameras, in
-    the scene's default look.
-    """
+    """Error of free-camera images, measured in the bake: relative RMS over surfaces, in the scene's default look."""
 
     value: float
     standard_error: float
@@ -320,9 +314,7 @@ class CurveMessage(Message):
 
 
 class BakeMessage(Message):
-    """server → client: another bake of the same scene is running or ready; to use it, open a session on it and send the
-    look.
-    """
+    """server → client: another bake of the scene is running or ready; to use it, open a session and send the look."""
 
     type: Literal["bake"] = "bake"
     bake: str

@@ -17,9 +17,7 @@ RoomName = Annotated[str, Field(min_length=MIN_ROOM, max_length=MAX_ROOM, patter
 
 
 class PresenceMessage(Message):
-    """client → server: own presence for others in the room: name, if the server has no login (left out: unchanged), and
-    selected material.
-    """
+    """client → server: own name, if the server has no login (left out: unchanged), and selected material."""
 
     type: Literal["presence"]
     name: PersonName | None = None

@@ -1,6 +1,4 @@
-"""Files of a data directory that belong in a backup: all except the ledger, which is copied separately, running work,
-and derived files.
-"""
+"""Files of a data directory that belong in a backup: without the ledger, running work, and derived files."""
 
 from __future__ import annotations
 

@@ -60,9 +60,7 @@ def get_image(image: Id, services: ServicesDep) -> ImageBody:
 async def put_metalness(
     image: Id, request: MetalnessRequest, services: ServicesDep, caller: CallerDep
 ) -> MetalnessBody:
-    """Use an image as metallic map: makes two images from it and the base color, and returns the terms of the material
-    that use them.
-    """
+    """Make two images from a metallic map and the base color, and return the material's terms that use them."""
     data, folder = services.settings.data, images_path(services.settings.data)
     await run_in_threadpool(services.access.quotas.check_bytes, caller.name, 0)
     terms = [complete_term(("terms", k), term, None) for k, term in enumerate(request.terms)]
@@ -91,9 +89,7 @@ def get_image_thumbnail(image: Id, services: ServicesDep) -> PngResponse:
 
 @router.delete("/{image}", status_code=204)
 async def delete_image(image: Id, services: ServicesDep) -> Response:
-    """Delete an image that no saved look, share link, session of this server or running job uses, with the images
-    derived from it, of which the same must hold.
-    """
+    """Delete an image and the images derived from it, if no saved look, share link, session or job uses them."""
     folder = images_path(services.settings.data)
     record = await run_in_threadpool(get_record, folder, image)
     derived_ids = [

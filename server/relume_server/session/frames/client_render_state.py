@@ -1,6 +1,4 @@
-"""Data of a view that the client renders itself, and whether the connection is fast enough for updates while
-dragging.
-"""
+"""Data of a view that the client renders itself, and whether the connection is fast enough for its updates."""
 
 from __future__ import annotations
 

@@ -3,7 +3,6 @@
 from alembic import context
 
 context.configure(
-    connection=context.config.attributes["connection"],
-    target_metadata=context.config.attributes.get("metadata"),
+    connection=context.config.attributes["connection"], target_metadata=context.config.attributes.get("metadata")
 )
 context.run_migrations()
