@@ -204,7 +204,7 @@ def test_names_that_are_no_unicode_are_refused_in_unicode(client: TestClient, pa
     ("content", "kind", "words"),
     [
         (b"hello", "multipart/form-data; boundary=b", "the body cannot be read"),
-        (b"\xff\xfe{", "application/json", "send what /api/openapi.json describes"),
+        (b"\xff\xfe{", "application/json", "send the format of /api/openapi.json"),
     ],
 )
 def test_bodies_that_cannot_be_read_are_a_kind_of_problem(

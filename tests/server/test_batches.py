@@ -96,7 +96,7 @@ def test_a_step_is_tried_once_more_and_then_fails_in_words(pool: ProcessPool, tm
     values = {"mark": str(tmp_path / "once")}
     assert pool.run(Step("die once", values=values), ignore, always)["pid"] > 0
     mark = tmp_path / "twice"
-    with pytest.raises(RelumeError, match=r"was killed twice.*; make the picture smaller"):
+    with pytest.raises(RelumeError, match=r"was killed twice.*; give a smaller size"):
         pool.run(Step("die", values={"mark": str(mark)}), ignore, always)
     assert mark.read_text() == "died died "
     assert pool.run(Step("work"), ignore, always)["pid"] > 0

@@ -89,7 +89,7 @@ def test_what_is_refused_later_is_said_alike(client: TestClient, baked: Baked) -
     problem = refused(client, RENDERS, json={**body, "color_space": "ACEScg"})
     assert problem["detail"] == "color_space is 'ACEScg'; give none: there is no OpenColorIO config here (RELUME_OCIO)"
     problem = refused(client, RENDERS, json={**body, "path": {"turntable": 8}})
-    assert problem["detail"].startswith("path is 'turntable 8'; give no path, or bake by method probes")
+    assert problem["detail"].startswith("path is 'turntable 8'; give no path, or bake with method probes")
     problem = refused(client, RENDERS, json={**body, "looks": [{"display": {"exposure": "x"}}]})
     assert problem["errors"][0]["pointer"] == "/looks/0/display/exposure"
     wrong_key = client.put("/api/looks/a", json={"materialz": {}})

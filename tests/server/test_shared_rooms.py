@@ -256,7 +256,7 @@ def test_who_watches_follows_and_cannot_edit(client: TestClient, baked: Baked) -
         vera.exact(0)
         vera.edit(1, SIGMA, 0.9)
         problem = vera.text("problem")["problem"]
-        assert (problem["status"], problem["detail"][:26]) == (403, "this link is for watching;")
+        assert (problem["status"], problem["detail"][:23]) == (403, "this link is view-only;")
         ann.edit(1, SIGMA, 0.31)
         picture(vera, 0, 810)
         assert people(ann, lambda them: len(them) == 2)[1]["role"] == "view"
