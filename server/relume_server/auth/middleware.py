@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 _UNCHANGED = 200
-"""Status codes of changes; 200 means a dry run, or that nothing changed."""
+"""Status of a dry run, or of a call without effect; changes answer 201, 202 or 204."""
 
 
 class AuthMiddleware:
