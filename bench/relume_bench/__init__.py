@@ -1,1 +1,1 @@
-"""Benchmarks: every performance claim is a figure from here. Start at `registry`."""
+"""Benchmarks: each performance claim is a figure from here. Start at `registry`."""

@@ -1,8 +1,8 @@
-"""accuracy.*: frame against truth, a teapot on a table, three environments; the worst of the three.
+"""accuracy.*: error of a frame against the reference, a teapot on a table, three environments; the worst of the three.
 
-Frame: 4,000 light triangles, one shadow ray each, T · c along the curve that a user drags. Truth:
-`relume.reference.reference_radiance`, every texel of the map with a shadow ray of its own, at the same view samples.
-The context also has the error where nothing casts a shadow: what is left of it there is not the shadow rays' fault.
+Frame: 4,000 environment triangles, one shadow ray each, T · c along the edited curve. Reference:
+`relume.reference.reference_radiance`, all texels of the map with a shadow ray each, at the same view samples. The
+context also has the error without shadows, to which shadow rays do not contribute.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ _CASES: tuple[Case, ...] = (
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """The three terms that have targets."""
+    """Measure the three terms that have targets."""
     return compare(_CASES, 20 if tiny else 2000, tiny)
 
 
 def compare(cases: tuple[Case, ...], num_positions: int, tiny: bool) -> list[Figure]:
-    """A figure for each case; they share shadow rays.
+    """Measure a figure for each case; all share shadow rays.
 
     Args:
-        cases: of each the figure's name, the term of pot and table, and the curve that is free.
+        cases: figure's name, term of pot and table, and free curve of each.
         num_positions: view samples.
         tiny: few lights, one environment, few texels.
     Returns:
-        The worst error over the environments, and its standard error over the view samples.
+        Worst error over the environments, and its standard error over the view samples.
     """
     num_lights = 200 if tiny else 4000
     errors: dict[str, dict[str, JackknifeEstimate]] = {name: {} for name, _, _ in cases}
@@ -71,7 +71,7 @@ def compare(cases: tuple[Case, ...], num_positions: int, tiny: bool) -> list[Fig
 
 
 def _without_shadows(lit_samples: LitSamples) -> LitSamples:
-    """Put the same points where nothing is near them, so that nothing casts a shadow."""
+    """Move the points apart, so that nothing casts a shadow."""
     corners = np.array([[1e6, 1e6, 1e6], [1e6 + 1, 1e6, 1e6], [1e6, 1e6 + 1, 1e6]], np.float32)
     geometry = replace(lit_samples.geometry, embree=EmbreeScene.build(corners, np.array([[0, 1, 2]], np.uint32)))
     surface_points = lit_samples.surface_points

@@ -1,7 +1,6 @@
-"""accuracy.TERM: as `relume_bench.accuracy`, for every other term, at moderate sharpness; a tenth of the view samples.
+"""accuracy.TERM: as `relume_bench.accuracy`, for all other terms, at moderate sharpness; a tenth of the view samples.
 
-Brute force over half a million texels costs minutes for each term; how well 200 samples tell the error is its standard
-error.
+Brute force over half a million texels takes minutes per term; the standard error tells the uncertainty of 200 samples.
 """
 
 from __future__ import annotations
@@ -31,5 +30,5 @@ CASES: tuple[Case, ...] = tuple(
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Measure every term but `lambert`, which has a figure with a target."""
+    """Measure every term except `lambert`, which has a figure with a target."""
     return compare(CASES, 20 if tiny else 200, tiny)

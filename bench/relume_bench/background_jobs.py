@@ -1,4 +1,4 @@
-"""What is made beside the frames of a picture while a hand moves, as a session makes it."""
+"""Background jobs of an image during a drag, as a session runs them."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 
 
 class BackgroundJobs:
-    """A thread for what a picture waits for; use as a context.
+    """A thread for the jobs of an image; a context manager.
 
     Attributes:
-        lags_s: of each frame, how long ago the look was wanted whose light between surfaces it shows.
+        lags_s: for each frame, the age of the look whose indirect light it shows.
     """
 
     def __init__(self, picture: FreeCameraPicture) -> None:
@@ -31,7 +31,7 @@ class BackgroundJobs:
         self._thread.shutdown()
 
     def request(self) -> None:
-        """Another look is wanted; what has been made goes in."""
+        """Request another look, and install finished results."""
         self._requested_s = time.perf_counter()
         if self._running is not None and self._running[1].done():
             job, future, self._displayed_request_s = self._running
@@ -39,7 +39,7 @@ class BackgroundJobs:
             self._running = None
 
     def start_next(self) -> None:
-        """A frame is there; what it lacks is begun, where nothing else is made."""
+        """Start the next job after a frame, unless one is running."""
         self.lags_s.append(time.perf_counter() - self._displayed_request_s)
         job = self._picture.next_job() if self._running is None else None
         if job is not None and not job.is_refinement:
@@ -50,5 +50,5 @@ class BackgroundJobs:
 
     @property
     def lag_s(self) -> float:
-        """The median."""
+        """Median lag."""
         return float(np.median(self.lags_s))

@@ -1,9 +1,9 @@
 """bake.wall_vs_rays and bake.teatray_s: whole bakes of the built-in scene in one process, with all threads.
 
-The first is the wall time of everything (light triangles, view samples, tracing, the store, publishing) ÷ the seconds
-in which the kernels of the visibility stage trace and predict, at 640×480 and 2,000 lights. The second is the wall time
-at the size of Ben-Artzi's Teatray (66,867 pixels, 4,000 triangles), whose precomputation his table 1 gives as 17
-minutes; the scene is our own still life after it, not his data.
+The first is the total wall time (environment triangles, view samples, tracing, store, publishing) ÷ the seconds in
+which the kernels of the visibility stage trace and predict, at 640×480 and 2,000 lights. The second is the wall time at
+the size of Ben-Artzi's Teatray (66,867 pixels, 4,000 triangles), whose precomputation takes 17 minutes in his table 1;
+the scene is our still life, modeled after it, not his data.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def measure(tiny: bool) -> list[Figure]:
     with tempfile.TemporaryDirectory() as folder:
         _bake(scene, (32, 24), 30, Path(folder) / "warm.zarr")
         wall_s, large = _bake(scene, (64, 48) if tiny else (640, 480), 60 if tiny else 2000, Path(folder) / "1.zarr")
-        # a few pixels fewer than samples: silhouettes have two or three
+        # slightly fewer pixels than samples: silhouettes have two or three per pixel
         teatray_s, teatray = _bake(
             scene, (64, 48) if tiny else (296, 222), 60 if tiny else 4000, Path(folder) / "2.zarr"
         )
@@ -40,7 +40,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _bake(scene: Scene, size: tuple[int, int], num_lights: int, target: Path) -> tuple[float, dict[str, Any]]:
-    """Wall time of a bake, and what is to be known about it."""
+    """Return the wall time of a bake, and its context."""
     written: list[TaskOutput] = []
     recipe = Recipe("direct", ("front",), size, num_lights)
     wall_s = seconds(

@@ -1,4 +1,4 @@
-"""A data folder with a baked scene, a server process over it, and a client of its sessions."""
+"""A data directory with a baked scene, a server process on it, and a client of its sessions."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ OPENING = json.dumps({"type": "open"})
 
 @dataclass(frozen=True)
 class BakedFolder:
-    """A data folder that holds one bake.
+    """A data directory with one bake.
 
     Attributes:
-        bake_s: seconds that the bake took, the start of worker processes included.
+        bake_s: seconds of the bake, including the start of worker processes.
     """
 
     data: Path
@@ -48,7 +48,7 @@ class BakedFolder:
 
 @contextmanager
 def baked_folder(scene: Scene, recipe: Recipe) -> Iterator[BakedFolder]:
-    """Bake a scene into a temporary data folder."""
+    """Bake a scene into a temporary data directory."""
     with tempfile.TemporaryDirectory() as folder:
         with BakeService(Path(folder)) as service:
             register_scene(service.data_dir, service.ledger, scene)
@@ -61,7 +61,7 @@ class Server:
     """A running server process.
 
     Attributes:
-        started_s: when it was started, on the clock of time.perf_counter.
+        started_s: time of its start, by time.perf_counter.
         edits: file with the milliseconds of each edit.
     """
 
@@ -71,20 +71,20 @@ class Server:
     edits: Path
 
     def session(self, bake: str) -> str:
-        """Address of sessions on a bake."""
+        """WebSocket URL of sessions on a bake."""
         return f"ws://127.0.0.1:{self.port}/api/bakes/{bake}/session"
 
     def edit_ms(self) -> list[float]:
-        """Edit received → frame handed to the socket, in the order of frames."""
+        """Times from receiving an edit to sending its frame, in order of frames."""
         return [json.loads(line) for line in self.edits.read_text().splitlines()]
 
 
 @contextmanager
 def serving(data_folder: BakedFolder, settings: Mapping[str, str] | None = None) -> Iterator[Server]:
-    """Start the server; it is ready when it accepts connections.
+    """Start the server; it accepts connections when this returns.
 
     Args:
-        settings: environment variables of it.
+        data_folder: to serve. settings: environment variables.
     """
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -114,18 +114,18 @@ def _wait(process: subprocess.Popen[bytes], port: int) -> None:
 
 
 class SessionClient:
-    """One live session; acknowledges every frame at once."""
+    """A live session that acknowledges every frame at once."""
 
     def __init__(self, connection: ClientConnection) -> None:
         self._connection = connection
         self._last: dict[str, Any] = {"exact": False, "revision": -1}
 
     def send_message(self, **message: Any) -> None:
-        """One JSON message."""
+        """Send a JSON message."""
         self._connection.send(json.dumps(message))
 
     def frame(self, timeout_s: float | None = None) -> tuple[dict[str, Any], int] | None:
-        """Header and size of the next frame; None where none comes in time. Raises PlanError on a problem."""
+        """Receive the header and the size of the next frame; None after the timeout. Raises PlanError on a problem."""
         while True:
             try:
                 message = self._connection.recv(timeout_s)
@@ -142,7 +142,7 @@ class SessionClient:
             return header, len(message)
 
     def exact(self, revision: int) -> None:
-        """Wait until the exact frame of a revision is there."""
+        """Wait for the exact frame of a revision."""
         while not (self._last["exact"] and self._last["revision"] >= revision):
             self.frame()
 

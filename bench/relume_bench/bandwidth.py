@@ -1,9 +1,8 @@
-"""frame.bandwidth_ratio: how much of the memory's read bandwidth an incremental update uses.
+"""frame.bandwidth_ratio: fraction of the memory's read bandwidth that an incremental update uses.
 
-Numerator: bytes of the operator that `relume.operators.update_kernel.stream` reads for 30 random columns of 256 (others
-each time, so that no cache holds them) at 512×512×RGB,
-per second. Denominator: the same array summed from end to end by
-the same threads. Both are taken in turn; the best of each counts, as other programs can only slow them down.
+Numerator: bytes per second of the operator that `relume.operators.update_kernel.stream` reads for 30 random columns of
+256 (different ones each time, so that no cache contains them) at 512×512×RGB. Denominator: the same array summed from
+end to end by the same threads. Both alternate; the best of each counts, because other programs can only slow them down.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ def _sum(values, start, stop):  # type: ignore[no-untyped-def]
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Time both sides on the same 805 MB, in turn."""
+    """Time both sides on the same 805 MB, alternating."""
     side = 64 if tiny else 512
     tiles, samples = tile_layout(side * side)
     transport = np.full((tiles, 3, _NUM_BANDS, samples), 1e-6, np.float32)

@@ -1,12 +1,12 @@
-"""btf.compression_*: how well BTFs are kept.
+"""btf.compression_*: error, ratio and time of BTF compression.
 
-`btf.compression_error`: relative RMS of all values, of what is kept as it is rounded, where it is a fiftieth of a byte
-for each channel of each image; the worst of the three synthetic BTFs. `curve` of the context: ratio and error of what
-was kept for three bounds, with fewer and fewer of its components; between the best of them, logarithms are linear. In
-brackets is what the ideal coder of as many bytes misses, whose tables cost nothing. The norm:
-√Σ(kept − made)² ÷ √Σ made²; `range_error` divides by √mean square of the brightest thousandth instead, as errors of
-8-bit images are often told; `delta_e` is the mean colour difference (CIE 1976) of texels in full light at that ratio.
-`btf.compression_ratio`: at an error of 5 %. `btf.compression_s`: what the slowest of the three takes to 5 %.
+`btf.compression_error`: relative RMS of all values after compression and rounding at 1/50 byte per channel and image;
+the worst of the three synthetic BTFs. `curve` in the context: ratio and error for three error bounds, each with
+decreasing numbers of components; interpolated linearly in logarithms between the best points. In parentheses: the error
+of the ideal coder at the same size, without its tables. Norm: √Σ(compressed − original)² ÷ √Σ original²; `range_error`
+divides by the RMS of the brightest thousandth instead, as for errors of 8-bit images; `delta_e` is the mean color
+difference (CIE 1976) of texels in full light at that ratio. `btf.compression_ratio`: at an error of 5 %.
+`btf.compression_s`: time of the slowest of the three to 5 %.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from relume_bench.figure import Figure
 
 _BOUNDS = (0.05, 0.1, 0.2)
 _AT_RATIO, _AT_ERROR = 50.0, 0.05
-_RATIOS = (12.5, 25.0, _AT_RATIO, 100.0, 150.0)  # that the curve is told at, beside the ideal coder's
+_RATIOS = (12.5, 25.0, _AT_RATIO, 100.0, 150.0)  # compared with the ideal coder's
 _SOME_TEXELS = 200
 _TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])  # ITU-R BT.709-6
 
 
 class _Curve(NamedTuple):
-    """Of one BTF: ratios and errors of what may be kept; seconds to the first bound; of_range: see the module."""
+    """Rate-distortion curve of one BTF: ratios and errors; seconds to the first bound; of_range: see the module."""
 
     samples: list[tuple[float, float]]
     seconds: float
@@ -41,7 +41,7 @@ class _Curve(NamedTuple):
 
     @property
     def _best(self) -> NDArray[np.float64]:
-        """Points that no other is better than in both, logarithms, ratios and errors rising. (2, n)"""
+        """Pareto-optimal points, logarithms, ratios and errors increasing. (2, n)"""
         best: list[tuple[float, float]] = []
         for ratio, error in sorted(self.samples, reverse=True):
             if not best or error < best[-1][1]:
@@ -50,7 +50,7 @@ class _Curve(NamedTuple):
 
     @property
     def errors(self) -> list[float]:
-        """At each of `_RATIOS`; beyond what was tried the last of it."""
+        """Errors at `_RATIOS`; beyond the measured range its last value."""
         ratio, error = self._best
         return [float(log_error) for log_error in np.exp(np.interp(np.log(_RATIOS), ratio, error))]
 
@@ -65,7 +65,7 @@ class _Curve(NamedTuple):
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Make the three, and compress each for some bounds."""
+    """Make the three BTFs, and compress each for several bounds."""
     with open_values_folder(tiny) as values_folder:
         synthetic_btfs = {name: SyntheticBtf(name, values_folder, tiny) for name in GEOMETRIES}
         curves = {name: _curve(btf) for name, btf in synthetic_btfs.items()}
@@ -102,10 +102,10 @@ def _curve(btf: SyntheticBtf) -> _Curve:
 
 
 def _estimate_energy_bound(values: ValueFile) -> list[float]:
-    """What the ideal coder of as many bits misses, relative RMS, at each of `_RATIOS`: reverse water-filling.
+    """Error of the ideal coder with as many bits, relative RMS, at each of `_RATIOS`: reverse water-filling.
 
-    Of independent Gaussian components of variances λ, R bits a texel leave Σ min(λ, θ) with R = Σ max(0, ½ log₂ λ/θ).
-    Components are the best of each view, bits go to whichever view they tell most of, tables cost nothing.
+    For independent Gaussian components of variances λ, R bits per texel leave Σ min(λ, θ) with R = Σ max(0, ½ log₂
+    λ/θ). Components are the principal ones of each view, bits are shared between views, tables are free.
     """
     energy, level_variances = 0.0, []
     for view in range(values.grid.num_directions):
@@ -117,12 +117,12 @@ def _estimate_energy_bound(values: ValueFile) -> list[float]:
     level = np.geomspace(variance.min(), variance.max(), 4000)
     bits = np.array([0.5 * np.log2(np.maximum(variance / threshold, 1)).sum() for threshold in level])
     residual = np.array([np.minimum(variance, threshold).sum() for threshold in level])
-    target_bits = 8 * 3 * values.grid.num_directions**2 / np.array(_RATIOS)  # bits of all views of a texel
+    target_bits = 8 * 3 * values.grid.num_directions**2 / np.array(_RATIOS)  # bits of all views per texel
     return [float(threshold) for threshold in np.sqrt(np.interp(target_bits, bits[::-1], residual[::-1]) / energy)]
 
 
 def _delta_e(values: ValueFile, compressed: LocalPcaBtf) -> float:
-    """Mean colour difference of some texels from all sides, where white is a matt white surface in the same light."""
+    """Mean color difference of some texels over all directions; white is a matte white surface in the same light."""
     texels = np.linspace(0, compressed.levels[0, 1] * compressed.levels[0, 2] - 1, _SOME_TEXELS).astype(int)
     decoded = np.stack([compressed.texel_brdf(texel) for texel in texels], axis=2)
     exact = np.stack([values.get_view(view)[:, texels] for view in range(len(decoded))])
@@ -130,7 +130,7 @@ def _delta_e(values: ValueFile, compressed: LocalPcaBtf) -> float:
 
 
 def _to_lab(values: NDArray[Any]) -> NDArray[np.float64]:
-    """CIE L*a*b* of linear Rec. 709 radiance; white is what a matt white surface sends. (..., 3)"""
+    """CIE L*a*b* of linear Rec. 709 radiance; white is a matte white surface. (..., 3)"""
     relative_xyz = np.pi * np.maximum(values, 0).astype(np.float64) @ (_TO_XYZ / _TO_XYZ.sum(axis=1, keepdims=True)).T
     x, y, z = np.moveaxis(
         np.where(relative_xyz > 216 / 24389, np.cbrt(relative_xyz), relative_xyz * 841 / 108 + 4 / 29), -1, 0

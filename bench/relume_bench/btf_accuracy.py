@@ -1,9 +1,8 @@
-"""btf.*: how near BTFs are to what they stand for.
+"""btf.*: error of BTF rendering against the geometry and the uncompressed values.
 
-`btf.geometry_rmse`: a plane that is covered with the woven BTF, under a sky, against Mitsuba's paths through the real
-small geometry on the same place, seen from between the directions that the BTF was made for. Its noise is taken off.
-`btf.sphere_rmse`: the same about a ball. `btf.table_rmse`: the plane's view samples against sums over all values before
-compression.
+`btf.geometry_rmse`: a plane covered with the woven BTF, under an environment, against Mitsuba's paths through the
+actual small geometry, from a view between the directions of the BTF. The noise is removed. `btf.sphere_rmse`: the same
+on a ball. `btf.table_rmse`: the plane's view samples against sums over all uncompressed values.
 """
 
 from __future__ import annotations
@@ -17,11 +16,11 @@ from relume_bench.btf_sphere import against_displaced
 from relume_bench.btf_synthetic import SyntheticBtf, open_values_folder
 from relume_bench.figure import Figure
 
-_BOUND, _FINE = 0.05, 0.02  # of pictures, and of what is compared with all values
+_BOUND, _FINE = 0.05, 0.02  # of images, and of the comparison with all values
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Make a weave, and compare its pictures with the real one's."""
+    """Make a weave, and compare its images with the actual geometry."""
     with (
         open_values_folder(tiny) as values_folder,
         tempfile.TemporaryDirectory() as folder,

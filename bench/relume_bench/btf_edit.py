@@ -1,8 +1,7 @@
-"""btf.edit_ms: how quickly a BTF at a fixed view follows a hand.
+"""btf.edit_ms: time to edit a BTF at a fixed view.
 
-The still life at 640×480 in direct light, every surface covered with the weave: from an edit of how often it repeats to
-the exact image. `shaded` is the image from nothing, in which what arrives is found first: what an edit took while that
-was not kept.
+The still life at 640×480 in direct light, all surfaces covered with the weave: from an edit of its repetition to the
+exact image. `shaded` is the image from nothing, including the incident light, which is cached for edits.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ _BOUND, _SCALE = 0.05, 4.0
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Cover a still life, and change how."""
+    """Cover a still life, and edit the repetition."""
     size, lights, frames = ((40, 30), 100, 3) if tiny else ((640, 480), 1000, 10)
     with (
         open_values_folder(tiny) as values_folder,

@@ -1,4 +1,4 @@
-"""Pictures of BTFs against what they stand for: the small geometry itself, and all values before compression."""
+"""Compare images of BTFs with the small geometry itself, and with all uncompressed values."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ from relume_bench.indirect import PASSES
 from relume_bench.mitsuba import bsdf, missing, read_passes, render
 from relume_bench.standard_error import compare_with_passes
 
-_NUM_VISIBLE_PERIODS = 1.5  # periods across the picture
-_REACH = 2  # periods of the geometry on each side; light from θ = 82° passes half a period of it
-_CAMERA_ANGLES = (22.0, 17.0), (52.0, 200.0)  # θ and φ, degrees: as far as can be from all directions of the BTF
+_NUM_VISIBLE_PERIODS = 1.5  # periods across the image
+_REACH = 2  # periods of the geometry on each side; light from θ = 82° crosses half a period of it
+_CAMERA_ANGLES = (22.0, 17.0), (52.0, 200.0)  # θ and φ, degrees: as far as possible from all directions of the BTF
 
 
 def against_geometry(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
-    """Compare a plane that is covered with a BTF of the weave with the weave, path-traced.
+    """Compare a plane covered with a BTF of the weave with the path-traced weave.
 
     Args:
-        record: of the BTF. folder: for stores. tiny: whether it is a trial.
+        record: of the BTF. folder: for stores. tiny: a trial run.
     """
     name = "btf.geometry_rmse"
     if (why := missing()) is not None:
@@ -70,10 +70,10 @@ def against_geometry(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
 def traced_by_peer(
     displaced_scene: Scene, size: tuple[int, int], spp: int, terms: Sequence[Sequence[Mapping[str, Any]]], to: Path
 ) -> NDArray[np.float32]:
-    """The peer's passes of the real geometry, by paths of up to seven bounces.
+    """Render the actual geometry with the peer, with paths of up to seven bounces.
 
     Args:
-        displaced_scene: the scene. size: of the view. spp: of a pass. terms: of each mesh. to: a folder that is made.
+        displaced_scene: the scene. size: of the view. spp: per pass. terms: of each mesh. to: folder to create.
     Returns:
         (passes, height, width, 3) float32
     """
@@ -89,10 +89,10 @@ def traced_by_peer(
 
 
 def bake_with_btf(plane: Scene, record: BtfRecord, size: tuple[int, int], path: Path, lights: int) -> tuple[Any, Look]:
-    """A fixed view of one material's surface, opened, and the look that covers it.
+    """Bake and open a fixed view of one material's surface, with the look that covers it.
 
     Args:
-        plane: the scene. record: of the BTF. size: of the view. path: of the store. lights: triangles of the sky.
+        plane: the scene. record: of the BTF. size: of the view. path: of the store. lights: environment triangles.
     """
     bake = open_bake(
         bake_in_process(METHODS["direct"], plane, Recipe("direct", ("camera",), size, lights), path), Cache(2 << 30)
@@ -102,12 +102,12 @@ def bake_with_btf(plane: Scene, record: BtfRecord, size: tuple[int, int], path: 
 
 
 def against_table(record: BtfRecord, values: ValueFile, folder: Path, tiny: bool) -> Figure:
-    """Compare the plane's view samples with sums over all values, as they were before compression.
+    """Compare the plane's view samples with sums over all uncompressed values.
 
-    Each sample takes the texel that it lies in, on both sides: what is interpolated between texels is no error of ours.
+    Each sample uses the texel that contains it, on both sides, which excludes the error of interpolation.
 
     Args:
-        record: of the BTF. values: of it, before. folder: for stores. tiny: whether it is a trial.
+        record: of the BTF. values: uncompressed. folder: for stores. tiny: a trial run.
     """
     plane, _ = _make_scenes(GEOMETRIES["weave"](), *_CAMERA_ANGLES[0])
     size = (12, 12) if tiny else (96, 96)
@@ -132,7 +132,7 @@ def against_table(record: BtfRecord, values: ValueFile, folder: Path, tiny: bool
 
 
 def _to_middles(uv: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
-    """Move places to the middles of their texels, footprints to nothing."""
+    """Move UV coordinates to the centers of their texels, and footprints to zero."""
     moved, (height, width) = np.array(uv), size
     for axis, count in ((0, width), (1, height)):
         moved[:, axis] = (np.floor(uv[:, axis] * count) + 0.5) / count
@@ -141,7 +141,7 @@ def _to_middles(uv: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.fl
 
 
 def _from_table(values: ValueFile, lights: Any, receivers: Any, uv: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Sum all values over the lights that samples see, in plain NumPy."""
+    """Sum all values over the lights visible to the samples, in plain NumPy."""
     height, width = values.size
     texel = (np.floor(uv[:, 1] * height) % height * width + np.floor(uv[:, 0] * width) % width).astype(int)
     n, t = (np.asarray(a, np.float64) for a in (receivers.normal, receivers.tangent))
@@ -168,7 +168,7 @@ def _from_table(values: ValueFile, lights: Any, receivers: Any, uv: NDArray[np.f
 
 
 def _make_scenes(tile: Any, theta: float, phi: float) -> tuple[Scene, Scene]:
-    """A plane to be covered, and the geometry itself, both y-up, seen from far away."""
+    """A plane to cover, and the actual geometry, both Y up, viewed from far away."""
     t, p = np.radians([theta, phi])
     towards = np.array([np.sin(t) * np.cos(p), np.cos(t), -np.sin(t) * np.sin(p)])
     far = 60.0
@@ -176,7 +176,7 @@ def _make_scenes(tile: Any, theta: float, phi: float) -> tuple[Scene, Scene]:
         "camera", tuple(far * towards), (0.0, 0.0, 0.0), 2 * float(np.arctan(0.5 * _NUM_VISIBLE_PERIODS / far))
     )
     radiance = np.array(studio().radiance)
-    radiance[len(radiance) // 2 :] = 0  # a BTF knows no light from below, which holes of the geometry would let through
+    radiance[len(radiance) // 2 :] = 0  # the BTF has no light from below, which gaps of the geometry would let through
     environment = Environment("sky", radiance)
     material = (Material("Cloth", tile.materials[0]),)
     return tuple(  # type: ignore[return-value]
@@ -186,7 +186,7 @@ def _make_scenes(tile: Any, theta: float, phi: float) -> tuple[Scene, Scene]:
 
 
 def _plane() -> Mesh:
-    """Texture coordinates are metres: u along x, v along z."""
+    """A plane whose texture coordinates are meters: u along x, v along z."""
     half = float(_REACH)
     corners = np.array([[-half, 0, half], [half, 0, half], [half, 0, -half], [-half, 0, -half]], np.float32)
     return _mesh(corners, np.tile([0.0, 1, 0], (4, 1)), np.array([[0, 1, 2], [0, 2, 3]]), corners[:, [0, 2]])

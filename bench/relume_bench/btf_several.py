@@ -1,8 +1,8 @@
-"""btf.several_ratio, btf.five_vs_two: what an edit costs beside BTFs that it has nothing to do with.
+"""btf.several_ratio, btf.five_vs_two: cost of an edit in a scene with unrelated BTFs.
 
-The still life with a free camera, five of its materials covered: with five BTFs of 128 × 128 texels, with two that take
-turns, and with none. An edit is of the color of a sixth material, until its frame is there. Both figures are ratios of
-medians within one run, the edits of the three taking turns.
+The still life with a free camera, five of its materials covered: with five BTFs of 128 × 128 texels, with two that
+alternate, and with none. An edit changes the color of a sixth material; it ends with its frame. Both figures are ratios
+of medians within one run, the edits of the three alternating.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _EDITED = "Bowl"
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Edit one material beside five that are covered with none, two, and five BTFs."""
+    """Edit one material while five others are covered with none, two, and five BTFs."""
     size, num_probes, side, edits = ((40, 30), 2000, 8, 3) if tiny else ((320, 240), 15_000, 128, 40)
     recipe = Recipe("probes", ("front",), size, 300, num_probes=num_probes)
     with tempfile.TemporaryDirectory() as name, STORE.with_search_folder(Path(name) / "btfs"):
@@ -64,7 +64,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 class _Session:
-    """A picture of the still life, some of its materials covered."""
+    """An image of the still life, with some materials covered."""
 
     def __init__(self, transfer: BakedFreeCamera, records: Sequence[BtfRecord]) -> None:
         self._transfer, self._records = transfer, records
@@ -96,7 +96,7 @@ class _Session:
 
 
 def _records(folder: Path, side: int) -> list[BtfRecord]:
-    """Five BTFs that only differ in brightness, as large as wanted, of few texels that repeat."""
+    """Five BTFs of the requested size that differ in brightness only, repeating a few texels."""
     small_side = min(side, 16)
     small_record = TileGeometry(GEOMETRIES["weave"](), ubo_grid(), (small_side, small_side), 1, 1)
     values = ValueFile(folder / "values", ubo_grid(), (small_side, small_side))
@@ -112,7 +112,7 @@ def _records(folder: Path, side: int) -> list[BtfRecord]:
 
 
 def _repeat_texture(whole: LocalPcaBtf, times: int) -> LocalPcaBtf:
-    """The same texels, repeated along both sides."""
+    """Repeat the texels along both sides."""
     sides, first, mip_levels = [], 0, []
     side = whole.size[0] * times
     while side:
@@ -130,7 +130,7 @@ def _repeat_texture(whole: LocalPcaBtf, times: int) -> LocalPcaBtf:
 
 
 def _level(texels: NDArray[Any], mip_levels: NDArray[np.int32], k: int, side: int) -> NDArray[Any]:
-    """One level of the repeated texels, from all sides. (V, side * side, …)"""
+    """One level of the repeated texels, for all directions. (V, side * side, …)"""
     first, height, width = mip_levels[min(k, len(mip_levels) - 1)]
     level_texels = texels[:, first : first + height * width].reshape(len(texels), height, width, *texels.shape[2:])
     times = max(1, side // height)

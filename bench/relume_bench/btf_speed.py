@@ -1,10 +1,10 @@
-"""btf.*: how quickly BTFs are shown.
+"""btf.*: speed of rendering BTFs.
 
-`btf.view_fps`, `btf.light_ms`: the still life at 400×400, every surface covered with the weave: frames while the eye
-moves, and from a turned environment to the frame, all bounces, followed roughly.
-`btf.light_bytes`: what the browser is sent for such a turn as a JPEG of the quality that it asks for, which it gets
-where the link is too slow for HDR. `hdr` is the same frame where it is not; `by_browser` what it is sent where it draws
-itself, which shows the texels' mean.
+`btf.view_fps`, `btf.light_ms`: the still life at 400×400, all surfaces covered with the weave: frames while the camera
+moves, and the time from rotating the environment to the frame, all bounces, incrementally updated. `btf.light_bytes`:
+size of the frame of such a rotation as a JPEG of the quality that the browser requests, which is sent over connections
+too slow for HDR. `hdr` is the size of the HDR frame; `by_browser` that of the data for the browser's renderer, which
+shows the texels' mean.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _BOUND = 0.05
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Cover a still life, and turn it and its light."""
+    """Cover a still life, and rotate camera and light."""
     with (
         open_values_folder(tiny) as values_folder,
         tempfile.TemporaryDirectory() as folder,
@@ -68,7 +68,7 @@ def _measure_free_camera(record: BtfRecord, folder: Path, tiny: bool) -> list[Fi
 def _light_bytes(
     still_life: FreeCameraScene, override_with_btf: Callable[[Any], None], rotate_light: Callable[[Any, float], None]
 ) -> dict[str, float]:
-    """Bytes that go to a browser when light is turned: "jpeg", "hdr", "by_browser"."""
+    """Bytes sent to a browser when the light is rotated: "jpeg", "hdr", "by_browser"."""
     look = still_life.look(lambda document: rotate_light(document, 0.5))
     picture = still_life.picture(look, is_watched=True)
     picture.advance(None)

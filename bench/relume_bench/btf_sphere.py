@@ -1,9 +1,9 @@
-"""btf.sphere_rmse: a ball that is covered with a BTF of the weave, against the real small geometry wrapped about it.
+"""btf.sphere_rmse: a ball covered with a BTF of the weave, against the actual small geometry wrapped around it.
 
-The plane is wrapped about the ball by the stereographic projection, which turns small squares into squares: texture
-coordinates are places of the plane, and the real geometry's heights shrink as its sides do. A black ball lies within,
-as nothing is below a BTF. Both are seen by the whole sky. What is compared are pixels whose middles see the ball, but
-for a rim; `near` and `rim` are those that see it from less than 60° from its normal, and the others.
+The plane is wrapped around the ball by the stereographic projection, which maps small squares to squares: texture
+coordinates are points of the plane, and the heights of the geometry shrink with its sides. A black ball is inside,
+because nothing is below a BTF. Both are lit by the whole environment. Compared are pixels whose centers are on the
+ball, except near its silhouette; `near` and `rim` are those viewed at less than 60° from the normal, and the others.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ from relume_bench.standard_error import compare_with_passes
 F64 = NDArray[np.float64]
 
 _RADIUS = 1.25  # periods
-_VISIBLE_ANGLE = np.radians(115.0)  # from the middle of the plane, which is turned to the eye but for some
+_VISIBLE_ANGLE = np.radians(115.0)  # from the center of the plane, which is almost turned to the camera
 _SPHERE_ROTATION = np.radians(20.0)
-_FAR, _ACROSS = 40.0, 2.7  # the eye, and what its picture shows, periods
+_FAR, _ACROSS = 40.0, 2.7  # camera distance and extent of the image, periods
 _MAX_RADIUS = 0.97  # of the radius
-_STEPS = 160  # of the smooth ball's grid, along the plane's sides
+_STEPS = 160  # grid of the smooth ball, along the plane's sides
 _NEAR_COSINE = np.cos(np.radians(60.0))
 _BLACK: tuple[dict[str, Any], ...] = ({"model": "lambert", "color": [0.0, 0.0, 0.0]},)
 
 
 def against_displaced(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
-    """Compare a covered ball with the path-traced geometry about it.
+    """Compare a covered ball with the path-traced geometry around it.
 
     Args:
-        record: of the weave. folder: for stores. tiny: whether it is a trial.
+        record: of the weave. folder: for stores. tiny: a trial run.
     """
     name = "btf.sphere_rmse"
     if (why := missing()) is not None:
@@ -73,7 +73,7 @@ def against_displaced(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
 
 
 def _make_scenes() -> tuple[Scene, Scene]:
-    """The smooth ball and the real geometry about a black one, seen from far away."""
+    """The smooth ball, and the actual geometry around a black one, viewed from far away."""
     tile = centered_height(GEOMETRIES["weave"]())
     towards = np.array([np.sin(_SPHERE_ROTATION) * 0.8, np.sin(_SPHERE_ROTATION) * 0.6, np.cos(_SPHERE_ROTATION)])
     camera = look_at("camera", tuple(_FAR * towards), (0.0, 0.0, 0.0), 2 * float(np.arctan(0.5 * _ACROSS / _FAR)))
@@ -87,7 +87,7 @@ def _make_scenes() -> tuple[Scene, Scene]:
 
 
 def _project_to_sphere(uvs: F64) -> tuple[F64, F64, F64]:
-    """Where places of the plane (n, 2) lie about the unit ball: normal, axis of x, axis of y. (n, 3) each"""
+    """Map points of the plane (n, 2) to the unit ball: normal, x axis, y axis. (n, 3) each"""
     p, q = (uvs / (2 * _RADIUS)).T
     s = 1 + p**2 + q**2
     return (
@@ -98,7 +98,7 @@ def _project_to_sphere(uvs: F64) -> tuple[F64, F64, F64]:
 
 
 def _reach() -> float:
-    """How far the plane is covered, periods."""
+    """Half width of the covered plane, periods."""
     return float(2 * _RADIUS * np.tan(_VISIBLE_ANGLE / 2))
 
 
@@ -117,7 +117,7 @@ def _wrap_tile(tile: Tile) -> Mesh:
 
 
 def _make_sphere(radius: float, material: int) -> Mesh:
-    """What is covered, smooth."""
+    """The smooth covered ball."""
     along = np.linspace(-_reach(), _reach(), _STEPS + 1)
     uvs = np.stack([grid.ravel() for grid in np.meshgrid(along, along)], axis=1)
     i, j = (grid.ravel() for grid in np.meshgrid(np.arange(_STEPS), np.arange(_STEPS), indexing="ij"))
@@ -128,7 +128,7 @@ def _make_sphere(radius: float, material: int) -> Mesh:
 
 
 def _mesh(positions: F64, normals: F64, faces: NDArray[Any], tangents: F64, uvs: F64, material: int) -> Mesh:
-    """A mesh whose texture coordinates are places of the plane, v down."""
+    """A mesh whose texture coordinates are points of the plane, v down."""
     return Mesh(
         "cloth" if material == 0 else "inside",
         np.ascontiguousarray(positions, np.float32),
@@ -141,7 +141,7 @@ def _mesh(positions: F64, normals: F64, faces: NDArray[Any], tangents: F64, uvs:
 
 
 def _cosines(camera: Camera, size: tuple[int, int]) -> F64:
-    """Cosine between the eye and the ball's normal where pixels' middles see it; −1 beside it and on its rim. (h, w)"""
+    """Cosine between view direction and normal at pixel centers; −1 beside the ball and near its silhouette. (h, w)"""
     width, height = size
     x, y = np.meshgrid(2 * (np.arange(width) + 0.5) / width - 1, 1 - 2 * (np.arange(height) + 0.5) / height)
     half = np.tan(camera.yfov / 2)

@@ -1,4 +1,4 @@
-"""Synthetic BTFs of the benchmarks: all their values, kept in bench/.kept from one run to the next."""
+"""Synthetic BTFs for benchmarks; their values are cached in bench/.kept between runs."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ class SyntheticBtf:
     """A synthetic BTF before compression.
 
     Args:
-        name: of its geometry. folder: where its values are kept. tiny: whether it is a trial.
+        name: of its geometry. folder: of its values. tiny: a trial run.
     """
 
     def __init__(self, name: str, folder: Path, tiny: bool) -> None:
         self.name = name
-        size, self.grid = (8, 1) if tiny else (128, 3)  # as `relume material make-btf` does
+        size, self.grid = (8, 1) if tiny else (128, 3)  # like `relume material make-btf`
         small = TileGeometry(GEOMETRIES[name](), ubo_grid(), (size, size), self.grid, 1)
         self.values = ValueFile(folder / name, ubo_grid(), (size, size))
         self.values.fill(small.get_view, lambda share: None, lambda: False)
         self.height: F32 = small.height()
 
     def compress(self, bound: float) -> LocalPcaBtf:
-        """Kept to an error bound, as `relume material make-btf` does."""
+        """Compress to an error bound, like `relume material make-btf`."""
         compressed = compress(self.values, bound, lambda share: None, lambda: False)
         return replace(compressed, height=self.height)
 
     def save(self, folder: Path, bound: float) -> BtfRecord:
-        """The same in an asset store."""
+        """Compress and save in an asset store."""
         folder.mkdir(parents=True, exist_ok=True)
         source = folder / f"{self.name}.json"
         source.write_text(f"{self.name} {bound}")
@@ -51,7 +51,7 @@ class SyntheticBtf:
 
 @contextmanager
 def open_values_folder(tiny: bool) -> Iterator[Path]:
-    """Where values are: named by the code that makes them, those of other code are deleted; trials keep nothing."""
+    """Open the folder of values, named by the code that makes them; others are deleted; trial runs store nothing."""
     if tiny:
         with TemporaryDirectory() as trial:
             yield Path(trial)

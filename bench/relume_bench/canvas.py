@@ -1,9 +1,9 @@
-"""canvas.edit_to_pixels_ms: from the pointer's event to the frame on the canvas, in headless Chromium on this machine.
+"""canvas.edit_to_pixels_ms: from the pointer event to the frame on the canvas, in headless Chromium on this machine.
 
 The editor on the built-in scene at 640×480; the slider of the teapot's highlight width ("Exponent along" of its
-ashikhmin_shirley term) is dragged. Both ends are on
-the browser's clock, taken by the editor itself (`window.relumeStats`): the input event, and the draw of the
-frame. The browser, its software rasteriser and the server share the cores.
+ashikhmin_shirley term) is dragged. Both ends are on the browser's clock, recorded by the editor itself
+(`window.relumeStats`): the input event, and the drawing of the frame. The browser, its software rasterizer and the
+server share the cores.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from relume_server.settings import Settings
 
 _NAMES = ("canvas.edit_to_pixels_ms.p50", "canvas.edit_to_pixels_ms.p95")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-# Chromium as it is on a machine without a GPU: its own compositor, WebGL by SwiftShader where it is allowed to
+# Chromium on a machine without a GPU: its own compositor, WebGL by SwiftShader if enabled
 ARGUMENTS = ["--no-sandbox", "--enable-unsafe-swiftshader", "--disable-background-networking"]
 _READY_TIMEOUT_S = 90.0
 _AT_ONCE_MS, _QUIET_MS = 500, 100
@@ -89,9 +89,9 @@ def _drag(browser: str, url: str, num_moves: int) -> list[float]:
 
 
 def _wait_until_frozen(page: Any, move: Callable[[int], None]) -> None:
-    """Move a little now and then until frames come at once: what the slider moves is frozen then.
+    """Drag in small steps until frames come at once, because the operator of the slider is ready.
 
-    The page's policy forbids it to evaluate strings, so the waiting is done here.
+    The page's policy forbids evaluating strings, so the wait is done here.
     """
     deadline, k, in_a_row = time.monotonic() + _READY_TIMEOUT_S, 0, 0
     while in_a_row < 3:
@@ -106,10 +106,10 @@ def _wait_until_frozen(page: Any, move: Callable[[int], None]) -> None:
 
 
 def _wait_until_quiet(page: Any) -> None:
-    """Wait until the server has shaded and frozen all that it wants: edits are painted beside that, but slower."""
+    """Wait until the server has finished all shading and precomputing, which would slow frames down."""
     deadline, in_a_row = time.monotonic() + _READY_TIMEOUT_S, 0
     while in_a_row < _QUIET_LOOKS:
         if time.monotonic() > deadline:
-            raise TimeoutError("the server does not come to rest")
+            raise TimeoutError("the server does not become idle")
         in_a_row = in_a_row + 1 if page.locator("footer progress").count() == 0 else 0
         page.wait_for_timeout(_QUIET_MS)

@@ -1,11 +1,11 @@
-"""probes.canvas_fps: pictures a second that this machine's browser draws itself while the eye moves.
+"""probes.canvas_fps: frames per second that this machine's browser renders itself while the camera moves.
 
-The editor on the Cornell box, 40k points, 640×480; the mouse drags round and round. Headless Chromium without a GPU
-draws by its software rasteriser, with one sample a pixel, on the same cores as everything else; a browser like that is
-given to the server by itself, whose pictures a second over the same drag stand beside (`server_fps`), as do the bytes
-that came over the network for each picture. So do seconds and bytes from opening the editor to the first picture that
-the browser drew (`first_s`, `first_bytes`), and the bytes of each frame while a hand turns the environment and once it
-rests (`turn_bytes`, `turned_bytes`).
+The editor on the Cornell box, 40k probes, 640×480; the mouse orbits. Headless Chromium without a GPU renders with its
+software rasterizer, one sample per pixel, on the same cores as everything else; by default the server renders for such
+a browser. The server's frames per second over the same drag are in the context (`server_fps`), as are the network bytes
+per frame, seconds and bytes from opening the editor to the first frame rendered by the browser (`first_s`,
+`first_bytes`), and the bytes of each frame while the environment is rotated and afterwards (`turn_bytes`,
+`turned_bytes`).
 """
 
 from __future__ import annotations
@@ -66,8 +66,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 class _Received:
-    """What has come over the session since it was last cleared: the sizes of frames of each kind, and all bytes; and
-    whether the last of them held all functions."""
+    """Messages since the last `clear`: frame sizes by kind, total bytes, and whether the last one had all functions."""
 
     def __init__(self) -> None:
         self.clear()
@@ -81,11 +80,11 @@ class _Received:
         for kind, sizes in self.frames.items():
             if isinstance(message, bytes) and f'"kind":"{kind}"'.encode() in message[:600]:
                 sizes.append(len(message))
-                self.is_converged = b'"fidelity":"approximate"' in message[:600]  # no longer what was found quickly
+                self.is_converged = b'"fidelity":"approximate"' in message[:600]  # no longer the quick approximation
 
 
 def _drag(browser: str, url: str, renderer: str, moves: int) -> dict[str, Any]:
-    """Turn the eye round and round, drawn by one of both; then, where that is the browser, the environment."""
+    """Orbit the camera with one of both renderers; with the browser's, rotate the environment as well."""
     from playwright.sync_api import sync_playwright
 
     received = _Received()
@@ -122,14 +121,14 @@ def _drag(browser: str, url: str, renderer: str, moves: int) -> dict[str, Any]:
 
 
 def _first(page: Any, received: _Received) -> dict[str, float]:
-    """Seconds and bytes until the browser has drawn a picture, on the page's own clock."""
+    """Seconds and bytes until the browser has rendered a frame, on the page's own clock."""
     page.wait_for_function("() => window.relumeStats && window.relumeStats.drawnHere > 0", timeout=_READY_TIMEOUT_MS)
     current_ms, loaded = page.evaluate(_LOADED)
     return {"first_s": current_ms / 1e3, "first_bytes": loaded + received.num_bytes}
 
 
 def _rotate_environment(page: Any, received: _Received) -> dict[str, float]:
-    """Drag the slider of its rotation, and let go: the largest frame meanwhile, and afterwards."""
+    """Drag the slider of the rotation, and release it: largest frame during and after the drag."""
     slider = page.get_by_role("slider", name="Rotation").first
     slider.scroll_into_view_if_needed()
     page.wait_for_timeout(1000)
@@ -152,7 +151,7 @@ def _rotate_environment(page: Any, received: _Received) -> dict[str, float]:
 
 
 def _orbit_camera(page: Any, x: float, y: float, moves: int) -> None:
-    """Move the mouse about a place."""
+    """Move the mouse in circles."""
     for k in range(moves):
         page.mouse.move(x + 60 * math.sin(k / 10), y + 10 * math.cos(k / 7))
         page.wait_for_timeout(1000 / 60)

@@ -1,9 +1,9 @@
-"""freeze.curve_switch_s: what a user waits who touches another curve of a two-curve term.
+"""freeze.curve_switch_s: waiting time of a user who starts to edit another curve of a two-curve term.
 
-17,700 view samples of the teapot × 4,000 light triangles, cook_torrance; the rough operator along θh (256 bands, θd
-contracted) and the one along θd (64 bands, θh contracted), by which the picture follows the hand until the exact one is
-there. The larger of the two medians counts. In the row: the same of the exact ones, and how far the rough one is from
-what the exact one makes of a change of the curve, as a share of that change.
+17,700 view samples of the teapot × 4,000 environment triangles, cook_torrance; the merged-light operator along θh (256
+bands, θd contracted) and the one along θd (64 bands, θh contracted), which update the image until the exact one is
+ready. The larger of the two medians counts. In the context: the same for the exact operators, and the error of the
+merged-light operator for a change of the curve, relative to that change.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from relume_bench.timing import time_interleaved
 
 
 def lit_teapot(term: dict[str, Any], tiny: bool) -> LitSamples:
-    """View samples of a teapot, all of one term, with their light triangles and what they see of them."""
+    """View samples of a teapot of one term, with their visible environment triangles."""
     num_positions, num_lights, size = (100, 200, (64, 64)) if tiny else (17_700, 4000, (320, 320))
     return sample_lit_surface(teapot_on_table(studio(), (term,), (term,)), size, num_positions, num_lights, material=0)
 
 
 def merge_lights(lit_samples: LitSamples) -> LitSamples:
-    """The same with the lights merged that an operator is made of first."""
+    """Merge the lights as for a merged-light operator."""
     radiance, num = studio().radiance, lit_samples.lights.num_lights
     return replace(
         lit_samples, lights=cluster_lights(lit_samples.lights, choose_tiles(radiance, num), num_clusters(num))
@@ -45,10 +45,10 @@ def merge_lights(lit_samples: LitSamples) -> LitSamples:
 def error_of_change(
     lit_samples: LitSamples, merged: LitSamples, before: dict[str, Any], after: dict[str, Any], curve: str
 ) -> float:
-    """How far T Δc of merged lights is from that of all, relative RMSE.
+    """Error of T Δc with merged lights against all lights, relative RMSE.
 
     Args:
-        lit_samples, merged: points with lights. before, after: documents whose `curve` differs.
+        lit_samples, merged: points with lights. before, after: documents with different `curve`.
     """
     declared = TERMS[before["model"]].curve(curve)
     change = analysis(curve_bands(after, declared)) - analysis(curve_bands(before, declared))
@@ -63,7 +63,7 @@ def error_of_change(
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Freeze along both curves in turn."""
+    """Freeze along both curves, alternating."""
     term = cook_torrance(0.2)
     document = complete_term(("curve_switch",), term, None)
     lit_samples = lit_teapot(document, tiny)

@@ -1,6 +1,6 @@
-"""freeze.terms_s: `freeze.curve_switch_s` for every curve of every analytic term; the longest, all of them in the row.
+"""freeze.terms_s: `freeze.curve_switch_s` for every curve of every analytic term; the longest, all in the context.
 
-Parameters are those of `relume_bench.accuracy_terms`. One uncounted round each, which compiles, then one that counts.
+Parameters as in `relume_bench.accuracy_terms`. One warm-up round each, which compiles, then one that counts.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from relume_bench.timing import time_interleaved
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Time the freeze of one curve after another."""
+    """Time the freeze of each curve."""
     documents = [complete_term(("curve_switch",), term, None) for term in (LAMBERT, *(term for _, term, _ in CASES))]
     lit_samples = lit_teapot(documents[0], tiny)
     merged, durations = merge_lights(lit_samples), {}

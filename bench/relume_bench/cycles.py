@@ -1,7 +1,7 @@
-"""Hands scenes to Blender's Cycles, which lives in its own environment.
+"""Render scenes with Blender's Cycles, in its own environment.
 
-`python3.11 -m venv bench/.venv-cycles` and `bench/.venv-cycles/bin/pip install bpy==5.0.1`, which asks for Python 3.11,
-or RELUME_CYCLES_PYTHON names an interpreter that has it.
+`python3.11 -m venv bench/.venv-cycles` and `bench/.venv-cycles/bin/pip install bpy==5.0.1`, which needs Python 3.11; or
+set RELUME_CYCLES_PYTHON to an interpreter with it.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from relume.scene.model import Scene
 
 
 def missing() -> str | None:
-    """What Cycles lacks to run here; None where it can."""
+    """Reason why Cycles cannot run here; None if it can."""
     return (
         None
         if _interpreter()
-        else "Blender's bpy is not installed; bench/relume_bench/cycles.py says where it is looked for"
+        else "Blender's bpy is not installed; bench/relume_bench/cycles.py describes the installation"
     )
 
 
@@ -37,15 +37,15 @@ def render(
     scene: Scene, size: tuple[int, int], materials: Sequence[Mapping[str, Any]], spp: Sequence[int], bounces: int,
     folder: Path,
 ) -> dict[str, Any]:  # fmt: skip
-    """Let Cycles render the scene's first view at rising sample counts, all light, with two seeds each.
+    """Render the scene's first view with Cycles at increasing sample counts, all light, with two seeds each.
 
     Args:
-        scene: handed over as arrays. size: width and height, pixels.
-        materials: of each mesh "diffuse" and "glossy" colours, and "roughness".
-        spp: sample counts, rising. bounces: reflections of a path at most.
-        folder: where files of the exchange are written.
+        scene: passed as arrays. size: width and height, pixels.
+        materials: for each mesh "diffuse" and "glossy" colors, and "roughness".
+        spp: increasing sample counts. bounces: maximum number per path.
+        folder: for exchanged files.
     Returns:
-        "version", and "steps" with "spp", "seconds" of one picture and its "noise", absolute. Writes picture.npy.
+        "version", and "steps" with "spp", "seconds" per image and its absolute "noise". Writes picture.npy.
     """
     camera = scene.cameras[0]
     arrays: dict[str, Any] = {"camera": camera.to_world, "environment": scene.environment.radiance}

@@ -1,9 +1,9 @@
-"""demo.preview_s, demo.bake_s and demo.first_picture_s: what somebody waits who runs `relume demo`.
+"""demo.preview_s, demo.bake_s and demo.first_picture_s: waiting times of `relume demo`.
 
-The bakes are the demo's own with indirect light, of both views: the preview at 320×240 and 300 lights, with which
-people begin, and the one at 640×480 and 2,000 lights that takes its place. Each from submitting to `ready`, alone, the
-start of worker processes included where it needs some. The first picture: from the start of the server process to the
-first frame of a session on the finished bake; once when the bake has never been opened, and once more.
+The demo's own bakes with indirect light, of both views: the preview at 320×240 and 300 lights, and the bake at 640×480
+and 2,000 lights that replaces it. Each from submitting to `ready`, alone, including the start of worker processes if
+needed. First image: from the start of the server process to the first frame of a session on the finished bake; once for
+a bake that was never opened, and once more.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Pictures of docs/indirect-light.md: reflected light by us and by Mitsuba, and how far they are apart.
-
-python -m relume_bench.error_map SCENE FILE.jpg     SCENE is one of relume_bench.gather_scenes
-"""
+"""Images for docs/indirect-light.md: indirect light by relume and by Mitsuba, and their difference."""
 
 from __future__ import annotations
 
@@ -16,8 +13,8 @@ from relume_bench.gather_scenes import Pair, render_pair
 
 F64 = NDArray[np.float64]
 
-_BLOCK = 4  # pixels a side: noise of Mitsuba's that is left is a quarter
-_FULL = 0.1  # of the root mean square has full colour
+_BLOCK = 4  # pixels per side: leaves a quarter of Mitsuba's noise
+_FULL = 0.1  # of the RMS is full color
 _WHITE = 3.0  # of it is white
 
 

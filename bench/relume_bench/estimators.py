@@ -1,9 +1,10 @@
-"""estimators.*: light on view samples by final-gather rays, and by connecting gather cells to every sample.
+"""estimators.*: indirect light at view samples by final-gather rays, and by connecting patches to every sample.
 
-The second is Nguyen's, E(x) = Σ_g V(x, g) L_g cos θx cos θg A_g / max(r², A_g / π), one shadow ray a cell, areas by
-points spread evenly on the triangles. Cells are merged along their tree to as many as there are gather rays, or as many
-as their visibility bits take the store of the links, or not at all. Both see the same light on the same cells; truth is
-the mean of many gather rays. Relative RMSE of the irradiance of samples all over the picture, none shared.
+The second is Nguyen's, E(x) = Σ_g V(x, g) L_g cos θx cos θg A_g / max(r², A_g / π), one shadow ray per patch, areas by
+points distributed evenly on the triangles. Patches are merged along their tree to as many as there are gather rays, or
+as many as their visibility bits fit into the store of the gather hits, or not at all. Both use the same light on the
+same patches; the reference is the mean of many gather rays. Relative RMSE of the irradiance of samples all over the
+image, none shared.
 """
 
 from __future__ import annotations
@@ -86,13 +87,13 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _without_the_worst(estimate: F64, reference: F64) -> float:
-    """Relative RMSE over all but the hundredth of samples that are furthest off."""
+    """Relative RMSE without the worst hundredth of the samples."""
     squared_errors = np.sort(((estimate - reference) ** 2).mean(axis=1))[: round(0.99 * len(reference))]
     return float(np.sqrt(squared_errors.mean() / np.mean(reference**2)))
 
 
 def _areas(geometry: SceneBuffers, tree: PatchTree, num_patches: int, num_samples: int) -> F64:
-    """Of every cell, m². (C,)"""
+    """Areas of all patches, m². (C,)"""
     rng = np.random.default_rng(_SEED)
     a, b, c = geometry.positions[geometry.faces].astype(np.float64).transpose(1, 0, 2)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
@@ -112,7 +113,7 @@ def _areas(geometry: SceneBuffers, tree: PatchTree, num_patches: int, num_sample
 
 
 def _merge_patches(position: Any, normal: Any, area: F64, radiance: F64, count: int) -> tuple[Any, Any, F64, F64]:
-    """Neighbours in the tree as one: the place of the middle one, all their area and power."""
+    """Merge neighbors in the tree: position of the middle one, total area and power."""
     bounds = np.linspace(0, len(area), count + 1).astype(np.int64)
     middle, total = (bounds[:-1] + bounds[1:]) // 2, np.add.reduceat(area, bounds[:-1])
     power = np.add.reduceat(area[:, None] * radiance, bounds[:-1])
@@ -122,7 +123,7 @@ def _merge_patches(position: Any, normal: Any, area: F64, radiance: F64, count: 
 def _connect_to_patches(
     geometry: SceneBuffers, surface_points: SurfacePoints, patches: tuple[Any, Any, F64, F64]
 ) -> F64:
-    """E of points. (n, 3)"""
+    """Irradiance of points. (n, 3)"""
     position, normal, area, radiance = patches
     out = np.zeros((len(surface_points.position), 3))
     for p, (x, n) in enumerate(zip(surface_points.position, surface_points.normal, strict=True)):

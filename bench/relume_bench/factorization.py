@@ -1,11 +1,11 @@
-"""factorization.*: how many terms ρ(ωi, ωo) = Σ_k σ_k h_k(ωo) g_k(ωi), the factorization of a BRDF, needs, by its SVD.
+"""factorization.*: number of terms of the factorization ρ(ωi, ωo) = Σ_k σ_k h_k(ωo) g_k(ωi) of a BRDF, by its SVD.
 
 The laws of Mahajan, Tseng and Ramamoorthi 2008: 2.5 s for Phong's exponent s, and a constant over σ² for the half-angle
 Gaussian of Torrance and Sparrow (eq. 14). The norm is theirs: 99 % of the energy, both directions on the hemisphere,
-all solid angles alike, no cosine. That is 10 % RMS; `terms_for_2_percent` says what 2 % RMS take.
+uniform in solid angle, no cosine. That is 10 % RMS; `terms_for_2_percent` is the number for 2 % RMS.
 
-An isotropic BRDF depends on φi − φo alone, so that its SVD falls into one for each frequency m of that angle, and what
-is above m = 0 counts twice, as cosine and as sine.
+An isotropic BRDF depends on φi − φo only, so its SVD splits into one for each frequency m of that angle; those with m >
+0 count twice, as cosine and as sine.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from relume_bench.figure import Figure
 
 F64 = NDArray[np.float64]
 Brdf = Callable[[F64, F64], F64]
-"""Of cosines: of the mirror direction's angle, of the half angle."""
+"""Functions of cosines: of the angle to the mirror direction, of the half angle."""
 
 ENERGY = 0.99
 EXPONENTS, SIGMAS = (10.0, 20.0, 30.0, 60.0, 100.0), (0.1, 0.15, 0.2, 0.3)
@@ -68,9 +68,9 @@ def _torrance_sparrow(sigma: float) -> Brdf:
 
 
 def _energies(brdf: Brdf, size: int) -> F64:
-    """Squared singular values, largest first. size: zenith angles of either direction, by Gauss and Legendre."""
+    """Squared singular values, largest first. size: zenith angles of either direction, by Gauss–Legendre."""
     node, weight = np.polynomial.legendre.leggauss(size)
-    cosine, weight = (node + 1) / 2, weight / 2  # of the zenith angle, whose solid angle is even
+    cosine, weight = (node + 1) / 2, weight / 2  # of the zenith angle, uniform in solid angle
     sine, azimuth = np.sqrt(1 - cosine**2), np.pi * (np.arange(2 * size) + 0.5) / (2 * size)
     level = np.outer(cosine, cosine)[:, :, None]
     across = np.outer(sine, sine)[:, :, None] * np.cos(azimuth)

@@ -1,4 +1,4 @@
-"""What a benchmark says: a name, a value, its unit, and how it came about."""
+"""Result of a benchmark: name, value, unit, and context."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ class Figure:
     """One line of `relume bench`.
 
     Attributes:
-        value: None where it could not be measured; then the context says why in "skipped".
+        value: None if it could not be measured; the context has the reason in "skipped".
         context: sizes, both sides of a ratio, the parts of a maximum.
-        standard_error: of a value that is a Monte Carlo estimate, in the same unit; None of all others.
+        standard_error: of a Monte Carlo estimate, in the same unit; None for all others.
     """
 
     name: str
@@ -24,10 +24,10 @@ class Figure:
 
 
 def skipped(names: tuple[str, ...], unit: str, why: str) -> list[Figure]:
-    """Figures that this machine cannot give.
+    """Figures that this machine cannot measure.
 
     Args:
-        names: of the figures. unit: that they would have.
-        why: a sentence for their rows.
+        names: of the figures. unit: of the figures.
+        why: sentence for the context.
     """
     return [Figure(name, None, unit, {"skipped": why}) for name in names]

@@ -1,10 +1,9 @@
-"""flood.latency_ratio: another session's edit → frame beside flooding viewers ÷ alone, p50, the worse of one and four.
+"""flood.latency_ratio: edit latency with flooding viewers ÷ without, p50, the worse of one and four viewers.
 
-A real server in its own process, the picture of `relume_bench.session`. A client edits and waits for the frame, with a
-rest in between as a hand has. In turn, on the same session: alone, beside one and beside four viewers,
-each in a process of its
-own that sends messages as fast as its socket takes them, and comes back if it is told to go: acknowledgements, edits of
-the exposure, and edits that are refused, in turn.
+A real server in its own process, the image of `relume_bench.session`. A client edits and waits for the frame, with a
+pause in between as in a drag. On the same session, alternating: alone, with one and with four viewers, each in a
+process of its own that sends messages as fast as its socket accepts them, and reconnects if it is disconnected:
+acknowledgments, edits of the exposure, and rejected edits, alternating.
 """
 
 from __future__ import annotations
@@ -34,23 +33,21 @@ _START_S = 60.0
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Bake, serve, edit alone and beside floods, in turn."""
+    """Bake, serve, edit without and with floods, alternating."""
     size, num_lights, rounds, seconds = ((64, 64), 60, 1, 0.3) if tiny else ((512, 512), 1000, 3, 4.0)
     scene = teapot_on_table(studio(), (LAMBERT, cook_torrance(0.2)), (LAMBERT,))
     room = secrets.token_hex(16)
     latencies: dict[tuple[str, int], list[float]] = {}
     with (
         baked_folder(scene, Recipe("direct", ("front",), size, num_lights)) as data_folder,
-        serving(
-            data_folder, {"RELUME_MAX_PEOPLE": "64"}
-        ) as server,  # those that were killed keep their place for a while
+        serving(data_folder, {"RELUME_MAX_PEOPLE": "64"}) as server,  # killed viewers stay members for a while
         session(server, data_folder.bake) as client,
         _flood_room(server, data_folder, room),
     ):
         client.send_message(type="prepare", curve="/materials/Teapot/terms/1/curves/theta_h")
         client.exact(0)
         slider_client = _SliderClient(client)
-        slider_client.edit(seconds)  # what is made once is made
+        slider_client.edit(seconds)  # one-time work is done first
         for _ in range(rounds):
             for kind in FLOOD_TYPES:
                 for number in (0, 1, 4):
@@ -65,7 +62,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 class _SliderClient:
-    """Moves a slider a little, again and again."""
+    """Drags a slider in small steps."""
 
     def __init__(self, client: SessionClient) -> None:
         self._client, self._revision = client, 0
@@ -89,7 +86,7 @@ class _SliderClient:
 
 @contextmanager
 def _flood_room(server: Server, data_folder: BakedFolder, room: str) -> Iterator[None]:
-    """An editor who does nothing is in the room, so that others can watch."""
+    """Keep an idle editor in the room, so that viewers can join."""
     address = f"{server.session(data_folder.bake)}?room_prefix={room[:8]}"
     with connect(address, subprotocols=[SPEAKS], max_size=None, max_queue=None, compression=None) as editor:
         editor.send(json.dumps({"type": "open", "room": room}))
@@ -108,7 +105,7 @@ def _flooding(server: Server, data_folder: BakedFolder, watch: str, kind: str, n
     try:
         for each in start_events:
             if not each.wait(_START_S):
-                raise PlanError("the server takes nothing of a flood")
+                raise PlanError("the server does not read the flood")
         yield
     finally:
         for viewer in viewers:

@@ -1,4 +1,4 @@
-"""Viewers that send as fast as the server takes it, each in a process of its own. They are no load themselves."""
+"""Viewers that send as fast as the server reads, each in a process of its own, with little load of their own."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from websockets.sync.client import ClientConnection, connect
 FLOOD_TYPES = ("acknowledgements", "exposure", "refused")
 SPEAKS = Subprotocol("relume.v2")
 _AT_ONCE, _REST_S = 20_000, 0.5
-_BEFORE_S = 2.0  # until the server has taken what it takes of a burst
+_BEFORE_S = 2.0  # until the server has read the initial burst
 
 
 def flood(address: str, watch: str, kind: str, started: Event) -> None:
-    """Send as fast as can be, until killed.
+    """Send as fast as possible, until killed.
 
     Args:
-        address: of the session. watch: opens its room to a viewer. kind: one of `FLOOD_TYPES`.
-        started: set when it has been at it for a while.
+        address: of the session. watch: view token of the room. kind: one of `FLOOD_TYPES`.
+        started: set after a while of sending.
     """
     block = b"".join(_frame(_message(kind, revision)) for revision in range(1, _AT_ONCE))
     threading.Timer(_BEFORE_S, started.set).start()
@@ -37,7 +37,7 @@ def flood(address: str, watch: str, kind: str, started: Event) -> None:
             threading.Thread(target=_read, args=(viewer,), daemon=True).start()
             while True:
                 viewer.socket.sendall(block)
-        time.sleep(_REST_S)  # else it would be a flood of connections
+        time.sleep(_REST_S)  # otherwise it would flood connections
 
 
 def _read(viewer: ClientConnection) -> None:
@@ -47,7 +47,7 @@ def _read(viewer: ClientConnection) -> None:
 
 
 def _frame(message: dict[str, object]) -> bytes:
-    """A text frame as clients send it (RFC 6455), masked by zeros."""
+    """Build a client's text frame (RFC 6455), masked with zeros."""
     payload = json.dumps(message).encode()
     length = struct.pack("!B", 128 + len(payload)) if len(payload) < 126 else struct.pack("!BH", 254, len(payload))
     return b"\x81" + length + bytes(4) + payload

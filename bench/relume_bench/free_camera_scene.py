@@ -1,4 +1,4 @@
-"""A built-in scene with views that move, as somebody moves an eye, a material or a light in it."""
+"""A built-in scene baked for a free camera, with drags of the camera, a material or a light."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ from relume.store.bake_protocol import Recipe
 from relume_bench.background_jobs import BackgroundJobs
 from relume_bench.timing import percentiles
 
-_MOVED = 0.01  # of the distance to the target, each frame
+_MOVED = 0.01  # of the distance to the target, per frame
 _CACHE_BYTES = 4 << 30
 _GOLDEN = 0.618
-_UNCOUNTED = 4  # drags; what is made beside them takes some tenths of a second each time
+_NUM_WARM_UP = 4  # warm-up drags; their jobs take some tenths of a second each time
 
 
 class Drag(NamedTuple):
-    """Times of its frames.
+    """Frame times of a drag.
 
     Attributes:
-        seconds: of each. lag_s: how old the look is whose light between surfaces is shown, the median.
+        seconds: of each frame. lag_s: median age of the look whose indirect light is shown.
     """
 
     seconds: list[float]
@@ -46,24 +46,24 @@ class Drag(NamedTuple):
 
     @property
     def median_s(self) -> float:
-        """Of the frames."""
+        """Median frame time."""
         return float(np.median(self.seconds))
 
     def summarize(self) -> dict[str, float]:
-        """What a context tells of it: milliseconds, and frames a second of all."""
+        """Summary for a context: milliseconds, and frames per second over all frames."""
         p50, p95 = percentiles(self.seconds)
         per_second = len(self.seconds) / sum(self.seconds)
         return {"p50_ms": 1e3 * p50, "p95_ms": 1e3 * p95, "per_s": per_second, "lag_ms": 1e3 * self.lag_s}
 
 
 def run_update_jobs(picture: FreeCameraPicture) -> None:
-    """What is made beside the frames while a hand moves, made now."""
+    """Run the background jobs of a drag now."""
     while (job := picture.next_job()) is not None and not job.is_refinement:
         _run_job(picture, job)
 
 
 def run_light_jobs(picture: FreeCameraPicture | Picture) -> None:
-    """What follows when a hand rests: all its light is found; not the finer frame, which is no matter of light."""
+    """Run the light jobs after a drag: all light is computed, without the refined frame, which is independent of it."""
     while (job := picture.next_job()) is not None and not isinstance(job, RefineHighlights):
         _run_job(picture, job)
 
@@ -74,11 +74,11 @@ def _run_job(picture: FreeCameraPicture | Picture, job: Any) -> None:
 
 
 class FreeCameraScene:
-    """A built-in scene, baked with views that move.
+    """A built-in scene, baked for a free camera.
 
     Args:
-        name: of the scene. folder: for its stores. size: of pictures. tiny: whether it is a trial.
-        num_probes: about how many; None: 50,000.
+        name: of the scene. folder: for its stores. size: of images. tiny: a trial run.
+        num_probes: approximate number; None: 50,000.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class FreeCameraScene:
         bake_in_process(METHODS["probes"], self._scene, self.recipe, path)
         self.bake_s = time.perf_counter() - start_time
         self.num_bytes = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
-        self._num_drags, self._num_uncounted = 0, 1 if tiny else _UNCOUNTED
+        self._num_drags, self._num_warm_up = 0, 1 if tiny else _NUM_WARM_UP
         self.bake = open_bake(path, Cache(_CACHE_BYTES))
         assert isinstance(self.bake, BakedFreeCamera)
         self.free_camera_bake = self.bake
@@ -106,17 +106,17 @@ class FreeCameraScene:
 
     @property
     def scene(self) -> Scene:
-        """As it was made."""
+        """The original scene."""
         return self._scene
 
     def look(self, change: Callable[[dict[str, Any]], None] = lambda document: None) -> Look:
-        """The scene's own, changed."""
+        """The scene's default look, modified."""
         document = copy.deepcopy(complete({}, self.free_camera_bake.default_look))
         change(document)
         return validate(document, self.free_camera_bake.default_look)
 
     def picture(self, look: Look, *, is_watched: bool = False) -> FreeCameraPicture:
-        """A picture with that look, all its light there."""
+        """A live image with this look and all its light."""
         picture = FreeCameraPicture(self.free_camera_bake, self.recipe.views[0], is_watched=is_watched)
         picture.set_look(look)
         picture.advance(None)
@@ -126,7 +126,7 @@ class FreeCameraScene:
     def time_camera_moves(
         self, frames: int, change: Callable[[dict[str, Any]], None] = lambda document: None
     ) -> list[float]:
-        """Seconds from an eye to its encoded frame, each once; of a changed look. Somebody watches."""
+        """Seconds from each camera to its encoded frame, with a modified look. Interactive."""
         picture, camera = self.picture(self.look(change), is_watched=True), self._scene.cameras[0]
 
         def move(k: int) -> None:
@@ -144,14 +144,13 @@ class FreeCameraScene:
         is_watched: bool = False,
         on_frame: Callable[[FreeCameraPicture, int], None] = lambda picture, k: None,
     ) -> Drag:
-        """A look after the other, each as soon as the frame of the one before is encoded.
+        """Show one look after another, each as soon as the frame of the previous one is encoded.
 
         Args:
-            frames: how many. change: of the look's document, by the share of the way. is_watched: somebody waits.
-            on_frame: what else happens to the picture in each frame.
+            frames: number. change: of the look's document, by the fraction of the drag. is_watched: interactive.
+            on_frame: other changes to the image in each frame.
         Returns:
-            Seconds from each look to its frame. No two drags come to the same values: what an edit is projected to is
-            found in each.
+            Seconds from each look to its frame. No two drags use the same values, because results of edits are cached.
         """
 
         def drag() -> Drag:
@@ -169,12 +168,12 @@ class FreeCameraScene:
 
             return self._timed(picture, frames, apply_edit)
 
-        for _ in range(self._num_uncounted):  # of a process just begun, kernels are loaded and memory is touched first
+        for _ in range(self._num_warm_up):  # in a new process kernels are loaded and memory is touched first
             drag()
         return drag()
 
     def measure_visible_fraction(self, material: str) -> float:
-        """Share of the first view's pixels that show a material."""
+        """Fraction of the first view's pixels that show a material."""
         face = look_around(
             self.free_camera_bake.stored_scene, self.free_camera_bake.embree, self._scene.cameras[0], self.size
         ).hits.face
@@ -196,7 +195,7 @@ class FreeCameraScene:
         return Drag(frame_times, background.lag_s)
 
     def exact(self, change: Callable[[dict[str, Any]], None]) -> NDArray[np.float32]:
-        """The picture of a fixed view from the same place."""
+        """Exact image of a fixed view from the same camera."""
         path = self.folder / f"{self.name}-gather.zarr"
         if not path.exists():
             bake_in_process(METHODS["gather"], self._scene, replace(self.recipe, method="gather"), path)
@@ -204,12 +203,12 @@ class FreeCameraScene:
         return render_image(transfer, self.recipe.views[0], self.look(change))[..., :3]
 
     def inner(self) -> NDArray[np.bool_]:
-        """Pixels whose neighbours see the same face's plane: no edge of an object. (height, width)"""
+        """Mask of pixels whose neighbors are in the same face's plane: no object edges. (height, width)"""
         gbuffer = look_around(
             self.free_camera_bake.stored_scene, self.free_camera_bake.embree, self._scene.cameras[0], self.size
         )
         width, height = self.size
-        num = width * height  # the first rays go through the middles of pixels
+        num = width * height  # the first rays go through pixel centers
         face = gbuffer.hits.face[:num].reshape(height, width)
         normal = np.where(face[..., None] >= 0, self.free_camera_bake.stored_scene.face_normal[np.maximum(face, 0)], 0)
         offset = (gbuffer.hits.distance[:num, None] * gbuffer.directions[:num]).reshape(height, width, 3)
@@ -223,5 +222,5 @@ class FreeCameraScene:
 
 
 def rotated(document: dict[str, Any], fraction: float) -> None:
-    """Turn the environment by a share of a quarter turn."""
+    """Rotate the environment by a fraction of a quarter turn."""
     document["environment"]["rotation"] = 90 * fraction

@@ -1,8 +1,8 @@
-"""gather.*: what somebody waits who edits a picture with light between surfaces.
+"""gather.*: waiting times when editing an image with indirect light.
 
-The Cornell box under the sky at 400×400 with 2,000 lights and 16,000 gather cells, its floor half glossy. The bake is
-in one process with all threads, after a tiny one that compiles. The edit: the exponent of the floor's highlight moves
-between 3 and 300, from the look to the encoded bytes, all bounces kept; its operator is frozen once before.
+The Cornell box under the environment at 400×400 with 2,000 lights and 16,000 patches, its floor half glossy. The bake
+is in one process with all threads, after a tiny one that compiles. The edit: the exponent of the floor's highlight
+moves between 3 and 300, from the look to the encoded bytes, all bounces included; its operator is precomputed.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ _SPEED = "frames/s"
 
 
 class Baked(NamedTuple):
-    """A bake, and how it went.
+    """A bake, and its cost.
 
     Attributes:
-        wall_s: of it. context: its parts.
+        wall_s: total. context: its parts.
     """
 
     path: Path
@@ -69,18 +69,18 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def make_recipe(tiny: bool) -> Recipe:
-    """The recipe that is measured, or, where tiny, one that bakes in a second."""
+    """The measured recipe, or with `tiny` one that bakes in a second."""
     return Recipe("gather", ("front",), *(((40, 40), 60) if tiny else ((400, 400), 2000)))
 
 
 def bake(scene: Scene, recipe: Recipe, target: Path) -> Baked:
-    """Bake in this process by the method `gather`.
+    """Bake in this process with the method `gather`.
 
     Args:
-        scene: that is baked. recipe: how.
+        scene: to bake. recipe: of the bake.
         target: folder of the store.
     Returns:
-        Where the store is, wall seconds, and wall and tracing seconds and rays of every stage.
+        The store, wall seconds, and wall and tracing seconds and rays of every stage.
     """
     method, stages = (
         GatherMethod(),
@@ -104,28 +104,28 @@ def bake(scene: Scene, recipe: Recipe, target: Path) -> Baked:
 
 
 def store_mb(path: Path) -> float:
-    """Content of all files, 10⁶ bytes."""
+    """Size of all files, 10⁶ bytes."""
     return sum(file.stat().st_size for file in path.rglob("*") if file.is_file()) / 1e6
 
 
 def open_exact_picture(transfer: FixedViewTransfer) -> Picture:
-    """A picture at rest."""
+    """A converged image."""
     picture = Picture(transfer, "front", Cache(4 << 30))
     run_until_exact(picture)
     return picture
 
 
 def run_until_exact(picture: Picture) -> None:
-    """Make all that is lacking."""
+    """Run all pending jobs."""
     while not picture.advance(None).exact or picture.next_job() is not None:
         if picture.next_job() is not None:
             picture.run_next_job(lambda share: None, lambda: False)
 
 
 def _time_freezes(transfer: FixedViewTransfer, picture: Picture) -> dict[str, float]:
-    """Seconds until the picture follows a hand on the floor's highlight, and until its operators are exact ones.
+    """Seconds until the image follows a drag of the floor's highlight, and until its operators are exact.
 
-    Both are made once before, which compiles. The last one made stays the one that the picture follows.
+    Both are computed once before, which compiles. The last one stays installed.
     """
     warm, durations = open_exact_picture(transfer), dict[str, float]()
     for pointer in ("curves/theta_h", "params/exponent"):
@@ -141,11 +141,12 @@ def _time_freezes(transfer: FixedViewTransfer, picture: Picture) -> dict[str, fl
 
 
 def edit_frames_s(transfer: FixedViewTransfer, picture: Picture, num_frames: int) -> list[float]:
-    """Seconds of each frame but the first, from the look to the encoded bytes, while the floor's exponent is dragged.
+    """Seconds of each frame except the first, from the look to the encoded bytes, while the floor's exponent is
+    dragged.
 
     Args:
         transfer: the opened bake, with its default look.
-        picture: of it, at rest, what a hand needs made before.
+        picture: converged image, with the drag's operator.
         num_frames: looks of the drag.
     """
     durations = []

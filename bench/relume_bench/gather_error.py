@@ -1,9 +1,8 @@
-"""gather.rmse_diffuse and gather.rmse_glossy: the picture's reflected light against Mitsuba's path tracer.
+"""gather.rmse_diffuse and gather.rmse_glossy: the image's indirect light against Mitsuba's path tracer.
 
-The bake of bench/gather.py. Diffuse: the whole picture, its floor's highlight taken away. Glossy: the highlight of the
-floor alone (exponent 100) over the floor's pixels, lit by surfaces that reflect diffusely. Direct light is in neither,
-and Mitsuba has as many bounces as we have. Its own noise is taken off:
-`relume_bench.standard_error.compare_with_passes`.
+The bake of `relume_bench.gather`. Diffuse: the whole image without its floor's highlight. Glossy: only the highlight of
+the floor (exponent 100) over the floor's pixels, lit by diffuse surfaces. Neither contains direct light, and Mitsuba
+has the same number of bounces. Its noise is removed: `relume_bench.standard_error.compare_with_passes`.
 """
 
 from __future__ import annotations
@@ -64,7 +63,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _is_all_floor(transfer: FixedViewTransfer) -> Any:
-    """Pixels that nothing else has a part in. (height, width) bool"""
+    """Mask of pixels that show the floor only. (height, width) bool"""
     view = transfer.views["front"]
     is_floor = np.zeros(view.num_view_samples, bool)
     is_floor[view.rows(transfer.material_names.index("Floor"))] = True

@@ -1,8 +1,7 @@
-"""gather.full_rmse_SCENE and gather.full_bias_SCENE: reflected light against Mitsuba's whole path tracer.
+"""gather.full_rmse_SCENE and gather.full_bias_SCENE: indirect light against Mitsuba's full path tracer.
 
-The pictures of bench/relume_bench/gather_scenes.py, every surface on the way with its whole BSDF on Mitsuba's side:
-highlights light other surfaces there by their own shape,
-with us by few functions (docs/indirect-light.md#bounces).
+The images of `relume_bench.gather_scenes`; with Mitsuba every surface on a path has its full BSDF: its highlights light
+other surfaces with their own shape, with relume by few functions (docs/indirect-light.md#bounces).
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from relume_bench.indirect import PASSES
 from relume_bench.mitsuba import missing
 from relume_bench.standard_error import compare_with_passes
 
-_SPP = {"still_life": 128}  # of each pass: errors of some per cent are told from the noise; its highlights have most
+_SPP = {"still_life": 128}  # per pass: separates errors of some percent from the noise, most of which is in highlights
 _OTHER_SPP = 16
 _UNIT = "%"
 

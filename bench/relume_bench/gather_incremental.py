@@ -1,8 +1,9 @@
-"""gather.incremental_error: images that follow a dragged color, or the number of bounces, before they are exact.
+"""gather.incremental_error: error of incremental images while a color or the number of bounces is dragged.
 
-The room of bench/gather.py. Its red wall is dragged to blue, its floor to dark grey, and bounces from all to one, held
-by the hand; what holding makes is made before. The last frame of each drag against the same look shaded, relative RMSE
-of the whole picture; the worst of the three. Beside it the time of a frame, from the look to the encoded bytes.
+The room of `relume_bench.gather`. Its red wall is dragged to blue, its floor to dark gray, and bounces from all to one;
+the drag is announced and its operators are ready. The last frame of each drag against the same look shaded, relative
+RMSE of the whole image; the worst of the three. In the context also the time of a frame, from the look to the encoded
+bytes.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ def measure(tiny: bool) -> list[Figure]:
     recipe, num_frames = make_recipe(tiny), 3 if tiny else 12
     drags: dict[str, tuple[str, Edit]] = {
         "red wall to blue": ("/materials/Red wall/terms/0/color", _make_color_edit("Red wall", [0.06, 0.1, 0.7])),
-        "floor to dark grey": ("/materials/Floor/terms/0/color", _make_color_edit("Floor", [0.1, 0.1, 0.1])),
+        "floor to dark gray": ("/materials/Floor/terms/0/color", _make_color_edit("Floor", [0.1, 0.1, 0.1])),
         "all bounces to one": ("/transport/bounces", _bounces),
     }
     with tempfile.TemporaryDirectory() as folder:
@@ -65,7 +66,7 @@ def _bounces(document: Document, fraction: float) -> None:
 
 
 def _measure_drag(transfer: FixedViewTransfer, pointer: str, edit: Edit, num_frames: int) -> dict[str, float]:
-    """Error of the last frame, the change that it shows, both relative, and median milliseconds of a frame."""
+    """Error of the last frame, the change that it shows, both relative, and median milliseconds per frame."""
     picture = Picture(transfer, "front", Cache(4 << 30))
     run_until_exact(picture)
     before = picture.image().astype(np.float64)

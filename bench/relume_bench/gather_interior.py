@@ -1,4 +1,4 @@
-"""gather.interior_bake_s and gather.interior_store_mb: a room lit through one window, 64,000 gather cells.
+"""gather.interior_bake_s and gather.interior_store_mb: a room lit through one window, 64,000 patches.
 
 800×800 pixels and 2,000 lights, in one process with all threads, after a tiny bake that compiles.
 """

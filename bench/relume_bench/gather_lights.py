@@ -1,11 +1,11 @@
-"""gather.light_move_fps, gather.area_light_move_fps, gather.light_intensity_fps: lights in the room of bench/gather.py.
+"""gather.light_move_fps, gather.area_light_move_fps, gather.light_intensity_fps: dragging lights in the gather room.
 
-A point light and a rectangle of 0.5 × 0.5 m under the ceiling are moved, and the rectangle is dimmed, held by the hand;
-from the look to the encoded bytes, medians. What holding it makes is made before. A frame of a moved lamp may be
-near the look: at rest it is shaded exactly, and `error_before_rest` is how far from that the last frame was.
+A point light and a rectangle of 0.5 × 0.5 m below the ceiling are moved, and the rectangle is dimmed; from the look to
+the encoded bytes, medians, with the drag announced and prepared. The frame of a moved light may be approximate: after
+the drag it is shaded exactly, and `incremental_error` is the error of the last frame.
 
-`over_embreex` is the time of a frame ÷ what `EmbreeScene.run` takes, in one thread, for a shadow ray from each view
-sample to the middle of the lamp: the least that a frame of new shadows could cost.
+`over_embreex` is the time of a frame ÷ that of `EmbreeScene.run`, in one thread, for a shadow ray from each view sample
+to the center of the light: the minimum for a frame with new shadows.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _PANEL: dict[str, Any] = {"kind": "rectangle", "direction": [0.0, -1.0, 0.0], "e
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Measure three drags: a point moved, a panel moved, a panel dimmed."""
+    """Measure three drags: a point light moved, an area light moved, an area light dimmed."""
     num_frames, recipe = 3 if tiny else 24, make_recipe(tiny)
     with tempfile.TemporaryDirectory() as folder:
         scene = cornell_box(is_floor_glossy=True)
@@ -66,8 +66,9 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 class _Drag(NamedTuple):
-    """frames_s: seconds of each frame. prepared_s: of what is made once for it: rows on touch, the lamp's image when
-    dimmed. error: of the last frame, relative RMSE against the exact picture."""
+    """frames_s: seconds of each frame. prepared_s: one-time work: transport rows for a move, the light's image for
+    dimming. error: of the last frame, relative RMSE against the exact image.
+    """
 
     frames_s: list[float]
     prepared_s: float
@@ -75,7 +76,7 @@ class _Drag(NamedTuple):
 
 
 def _measure_drag(transfer: FixedViewTransfer, picture: Picture, point_lights: Sequence[dict[str, Any]]) -> _Drag:
-    """The first two frames are left out: one is at rest, the other asks for that image, and compiles."""
+    """The first two frames are excluded: one is converged, the other requests the light's image, and compiles."""
     frames_s, prepared_s = [], 0.0
     for k, point_light in enumerate(point_lights):
         document = copy.deepcopy(transfer.default_look)
@@ -98,7 +99,7 @@ def _measure_drag(transfer: FixedViewTransfer, picture: Picture, point_lights: S
 
 
 def _embreex_s(scene: Scene, size: tuple[int, int], position: Sequence[float]) -> float:
-    """Of a shadow ray from each view sample, in the order in which they are stored; the best of five."""
+    """Seconds of a shadow ray from each view sample, in stored order; the best of five."""
     geometry = build_scene_buffers(scene)
     samples = sample_view(scene, geometry, "front", size)
     origins = np.ascontiguousarray(samples.surface.points.position[samples.material != BACKGROUND])

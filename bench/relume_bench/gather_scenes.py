@@ -1,11 +1,10 @@
-"""gather.rmse_SCENE: reflected light of the scenes made by code, each a whole picture.
+"""gather.rmse_SCENE: indirect light of the built-in scenes, each a whole image.
 
-As gather.rmse_diffuse, but with the highlights that the camera sees; surfaces on the way reflect by their diffuse terms
-on both sides, so that what is left is cells, rays and grain (bench/relume_bench/gather_full.py has whole materials). We
-have twice the width and height,
-averaged over 2 × 2 pixels as Mitsuba's box filter averages over one of its own. Mitsuba's side
-has no textures, and of highlights those of peer_mitsuba_plugins.py: in the still life both renderers have the mean
-colour of the tray's wood, and Cook and Torrance's highlights on teapot, handles and bowl. The others are as they are.
+As gather.rmse_diffuse, but with the highlights that the camera sees; surfaces on the path reflect by their diffuse
+terms on both sides, which leaves errors of patches, rays and noise (`relume_bench.gather_full` has full materials).
+Relume renders twice the width and height, averaged over 2 × 2 pixels like Mitsuba's box filter. Mitsuba has no
+textures, and only the highlights of peer_mitsuba_plugins.py: in the still life both renderers have the mean color of
+the tray's wood, and Cook–Torrance highlights on teapot, handles and bowl. The other scenes are unchanged.
 """
 
 from __future__ import annotations
@@ -43,10 +42,10 @@ _UNIT = "relative RMSE"
 
 
 class Pair(NamedTuple):
-    """Reflected light of one scene.
+    """Indirect light of one scene.
 
     Attributes:
-        rendered: (height, width, 3). passes: independent ones of Mitsuba's. (passes, height, width, 3)
+        rendered: (height, width, 3). passes: independent ones by Mitsuba. (passes, height, width, 3)
     """
 
     rendered: F64
@@ -68,11 +67,11 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def render_pair(name: str, spp: int = _SPP, tiny: bool = False, *, is_full: bool = False) -> Pair:
-    """Bake and render one of `SIZES` by both renderers.
+    """Bake and render one of `SIZES` with both renderers.
 
     Args:
-        name: of the scene. spp: of each of Mitsuba's passes. tiny: sizes that mean nothing.
-        is_full: surfaces on the way reflect by all their terms; else by diffuse ones.
+        name: of the scene. spp: per Mitsuba pass. tiny: a trial run.
+        is_full: surfaces on the path reflect by all their terms; otherwise by diffuse ones.
     """
     scene = cornell_box(is_floor_glossy=True) if name == "cornell_box" else built_in(name)
     size = (40, 30) if tiny else SIZES[name]
@@ -96,7 +95,7 @@ def render_pair(name: str, spp: int = _SPP, tiny: bool = False, *, is_full: bool
 
 
 def _choose_replacement_terms(scene: Scene) -> dict[str, Terms]:
-    """Terms of the still life that both have."""
+    """Terms of the still life that both renderers support."""
     materials_by_name = {material.name: material for material in scene.materials}
     wood = materials_by_name["Tray"].textures["diffuse"].pixels.mean(axis=(0, 1), dtype=np.float64).tolist()
     teapot, bowl = materials_by_name["Teapot"].terms[0], materials_by_name["Bowl"].terms[0]

@@ -1,8 +1,8 @@
-"""glass.rmse: a scene with glass against Mitsuba's whole path tracer with dielectrics of its own.
+"""glass.rmse: a scene with glass against Mitsuba's full path tracer with its own dielectrics.
 
-A grey floor with a clear ball, a ball that absorbs and a green pane before a red ball, under a sky with a sun, all
-paths. Mitsuba's volpath bends light's rays as well: caustics and what inner sides reflect are part of the error. Parts
-of the picture are in the row: the floor before the glass, the pane, the balls.
+A gray floor with a clear ball, an absorbing ball and a green pane in front of a red ball, under an environment with a
+sun, all paths. Mitsuba's volpath refracts light paths as well: caustics and internal reflections are part of the error.
+Regions of the image are in the context: the floor in front of the glass, the pane, the balls.
 """
 
 from __future__ import annotations
@@ -38,8 +38,10 @@ _NAME, _UNIT = "glass.rmse", "relative RMSE"
 _SIZE, _FINER, _SPP = (400, 300), 2, 128
 _DEPTH = 24
 _ABSORBED = (0.3, 1.5, 4.0)
-_IMAGE_REGIONS = {"floor": (0.0, 1.0, 0.8, 1.0), "pane": (0.41, 0.64, 0.3, 0.7), "clear": (0.1, 0.32, 0.35, 0.62),
-          "absorbing": (0.73, 0.9, 0.43, 0.66)}  # fmt: skip
+_IMAGE_REGIONS = {
+    "floor": (0.0, 1.0, 0.8, 1.0), "pane": (0.41, 0.64, 0.3, 0.7), "clear": (0.1, 0.32, 0.35, 0.62),
+    "absorbing": (0.73, 0.9, 0.43, 0.66),
+}  # fmt: skip
 
 
 def measure(tiny: bool) -> list[Figure]:
@@ -64,7 +66,7 @@ def measure(tiny: bool) -> list[Figure]:
 def _compare_region(
     rendered: F64, reference_passes: F32, left: float, right: float, top: float, bottom: float
 ) -> NoiseCorrectedError:
-    """Of a part of the picture, in shares of width and height."""
+    """Compare a region of the image, given in fractions of width and height."""
     height, width, _ = rendered.shape
     rows, columns = slice(int(top * height), int(bottom * height)), slice(int(left * width), int(right * width))
     return compare_with_passes(rendered[rows, columns], reference_passes[:, rows, columns])
@@ -108,7 +110,7 @@ def _render_mitsuba(scene: Scene, size: tuple[int, int], spp: int, folder: Path)
 
 
 def _dielectric(glass: Glass) -> Mapping[str, Any]:
-    """Glass as a plugin of Mitsuba's, with the medium inside of a solid."""
+    """Glass as a Mitsuba plugin, with the medium inside a solid."""
     if glass.thickness == 0:
         tint = {"type": "rgb", "value": list(glass.tint)}
         return {"type": "thindielectric", "int_ior": glass.ior, "specular_transmittance": tint}

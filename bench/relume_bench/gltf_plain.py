@@ -1,6 +1,6 @@
-"""A glTF file as plain arrays for a peer: an own, short reader, so that what the importer misreads is seen.
+"""Read a glTF file as plain arrays for a peer: an independent, short reader that reveals errors of the importer.
 
-Shares nothing with `relume.scene`. Triangle lists only; nothing is checked, the files are known.
+Shares nothing with `relume.scene`. Triangle lists only; nothing is validated, the files are known.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ class Shape:
     """One primitive of one node, in world space.
 
     Attributes:
-        attributes: by the file's names; normals unit. (n, 2 to 4) each.
-        faces: (m, 3). material: the file's, by number; None for the default.
+        attributes: by the file's names; unit normals. (n, 2 to 4) each.
+        faces: (m, 3). material: index in the file; None for the default.
     """
 
     attributes: dict[str, F32]
@@ -42,10 +42,10 @@ class Shape:
 
 @dataclass(frozen=True)
 class File:
-    """What a file says.
+    """Contents of a file.
 
     Attributes:
-        lights: of KHR_lights_punctual, with their place (4, 4).
+        lights: of KHR_lights_punctual, with their transform (4, 4).
     """
 
     json: dict[str, Any]
@@ -55,7 +55,7 @@ class File:
     chunk: bytes = b""
 
     def buffer_view(self, number: int) -> bytes:
-        """Its bytes."""
+        """Bytes of a buffer view."""
         view = self.json["bufferViews"][number]
         buffer = self.json["buffers"][view["buffer"]]
         data = self._bytes(buffer["uri"]) if "uri" in buffer else self.chunk
@@ -63,7 +63,7 @@ class File:
         return data[start : start + view["byteLength"]]
 
     def accessor(self, number: int) -> NDArray[Any]:
-        """Its values, integers that stand for shares as shares. (count, width)"""
+        """Values of an accessor, normalized integers as fractions. (count, width)"""
         description = self.json["accessors"][number]
         dtype, width, count = (
             np.dtype(_TYPES[description["componentType"]]),
@@ -80,7 +80,7 @@ class File:
         return values / np.float32(np.iinfo(dtype).max) if description.get("normalized") else values
 
     def image(self, texture: int) -> NDArray[np.uint8]:
-        """A texture's bytes, RGBA. (height, width, 4)"""
+        """Bytes of a texture, RGBA. (height, width, 4)"""
         texture_info = self.json["textures"][texture]
         source = (
             texture_info.get("extensions", {})
@@ -92,7 +92,7 @@ class File:
         return np.asarray(Image.open(io.BytesIO(data)).convert("RGBA"))
 
     def wraps(self, texture: int) -> str:
-        """How it continues, as Mitsuba calls it."""
+        """Wrap mode of a texture, in Mitsuba's terms."""
         sampler = self.json["textures"][texture].get("sampler")
         mode = 10_497 if sampler is None else self.json["samplers"][sampler].get("wrapS", 10_497)
         return {33_071: "clamp", 33_648: "mirror"}.get(mode, "repeat")
@@ -104,7 +104,7 @@ class File:
 
 
 def read_plain(path: Path) -> File:
-    """Read a file that is known to be right."""
+    """Read a file that is known to be valid."""
     data, chunk = path.read_bytes(), b""
     if data[:4] == b"glTF":
         length = struct.unpack_from("<I", data, 12)[0]
@@ -166,7 +166,7 @@ def _shape(file: File, primitive: dict[str, Any], to_world: F64) -> Shape:
 
 
 def _make_flat(attributes: dict[str, F32], faces: NDArray[np.uint32]) -> tuple[dict[str, F32], NDArray[np.uint32]]:
-    """Every triangle with corners and a normal of its own."""
+    """Give each triangle its own vertices and normal."""
     corners = faces.reshape(-1)
     corner_attributes = {name: values[corners] for name, values in attributes.items()}
     a, b, c = corner_attributes["POSITION"].reshape(-1, 3, 3).transpose(1, 0, 2)

@@ -1,8 +1,8 @@
-"""frame.incremental_rmse: what is left of 500 edits once the hand rests.
+"""frame.incremental_rmse: remaining error of 500 incremental edits after the drag.
 
-A live picture follows random edits (parameter jumps, drawn curves, colours; now and then another curve, term or
-material) with 30 coefficients a step and never enough steps to become exact. Then it settles through `advance` alone.
-It is compared with T · c of the last look in float64, from operators frozen anew.
+A live image follows random edits (parameter jumps, drawn curves, colors; now and then another curve, term or material)
+with 30 coefficients per step and never enough steps to become exact. Then it converges through `advance` alone. It is
+compared with T · c of the last look in float64, from newly frozen operators.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ from relume_bench.scenes import LAMBERT, cook_torrance, teapot_on_table
 F64 = NDArray[np.float64]
 
 _BUDGET = 30
-_STRETCH = 25  # edits of one curve before the hand moves to another
+_STRETCH = 25  # edits of one curve before switching to another
 _TARGETS = (("Teapot", 1, "theta_h", "sigma"), ("Table", 1, "theta_h", "roughness"), ("Teapot", 1, "theta_d", "ior"))
 _RANGES = {"sigma": (0.02, 0.8), "roughness": (0.1, 0.9), "ior": (1.1, 3.0)}
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Edit, settle, compare."""
+    """Edit, converge, compare."""
     size, num_lights, num_edits = ((40, 40), 100, 20) if tiny else ((256, 256), 1000, 500)
     glossy = {"model": "ggx", "color": [0.5, 0.5, 0.5], "params": {"roughness": 0.4, "f0": 0.1}}
     scene = teapot_on_table(studio(), (LAMBERT, cook_torrance(0.2)), (LAMBERT, glossy))
@@ -67,7 +67,7 @@ def _run_until_exact(picture: Picture) -> None:
 
 
 def _edit(picture: Picture, transfer: FixedViewTransfer, num_edits: int) -> tuple[Look, int]:
-    """Random edits; returns the last look and how many of them were not exact when the next one came."""
+    """Apply random edits; return the last look and the number of edits that were not exact when the next one came."""
     rng, inexact = np.random.default_rng(29), 0
     document = copy.deepcopy(transfer.default_look)
     look = validate(document, transfer.default_look)
@@ -75,7 +75,7 @@ def _edit(picture: Picture, transfer: FixedViewTransfer, num_edits: int) -> tupl
         material, index, curve, parameter = _TARGETS[k // _STRETCH % len(_TARGETS)]
         term = document["materials"][material]["terms"][index]
         if k % _STRETCH == 0:
-            _run_until_exact(picture)  # the hand rests before it opens another curve
+            _run_until_exact(picture)  # the drag pauses before another curve is opened
             picture.prepare(f"/materials/{material}/terms/{index}/curves/{curve}")
         _change(rng, term, curve, parameter)
         look = validate(copy.deepcopy(document), transfer.default_look)
@@ -87,7 +87,7 @@ def _edit(picture: Picture, transfer: FixedViewTransfer, num_edits: int) -> tupl
 
 
 def _change(rng: np.random.Generator, term: dict[str, Any], curve: str, parameter: str) -> None:
-    """A parameter jumps, a curve is drawn (in some channels), or a colour changes."""
+    """Let a parameter jump, draw a curve (in some channels), or change a color."""
     kind = rng.integers(4)
     if kind == 0:
         term["color"] = rng.uniform(0, 2, 3).tolist()
@@ -103,7 +103,7 @@ def _change(rng: np.random.Generator, term: dict[str, Any], curve: str, paramete
 
 
 def _full_image(transfer: FixedViewTransfer, look: Look) -> F64:
-    """Σ terms of colour · texture · outgoing curves · T · c, all in float64 but T. (height, width, 3)"""
+    """Σ over terms of color · texture · outgoing curves · T · c, all in float64 except T. (height, width, 3)"""
     view = transfer.views["front"]
     radiance = np.zeros((view.num_view_samples, 3))
     radiance[view.num_surface_samples :] = view.background()

@@ -1,4 +1,4 @@
-"""Reflected light alone, of a gather bake and of Mitsuba's path tracer, with the same bounces."""
+"""Indirect light alone, of a gather bake and of Mitsuba's path tracer, with the same number of bounces."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from relume_bench.mitsuba import read_passes, render
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-PASSES = 8  # independent pictures of the peer, from which the noise of their mean is known
+PASSES = 8  # independent images by the peer, which give the noise of their mean
 
 
 def reflected(transfer: FixedViewTransfer, terms: Mapping[str, Sequence[Mapping[str, Any]]]) -> F64:
-    """Light of a picture that surfaces have reflected onto what is seen. (height, width, 3)
+    """Indirect light of an image. (height, width, 3)
 
     Args:
-        terms: of materials that have others than in the scene's own look.
+        transfer: the bake. terms: of materials that differ from the scene's default look.
     """
     document = copy.deepcopy(transfer.default_look)
     for name, material_terms in terms.items():
@@ -46,7 +46,7 @@ def reflected(transfer: FixedViewTransfer, terms: Mapping[str, Sequence[Mapping[
 
 @contextmanager
 def ignore_glossy_reflection() -> Iterator[None]:
-    """Restrict our light between surfaces to what diffuse terms send, for peers that are restricted alike."""
+    """Restrict relume's indirect light to diffuse terms, for peers with the same restriction."""
 
     def key_of_diffuse_terms(terms: Sequence[Mapping[str, Any]], normals: NormalMap | None) -> bytes:
         return pack_reflectance(list(filter(scatters_diffusely, terms)), normals)
@@ -56,7 +56,7 @@ def ignore_glossy_reflection() -> Iterator[None]:
 
 
 def mitsuba_job(camera_bsdfs: Sequence[Any], bounce_bsdfs: Sequence[Any]) -> dict[str, Any]:
-    """What `relume_bench.mitsuba.render` is to be told besides counts; arguments as of `reflected_by_mitsuba`."""
+    """Job for `relume_bench.mitsuba.render`, without counts; arguments as for `reflected_by_mitsuba`."""
     return {"seen": camera_bsdfs, "bsdfs": bounce_bsdfs, "bounces": MAX_BOUNCES}
 
 
@@ -68,14 +68,14 @@ def reflected_by_mitsuba(
     spp: int,
     folder: Path,
 ) -> F32:
-    """Independent passes of Mitsuba's picture of the same light. (`GLASS_RULE`, height, width, 3)
+    """Independent passes of Mitsuba's image of the same light. (`GLASS_RULE`, height, width, 3)
 
     Args:
         scene: its first view is rendered.
         size: width and height, pixels.
-        camera_bsdfs, bounce_bsdfs: BSDFs of the meshes where the camera sees them, and further along paths.
-        spp: samples of a pixel in each pass, a power of two.
-        folder: where files of the exchange are written.
+        camera_bsdfs, bounce_bsdfs: BSDFs of the meshes at the first hit, and further along paths.
+        spp: samples per pixel in each pass, a power of two.
+        folder: for exchanged files.
     """
     render(scene, size, {"spp": [spp], "passes": PASSES, **mitsuba_job(camera_bsdfs, bounce_bsdfs)}, folder)
     return read_passes(folder)

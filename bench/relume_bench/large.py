@@ -1,9 +1,9 @@
-"""large.*: a curve dragged where a material fills 1920×1080 pixels and its operator does not fit in float32.
+"""large.*: dragging a curve of a material that fills 1920×1080 pixels, with an operator too large for float32.
 
-A glossy teapot fills the picture; its θh, all 256 bands of it, is in hand, and every frame adds all columns.
-`large.frame_ms`: look → picture brought on, median of the edits, columns in 16 bits. In its row also by some samples,
-as where the memory is smaller; how long each operator takes to be made; how far the last frame is from the same look
-shaded (relative RMSE). `large.frame_ratio`: frames in 16 bits ÷ in float32, at a quarter of the pixels, where both fit.
+A glossy teapot fills the image; its θh curve, all 256 bands, is dragged, and every frame adds all columns.
+`large.frame_ms`: look → updated image, median of the edits, columns in 16 bits. In the context also: the subsampled
+operator for smaller memory; the time to make each operator; the error of the last frame against the same look shaded
+(relative RMSE). `large.frame_ratio`: frames in 16 bits ÷ in float32, at a quarter of the pixels, where both fit.
 `large.bytes_ratio`: memory of the operator in 16 bits ÷ in float32.
 """
 
@@ -34,11 +34,11 @@ from relume_bench.scenes import cook_torrance, teapot_on_table
 
 _ROOMY, _BANDS = 16 << 30, 256
 _ACTIVE_POINTER = "/materials/Teapot/terms/0/curves/theta_h"
-_CLOSE = 0.3  # of the eye's distance; the teapot fills the picture
+_CLOSE = 0.3  # of the camera distance; the teapot fills the image
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Measure the large picture, then a quarter of it."""
+    """Measure the large image, then a quarter of it."""
     (width, height), num_lights, num_edits = ((48, 27), 40, 2) if tiny else ((1920, 1080), 100, 10)
     scene = teapot_on_table(studio(), (cook_torrance(0.2),), (cook_torrance(0.2),), _CLOSE)
 
@@ -52,7 +52,7 @@ def measure(tiny: bool) -> list[Figure]:
     quarter = dragged((width // 2, height // 2), ("packed", "float32"))
     details = {"size": [width, height], "bands": _BANDS, "lights": num_lights, "edits": num_edits}
     sizes = {form: form_result["bytes"] / (width * height) for form, form_result in large.items()}
-    whole = operator_bytes(width * height, _BANDS)  # a sample a pixel, as where a material fills the picture
+    whole = operator_bytes(width * height, _BANDS)  # one sample per pixel, as for a material that fills the image
     sizes["float32"] = whole / (width * height)
     return [
         Figure("large.frame_ms", large["packed"]["ms"], "ms", {**details, **large}),
@@ -62,7 +62,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _looks(transfer: FixedViewTransfer, num: int) -> list[Look]:
-    """The highlight's curve, drawn higher and narrower from look to look."""
+    """The highlight's curve, higher and narrower from look to look."""
     looks = []
     for k in range(num):
         document = copy.deepcopy(transfer.default_look)
@@ -74,7 +74,7 @@ def _looks(transfer: FixedViewTransfer, num: int) -> list[Look]:
 
 
 def _measure_forms(transfer: FixedViewTransfer, forms: tuple[str, ...], num_edits: int) -> dict[str, Any]:
-    """The drag with operators of several forms, each in a memory that has room for no better one."""
+    """Drag with operators of several forms, each with memory for no better one."""
     rows = transfer.views["front"].rows(0)
     num = rows.stop - rows.start
     budgets = {"float32": _ROOMY, "packed": operator_bytes(num, _BANDS) - 1, "thin": quantized_bytes(num, _BANDS) - 1}
@@ -84,7 +84,7 @@ def _measure_forms(transfer: FixedViewTransfer, forms: tuple[str, ...], num_edit
 
 
 def _measure_edits(transfer: FixedViewTransfer, looks: list[Look], budget_bytes: int, last: Any) -> dict[str, Any]:
-    """Drag with what is touched frozen beforehand; last: what the last look is when it is shaded."""
+    """Drag with the precomputed operator; last: the last look, shaded."""
     cache = Cache(budget_bytes)
     picture = _open_exact(transfer, looks[0], cache)
     picture.prepare(_ACTIVE_POINTER)

@@ -1,10 +1,10 @@
-"""lights.rmse_…: direct light of each kind against Mitsuba 3; lights.intensity_fps: frames a second of a dimmed light.
+"""lights.rmse_…: direct light of each kind against Mitsuba 3; lights.intensity_fps: frames per second of a dimmed
+light.
 
-The Cornell box, 128×128 pixels, diffuse; the environment is dark. Pictures are compared by means over squares of 4×4
-pixels, Mitsuba's noise taken off: a pixel has one view sample inside surfaces and Mitsuba's many, which differ along
-every edge of a hard shadow.
-Mitsuba's spot falls off in angle and ours in cosine: the cone compared has an edge of a tenth of a degree.
-bench/relume_bench/mitsuba.py says where Mitsuba is looked for.
+The Cornell box, 128×128 pixels, diffuse; the environment is black. Images are compared by means over blocks of 4×4
+pixels, with Mitsuba's noise removed: a pixel has one view sample inside surfaces and many in Mitsuba, which differ
+along the edges of hard shadows. Mitsuba's spot falls off in angle and ours in cosine: the compared cone has an edge of
+a tenth of a degree. For the installation of Mitsuba see bench/relume_bench/mitsuba.py.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _LIGHTS: dict[str, dict[str, Any]] = {
         "emission": [3.0, 3.0, 3.0],
     },
     "directional": {"kind": "directional", "direction": [-0.4, -1.0, -0.5], "emission": [2.0, 2.0, 2.0]},
-    "rectangle": {  # before the room and above the picture: Mitsuba would show it
+    "rectangle": {  # in front of the room and above the image: Mitsuba would show it
         "kind": "rectangle", "position": [0.1, 2.3, 1.3], "direction": [0.0, -0.7, -1.0], "rotation": 20.0,
         "size": [0.5, 0.3], "emission": [20.0, 18.0, 15.0],
     },
@@ -55,7 +55,7 @@ _FPS = "lights.intensity_fps"
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Errors, and frames per second while one of two lights is dimmed; compute and encode."""
+    """Errors, and frames per second while one of two lights is dimmed, including encoding."""
     with tempfile.TemporaryDirectory() as folder:
         return [*_errors(Path(folder), tiny), _gain_fps(Path(folder), tiny)]
 
@@ -96,7 +96,7 @@ def _average_blocks(picture: NDArray[np.floating]) -> F64:
 
 
 def _emitter(light: dict[str, Any], transfer: FixedViewTransfer) -> dict[str, Any]:
-    """A light of a look as Mitsuba describes it; `to_world` by rows."""
+    """A light of a look as Mitsuba's description; `to_world` row by row."""
     geometry = _make_look(transfer, {"A": light}).lights["A"].geometry
     emission = {"type": "rgb", "value": light["emission"]}
     if light["kind"] == "point":
@@ -113,7 +113,7 @@ def _emitter(light: dict[str, Any], transfer: FixedViewTransfer) -> dict[str, An
         inner, outer = geometry.cone
         angles = {"beam_width": inner, "cutoff_angle": outer}
         return {"type": "spot", "intensity": emission, "to_world": to_world.ravel().tolist(), **angles}
-    corner, edges = rectangle(geometry)  # Mitsuba's covers [-1, 1]²
+    corner, edges = rectangle(geometry)  # Mitsuba's rectangle covers [-1, 1]²
     to_world[:3, :2] = edges.T / 2
     to_world[:3, 2] = np.array(geometry.direction) / np.linalg.norm(geometry.direction)
     to_world[:3, 3] = corner + edges.sum(axis=0) / 2
@@ -122,7 +122,7 @@ def _emitter(light: dict[str, Any], transfer: FixedViewTransfer) -> dict[str, An
 
 
 def _gain_fps(folder: Path, tiny: bool) -> Figure:
-    """Time frames of a picture with reflected light, 400×400, while one of two lights is dimmed."""
+    """Time frames of an image with indirect light, 400×400, while one of two lights is dimmed."""
     scene: Scene = cornell_box()
     size, method = ((32, 32), "direct") if tiny else ((400, 400), "gather")
     store = bake_in_process(

@@ -1,9 +1,8 @@
-"""load.drag_with_renders_ratio: frames a second of a dragged slider beside full queues ÷ alone.
+"""load.drag_with_renders_ratio: frames per second of a dragged slider with full job queues ÷ without.
 
-A real server in its own process, the picture of `relume_bench.session`. A client drags σ and sends each edit when the
-frame of the one before is there, so that it has all the frames that the server can give. In turn,
-on the same session: alone,
-and while batches of exact pictures and a comparison with brute force wait and run; the ratio is of the medians.
+A real server in its own process, the image of `relume_bench.session`. A client drags σ and sends each edit after the
+previous frame, and so gets all frames that the server can render. On the same session, alternating: alone, and while
+batches of exact images and a comparison are queued and running; the ratio is of the medians.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ _WAIT_S = 120.0
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Bake, serve, drag with the queues empty and full, in turn."""
+    """Bake, serve, drag with the queues empty and full, alternating."""
     size, num_lights, rounds, seconds = ((64, 64), 60, 1, 0.5) if tiny else ((512, 512), 1000, 5, 3.0)
     scene = teapot_on_table(studio(), (LAMBERT, cook_torrance(0.2)), (LAMBERT,))
     with (
@@ -39,7 +38,7 @@ def measure(tiny: bool) -> list[Figure]:
         client.send_message(type="prepare", curve="/materials/Teapot/terms/1/curves/theta_h")
         client.exact(0)
         slider_client = _SliderClient(client)
-        slider_client.drag(seconds)  # what is made once is made
+        slider_client.drag(seconds)  # one-time work is done first
         unloaded_ms: list[float] = []
         loaded_ms: list[float] = []
         painted = 0
@@ -65,13 +64,13 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 class _SliderClient:
-    """Drags σ to and fro."""
+    """Drags σ back and forth."""
 
     def __init__(self, client: SessionClient) -> None:
         self._client, self._revision = client, 0
 
     def drag(self, seconds: float) -> float:
-        """Frames a second."""
+        """Frames per second."""
         start_time, frames = time.perf_counter(), 0
         while (durations := time.perf_counter() - start_time) < seconds:
             self._revision += 1
@@ -86,7 +85,7 @@ class _SliderClient:
 
 
 def _fill(server: Server, data_folder: BakedFolder) -> list[str]:
-    """Queue batches and a comparison, and wait until both run; returns their addresses."""
+    """Queue batches and a comparison, and wait until both run; return their URLs."""
     common = {"bake": data_folder.bake, "view": "front"}
     looks = [{"materials": {"Teapot": {"terms": [LAMBERT, cook_torrance(0.15 + 0.002 * k)]}}} for k in range(200)]
     job_addresses = [
@@ -98,7 +97,7 @@ def _fill(server: Server, data_folder: BakedFolder) -> list[str]:
     deadline = time.monotonic() + _WAIT_S
     while not all(_call(server, "GET", addresses[k])["progress"] > 0 for k in (0, -1)):
         if time.monotonic() > deadline:
-            raise TimeoutError("the queues do not begin")
+            raise TimeoutError("the queues do not start")
         time.sleep(0.05)
     return addresses
 

@@ -1,15 +1,15 @@
-"""What the machine did beside a measurement: processor time that its host gave to other guests."""
+"""Processor time that the host gave to other guests during a measurement."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-_STAT = Path("/proc/stat")  # Linux; elsewhere nothing is said
+_STAT = Path("/proc/stat")  # Linux only
 _USER, _NICE, _SYSTEM, _IRQ, _SOFT_IRQ, _STEAL = 0, 1, 2, 5, 6, 7
 
 
 def processor_ticks() -> tuple[int, int] | None:
-    """Ticks since the start that were wanted by programs here, and those of them that the host did not give."""
+    """Ticks since boot that programs here requested, and those that the host did not give."""
     if not _STAT.is_file():
         return None
     with _STAT.open() as lines:
@@ -19,9 +19,9 @@ def processor_ticks() -> tuple[int, int] | None:
 
 
 def measure_stolen_fraction(before: tuple[int, int] | None, after: tuple[int, int] | None) -> float | None:
-    """Share of the wanted processor time between two readings that went to other guests; None where it is not known.
+    """Fraction of the requested processor time between two readings that went to other guests; None if unknown.
 
-    A wall time measured while it is 0.5 is about twice what the machine needs by itself.
+    At 0.5 a wall time is about twice what the machine needs by itself.
     """
     if before is None or after is None or after[0] <= before[0]:
         return None

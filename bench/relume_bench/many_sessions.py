@@ -1,10 +1,10 @@
-"""load.aggregate_ratio: frames a second summed over 1 … 64 sessions that all drag, lowest ÷ best.
-load.frame_cost_ratio: the server's processor time for a frame, least ÷ most of the same numbers of sessions.
+"""load.aggregate_ratio: total frames per second of 1 … 64 dragging sessions, lowest ÷ best. load.frame_cost_ratio: the
+server's processor time per frame, least ÷ most over the same numbers of sessions.
 
-A real server in its own process; this one has the hands of all sessions (`bench.controls`). All sessions are on one
-bake: with one slider in everybody's hand, so that all read one operator, and with four sliders in turn. Numbers of
-sessions are taken in turn, round after round; the ratios are of medians. What a frame costs hardly depends on what else
-the machine does, and tells whether sessions are in each other's way; how many there are a second does.
+A real server in its own process; the clients of all sessions are in this one (`relume_bench.slider_clients`). All
+sessions are on one bake: with one slider, so that all use one operator, and with four sliders. Numbers of sessions
+alternate, round after round; the ratios are of medians. The cost of a frame hardly depends on other load, and shows
+whether sessions disturb each other; the rate depends on it.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ _WARM_S = 1.0
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Bake, serve, drag with more and more hands."""
+    """Bake, serve, drag with increasing numbers of clients."""
     size, num_lights, rounds, seconds = ((64, 64), 60, 1, 0.3) if tiny else ((640, 480), 1000, 5, 2.0)
     numbers = (1, 2) if tiny else (1, 2, 4, 8, 16, 32, 64)
     glossy_terms = (LAMBERT, cook_torrance(0.2))
     scene = teapot_on_table(studio(), glossy_terms, glossy_terms)
-    settings = {"RELUME_MAX_SESSIONS": "256"}  # those that have just gone are counted, too
+    settings = {"RELUME_MAX_SESSIONS": "256"}  # sessions that have just left still count
     variants = {"one_operator": (_SLIDERS[:1], numbers), "several": (_SLIDERS, tuple(n for n in numbers if n > 2))}
     results: dict[tuple[str, int], list[tuple[float, float]]] = {}
     with (
@@ -69,7 +69,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 async def _prepare_curves(server: Server, data_folder: BakedFolder) -> None:
-    """Have made what is made once: pictures of the scene's own look, what each slider needs."""
+    """Do one-time work: default images, and the operator of each slider."""
     async with _open_slider_clients(server, data_folder, _SLIDERS, len(_SLIDERS)) as slider_clients:
         for slider_client in slider_clients:
             await slider_client.drag()
@@ -84,7 +84,7 @@ async def _measure_drag(
     number: int,
     seconds: float,
 ) -> tuple[float, float]:
-    """Frames a second of so many hands together, and milliseconds of processor time that the server takes for each."""
+    """Total frames per second of so many clients, and the server's processor time per frame in milliseconds."""
     async with _open_slider_clients(server, data_folder, sliders, number) as slider_clients:
         await asyncio.gather(*(slider_client.drag() for slider_client in slider_clients))
         await asyncio.sleep(min(_WARM_S, seconds))
@@ -98,7 +98,7 @@ async def _measure_drag(
 async def _open_slider_clients(
     server: Server, data_folder: BakedFolder, sliders: Sequence[tuple[str, tuple[float, float]]], number: int
 ) -> AsyncIterator[list[SliderClient]]:
-    """Open the sessions; each fails here where its hand does."""
+    """Open the sessions; a failed client raises here."""
     async with AsyncExitStack() as stack:
         slider_clients = []
         for k in range(number):
@@ -123,7 +123,7 @@ def _frames(slider_clients: Sequence[SliderClient]) -> int:
 
 
 def _spent_s(server: Server) -> float:
-    """Processor time of the server's process so far; nothing where the system does not say."""
+    """Processor time of the server's process so far; 0 if the system does not report it."""
     stat = Path(f"/proc/{server.pid}/stat")
     if not stat.is_file():
         return 0.0

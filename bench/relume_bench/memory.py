@@ -1,8 +1,8 @@
-"""memory.*: resident memory of a real server and its worker processes, before ten scenes, after them, and at rest.
+"""memory.*: resident memory of a real server and its worker processes, before ten scenes, after them, and when idle.
 
-Each scene is baked, opened in a session, one of its curves taken in hand, its light turned and exchanged, and left.
-`memory.server_growth`: by how much the server at rest is larger after forty scenes more, of small pictures: all kernels
-are loaded after ten, and what grows from then on is kept for nobody.
+Each scene is baked, opened in a session, one of its curves is edited, its environment rotated and replaced, and the
+session closed. `memory.server_growth`: growth of the idle server after forty more scenes, with small images: all
+kernels are loaded after ten, and any later growth is a leak.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ from relume_worker.database import open_database
 from relume_worker.ledger import Ledger
 from relume_worker.scenes import register_scene
 
-_REST_S, _MORE_S = 60, 30  # what the server waits before it lets go, and time to do it
+_REST_S, _MORE_S = 60, 30  # idle time before the server releases memory, plus time to do it
 _NUM_SCENES, _NUM_MORE = 10, 40
 
 
 @dataclass(frozen=True)
 class Resident:
-    """Resident memory in bytes. workers: of all processes that the server has started."""
+    """Resident memory in bytes. workers: all child processes of the server."""
 
     server: int
     workers: int
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Let one server bake and show scene after scene, then leave it alone."""
+    """Let one server bake and show scene after scene, then leave it idle."""
     size, num_lights = ((64, 48), 60) if tiny else ((640, 480), 1000)
     num_scenes, num_more = (2, 1) if tiny else (_NUM_SCENES, _NUM_MORE)
     scenes = list(_make_scenes(num_scenes + num_more))
@@ -73,20 +73,20 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _make_scenes(count: int) -> Iterator[Scene]:
-    """Scenes of several sizes made by code, each another."""
+    """Generated scenes of several sizes, all different."""
     yield from [each.make() for each in BUILT_IN.values()][:count]
     for number in range(count - len(BUILT_IN)):
         yield teapot_on_table(studio(), (LAMBERT, cook_torrance(0.1 + 0.01 * number)), (LAMBERT,))
 
 
 def _use_all(server: Server, scenes: list[Scene], size: tuple[int, int], num_lights: int) -> None:
-    """One after another, every second with light between surfaces."""
+    """Use one scene after another, every second with indirect light."""
     for number, scene in enumerate(scenes):
         _use_scene(server, scene, size, num_lights, "gather" if number % 2 else "direct")
 
 
 def _rested(server: Server, tiny: bool) -> Resident:
-    """What is held when nobody has been there for a while."""
+    """Memory after some idle time."""
     time.sleep(0 if tiny else _REST_S + _MORE_S)
     return _resident(server.pid)
 
@@ -99,7 +99,7 @@ def _register(data_folder: BakedFolder, scenes: list[Scene]) -> None:
 
 
 def _use_scene(server: Server, scene: Scene, size: tuple[int, int], num_lights: int, method: str) -> None:
-    """Bake a scene, look at it, edit it, and leave."""
+    """Bake a scene, open it, edit it, and leave."""
     views = [scene.cameras[0].name]
     bake = _call(server, "POST", "/api/bakes", scene=scene.id, views=views, size=size, lights=num_lights, method=method)
     while bake["state"] in ("queued", "running"):
@@ -128,7 +128,7 @@ def _call(server: Server, verb: str, path: str, **body: Any) -> Any:
 
 
 def _resident(server: int) -> Resident:
-    """Of a process, and of all that it and they have started."""
+    """Resident memory of a process, and of all its descendants."""
     parents = dict(_processes())
     below, num_bytes = {server}, 0
     while len(below) > num_bytes:
@@ -138,7 +138,7 @@ def _resident(server: int) -> Resident:
 
 
 def _processes() -> Iterator[tuple[int, int]]:
-    """Every process with its parent."""
+    """All processes with their parents."""
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:
             yield int(path.parent.name), int(path.read_text().rpartition(")")[2].split()[1])

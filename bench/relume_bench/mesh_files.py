@@ -1,7 +1,7 @@
-"""import.obj, import.ply: seconds to read a grid of a million triangles, and how long other libraries take.
+"""import.obj, import.ply: seconds to read a grid of a million triangles, compared with other libraries.
 
-The text has positions, texture coordinates and normals; the .ply is binary. Where tinyobjloader and plyfile are
-installed, which relume does not need, they read the same bytes in turn. docs/adr/0010-scene-file-readers.md.
+The OBJ text has positions, texture coordinates and normals; the PLY is binary. If tinyobjloader and plyfile are
+installed, which relume does not need, they read the same bytes, alternating. docs/adr/0010-scene-file-readers.md.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _ROUNDS = 3
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Both formats, each by our reader and, where it is installed, by the library for it."""
+    """Both formats, each with our reader and, if installed, with the library for it."""
     positions, faces = _grid(8 if tiny else 707)
     obj, ply = _obj_text(positions, faces), _ply_bytes(positions, faces)
     return [
@@ -52,7 +52,7 @@ def _figure(
 
 
 def _grid(size: int) -> tuple[F32, I32]:
-    """2 · size² triangles of rough ground. (n, 3) and (num_triangles, 3)"""
+    """2 · size² triangles of rough terrain. (n, 3) and (num_triangles, 3)"""
     y, x = np.mgrid[0 : size + 1, 0 : size + 1]
     height = np.random.default_rng(0).random(x.shape)
     first = (np.arange(size)[:, None] * (size + 1) + np.arange(size)).ravel()
@@ -80,7 +80,7 @@ def _ply_bytes(positions: F32, faces: I32) -> bytes:
 
 
 def _by_tinyobjloader(data: bytes) -> int:
-    """The corners one by one: its array of them, `numpy_indices`, repeats the first (2.0.0rc13)."""
+    """Read corner by corner: its array `numpy_indices` repeats the first one (2.0.0rc13)."""
     import tinyobjloader
 
     reader = tinyobjloader.ObjReader()

@@ -1,7 +1,7 @@
-"""mirror.rmse, mirror.sharp_rmse: a room with mirrors against Mitsuba's whole path tracer with conductors of its own.
+"""mirror.rmse, mirror.sharp_rmse: a room with mirrors against Mitsuba's full path tracer with its own conductors.
 
-A corner of two coloured walls with a ball of chrome, one of brass and a clay one on a polished table, under a hazy sun
-in a sky, all paths. `mirror.sharp_rmse` is of the pixels that the two metal balls fill.
+A corner of two colored walls with a chrome ball, a brass ball and a clay ball on a polished table, under a hazy sun in
+an environment, all paths. `mirror.sharp_rmse` is over the pixels of the two metal balls.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _compare_pixels(rendered: F64, reference_passes: F32, mask: NDArray[np.bool_]) -> NoiseCorrectedError:
-    """Of some pixels, as if they were a row."""
+    """Compare some pixels, as if they were a row."""
     return compare_with_passes(rendered[mask][None], reference_passes[:, mask][:, None])
 
 
@@ -92,7 +92,7 @@ def _material(name: str) -> Material:
 
 
 def _render_relume(scene: Scene, size: tuple[int, int], lights: int, folder: Path) -> tuple[F64, NDArray[np.bool_]]:
-    """The picture, and which pixels the metal balls fill."""
+    """The image, and the mask of the metal balls."""
     width, height = size
     recipe = Recipe("gather", ("front",), (_FINER * width, _FINER * height), lights)
     transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Cache(4 << 30))
@@ -112,7 +112,7 @@ def _render_mitsuba(scene: Scene, size: tuple[int, int], spp: int, folder: Path)
 
 
 def _bsdf(name: str) -> dict[str, object]:
-    """A material as Mitsuba has it: diffuse, a smooth conductor, or so much of each as ours adds up."""
+    """A material as Mitsuba's: diffuse, a smooth conductor, or a mixture that equals the sum of our terms."""
 
     def rgb(value: tuple[float, ...]) -> dict[str, object]:
         return {"type": "rgb", "value": list(value)}

@@ -1,7 +1,7 @@
-"""Hands scenes to Mitsuba 3, which lives in its own environment.
+"""Render scenes with Mitsuba 3, in its own environment.
 
-`python3 -m venv bench/.venv-peers` and `bench/.venv-peers/bin/pip install mitsuba numpy`, or RELUME_PEERS_PYTHON names
-an interpreter that has it. DRJIT_LIBLLVM_PATH names the LLVM library if it is not found under /usr/lib.
+`python3 -m venv bench/.venv-peers` and `bench/.venv-peers/bin/pip install mitsuba numpy`, or set RELUME_PEERS_PYTHON to
+an interpreter with it. DRJIT_LIBLLVM_PATH is the LLVM library if it is not found under /usr/lib.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from relume.scene.model import Scene
 
 F32 = NDArray[np.float32]
 
-_FINE_ROWS = 2048  # of a map that is handed over, where n times its rows may be as many
+_FINE_ROWS = 2048  # maximum rows of a resampled map, n times its own
 _MAX_SPP_PER_PASS = 32  # at once; more would not fit in memory
 
 
 def missing() -> str | None:
-    """What Mitsuba lacks to run here; None where it can."""
+    """Reason why Mitsuba cannot run here; None if it can."""
     if _interpreter() is None:
-        return "Mitsuba is not installed; bench/relume_bench/mitsuba.py says where it is looked for"
+        return "Mitsuba is not installed; bench/relume_bench/mitsuba.py describes the installation"
     if _llvm() is None:
         return "there is no LLVM library; install libllvm19 or set DRJIT_LIBLLVM_PATH"
     return None
@@ -49,7 +49,7 @@ def bsdf(terms: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Terms of a material as a plugin of peer_mitsuba_plugins.py.
 
     Args:
-        terms: `lambert` ones, and at most one `blinn_phong` or dielectric `cook_torrance`; textures are left out.
+        terms: `lambert` terms, and at most one `blinn_phong` or dielectric `cook_torrance`; textures are ignored.
     """
     whole = [complete_term(("mitsuba",), term, None) for term in terms]
     diffuse = np.sum([term["color"] for term in whole if term["model"] == "lambert"] or [[0.0] * 3], axis=0).tolist()
@@ -61,7 +61,7 @@ def bsdf(terms: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             "sigma": params["sigma"], "ior": params["ior"],
         }  # fmt: skip
     glossy, exponent = (lobes[0]["color"], lobes[0]["params"]["exponent"]) if lobes else ([0.0] * 3, 1.0)
-    # a highlight reflects up to four times its colour
+    # a highlight reflects up to four times its color
     diffuse_fraction = sum(diffuse) / max(1e-9, sum(diffuse) + 4 * sum(glossy))
     return {
         "type": "lambert_blinn_phong", "albedo": diffuse, "gain": glossy, "exponent": exponent,
@@ -70,9 +70,9 @@ def bsdf(terms: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def map_for_mitsuba(radiance: F32) -> F32:
-    """An environment's map as Mitsuba reads it: row j of R lies at θ = π j/(R − 1), the first and last at the poles.
+    """Resample an environment map for Mitsuba: row j of R is at θ = π j/(R − 1), the first and last at the poles.
 
-    Finer rows lie within one of ours, or on the border of two, where they are the mean of both. Columns lie as ours.
+    A finer row lies within one of ours, or on the border of two, and is their mean then. Columns are unchanged.
 
     Args:
         radiance: (height, width, 3)
@@ -87,12 +87,12 @@ def map_for_mitsuba(radiance: F32) -> F32:
 
 
 def read_passes(folder: Path) -> F32:
-    """Read the independent pictures that `render` was asked for. (passes, height, width, 3)"""
+    """Read the independent images that `render` made. (passes, height, width, 3)"""
     return np.asarray(np.load(folder / "passes.npy", allow_pickle=False), np.float32)
 
 
 def averaged(fine: NDArray[Any], finer: int) -> NDArray[np.float64]:
-    """Average a picture that has `finer` times as many pixels both ways as the peer's. (h, w, 3) float64"""
+    """Average an image with `finer` times as many pixels per side as the peer's. (h, w, 3) float64"""
     height, width, _ = fine.shape
     blocks = fine.reshape(height // finer, finer, width // finer, finer, 3)
     return np.asarray(blocks.mean(axis=(1, 3), dtype=np.float64))
@@ -101,17 +101,17 @@ def averaged(fine: NDArray[Any], finer: int) -> NDArray[np.float64]:
 def render(
     scene: Scene, size: tuple[int, int], job: Mapping[str, Any], folder: Path, images: Mapping[str, F32] | None = None
 ) -> dict[str, Any]:
-    """Hand the scene's first view over as arrays and let the peer render.
+    """Render the scene's first view with the peer, from arrays.
 
     Args:
-        scene: that is handed over. size: width and height, pixels.
-        job: "spp", counts to render with; "bsdfs", one a mesh; "passes" where independent passes are wanted; "bounces"
-            and "seen" where reflected light alone is (peer_mitsuba_render.py); "integrator" where more than direct
-            light is; "emitters", of lights beside the map; both are Mitsuba's own descriptions.
-        folder: where files of the exchange are written.
-        images: that descriptions of materials name as {"array": name}. (height, width, 1) each
+        scene: to render. size: width and height, pixels.
+        job: "spp", sample counts; "bsdfs", one per mesh; "passes" for independent passes; "bounces" and "seen" for
+            indirect light alone (peer_mitsuba_render.py); "integrator" for more than direct light; "emitters", lights
+            besides the map; both are Mitsuba's own descriptions.
+        folder: for exchanged files.
+        images: that descriptions of materials refer to as {"array": name}. (height, width, 1) each
     Returns:
-        What it wrote to result.json in `folder`.
+        Contents of result.json in `folder`.
     Raises:
         CalledProcessError: the peer failed.
     """
@@ -125,12 +125,12 @@ def render(
 def render_arrays(
     arrays: Mapping[str, Any], scene: Scene, size: tuple[int, int], job: Mapping[str, Any], folder: Path
 ) -> dict[str, Any]:
-    """Let the peer render surfaces that are handed over as arrays, seen and lit as a scene's first view.
+    """Render surfaces given as arrays with the peer, with the camera and environment of a scene's first view.
 
     Args:
-        arrays: "positions_k", "normals_k", "uvs_k" and "faces_k" of each surface, and what descriptions name.
-        scene: whose camera and environment are taken.
-        size, job, folder: as of `render`.
+        arrays: "positions_k", "normals_k", "uvs_k" and "faces_k" of each surface, and arrays for descriptions.
+        scene: of camera and environment.
+        size, job, folder: as for `render`.
     """
     camera, llvm = scene.cameras[0], _llvm()
     arrays_by_name: dict[str, Any] = {

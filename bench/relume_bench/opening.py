@@ -1,16 +1,15 @@
-"""opening.*: what somebody waits for who opens a bake of fixed views, or changes its light.
+"""opening.*: waiting times when opening a fixed-camera bake, or changing its light.
 
 The still life, 1,000 lights, each bake opened for the first time, from the call that opens its store: `opening.first_s`
-ends with the first picture that is encoded, of straight light where light between surfaces was baked (`lit_s` in the
-row: the first preview of all light), `opening.exact_s` and `opening.exact_gather_s` with the exact one, of
-640×480 pixels, of straight light and of all of it. `opening.prewarmed_s`, `opening.prewarmed_gather_s`: the same exact
-ones of bakes that have lain for a while, so that their first pictures were made ahead. `opening.relight_s`,
-`opening.relight_gather_s`: from a look whose light is turned, or is another map's, to its exact picture, the longer of
-the two.
+ends with the first encoded image, of direct light if indirect light was baked (`lit_s`: the first preview of all
+light), `opening.exact_s` and `opening.exact_gather_s` with the exact one, of 640×480 pixels, of direct and of all
+light. `opening.prewarmed_s`, `opening.prewarmed_gather_s`: the same exact images of bakes whose first images were
+rendered in advance. `opening.relight_s`, `opening.relight_gather_s`: from a look with a rotated, or another,
+environment to its exact image, the longer of the two.
 
-`opening.large_…`: the same of straight light at 1920×1080 pixels; `opening.large_edit_ms`: look → encoded bytes while
-the teapot's highlight is in hand, the median. In their rows also 3840×2160 pixels; `opening.larger_ratio`: the largest
-ratio of both sizes' figures ÷ that of their pixels.
+`opening.large_…`: the same for direct light at 1920×1080 pixels; `opening.large_edit_ms`: look → encoded bytes while
+the teapot's highlight is dragged, the median. Their contexts also have 3840×2160 pixels; `opening.larger_ratio`: the
+largest ratio of both sizes' figures ÷ that of their pixels.
 """
 
 from __future__ import annotations
@@ -40,15 +39,16 @@ from relume.store.bake_protocol import BakeMethod, Recipe
 from relume_bench.figure import Figure
 from relume_bench.timing import seconds
 
-_CACHE_BYTES = 6 << 30  # the most that a server takes unless it is told
+_CACHE_BYTES = 6 << 30  # default cache budget of a server
 _ACTIVE_POINTER = "/materials/Teapot/terms/1/params/nu"
 _EDITS = 30
 _TURNED, _EXCHANGED = {"rotation": 50.0}, {"map": "clear_sky"}
 
 
 class _Waits(NamedTuple):
-    """Seconds until the first picture, the first of all light, the exact one, the exact one that was made ahead, and
-    exact ones of two other lights; milliseconds of a frame."""
+    """Seconds until the first image, the first with all light, the exact one, the exact one from prewarmed data, and
+    exact ones with two other environments; milliseconds per frame.
+    """
 
     first_s: float
     lit_s: float
@@ -60,7 +60,7 @@ class _Waits(NamedTuple):
 
     @property
     def relit_s(self) -> float:
-        """The longer one of both lights."""
+        """The longer one of both environments."""
         return max(self.turned_s, self.exchanged_s)
 
 
@@ -124,13 +124,13 @@ def _measure_waits(method: BakeMethod, size: tuple[int, int], num_lights: int) -
 
 
 def _open_picture(path: Path, view: str) -> tuple[FixedViewTransfer, Picture]:
-    """A bake of which nothing is in memory, and its picture."""
+    """Open a bake with an empty cache, and its image."""
     transfer = open_transfer(path, Cache(_CACHE_BYTES))
     return transfer, Picture(transfer, view, Cache(_CACHE_BYTES), is_watched=True)
 
 
 def _prewarm(path: Path, view: str) -> None:
-    """What is made of a bake before anybody opens it."""
+    """Prewarm a bake."""
     transfer = open_transfer(path, Cache(_CACHE_BYTES))
     render_image(transfer, view, validate(transfer.default_look, transfer.default_look))
 
@@ -140,14 +140,14 @@ def _run_next_job(picture: Picture) -> None:
 
 
 def _run_until_exact(picture: Picture) -> None:
-    """Make all that is lacking, and the bytes of the exact picture."""
+    """Run all pending jobs, and encode the exact image."""
     while not picture.advance(None).exact or picture.next_job() is not None:
         _run_next_job(picture)
     picture.encode(picture.all_tiles(), "rgb9e5")
 
 
 def _relit_s(transfer: FixedViewTransfer, picture: Picture, light: dict[str, Any]) -> float:
-    """Seconds until the picture shows the scene's own look in another light exactly."""
+    """Seconds until the exact image of the default look in another environment."""
     document = copy.deepcopy(transfer.default_look)
     document["environment"] |= light
     picture.set_look(validate(document, transfer.default_look))
@@ -155,7 +155,7 @@ def _relit_s(transfer: FixedViewTransfer, picture: Picture, light: dict[str, Any
 
 
 def _edit_ms(transfer: FixedViewTransfer, picture: Picture) -> float:
-    """The median frame of a drag, what the hand needs made before."""
+    """Median frame time of a drag with a precomputed operator."""
     picture.prepare(_ACTIVE_POINTER)
     _run_until_exact(picture)
     durations = []

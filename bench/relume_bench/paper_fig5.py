@@ -1,9 +1,9 @@
 """paper.fig5_*: incremental against standard non-linear approximation with 20 of 256 wavelet terms (Ben-Artzi, fig. 5).
 
-The half-angle curve of a Cook–Torrance highlight, a sharp peak; the user draws a coloured rise far from it, in so many
-frames of a drag, then rests. Incremental: 20 coefficients a frame and channel, spent on what changed (eqs. 29 to 31).
+The half-angle curve of a Cook–Torrance highlight, a sharp peak; the user draws a colored rise far from it, in so many
+frames of a drag, then stops. Incremental: 20 coefficients per frame and channel, spent on the changes (eqs. 29 to 31).
 Non-linear: the 20 largest coefficients of the curve. Error: of the image of that term, over its view samples. The
-paper's figure is of its own scene: 4.8e-8 against 0.12.
+paper's figure is for its own scene: 4.8e-8 against 0.12.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ F64 = NDArray[np.float64]
 
 _BUDGET, _CURVE = 20, "theta_h"
 _DRAG, _REST = 30, 12  # frames
-_PEAK_DEG, _RISE = (20.0, 40.0, 62.0, 80.0), (0.6, 0.15, 0.05)  # where the rise begins, peaks, ends; its RGB height
+_PEAK_DEG, _RISE = (20.0, 40.0, 62.0, 80.0), (0.6, 0.15, 0.05)  # start, peak and end of the rise; its RGB height
 
 
 def measure(tiny: bool) -> list[Figure]:
@@ -61,7 +61,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _draw_curve(start: dict[str, Any], fraction: float) -> dict[str, Any]:
-    """The generated curve with a part of the rise on it, as bands of each channel."""
+    """The generated curve with a fraction of the rise, as bands per channel."""
     bands = curve_bands(start, TERMS["cook_torrance"].curve(_CURVE))
     degrees = (np.arange(bands.shape[1]) + 0.5) * 90 / bands.shape[1]
     rise = np.interp(degrees, _PEAK_DEG, [0, 1, 0.4, 0])
@@ -73,7 +73,7 @@ def _draw_curve(start: dict[str, Any], fraction: float) -> dict[str, Any]:
 def _render_drag(
     lit_samples: LitSamples, operator: LinearOperator, start: dict[str, Any], frames: list[dict[str, Any]]
 ) -> F64:
-    """The term's image after the drag and the rest."""
+    """The term's image after the drag has converged."""
     curve = TERMS["cook_torrance"].curve(_CURVE)
     basis, light = CurveBasis.from_curve(curve), Illumination(BAKED_ENVIRONMENT, (), LightPaths(True, 1, 0))
     empty = DisplayedImage(np.zeros_like(operator.transport[:, :, 0]))
@@ -89,12 +89,12 @@ def _image(operator: LinearOperator, coefficients: F64) -> F64:
 
 
 def _select_rows(image: F64, num_positions: int) -> F64:
-    """Samples of an image in tiles, (tiles, 3, samples), one a row. (n, 3)"""
+    """Samples of an image in tiles, (tiles, 3, samples), one per row. (n, 3)"""
     return image.transpose(0, 2, 1).reshape(-1, 3)[:num_positions]
 
 
 def _largest(coefficients: F64) -> F64:
-    """The coefficients, all but the largest of each channel made zero."""
+    """The coefficients, all but the largest of each channel set to zero."""
     truncated = np.zeros_like(coefficients)
     index = np.argsort(-np.abs(coefficients), axis=1)[:, :_BUDGET]
     np.put_along_axis(truncated, index, np.take_along_axis(coefficients, index, axis=1), axis=1)

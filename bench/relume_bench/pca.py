@@ -1,11 +1,10 @@
-"""pca.*: how few vectors stand for the curves of a parameter (Nguyen 2010, section 4 and figure 5).
+"""pca.*: number of vectors that represent the curves of a parameter (Nguyen 2010, section 4 and figure 5).
 
-Norm of `pca.blinn_phong_6`: √mean (linearised − exact)² ÷ √mean exact² over all bands and values of the parameter, the
+Norm of `pca.blinn_phong_6`: √mean (linearized − exact)² ÷ √mean exact² over all bands and values of the parameter, the
 exponent evenly spaced over [3, 300] as in the paper, 256 bands; decomposed at 298 values, measured at those between.
-`pca.vectors` is the largest number of vectors, over all terms and sliders, that holds this norm to 1e-3; in its context
-are the errors of each slider with 2 to 16 vectors: over all values, and at the worst of them. `pca.slider_nodes` is the
-largest number of nodes of an operator along a slider (`relume.operators.parameter_operator`), all of them in the
-context.
+`pca.vectors` is the largest number of vectors, over all terms and sliders, that keeps this norm at 1e-3; its context
+has the errors of each slider with 2 to 16 vectors: over all values, and at the worst value. `pca.slider_nodes` is the
+largest number of nodes of an operator along a slider (`relume.operators.parameter_operator`), all in the context.
 """
 
 from __future__ import annotations
@@ -47,7 +46,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _count_nodes(terms: list[Term]) -> Figure:
-    """Nodes of every slider; "bands" where too many would be needed."""
+    """Nodes of every slider; "bands" if too many would be needed."""
     num_nodes: dict[str, int | str] = {}
     for term in terms:
         for parameter in term.parameters:
@@ -58,7 +57,7 @@ def _count_nodes(terms: list[Term]) -> Figure:
 
 
 def _errors(term: Term, parameter: Parameter, num: int) -> dict[int, tuple[float, float]]:
-    """Error over all values, and at the worst, by number of vectors."""
+    """Error over all values, and at the worst one, by number of vectors."""
     components = decompose(_curves(term, parameter, slider_values(parameter, num)))
     exact = _curves(term, parameter, slider_values(parameter, num - 1, at_midpoints=True))
     errors = {}
@@ -70,7 +69,7 @@ def _errors(term: Term, parameter: Parameter, num: int) -> dict[int, tuple[float
 
 
 def _curves(term: Term, parameter: Parameter, values: F64) -> F64:
-    """What a parameter moves, all its curves multiplied. (values, J)"""
+    """Product of all curves that a parameter changes. (values, J)"""
     curves = curves_of_parameter(term, parameter.name)
     return np.array(
         [joint([curve_at_value(term, curve, {parameter.name: value}) for curve in curves]) for value in values]

@@ -1,4 +1,4 @@
-"""Renders a scene with Blender's Cycles at rising sample counts; run by the peer's own interpreter, knows no relume.
+"""Render a scene with Blender's Cycles at increasing sample counts, in its own environment, without relume.
 
 python -I peer_cycles_render.py FOLDER     reads cycles.npz and cycles.json there, writes cycles_result.json and
                                            picture.npy
@@ -17,11 +17,11 @@ import numpy as np
 bpy: Any = __import__("bpy")
 Matrix: Any = __import__("mathutils").Matrix
 
-Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # from our Y up
+Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # from Y up
 
 
 def material(index: int, colors: dict[str, Any]) -> Any:
-    """Diffuse and glossy together."""
+    """A mixture of diffuse and glossy."""
     node_material = bpy.data.materials.new(f"material {index}")
     tree = node_material.node_tree
     tree.nodes.clear()
@@ -41,7 +41,7 @@ def material(index: int, colors: dict[str, Any]) -> Any:
 
 
 def environment(radiance: Any) -> None:
-    """Both maps have +X in their middle, and to its right our +Z, which is Blender's −Y; its rows go upward."""
+    """The environment. Both maps have +X in the center, our +Z is Blender's −Y; Blender's rows go upward."""
     height, width = radiance.shape[:2]
     image = bpy.data.images.new("sky", width, height, float_buffer=True, is_data=True)
     opaque = np.concatenate([radiance[::-1], np.ones((height, width, 1))], axis=2)
@@ -55,7 +55,7 @@ def environment(radiance: Any) -> None:
 
 
 def load(folder: Path, job: dict[str, Any]) -> None:
-    """The scene."""
+    """Load the scene."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     arrays, scene = np.load(folder / "cycles.npz", allow_pickle=False), bpy.context.scene
     for k, colors in enumerate(job["materials"]):
@@ -81,13 +81,13 @@ def load(folder: Path, job: dict[str, Any]) -> None:
 
 
 def render(folder: Path, spp: int, seed: int) -> tuple[Any, float]:
-    """Render the scene that is loaded.
+    """Render the loaded scene.
 
     Args:
-        folder: where a file of the picture is written.
-        spp: samples a pixel. seed: of them.
+        folder: for the image file.
+        spp: samples per pixel. seed: of the samples.
     Returns:
-        The picture, (height, width, 3) float64, and its seconds.
+        The image, (height, width, 3) float64, and its seconds.
     """
     scene = bpy.context.scene
     scene.cycles.samples, scene.cycles.seed = spp, seed
@@ -104,7 +104,7 @@ def render(folder: Path, spp: int, seed: int) -> tuple[Any, float]:
 
 
 def main(folder: Path) -> None:
-    """Render what cycles.json asks for, and write cycles_result.json and picture.npy."""
+    """Render the job of cycles.json, and write cycles_result.json and picture.npy."""
     job = json.loads((folder / "cycles.json").read_text())
     load(folder, job)
     step_results = []

@@ -1,16 +1,13 @@
-"""peer.mitsuba_gather_time_ratio and peer.cycles_time_ratio: how long they render, after an edit of a material under
-global illumination, until their noise is as small as our error ÷ our time for the edit's frame.
+"""peer.mitsuba_gather_time_ratio and peer.cycles_time_ratio: time that they render, after an edit of a material under
+global illumination, until their noise equals our error ÷ our time for the edit's frame.
 
-The bake and the edit of bench/relume_bench/gather.py: the exponent of the floor's highlight. Our error: the reflected
-light of the whole picture against Mitsuba's path tracer, its noise taken off,
-or what it is very likely below where it cannot be
-told from the noise. Mitsuba renders reflected light alone, as bench/relume_bench/indirect.py has it, which is less work
-than a picture. Cycles renders whole pictures,
-a Beckmann highlight as wide as ours in place of Blinn and Phong's; its noise
-is compared with our error in the same units. Every surface has its whole material with both of them: what we leave out
-of the light that highlights send is among our error. Noise is the difference of two seeds over √2; where our error is
-not reached at the largest count, the time is extrapolated by noise ∝ 1/√spp, time ∝ spp, and the context says so. Scene
-loading and compiling are not counted; nor is our bake.
+The bake and the edit of `relume_bench.gather`: the exponent of the floor's highlight. Our error: the indirect light of
+the whole image against Mitsuba's path tracer, its noise removed, or its upper bound if it is below the noise. Mitsuba
+renders indirect light alone, as in `relume_bench.indirect`, which is less work than an image. Cycles renders whole
+images, with a Beckmann highlight of the same width instead of Blinn–Phong; its noise is compared with our error in the
+same units. Both have the full material of every surface: our approximation of light reflected by highlights is part of
+our error. Noise is the difference of two seeds over √2; if our error is not reached at the largest count, the time is
+extrapolated by noise ∝ 1/√spp, time ∝ spp, and the context says so. Scene loading, compiling and our bake are excluded.
 """
 
 from __future__ import annotations
@@ -38,16 +35,16 @@ _NAMES = ("peer.mitsuba_gather_time_ratio", "peer.cycles_time_ratio")
 
 
 class _RelumeResult(NamedTuple):
-    """Error of reflected light, absolute; seconds of an edit's frame."""
+    """Error of indirect light, absolute; seconds of an edit's frame."""
 
     error: JackknifeEstimate
     edit_s: float
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Measure our edit and its error, then how long the others render to it."""
+    """Measure our edit and its error, then the others' times to reach it."""
     if (why := mitsuba.missing()) is not None:
-        return skipped(_NAMES, "ratio", f"our error is not known: {why}")
+        return skipped(_NAMES, "ratio", f"our error is unknown: {why}")
     scene, recipe = cornell_box(is_floor_glossy=True), make_recipe(tiny)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -93,7 +90,7 @@ def _edit_s(transfer: FixedViewTransfer, num_frames: int) -> float:
 
 
 def _materials(scene: Scene) -> list[dict[str, Any]]:
-    """The same for Cycles; its highlight has the floor's albedo, four times its colour, and width, α² = 2/(s + 2)."""
+    """Materials for Cycles; its highlight has four times the albedo of the floor's color, and α² = 2/(s + 2)."""
     floor = GLOSSY_FLOOR[1]
     alpha = (2 / (floor["params"]["exponent"] + 2)) ** 0.5
     black = {"glossy": [0.0, 0.0, 0.0], "roughness": 0.0}

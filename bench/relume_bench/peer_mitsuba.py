@@ -1,14 +1,13 @@
-"""peer.mitsuba_time_ratio: how long Mitsuba 3 renders until its noise is as small as our error ÷ our time per edit.
+"""peer.mitsuba_time_ratio: time that Mitsuba 3 renders until its noise equals our error ÷ our time per edit.
 
 Same teapot on a table, same camera, map and 512×512 pixels, same BRDF formula (a Python plugin that Mitsuba compiles
 with the rest), variant llvm_ad_rgb, direct light with multiple importance sampling. Its error at a sample count is the
-difference of two renders with other seeds over √2. Where the error that we have is not reached at the largest count,
-the time is extrapolated by error ∝ 1/√spp, time ∝ spp, and the context says so. Scene loading and compiling are not
-counted; nor is our bake.
+difference of two renders with different seeds over √2. If our error is not reached at the largest count, the time is
+extrapolated by error ∝ 1/√spp, time ∝ spp, and the context says so. Scene loading, compiling and our bake are excluded.
 
-Our error: the frame of 4,000 light triangles against `relume.reference` over 2,000 random view samples. Our time: a
-change of σ that moves every coefficient, from the look to the encoded bytes (it does not depend on the lights).
-bench/relume_bench/mitsuba.py says where Mitsuba is looked for.
+Our error: the frame of 4,000 environment triangles against `relume.reference` over 2,000 random view samples. Our time:
+a change of σ that changes every coefficient, from the look to the encoded bytes (independent of the lights). For the
+installation of Mitsuba see bench/relume_bench/mitsuba.py.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ _TERMS = tuple(complete_term(("peer",), term, None) for term in (LAMBERT, cook_t
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Measure our error and our edit's time, then how long Mitsuba renders to that error."""
+    """Measure our error and our edit's time, then Mitsuba's time to reach that error."""
     if (why := missing()) is not None:
         return skipped(_NAMES, "ratio", why)
     size = (32, 32) if tiny else (512, 512)
@@ -83,7 +82,7 @@ def _measure_relume_error(scene: Scene, tiny: bool) -> JackknifeEstimate:
 
 
 def _time_relume_edit(scene: Scene, size: tuple[int, int], tiny: bool) -> tuple[float, Any]:
-    """Median seconds of an edit, and the picture of the default look."""
+    """Median seconds of an edit, and the image of the default look."""
     with tempfile.TemporaryDirectory() as folder:
         recipe = Recipe("direct", ("front",), size, 60 if tiny else 1000)
         transfer = open_transfer(

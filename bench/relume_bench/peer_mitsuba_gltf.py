@@ -1,7 +1,7 @@
-"""glTF's material as a BSDF of Mitsuba 3: the formulas of the specification's appendix B and of the extensions.
+"""glTF's material as a BSDF for Mitsuba 3: the formulas of the specification's appendix B and of the extensions.
 
-Imported by peer_mitsuba_files.py; knows nothing of relume. Textures are multiplied by factors where arrays are made, so
-that here everything is an image or one texel.
+Imported by peer_mitsuba_files.py; independent of relume. Textures are multiplied by their factors when the arrays are
+made, so that here everything is an image or one texel.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ _LEAST_ALPHA = 1e-3
 
 
 class Texel(dict[str, Any]):
-    """What a material's images say at a point."""
+    """Values of a material's images at a point."""
 
     def __getattr__(self, name: str) -> Any:
         return self[name]
 
 
 class _Gltf(mi.BSDF):  # type: ignore[misc]
-    """Metallic-roughness with specular, anisotropy, clearcoat and sheen; one side, of reflection alone.
+    """Metallic-roughness with specular, anisotropy, clearcoat and sheen; one-sided, reflection only.
 
-    Properties: textures "base" (3), "rough" (1), "metal" (1), "weight" (1) and "tint" (3) of what is specular, "coat"
+    Properties: textures "base" (3), "rough" (1), "metal" (1), "weight" (1) and "tint" (3) of the specular lobe, "coat"
     (1), "coat_rough" (1), "sheen" (3), "normal" (3, unit, tangent space, halved and moved into [0, 1]); "colors",
     "tangent" and "hand" are attributes of the mesh; numbers "f0", "anisotropy", "turn", "sheen_alpha", and six
-    "NAME_ij" that say where a texture lies.
+    "NAME_ij" for the UV transform of a texture.
     """
 
     def __init__(self, props: Any) -> None:
@@ -68,7 +68,7 @@ class _Gltf(mi.BSDF):  # type: ignore[misc]
         return texel
 
     def _frame(self, si: Any, active: Any) -> Any:
-        """Tangent, bitangent and normal, as a normal map bends them, in coordinates of the shading frame."""
+        """Tangent, bitangent and normal after normal mapping, in coordinates of the shading frame."""
         if "tangent" in self.textures:
             along = mi.Vector3f(self.textures["tangent"].eval_3(si, active)) * 2 - 1
             handedness = self.textures["hand"].eval_1(si, active) * 2 - 1
@@ -89,7 +89,7 @@ class _Gltf(mi.BSDF):  # type: ignore[misc]
         return mi.Frame3f(s, dr.cross(normal, s), normal)
 
     def _towards_texels(self, si: Any) -> tuple[Any, Any]:
-        """Where the places of the normal map go along its u, and along its v, which runs down."""
+        """Directions of the normal map's u, and of its v, which points down."""
         if "normal_00" not in self.numbers:
             return si.dp_du, si.dp_dv
         (a, b), (c, d) = ([self.numbers[f"normal_{row}{column}"] for column in range(2)] for row in range(2))
@@ -97,7 +97,7 @@ class _Gltf(mi.BSDF):  # type: ignore[misc]
         return (d * si.dp_du - c * si.dp_dv) / determinant, (a * si.dp_dv - b * si.dp_du) / determinant
 
     def _value(self, t: Texel, wi: Any, wo: Any) -> Any:
-        """BRDF times the cosine; directions in the bent frame."""
+        """BRDF times the cosine; directions in the mapped frame."""
         cos_o, cos_i = dr.maximum(wi.z, 1e-4), dr.maximum(wo.z, 1e-4)
         h = dr.normalize(wi + wo)
         cos_d = dr.abs(dr.dot(wi, h))
@@ -135,7 +135,7 @@ class _Gltf(mi.BSDF):  # type: ignore[misc]
         return dr.lerp(low_value, dr.gather(mi.Float, self.sheen_table, low + 1), fraction)
 
     def _get_lobe_probabilities(self, t: Texel) -> tuple[Any, Any, Any]:
-        """Of rays by the cosine, by the facets, by the coat."""
+        """Sampling probabilities of the cosine, the facets, and the coat."""
         diffuse = 0.1 + 0.4 * (1 - t.metal)
         coat = 0.3 * t.coat if "coat" in t else mi.Float(0)
         return diffuse * (1 - coat), (1 - diffuse) * (1 - coat), coat
@@ -205,7 +205,7 @@ mi.register_bsdf("gltf", _Gltf)
 
 
 def _sheen_l(x: Any, alpha: float) -> Any:
-    """Estevez and Kulla 2017, equation 3."""
+    """Equation 3 of Estevez and Kulla 2017."""
     t = (1 - alpha) ** 2
     ends = ((25.3245, 3.32435, 0.16801, -1.27393, -4.85967), (21.5473, 3.82987, 0.19823, -1.97760, -4.32054))
     a, b, c, d, e = (t * smooth_value + (1 - t) * rough_value for smooth_value, rough_value in zip(*ends, strict=True))
@@ -219,7 +219,7 @@ def _sheen_lambda(cosine: Any, alpha: float) -> Any:
 
 
 def _sheen_albedo(alpha: float, num: int = 65) -> list[float]:
-    """Share of light from each cosine that a white sheen reflects, at even cosines."""
+    """Albedo of a white sheen at evenly spaced cosines."""
     albedos = []
     for k in range(num):
         cos_o = max(k / (num - 1), 1e-3)

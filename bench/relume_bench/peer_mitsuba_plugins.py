@@ -9,7 +9,7 @@ dr: Any = __import__("drjit")
 
 
 class _Sided(mi.BSDF):  # type: ignore[misc]
-    """Reflects on its front alone, in components of these flags. A subclass has `sample`, `eval` and `pdf`."""
+    """One-sided BSDF with components of these flags. A subclass has `sample`, `eval` and `pdf`."""
 
     def __init__(self, props: Any, *flags: Any) -> None:
         mi.BSDF.__init__(self, props)
@@ -26,10 +26,10 @@ class _Sided(mi.BSDF):  # type: ignore[misc]
 
 
 class _TwoLobes(_Sided):
-    """A diffuse and a glossy lobe. A subclass has, `wo` being towards the light as Mitsuba names it,
+    """A diffuse and a glossy lobe. A subclass has, with `wo` toward the light in Mitsuba's convention,
 
-    `_value(wi, wo)`, BRDF times the cosine; `_drawn(wi, which, place)`, a direction from numbers in [0, 1), and
-    `_density(wi, wo)` of drawing it, 1/sr.
+    `_value(wi, wo)`, BRDF times the cosine; `_sample_direction(wi, lobe_sample, direction_sample)`, a direction from
+    numbers in [0, 1), and `_density(wi, wo)`, its density, 1/sr.
     """
 
     def __init__(self, props: Any) -> None:
@@ -61,7 +61,7 @@ def _above(wi: Any, wo: Any, active: Any) -> Any:
 class LambertCookTorrance(_TwoLobes):
     """albedo/π + D F G / (4π cos θi cos θo), Beckmann facets, dielectric Fresnel, V-cavity masking.
 
-    Samples the cosine and the facets half and half.
+    Samples the cosine and the facets with equal probability.
     """
 
     def __init__(self, props: Any) -> None:
@@ -99,7 +99,7 @@ mi.register_bsdf("lambert_cook_torrance", lambda props: LambertCookTorrance(prop
 
 
 class LambertBlinnPhong(_TwoLobes):
-    """albedo/π + gain (s + 2)/(2π) cos^s θh; samples the two by their albedos' means."""
+    """albedo/π + gain (s + 2)/(2π) cos^s θh; samples the two by their mean albedos."""
 
     def __init__(self, props: Any) -> None:
         super().__init__(props)
@@ -130,10 +130,10 @@ mi.register_bsdf("lambert_blinn_phong", lambda props: LambertBlinnPhong(props))
 
 
 class _MirrorOverDiffuse(_Sided):
-    """`diffuse_probability` of a smooth mirror beside albedo/π.
+    """A smooth mirror mixed with albedo/π, by `diffuse_probability`.
 
-    Mitsuba's own `blendbsdf` of the two loses light: under a constant sky of 1, a tenth of a mirror over an albedo of
-    0.3 sends 0.363 (3.9.1), as densities of what it samples lack the weights.
+    Mitsuba's own `blendbsdf` of the two loses energy: under a constant environment of 1, a mixture with a tenth of a
+    mirror and an albedo of 0.3 reflects 0.363 (3.9.1), because the sampling densities lack the weights.
     """
 
     def __init__(self, props: Any) -> None:
@@ -165,11 +165,10 @@ mi.register_bsdf("mirror_over_diffuse", lambda props: _MirrorOverDiffuse(props))
 
 
 class Indirect(mi.SamplingIntegrator):  # type: ignore[misc]
-    """Light that surfaces have reflected onto what the camera sees: one step, then Mitsuba's own path tracer.
+    """Indirect light at the first hit of the camera: one step, then Mitsuba's own path tracer.
 
-    `camera_bsdfs` is the scene as the camera sees it; beyond the first surface paths go on in the scene that is
-    rendered, which may reflect otherwise. That paths leave the scene right after the first surface is direct light: it
-    is left out.
+    `camera_bsdfs` is the scene for camera rays; after the first hit paths continue in the rendered scene, which may
+    have other BSDFs. Paths that leave the scene right after the first hit are direct light, and excluded.
     """
 
     def __init__(self, camera_bsdfs: Any, bounces: int) -> None:
@@ -184,11 +183,11 @@ class Indirect(mi.SamplingIntegrator):  # type: ignore[misc]
         """Mitsuba's interface.
 
         Args:
-            scene: in which paths go on. sampler: of random numbers.
-            ray: from the camera. medium: always None, as there are none.
-            active: lanes that are wanted.
+            scene: for the rest of the path. sampler: of random numbers.
+            ray: from the camera. medium: always None, there are none.
+            active: active lanes.
         Returns:
-            Radiance, which lanes hit anything, and no further values.
+            Radiance, lanes with a hit, and no further values.
         """
         si = self.camera_bsdfs.ray_intersect(ray, active)
         active = active & si.is_valid()

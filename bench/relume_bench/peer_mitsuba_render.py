@@ -1,7 +1,7 @@
-"""Renders a scene with Mitsuba 3 at rising sample counts; run by the peer's own interpreter, knows nothing of relume.
+"""Render a scene with Mitsuba 3 at increasing sample counts, in its own environment, without relume.
 
 python -I peer_mitsuba_render.py FOLDER     reads scene.npz and job.json there, writes result.json, and picture.npy
-                                            or passes.npy (as many independent pictures as the job asks for)
+                                            or passes.npy (independent images, as many as in the job)
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ __import__("peer_mitsuba_gltf")
 
 
 def resolve_description(arrays: Any, value: Any) -> Any:
-    """A description with its images.
+    """Resolve the images of a description.
 
     Args:
         arrays: of scene.npz.
-        value: {"array": name} in it becomes a texture of that array, (height, width, 1 or 3), its values as they are;
-            "wrap_mode" and "filter_type" may stand beside it.
+        value: {"array": name} becomes a texture of that array, (height, width, 1 or 3), with raw values; optional
+            "wrap_mode" and "filter_type".
     """
     if isinstance(value, dict) and "array" in value:
         plain_entries = {key: entry for key, entry in value.items() if key != "array"}
@@ -39,12 +39,12 @@ def resolve_description(arrays: Any, value: Any) -> Any:
 
 
 def mesh(arrays: Any, k: int, bsdf: dict[str, Any]) -> Any:
-    """One mesh of the scene.
+    """Create one mesh of the scene.
 
     Args:
-        arrays: of scene.npz. k: which mesh; "NAME_of_k" of the arrays are attributes of its vertices.
-        bsdf: its material, as `relume_bench.mitsuba.bsdf` describes it; "interior" is the medium inside, "emitter" what
-            it shines. One that is neither a dielectric nor has "sides" is the same from both.
+        arrays: of scene.npz. k: index of the mesh; "NAME_of_k" in the arrays are attributes of its vertices.
+        bsdf: its material, as from `relume_bench.mitsuba.bsdf`; "interior" is the medium inside, "emitter" its
+            emission. Without dielectric and "sides" it is made two-sided.
     """
     props = mi.Properties()
     attached = {
@@ -74,14 +74,14 @@ def mesh(arrays: Any, k: int, bsdf: dict[str, Any]) -> Any:
 
 
 def load(folder: Path, job: dict[str, Any], bsdfs: list[dict[str, Any]]) -> Any:
-    """The scene with a BSDF for each mesh.
+    """Load the scene with a BSDF for each mesh.
 
-    Our cameras look along -Z with +X to the right, Mitsuba's along +Z with +X to the left; our maps have +X in their
-    middle, Mitsuba's +Z.
+    Our cameras look along -Z with +X to the right, Mitsuba's along +Z with +X to the left; our maps have +X in the
+    center, Mitsuba's +Z.
 
     Args:
-        folder: with scene.npz. job: of job.json: size, camera, emitters, integrator, by default of direct light.
-        bsdfs: descriptions, one a mesh.
+        folder: of scene.npz. job: of job.json: size, camera, emitters, integrator, by default of direct light.
+        bsdfs: descriptions, one per mesh.
     """
     arrays = np.load(folder / "scene.npz", allow_pickle=False)
     transform = mi.ScalarTransform4f
@@ -111,10 +111,10 @@ def load(folder: Path, job: dict[str, Any], bsdfs: list[dict[str, Any]]) -> Any:
 
 
 def renderer(folder: Path, job: dict[str, Any]) -> Callable[[int, int], Any]:
-    """What makes a picture of so many samples a pixel from a seed, `job["most"]` samples at once.
+    """Return a function that renders an image from a sample count and a seed, `job["most"]` samples at once.
 
-    Direct light; or, where the job says "bounces", the light alone that surfaces have reflected so many times at most
-    onto what the camera sees. "bsdfs" are of the surfaces on the way, "seen" of what the camera sees.
+    Direct light; or with "bounces" in the job, indirect light alone with at most so many bounces. "bsdfs" are for the
+    surfaces on the path, "seen" for those at the first hit.
     """
     scene, max_spp = load(folder, job, job["bsdfs"]), job["most"]
     is_direct = "bounces" not in job
@@ -132,18 +132,18 @@ def renderer(folder: Path, job: dict[str, Any]) -> Callable[[int, int], Any]:
 
 
 def steps(render: Callable[[int, int], Any], job: dict[str, Any], folder: Path) -> None:
-    """Render two pictures with different seeds at each count: their difference is √2 times the error of one.
+    """Render two images with different seeds at each count: their difference is √2 times the error of one.
 
     Args:
-        render: makes a picture of so many samples a pixel from a seed.
-        job: its "spp" are the counts, rising; "most" of them are rendered at once.
-        folder: where picture.npy, of the last count, and result.json are written.
+        render: from a sample count and a seed.
+        job: with increasing counts "spp"; "most" of them are rendered at once.
+        folder: for picture.npy, of the last count, and result.json.
     """
     render(job["spp"][0], 99)  # compiles
     step_results = []
     for spp in job["spp"]:
         if spp >= job["most"]:
-            render(job["most"], 98)  # each wavefront size warms up by itself
+            render(job["most"], 98)  # warm up each wavefront size
         start_time = time.perf_counter()
         first_image, second_image = (render(spp, seed) for seed in (1, 2))
         taken_s = (time.perf_counter() - start_time) / 2
@@ -156,12 +156,12 @@ def steps(render: Callable[[int, int], Any], job: dict[str, Any], folder: Path) 
 
 
 def passes(render: Callable[[int, int], Any], job: dict[str, Any], folder: Path) -> None:
-    """Render pictures that are independent of each other.
+    """Render independent images.
 
     Args:
-        render: makes a picture of so many samples a pixel from a seed.
-        job: its first "spp" is the count, and "passes" the number of pictures.
-        folder: where passes.npy, (passes, height, width, 3), and result.json are written.
+        render: from a sample count and a seed.
+        job: its first "spp" is the count, and "passes" the number of images.
+        folder: for passes.npy, (passes, height, width, 3), and result.json.
     """
     pictures = [render(job["spp"][0], seed)[..., :3] for seed in range(job["passes"])]
     np.save(folder / "passes.npy", np.array(pictures, np.float32))
@@ -169,7 +169,7 @@ def passes(render: Callable[[int, int], Any], job: dict[str, Any], folder: Path)
 
 
 def main(folder: Path) -> None:
-    """Render what job.json asks for."""
+    """Render the job of job.json."""
     job = json.loads((folder / "job.json").read_text())
     (passes if "passes" in job else steps)(renderer(folder, job), job, folder)
 

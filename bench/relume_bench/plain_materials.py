@@ -1,6 +1,6 @@
-"""Materials of a glTF file as the peer's BSDF has them, factors times images. See `relume_bench.gltf_plain`.
+"""Materials of a glTF file for the peer's BSDF, factors times images. See `relume_bench.gltf_plain`.
 
-Glass is the peer's own dielectric: thin where the file names no thickness, else solid and filled with what absorbs.
+Glass is the peer's own dielectric: thin if the file has no thickness, otherwise solid with an absorbing medium.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from relume_bench.gltf_plain import File
 F32 = NDArray[np.float32]
 Description = dict[str, Any]
 
-_FINER = 4  # texels of a mask that is cut, for each of the image's
+_FINER = 4  # texels of an alpha mask per texel of the image
 _LEAST_SHEEN = 0.07**2
 
 
@@ -24,7 +24,7 @@ class Materials:
     """Describes the materials of one file.
 
     Attributes:
-        arrays: images that descriptions name.
+        arrays: images for the descriptions.
     """
 
     def __init__(self, file: File) -> None:
@@ -32,10 +32,10 @@ class Materials:
         self.arrays: dict[str, F32] = {}
 
     def bsdf(self, number: int | None, has: Mapping[str, Any]) -> Description:
-        """A material, complete, with what it shines.
+        """A complete material with its emission.
 
         Args:
-            number: of it in the file; None for the default. has: attributes of the surface that wears it.
+            number: index in the file; None for the default. has: attributes of its surface.
         """
         description = {} if number is None else self._file.json["materials"][number]
         pbr, name = description.get("pbrMetallicRoughness", {}), f"m{number}"
@@ -75,7 +75,7 @@ class Materials:
         return bsdf
 
     def _bend(self, bsdf: Description, description: Description, name: str, has: Mapping[str, Any]) -> None:
-        """Normals, the direction of anisotropy, colours of vertices."""
+        """Add normals, the direction of anisotropy, and vertex colors."""
         stretched = _extension(description, "anisotropy")
         if (info := description.get("normalTexture")) is not None:
             normal_map = np.asarray(self._file.image(info["index"])[..., :3] / np.float32(127.5) - 1, np.float32)
@@ -109,7 +109,7 @@ class Materials:
         return {"array": name, **({} if info is None else {"wrap_mode": self._file.wraps(info["index"])}), **more}
 
     def _opacity(self, description: Description, pbr: Description, name: str) -> Any:
-        """Alpha, cut where it is a mask: between texels as well."""
+        """Alpha, thresholded for masks, between texels as well."""
         info, alpha = pbr.get("baseColorTexture"), pbr.get("baseColorFactor", [1, 1, 1, 1])[3]
         texels = np.full((1, 1, 1), alpha, np.float32)
         if info is not None:
@@ -155,7 +155,7 @@ def _extension(description: Description, kind: str) -> Description:
 
 
 def _set_uv_transform(bsdf: Description, key: str, info: Description | None) -> None:
-    """Where a texture lies, by KHR_texture_transform: translation · rotation · scale, v down."""
+    """Set the UV transform of KHR_texture_transform: translation · rotation · scale, v down."""
     uv_transform = (info or {}).get("extensions", {}).get("KHR_texture_transform")
     if uv_transform is None:
         return
@@ -170,7 +170,7 @@ def _linear(display: F32) -> F32:
 
 
 def _finer(texels: F32, times: int) -> F32:
-    """Bilinear between the middles of texels, which go round at the borders. (times · rows, times · columns, ...)"""
+    """Interpolate bilinearly between texel centers, wrapping at the borders. (times · rows, times · columns, ...)"""
     for axis in (0, 1):
         size = texels.shape[axis]
         position = (np.arange(size * times) + 0.5) / times - 0.5

@@ -1,7 +1,7 @@
-"""plan.*: what bakes take of what was planned for them, at the most over the built-in scenes and real ones.
+"""plan.*: actual ÷ planned cost of bakes, the maximum over the built-in scenes and real ones.
 
-Each is baked in a process of its own, on one thread, as worker processes are. A share above 1 would be a plan that is
-no upper bound.
+Each is baked in a process of its own, on one thread, like in worker processes. A fraction above 1 means that the plan
+is no upper bound.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ _FILES = ("scenes/*.glb", "scenes/*/*.glb", "scenes/openchessset_gltf/chess_set.
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Bake all scenes by all methods; the largest share of each kind, and whose it is."""
+    """Bake all scenes with all methods; the largest fraction of each kind, and its scene."""
     if not Path("/proc/self/status").exists():
-        return skipped(_NAMES, "", "only Linux counts the most memory that a process has held")
+        return skipped(_NAMES, "", "only Linux reports the peak memory of a process")
     size, num_lights = ((32, 24), 60) if tiny else ((640, 480), 500)
     ratios: dict[str, list[float]] = {}
     for scene in _make_scenes(tiny):
@@ -57,7 +57,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def measure_use(scene: Scene, recipe: Recipe) -> dict[str, Any]:
-    """What a bake takes in a process of its own; see `relume_bench.plan_process`."""
+    """Cost of a bake in a process of its own; see `relume_bench.plan_process`."""
     with tempfile.TemporaryDirectory() as folder:
         save_scene(scene, folder)
         command = [sys.executable, "-m", "relume_bench.plan_process", folder, recipe_json(recipe)]

@@ -1,7 +1,7 @@
-"""plan.disk_ratio: disk that is planned for bakes ÷ disk that they take, the largest over scenes and methods.
+"""plan.disk_ratio: planned ÷ actual disk space of bakes, the largest over scenes and methods.
 
-All built-in scenes and all of shared/data that can be imported, by all methods, in one size. A ratio below 1, a plan
-that is too small, fails the run.
+All built-in scenes and all importable ones of shared/data, with all methods, in one size. A ratio below 1, a plan that
+is too small, fails the run.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from relume_bench.scenes import shared_data
 
 NAME = "plan.disk_ratio"
 _FILES = ("scenes/*.glb", "scenes/*/*.glb", "scenes/*/*.gltf", "scenes/meshes/*.ply", "scenes/meshes/*.obj")
-_GLASS_FILES = "conformance/**/*.glb"  # of those, the ones that have glass: plans of these were worst
+_GLASS_FILES = "conformance/**/*.glb"  # those with glass had the worst plans
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Bake all scenes by all methods; the largest ratio, and whose it is."""
+    """Bake all scenes with all methods; the largest ratio, and its scene."""
     if not tiny and not shared_data().is_dir():
         return skipped((NAME,), "", "the folder of shared scenes is not here: set RELUME_SHARED_DATA")
     size, lights, num_probes = ((64, 48), 60, 2000) if tiny else ((320, 240), 300, 50_000)
@@ -42,7 +42,7 @@ def measure(tiny: bool) -> list[Figure]:
             ratios[f"{scene.name}, {name}"] = planned / measured_bytes
     largest, smallest = max(ratios, key=ratios.__getitem__), min(ratios, key=ratios.__getitem__)
     if ratios[smallest] < 1:
-        raise AssertionError(f"{smallest} takes {1 / ratios[smallest]:.2f} times what was planned")
+        raise AssertionError(f"{smallest} takes {1 / ratios[smallest]:.2f} times the planned space")
     context = {"size": list(size), "lights": lights, "probes": num_probes, "bakes": len(ratios), "most": largest}
     smallest_details = {"least": smallest, "least_ratio": round(ratios[smallest], 2)}
     each = {"ratios": {label: round(ratio, 2) for label, ratio in ratios.items()}}
@@ -62,7 +62,7 @@ def _list_scenes(tiny: bool) -> Iterator[Scene]:
 
 
 def _imported(path: Path) -> Iterator[Scene]:
-    """A scene; none where its file is one of those that are refused."""
+    """Yield a scene; none if its file is rejected."""
     try:
         yield import_scene(path, path.stem)
     except RelumeError:

@@ -1,9 +1,9 @@
-"""Bake a saved scene as a worker process does and report its cost.
+"""Bake a saved scene like a worker process, and report its cost.
 
 `python -m relume_bench.plan_process FOLDER RECIPE`.
 
-RECIPE is JSON as `relume_worker.status.recipe_json` writes it. Prints one line of JSON: bytes of memory at the most,
-samples of all views, rays, bytes of the store's arrays. Linux only: the system counts the memory.
+RECIPE is JSON from `relume_worker.status.recipe_json`. Prints one line of JSON: peak memory in bytes, view samples,
+rays, bytes of the store's arrays. Linux only, because of the peak memory.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from relume_worker.status import FREE_CAMERA_METHODS, recipe_from_json
 
 
 def main(folder: str, recipe: str) -> None:
-    """Bake, look at the store, print."""
+    """Bake, inspect the store, print."""
     planned_recipe, rays = recipe_from_json(recipe), 0
 
     def count(_: Task, written: TaskOutput) -> None:
@@ -44,7 +44,7 @@ def main(folder: str, recipe: str) -> None:
 
 
 def _peak_bytes() -> int:
-    """The most memory that this process has held since it was started."""
+    """Peak memory of this process."""
     lines = Path("/proc/self/status").read_text().splitlines()
     return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM:"))
 

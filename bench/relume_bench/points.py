@@ -1,4 +1,4 @@
-"""View samples of a scene as points, all or a random subset, and the frame's own sums over them, without a store."""
+"""View samples of a scene as points, all or a random subset, and a frame's sums over them, without a store."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from relume.transport.shading_points import ShadingPoints
 
 @dataclass(frozen=True)
 class LitSamples:
-    """Points with the light triangles that they see."""
+    """Points with their visible environment triangles."""
 
     geometry: SceneBuffers
     surface_points: ReferencePoints
@@ -37,13 +37,13 @@ class LitSamples:
 def sample_lit_surface(
     scene: Scene, size: tuple[int, int], num_positions: int, num_lights: int, material: int | None
 ) -> LitSamples:
-    """A random subset (fixed seed, order kept) of a view's samples, with the light triangles that they see.
+    """A random subset (fixed seed, order kept) of a view's samples, with their visible environment triangles.
 
     Args:
-        scene: its first view is taken. size: width and height, pixels.
-        num_positions: of the subset; all where there are fewer.
-        num_lights: triangles that the environment is divided into, at least.
-        material: whose samples are taken; None for those on any surface.
+        scene: its first view is used. size: width and height, pixels.
+        num_positions: of the subset; all if there are fewer.
+        num_lights: minimum number of environment triangles.
+        material: of the samples; None for all materials.
     """
     geometry = build_scene_buffers(scene)
     camera = scene.cameras[0]
@@ -68,11 +68,11 @@ def sample_lit_surface(
 
 
 def freeze_for_curve(lit_samples: LitSamples, document: Mapping[str, Any], active: str) -> LinearOperator:
-    """The operator of one term along one curve.
+    """Freeze the operator of one term along one curve.
 
     Args:
         lit_samples: points and lights. document: the complete term.
-        active: name of the curve that stays free.
+        active: name of the free curve.
     """
     term = TERMS[document["model"]].normalized(document)
     bands = {curve.name: curve_bands(document, curve) for curve in term.curves if not curve.depends_on_view}
@@ -84,11 +84,11 @@ def freeze_for_curve(lit_samples: LitSamples, document: Mapping[str, Any], activ
 
 
 def frame_radiance(lit_samples: LitSamples, document: Mapping[str, Any], active: str) -> NDArray[np.float64]:
-    """R = T · c of one term, as a frame computes it, times its colour and curves of the outgoing angle.
+    """R = T · c of one term, as a frame computes it, times its color and curves of the outgoing angle.
 
     Args:
         lit_samples: points and lights. document: the complete term.
-        active: name of the curve that T is frozen along.
+        active: name of the free curve of T.
     Returns:
         (n, 3) float64
     """

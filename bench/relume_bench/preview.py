@@ -1,8 +1,8 @@
-"""preview.*: a picture of turned light by a few samples, against shading all of them.
+"""preview.*: previews of a rotated environment from few samples, against shading all of them.
 
-The built-in scene at 640×480, 1,000 lights, the environment turned to 50°. `preview.speedup`: shading all materials ÷
-the median glimpse on the way there; `preview.error`: relative RMSE of the last glimpse against the shaded picture. The
-first glimpse, which chooses the samples, is in the context.
+The built-in scene at 640×480, 1,000 lights, the environment rotated to 50°. `preview.speedup`: time of shading all
+materials ÷ the median preview on the way there; `preview.error`: relative RMSE of the last preview against the shaded
+image. The first preview, which chooses the samples, is in the context.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from relume_bench.timing import seconds
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Turn in five steps, then rest."""
+    """Rotate in five steps, then converge."""
     size, num_lights = ((64, 48), 60) if tiny else ((640, 480), 1000)
     scene = demo_scene()
     view = scene.cameras[0].name
@@ -40,7 +40,7 @@ def measure(tiny: bool) -> list[Figure]:
         )
         picture = Picture(transfer, view, Cache(4 << 30))
         _run_until_exact(picture)
-        first, *glimpses = [
+        first, *preview_times = [
             seconds(partial(_rotate_environment, picture, transfer, angle)) for angle in range(10, 51, 10)
         ]
         preview = picture.image()
@@ -50,17 +50,17 @@ def measure(tiny: bool) -> list[Figure]:
         "size": list(size),
         "view_samples": transfer.views[view].num_surface_samples,
         "first_s": first,
-        "preview_s": float(np.median(glimpses)),
+        "preview_s": float(np.median(preview_times)),
         "all_s": whole,
     }
     return [
-        Figure("preview.speedup", whole / float(np.median(glimpses)), "ratio", context),
+        Figure("preview.speedup", whole / float(np.median(preview_times)), "ratio", context),
         Figure("preview.error", error, "relative RMSE", {"size": list(size)}),
     ]
 
 
 def _rotate_environment(picture: Picture, transfer: FixedViewTransfer, angle: float) -> None:
-    """One position of the hand: the glimpse alone."""
+    """One step of the drag: the preview alone."""
     document = copy.deepcopy(transfer.default_look)
     document["environment"]["rotation"] = float(angle)
     picture.set_look(validate(document, transfer.default_look))

@@ -1,16 +1,15 @@
-"""probes.*: what somebody waits who moves the eye, a material or a light of a view that moves.
+"""probes.*: waiting times when moving the camera, a material or a light of a free-camera view.
 
-Scenes: the Cornell box under the sky at 400×400, and the still life at 640×480, which has twice as many triangles as
-points. Times are from a message's content to the encoded bytes. `surface.view_fps`: the eye moves sideways, the
-look stays, and highlights are found finely only once the eye rests; `surface.sun_fps`: the same under a clear sky,
-the shadows of whose sun pixels find. `surface.brdf_ms`: the exponent of the floor's highlight moves, the eye and
-the lights stay; `edited_share` of the picture's pixels show it.
-What surfaces reflect onto each other is made beside the frames and follows `lag_ms` behind; `per_s` counts all frames,
-those among them that show it in every pixel, too. `surface.light_ms`: the environment turns, with all bounces, and
-is followed roughly, in the same way; `all_points_ms` is what all of it takes, at rest.
-`probes.against_fixed_…` is the moving view against the picture that replaces it, of a `gather` bake from the same
-place, pixels at edges of objects left out, which one side has antialiased; both spread evenly what highlights send to
-other surfaces.
+Scenes: the Cornell box under the environment at 400×400, and the still life at 640×480, which has twice as many
+triangles as probes. Times are from a message's content to the encoded bytes. `probes.view_fps`: the camera moves
+sideways, the look is constant, and highlights are refined only when the camera stops; `probes.sun_fps`: the same under
+a clear sky, whose sun casts per-pixel shadows. `probes.brdf_ms`: the exponent of the floor's highlight changes, camera
+and lights are constant; `edited_fraction` of the image's pixels show it. Indirect light is computed in the background
+and lags by `lag_ms`; `per_s` counts all frames, also those between updates of indirect light. `probes.light_ms`: the
+environment rotates, with all bounces, and is updated incrementally in the same way; `all_probes_ms` is the time of the
+full update, after the drag. `probes.against_fixed_…` is the free-camera view against the image that replaces it, of a
+`gather` bake from the same camera, without pixels at object edges, which only one side antialiases; both treat light
+that highlights reflect onto other surfaces as diffuse.
 """
 
 from __future__ import annotations
@@ -95,7 +94,7 @@ def _clear(document: dict[str, Any]) -> None:
 
 
 def make_exponent_edit(material: str) -> Callable[[dict[str, Any], float], None]:
-    """A change of a look: the exponent of a highlight of a material, from 5 to 35 by a share."""
+    """Edit of a look: the exponent of a material's highlight, from 5 to 35 by a fraction."""
 
     def change(document: dict[str, Any], fraction: float) -> None:
         white = {"model": "lambert", "color": [0.3, 0.3, 0.3], "texture": None}
@@ -106,7 +105,7 @@ def make_exponent_edit(material: str) -> Callable[[dict[str, Any], float], None]
 
 
 def _error(scene: FreeCameraScene, name: str, terms: list[dict[str, Any]]) -> Figure:
-    """Of a scene whose surfaces are all of one material."""
+    """Error in a scene whose surfaces all have one material."""
 
     def change(document: dict[str, Any]) -> None:
         for material in document["materials"].values():

@@ -1,12 +1,13 @@
-"""probes.brdf_vs_sun: how many times as soon as with Sun 2007 the picture of an edited material is there.
+"""probes.brdf_vs_sun: speed of showing an edited material, relative to Sun 2007.
 
-    ratio = (1 / frames a second of Sun 2007, table 1, "V&B") / (median from a look to its encoded frame)
+    ratio = (1 / frames per second of Sun 2007, table 1, "V&B") / (median from a look to its encoded frame)
 
-The value is the smallest of three: Tweety, Indoor and Watch, with as many vertices as the Cornell box has points here.
-The exponent of the floor's highlight moves; what the floor sends to others follows some frames behind, `lag_ms`, made
-beside the frames on the same cores. `p95_ms` is of frames that show it in all pixels, `per_s` counts all; `widest`
-is the ratio of the walls. The eye stands, as in an editor; Sun's column lets view and BRDF change at once, on a machine
-of 2007, in scenes and at frame sizes of its own. `moved_eye` is the ratio where our eye moves in each frame, too.
+The value is the smallest of three: Tweety, Indoor and Watch, with as many vertices as the Cornell box has probes here.
+The exponent of the floor's highlight changes; its light on other surfaces follows some frames later, `lag_ms`, computed
+in the background on the same cores. `p95_ms` is over frames that show it in all pixels, `per_s` counts all; `widest` is
+the ratio for the walls. The camera is fixed, as in an editor; Sun's column lets view and BRDF change at once, on a
+machine of 2007, in its own scenes and frame sizes. `moved_camera` is the ratio when our camera moves in each frame,
+too.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _FLOOR, _WALLS = "Floor", "Walls"
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Bake the box with as many points as each of Sun's scenes has vertices, and edit it."""
+    """Bake the box with as many probes as each of Sun's scenes has vertices, and edit it."""
     frames, size = (3, (60, 60)) if tiny else (60, (400, 400))
     context: dict[str, Any] = {"threads": num_threads(), "size": "×".join(map(str, size))}
     ratios = []
@@ -47,7 +48,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _drag_with_camera(box: FreeCameraScene, frames: int) -> Drag:
-    """Frames in which the eye moves and the floor is edited."""
+    """Frames in which the camera moves and the floor is edited."""
     camera, change = box.scene.cameras[0], make_exponent_edit(_FLOOR)
 
     def move(picture: Any, k: int) -> None:

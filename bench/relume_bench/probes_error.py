@@ -1,10 +1,9 @@
-"""probes.probe_rmse: what light vectors tell of single points, nothing interpolated, against brute force.
+"""probes.probe_rmse: error of incident radiance coefficients at single probes, without interpolation.
 
-Points of the Cornell box that the eye sees, their radiance towards it by all paths, against path tracing whose noise is
-taken off (`relume_bench.standard_error.compare_with_passes`): of the scene's own diffuse surfaces, and in the context
-of such with a wide highlight; `direct` is irradiance of all points straight from the sky,
-against every texel of the map
-traced.
+Radiance of visible probes of the Cornell box toward the camera, by all paths, against path tracing with its noise
+removed (`relume_bench.standard_error.compare_with_passes`): for the scene's own diffuse surfaces, and in the context
+for surfaces with a wide highlight; `direct` is the irradiance of all probes directly from the environment, against
+tracing every texel of the map.
 """
 
 from __future__ import annotations
@@ -38,13 +37,13 @@ F64 = NDArray[np.float64]
 Change = Callable[[dict[str, Any]], None]
 
 PASSES = 8
-_FEWER = 8  # paths where the error is not told apart so finely
-_COPIES = 8  # of each point, whose paths are traced together
+_FEWER = 8  # paths if the error is not resolved as finely
+_COPIES = 8  # paths per probe that are traced together
 _NUM_TEXELS_PER_UV = 4
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Bake the box, trace its points."""
+    """Bake the box, trace its probes."""
     num, paths = (4, 64) if tiny else (400, 4096)
     with tempfile.TemporaryDirectory() as folder:
         box = FreeCameraScene("cornell_box", Path(folder), (60, 60) if tiny else (400, 400), tiny)
@@ -67,7 +66,7 @@ def _set_rough_highlights(document: dict[str, Any]) -> None:
 
 
 def measure_direct_rmse(scene: FreeCameraScene, num: int) -> float:
-    """Irradiance of some points straight from the sky, against every texel of the map traced."""
+    """Irradiance of some probes directly from the environment, against tracing every texel of the map."""
     probes, probe_indices = _select_probes(scene, num)
     radiance = np.asarray(scene.scene.environment.radiance, np.float64)
     height, width, _ = radiance.shape
@@ -93,10 +92,10 @@ def measure_direct_rmse(scene: FreeCameraScene, num: int) -> float:
 def measure_radiance_rmse(
     scene: FreeCameraScene, num: int, num_paths: int, change: Change = lambda document: None
 ) -> NoiseCorrectedError:
-    """Radiance of some points towards the eye by all paths, against path tracing; of a look whose terms are broad.
+    """Radiance of some probes toward the camera by all paths, against path tracing; for a look with broad terms.
 
     Args:
-        scene: the scene, without textures. num: of points that the eye sees. num_paths: of each. change: of its look.
+        scene: without textures. num: visible probes. num_paths: per probe. change: of its look.
     """
     look, free_camera_bake, camera_position = (
         scene.look(change),
@@ -111,7 +110,7 @@ def measure_radiance_rmse(
         free_camera_bake, illumination_from_look(look, free_camera_bake.material_names, has_bounces=True)
     )
     tables = build_tables([material_documents(look, name) for name in free_camera_bake.material_names])
-    # what the in-basis tells of all light
+    # all light that the hemispherical basis represents
     highlight_tables = tables._replace(table_index=tables.table_index[..., [2, 3, 4, 5, 4, 5]])
     radiance = sum(
         shade_probes(
@@ -126,7 +125,7 @@ def measure_radiance_rmse(
 
 
 def _find_visible_probes(scene: FreeCameraScene, camera_position: F64) -> NDArray[np.intp]:
-    """Points that an eye sees: the insides of solids are lit by nothing real."""
+    """Indices of probes visible to the camera: the insides of solids are not lit correctly."""
     probes = scene.free_camera_bake.stored_scene.probes
     towards = camera_position - probes.position
     distance = np.linalg.norm(towards, axis=1)
@@ -143,7 +142,7 @@ def _select_probes(scene: FreeCameraScene, num: int) -> tuple[Any, NDArray[np.in
 
 
 def _trace_paths(built_in_scene: FreeCameraScene, look: Look, probe_indices: NDArray[np.intp], num_paths: int) -> F64:
-    """Radiance of points towards the eye, in independent passes that share their direct light. (passes, points, 3)"""
+    """Radiance of probes toward the camera, in independent passes with the same direct light. (passes, points, 3)"""
     scene, geometry, surface = (
         built_in_scene.scene,
         build_scene_buffers(built_in_scene.scene),

@@ -1,14 +1,13 @@
-"""probes.all_vs_sun, probes.first_edit_s, probes.incremental_error: eye, light and materials at once, bounces and all.
+"""probes.all_vs_sun, probes.first_edit_s, probes.incremental_error: camera, light and materials at once, all bounces.
 
-`surface.all_vs_sun`: in every frame the eye moves, the environment turns to where nobody had it, and the exponent
-of the floor's highlight moves, whose light all other surfaces get, with as many bounces as the bake has (24), and with
-two (`two_bounces`); of the Cornell box at 400×400, at as many points as scenes of Sun 2007 had vertices, whose frames
-a second (table 1, light, view and BRDF) are the other side; the smallest ratio. What surfaces send each other is made
-beside the frames, on the same cores, and is as old as `lag` says. `surface.first_touch_s`: from a hand's first
-edit of a material in a bake that has been shown once, to the frame that shows what others get of its light; the longest
-of both scenes and of all drags. `surface.follow_error`: the picture that a hand sees at the end of a drag, once
-that light has followed, against the same at rest, by what the drag has changed; the largest, and in the context all, by
-the picture too.
+`probes.all_vs_sun`: in every frame the camera moves, the environment rotates to a new angle, and the exponent of the
+floor's highlight, which lights all other surfaces, changes, with as many bounces as the bake has (24), and with two; of
+the Cornell box at 400×400, with as many probes as scenes of Sun 2007 had vertices, whose frames per second (table 1,
+light, view and BRDF) are the other side; the smallest ratio. Indirect light is computed in the background, on the same
+cores, and is `lag` old. `probes.first_edit_s`: from the first edit of a material in a bake that has been shown once, to
+the frame that shows its effect on other surfaces; the longest of both scenes and of all drags.
+`probes.incremental_error`: the image at the end of a drag, after the indirect light was updated, against the converged
+one, relative to the change of the drag; the largest, and in the context all, also relative to the image.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ Change = Callable[[dict[str, Any], float], None]
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Move all three at each size; then drag one material after another."""
+    """Change all three at each size; then drag one material after another."""
     with tempfile.TemporaryDirectory() as folder:
         context: dict[str, Any] = {"threads": num_threads(), "size": "60×60" if tiny else "400×400"}
         return [_all(Path(folder), context, tiny), *_measure_drags(Path(folder), tiny)]
@@ -49,8 +48,8 @@ def _all(folder: Path, context: dict[str, Any], tiny: bool) -> Figure:
         whole, two = (_together(box, 2 if tiny else _FRAMES, bounces) for bounces in (24, 2))
         ratios.append(1 / (sun_fps * whole.median_s))
         size_details[f"{box.num_probes}_points"] = (
-            f"{1e3 * whole.median_s:.0f} ms, {1 / whole.median_s:.1f} a second, lag {1e3 * whole.lag_s:.0f} ms, "
-            f"two bounces {1e3 * two.median_s:.0f} ms; Sun {sun_fps} a second"
+            f"{1e3 * whole.median_s:.0f} ms, {1 / whole.median_s:.1f} frames/s, lag {1e3 * whole.lag_s:.0f} ms, "
+            f"two bounces {1e3 * two.median_s:.0f} ms; Sun {sun_fps} frames/s"
         )
     return Figure("probes.all_vs_sun", min(ratios), "ratio", {**size_details, **context})
 
@@ -122,7 +121,7 @@ def _measure_drags(folder: Path, tiny: bool) -> list[Figure]:
         for name, change in _DRAGS.items():
             first[f"{scene.name}_{name}"], errors[f"{scene.name}_{name}"] = _measure_drag(scene, change)
     error_texts = {
-        name: f"{100 * change_error:.1f} % of the change, {100 * image_error:.2f} % of the picture"
+        name: f"{100 * change_error:.1f} % of the change, {100 * image_error:.2f} % of the image"
         for name, (change_error, image_error) in errors.items()
     }
     return [
@@ -137,7 +136,7 @@ def _measure_drags(folder: Path, tiny: bool) -> list[Figure]:
 
 
 def _measure_drag(scene: FreeCameraScene, change: Change) -> tuple[float, tuple[float, float]]:
-    """Seconds of the first edit, and the error of the last frame by what has changed and by the picture."""
+    """Seconds of the first edit, and the error of the last frame relative to the change and to the image."""
     looks = [
         scene.look(lambda document, k=k: change(document, k / _STEPS))  # type: ignore[misc]
         for k in range(_STEPS + 1)

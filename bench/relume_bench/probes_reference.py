@@ -1,14 +1,13 @@
-"""probes.rmse_*: the whole moving view against Mitsuba's whole path tracer.
+"""probes.rmse_*: the whole free-camera view against Mitsuba's full path tracer.
 
-The scenes of bench/relume_bench/probes.py, all surfaces of one material: diffuse in the Cornell box under its sky, or
-under one as bright whose sun is an eighth as wide,
-0.5° from its middle to its edge (`hard_sun`); nothing but a Blinn–Phong
-highlight on the still life, as wide as a GGX one of roughness 0.5 and 0.3 (α = roughness², s = 2/α² − 2); or metal of
-GGX itself, whose highlights have skirts, of these roughnesses, F0 of 0.9 (`ggx_…`; Mitsuba's `principled`).
-Mitsuba follows every path, highlights that light other surfaces among them, ours by few functions. Edges and
-background belong to the pictures. The picture is a fine frame, as where the eye has just come to rest and as renders
-are; `while_it_moves` is the same of a frame under a moving eye, `at_rest` of the fixed view that replaces it, in
-percent. Mitsuba's own noise is taken off: `relume_bench.standard_error.compare_with_passes`.
+The scenes of `relume_bench.probes`, all surfaces of one material: diffuse in the Cornell box under its environment, or
+under one of the same power whose sun is an eighth as wide, with a radius of 0.5° (`hard_sun`); only a Blinn–Phong
+highlight on the still life, as wide as a GGX one of roughness 0.5 and 0.3 (α = roughness², s = 2/α² − 2); or a GGX
+metal, whose highlights have long tails, of these roughnesses, F0 of 0.9 (`ggx_…`; Mitsuba's `principled`). Mitsuba
+traces all paths, including highlights that light other surfaces, which relume represents by few functions. Edges and
+background are included. The image is a refined frame, as right after the camera stops and in renders; `while_it_moves`
+is that of a frame with moving camera, `static_view` of the fixed view that replaces it, in percent. Mitsuba's noise is
+removed: `relume_bench.standard_error.compare_with_passes`.
 """
 
 from __future__ import annotations
@@ -50,8 +49,8 @@ _LOOK_VARIANTS = {
     "ggx_0.3": ("still_life", (640, 480)),
 }
 _F0 = 0.9  # of the metal
-_GAIN = 0.23  # a highlight reflects up to four times its colour
-# of each pass; 32 of others. The error of fewer is not known: its tails are heavy
+_GAIN = 0.23  # a highlight reflects up to four times its color
+# per pass; 32 for others. With fewer the error is unknown: its distribution has heavy tails
 _SPP = {"glossy_0.3": 128}
 _HARD = np.radians(0.5), 512  # radius of a hard sun, rows of its map
 _UNIT = "%"
@@ -79,7 +78,7 @@ def _number(kind: str) -> float:
 
 
 def _make_mitsuba_bsdf(kind: str) -> dict[str, Any]:
-    """The material as Mitsuba has it."""
+    """The material as Mitsuba's."""
     if kind.startswith("ggx"):
         color = {"type": "rgb", "value": [_F0] * 3}
         return {"type": "principled", "base_color": color, "metallic": 1.0, "roughness": _number(kind)}
@@ -87,7 +86,7 @@ def _make_mitsuba_bsdf(kind: str) -> dict[str, Any]:
 
 
 def _while_it_moves(bake: BakedFreeCamera, view: str, look: Look) -> NDArray[np.float32]:
-    """What a moving eye sees, all light there."""
+    """The image of a moving camera, with all light."""
     picture = FreeCameraPicture(bake, view, is_watched=True)
     picture.set_look(look)
     picture.advance(None)
@@ -98,7 +97,7 @@ def _while_it_moves(bake: BakedFreeCamera, view: str, look: Look) -> NDArray[np.
 
 
 def _render_fixed_camera(scene: Scene, recipe: Recipe, folder: Path, look: Look) -> NDArray[np.float32]:
-    """What replaces it: a fixed view from the same place."""
+    """The fixed view from the same camera that replaces it."""
     path = bake_in_process(METHODS["gather"], scene, recipe, folder / "gather.zarr")
     return render_image(open_transfer(path, Cache(4 << 30)), recipe.views[0], look)[..., :3]
 

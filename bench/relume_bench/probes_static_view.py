@@ -1,13 +1,13 @@
-"""probes.static_view_s, probes.correction_s: what somebody waits who has moved the eye and lets it rest.
+"""probes.static_view_s, probes.correction_s: waiting times after the camera stops.
 
-The eye of the still life, 640×480, steps aside twice, and is then given the time that it needs; the median of both.
-From the eye's last move to the encoded exact picture, without the quarter of a second that a session waits before it
-begins. `tracing_s` of that are view samples, shadow rays and gather rays; the rest is shading. `direct_s`: the same
-under a look without reflected light, for which no gather rays are traced. `moving_error` is how far the moving
-picture was from the exact one that replaces it, edges included, which only the exact one antialiases.
+The camera of the still life, 640×480, moves sideways twice, and then stays until the image has converged; the median of
+both. From the camera's last move to the encoded exact image, without the quarter of a second that a session waits
+first. `tracing_s` of that are view samples, shadow rays and gather rays; the rest is shading. `direct_s`: the same
+under a look without indirect light, for which no gather rays are traced. `free_camera_error` is the error of the
+free-camera image against the exact one that replaces it, including edges, which only the exact one antialiases.
 
-`surface.rest_first_s` ends with the moving picture that a few exact samples have corrected; `first_error` is how
-far that was from the exact one, `its_…` are of the Cornell box.
+`probes.correction_s` ends with the free-camera image that few exact samples have corrected; `first_error` is its error
+against the exact one, `its_…` are of the Cornell box.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ _CACHE_BYTES = 4 << 30
 
 
 class _Convergence(NamedTuple):
-    """Seconds until the exact picture, those in which it was traced, and until the first corrected one; errors.
+    """Seconds until the exact image, those of tracing, and until the first corrected image; errors.
 
-    `error` and `first_error` are the relative RMSE of the moving picture, and of the corrected one.
+    `error` and `first_error` are the relative RMSE of the free-camera image, and of the corrected one.
     """
 
     convergence_s: float
@@ -53,7 +53,7 @@ class _Convergence(NamedTuple):
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Bake both scenes, move the eye, wait."""
+    """Bake both scenes, move the camera, wait."""
     still_life = _measure_scene("interior" if tiny else "still_life", (64, 48) if tiny else (640, 480), tiny)
     box = still_life if tiny else _measure_scene("cornell_box", (400, 400), tiny)
     whole, direct = still_life
@@ -78,7 +78,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _measure_scene(name: str, size: tuple[int, int], tiny: bool) -> tuple[_Convergence, _Convergence]:
-    """Of all light, and of that which comes straight."""
+    """With all light, and with direct light only."""
     scene = built_in(name)
     recipe = Recipe("probes", (scene.cameras[0].name,), size, 60 if tiny else 1000, num_probes=2000 if tiny else 50_000)
     with tempfile.TemporaryDirectory() as folder:
@@ -92,7 +92,7 @@ def _measure_scene(name: str, size: tuple[int, int], tiny: bool) -> tuple[_Conve
 
 
 def _median(scene: Scene, free_camera_bake: BakedFreeCamera, size: tuple[int, int], light_paths: str) -> _Convergence:
-    """Two rests of one session, after one in a small picture, in which kernels are compiled and cells are lit."""
+    """Two stops of one session, after one with a small image, in which kernels are compiled and patches are lit."""
     look = validate(
         complete({"transport": {"show": light_paths}}, free_camera_bake.default_look), free_camera_bake.default_look
     )

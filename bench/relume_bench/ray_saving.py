@@ -1,8 +1,8 @@
-"""bake.ray_saving: shadow rays of a full trace ÷ those that the bake traced, and what that changed.
+"""bake.ray_saving: shadow rays of a full trace ÷ those that the bake traced, and the resulting error.
 
-The built-in scene, one view, baked twice: as always, and with every ray traced. The row has the bits that differ, the
-bake's own estimate of them, the relative RMSE between both pictures (of the scene's own look and all Lambert), and the
-wall time of each bake, which is also given as a multiple of its seconds in the kernels that trace and predict.
+The built-in scene, one view, baked twice: normally, and with every ray traced. The context has the different bits, the
+bake's own estimate of them, the relative RMSE between both images (of the scene's default look and all Lambert), and
+the wall time of each bake, also as a multiple of its seconds in the kernels that trace and predict.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from relume_bench.timing import seconds
 
 
 class _EveryRay(SampledViews):
-    """The same bake without predictions."""
+    """A bake without predictions."""
 
     name = "direct"
 
@@ -48,14 +48,14 @@ _BAKES: tuple[BakeMethod, ...] = (DirectMethod(), _EveryRay())
 
 
 def _times(method: BakeMethod, scene: Scene, recipe: Recipe, path: Path) -> tuple[float, float]:
-    """Seconds of a whole bake, and those in which it traced and predicted."""
+    """Seconds of a whole bake, and those of tracing and predicting."""
     written: list[TaskOutput] = []
     wall_s = seconds(lambda: bake_in_process(method, scene, recipe, path, lambda _, record: written.append(record)))
     return wall_s, sum(record.trace_s for record in written)
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Bake with predictions and with every ray, and compare two pictures of each."""
+    """Bake with predictions and with every ray, and compare two images of each."""
     scene = demo_scene()
     recipe = Recipe("direct", ("front",), (64, 48) if tiny else (640, 480), 60 if tiny else 2000)
     with tempfile.TemporaryDirectory() as folder:
@@ -80,7 +80,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _changes(scene: Scene, paths: list[Path]) -> dict[str, float]:
-    """Relative RMSE between the pictures of two stores."""
+    """Relative RMSE between the images of two stores."""
     looks: dict[str, dict[str, Any]] = {
         "own_look_changes_by": {},
         "lambert_changes_by": {"materials": {m.name: {"terms": [LAMBERT]} for m in scene.materials}},

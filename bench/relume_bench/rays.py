@@ -1,7 +1,7 @@
 """bake.rays_vs_embreex: shadow rays per second of the packets ÷ `EmbreeScene.run` on the same rays and threads.
 
-The rays are those of a bake: view samples of the built-in scene against its light triangles, above the horizon only.
-embreex gets them as arrays made beforehand, in the order in which the packets trace them, in pieces on the same pool.
+The rays are those of a bake: view samples of the built-in scene against its environment triangles, above the horizon
+only. embreex gets them as prepared arrays, in the order in which the packets trace them, in pieces on the same pool.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ _PIECE = 65_536
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Both sides in turn, the best of each; and how many rays they answer differently."""
+    """Both sides alternating, the best of each; and the number of rays with different results."""
     size, num_positions, num_lights = ((32, 24), 160, 50) if tiny else ((640, 480), 16_384, 300)
     scene = demo_scene()
     geometry = build_scene_buffers(scene)
     samples = sample_view(scene, geometry, "front", size)
     surfaces = int((samples.material != BACKGROUND).sum())
-    start = max(0, surfaces // 2 - num_positions // 2) // 16 * 16  # neighbours, as in a bake
+    start = max(0, surfaces // 2 - num_positions // 2) // 16 * 16  # neighbors, as in a bake
     origins = samples.surface.points.position[start : start + num_positions]
     normals = samples.surface.points.normal[start : start + num_positions]
     directions = tessellate_environment(scene.environment.radiance, num_lights).direction
@@ -80,7 +80,7 @@ def _active_rays(normals: F32, directions: F32) -> tuple[NDArray[np.intp], NDArr
 
 
 def embreex_scene(geometry: SceneBuffers) -> Any:
-    """The same triangles for embreex."""
+    """Scene of embreex with these triangles."""
     from embreex.mesh_construction import TriangleMesh
     from embreex.rtcore_scene import EmbreeScene
 

@@ -1,10 +1,9 @@
-"""assets.rmse: real files as they are imported and baked, against Mitsuba, which is given them by another reader.
+"""assets.rmse: real files, imported and baked, against Mitsuba with an independent reader.
 
-Each file, seen from its own camera or from `front`, in the light of a real map and of what shines in it, by method
-`gather`. The peer's scene is made from the file's bytes by `relume_bench.gltf_plain` and
-`relume_bench.plain_materials`,
-with the BRDF of the specification (`relume_bench.peer_mitsuba_gltf`) and the peer's own dielectrics; neither importer
-nor terms are shared. Errors are of the pixels on surfaces; the value is the median over the files, each is in the row.
+Each file, from its own camera or from `front`, lit by a real map and its own emitters, with method `gather`. The peer's
+scene is made from the file's bytes by `relume_bench.gltf_plain` and `relume_bench.plain_materials`, with the BRDF of
+the specification (`relume_bench.peer_mitsuba_gltf`) and the peer's own dielectrics; neither importer nor terms are
+shared. Errors are over pixels on surfaces; the value is the median over the files, each is in the context.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ F64 = NDArray[np.float64]
 _NAME, _UNIT = "assets.rmse", "relative RMSE"
 _SIZE, _FINER, _SPP, _LIGHTS = (320, 240), 2, 32, 2000
 _DEPTH = 24
-_CANDELA = 1 / 683  # as importers have it: W/sr
+_CANDELA = 1 / 683  # as in importers: W/sr
 FILES = {
     "cat": "scenes/egyptian-cat/cat.glb",
     "data_folder": "scenes/data_folder/data_folder.glb",
@@ -55,7 +54,7 @@ FILES = {
     "coats": "conformance/khronos_material_tests/ClearCoatTest.glb",
     "attenuation": "conformance/khronos_material_tests/AttenuationTest.glb",
     "blend": "conformance/gltf_asset_generator_0.6/Material_AlphaBlend/Material_AlphaBlend_05.gltf",
-    "vertex colours": "conformance/gltf_transform/BoxVertexColors.glb",
+    "vertex colors": "conformance/gltf_transform/BoxVertexColors.glb",
 }
 
 
@@ -65,11 +64,11 @@ def measure(tiny: bool) -> list[Figure]:
         return skipped((_NAME,), _UNIT, why)
     if not all((shared_data() / path).is_file() for path in FILES.values()):
         return skipped(
-            (_NAME,), _UNIT, "the real files are not there; bench/relume_bench/scenes.py says where they are looked for"
+            (_NAME,), _UNIT, "the real files are not there; bench/relume_bench/scenes.py describes their location"
         )
     file_names = list(FILES)[-1:] if tiny else list(FILES)
     comparisons = {name: compare_with_passes(*compared(name, tiny)) for name in file_names}
-    # where an error cannot be told from the peer's noise, what it is very likely below counts in its place
+    # an error below the peer's noise counts as its upper bound
     errors = {
         name: comparison.error.value if comparison.is_significant else comparison.limit
         for name, comparison in comparisons.items()
@@ -91,11 +90,11 @@ def _describe(comparison: NoiseCorrectedError) -> str:
 
 
 def compared(name: str, tiny: bool, folder: Path | None = None) -> tuple[F64, F32]:
-    """Our picture and the peer's passes of one file, the pixels on surfaces. (1, n, 3), (passes, 1, n, 3)
+    """Our image and the peer's passes of one file, pixels on surfaces. (1, n, 3), (passes, 1, n, 3)
 
     Args:
-        name: of `FILES`. tiny: whether it is to end in seconds.
-        folder: where whole pictures are kept, in NAME.npz; nowhere where None.
+        name: of `FILES`. tiny: a trial run.
+        folder: for whole images, in NAME.npz; None: not stored.
     """
     size, spp, lights = ((40, 30), 2, 60) if tiny else (_SIZE, _SPP, _LIGHTS)
     path = shared_data() / FILES[name]
@@ -114,7 +113,7 @@ def _light() -> Any:
 
 
 def _render_relume(scene: Scene, size: tuple[int, int], lights: int, folder: Path) -> tuple[F64, NDArray[np.bool_]]:
-    """The picture, and which pixels show any probes."""
+    """The image, and the mask of pixels on surfaces."""
     width, height = size
     recipe = Recipe("gather", (scene.cameras[0].name,), (_FINER * width, _FINER * height), lights)
     transfer = open_transfer(bake(scene, recipe, folder / "gather.zarr").path, Cache(4 << 30))
@@ -158,4 +157,4 @@ def _emitter(light: dict[str, Any], to_world: F64) -> list[dict[str, Any]]:
         return [{"type": "point", "position": to_world[:3, 3].tolist(), "intensity": spectrum}]
     if light["type"] == "directional":
         return [{"type": "directional", "direction": (-to_world[:3, 2]).tolist(), "irradiance": spectrum}]
-    raise ValueError(f"{light['type']} is not among the lights of these files")
+    raise ValueError(f"{light['type']} lights are not in these files")

@@ -1,7 +1,7 @@
-"""The server, recording each latency that it would only count: `python -m relume_bench.recording_server FILE`.
+"""The server, recording each latency in addition to the metric: `python -m relume_bench.recording_server FILE`.
 
-"Edit received → frame handed to the socket" is what the server observes for its metric relume_edit_to_socket_seconds:
-from the arrival of the message to the return of the call that gives the frame to the WebSocket.
+The server observes "edit received → frame sent" for its metric relume_edit_to_socket_seconds: from receiving the
+message to the return of the call that passes the frame to the WebSocket.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from relume_server.telemetry.metrics import Metrics
 
 
 class _Recorder:
-    """Stands in for a histogram."""
+    """Wraps a histogram."""
 
     def __init__(self, histogram: Any, path: Path) -> None:
         self._histogram, self._file = histogram, path.open("w")
 
     def observe(self, value: float) -> None:
-        """Count it, and note it in milliseconds."""
+        """Observe the value, and write it in milliseconds."""
         self._histogram.observe(value)
         self._file.write(json.dumps(1e3 * value) + "\n")
         self._file.flush()
 
 
 class RecordingMetrics(Metrics):
-    """Metrics that note the edits."""
+    """Metrics that record the edits."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,9 +1,9 @@
 """reference.mitsuba: our reference against Mitsuba 3, three scenes, same formulas and maps; the worst of the three.
 
-Both render independent passes, ours at four times the size, averaged over 4 × 4 view samples as Mitsuba's box filter
-averages over a pixel. With m_k Mitsuba's passes and o_k ours, m_k − (o_k − ō) has Mitsuba's mean and the noise of both,
-so that `relume.reference.comparison` tells a disagreement from noise per pixel. Mitsuba reads the map bilinearly and we
-read its texels, so the maps are smooth at the size of a texel.
+Both render independent passes, ours at four times the size, averaged over 4 × 4 view samples like Mitsuba's box filter.
+With m_k Mitsuba's passes and o_k ours, m_k − (o_k − ō) has Mitsuba's mean and the noise of both, so that
+`relume.reference.comparison` separates errors from noise per pixel. Mitsuba reads the map bilinearly and we read its
+texels, so the maps are smooth at the scale of a texel.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from relume.scene.model import Material, Scene
 from relume.scene.scene_folder import make_scene
 from relume_bench.figure import Figure, skipped
 from relume_bench.mitsuba import averaged, bsdf, missing, read_passes, render
-from relume_bench.scenes import cook_torrance, make_sky, teapot_on_table
+from relume_bench.scenes import cook_torrance, make_sun_environment, teapot_on_table
 from relume_bench.standard_error import compare_with_passes
 
 F32 = NDArray[np.float32]
@@ -36,7 +36,7 @@ _FINER = 4
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Noise taken off, how far apart the two are."""
+    """Difference of the two, with the noise removed."""
     if (why := missing()) is not None:
         return skipped(_NAMES, "relative RMSE", why)
     size, spp, passes = ((16, 12), 4, 2) if tiny else ((96, 72), 64, 8)
@@ -65,9 +65,9 @@ def _make_scenes(num_rows: int) -> dict[str, Scene]:
         return make_scene("Still life", demo.meshes, gray, demo.cameras[view : view + 1], light)
 
     return {
-        "teapot, high sun": teapot_on_table(make_sky("high", 0.8, num_rows), terms, terms),
-        "still life, low sun": make_still_life(0, make_sky("low", 0.3, num_rows)),
-        "still life from the left, haze": make_still_life(1, make_sky("haze", 0.5, num_rows, spread=0.02)),
+        "teapot, high sun": teapot_on_table(make_sun_environment("high", 0.8, num_rows), terms, terms),
+        "still life, low sun": make_still_life(0, make_sun_environment("low", 0.3, num_rows)),
+        "still life from the left, haze": make_still_life(1, make_sun_environment("haze", 0.5, num_rows, spread=0.02)),
     }
 
 
@@ -79,12 +79,12 @@ def _terms(albedo: float, sigma: float) -> tuple[dict[str, Any], ...]:
 def _disagreement(
     scene: Scene, size: tuple[int, int], spp: int, passes: int
 ) -> tuple[JackknifeEstimate, dict[str, Any]]:
-    """How far the two means are apart, and what else `relume.reference.comparison.Comparison` says of them.
+    """Difference of the two means, and the other results of `relume.reference.comparison.Comparison`.
 
     Args:
         scene: its first view is rendered by both.
-        size: width and height of Mitsuba's pictures, pixels.
-        spp: of a pixel in each of Mitsuba's passes, and of a view sample in ours.
+        size: width and height of Mitsuba's images, pixels.
+        spp: per pixel in each of Mitsuba's passes, and per view sample in ours.
         passes: of each renderer.
     """
     bsdfs = [bsdf(scene.materials[mesh.material].terms) for mesh in scene.meshes]

@@ -1,6 +1,6 @@
-"""import.refusal_ms: from a tiny bad file to the sentence that refuses it, where another has come before.
+"""import.refusal_ms: from a tiny invalid file to its error, after an earlier import.
 
-`cold_ms` is the first's, where nothing has been loaded, `ratio` the two; medians of a few.
+`cold_ms` is for the first import, before anything is loaded, `ratio` of the two; medians of a few.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from relume_server.io.import_request import ImportRequest
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Refuse a file that is none."""
+    """Import an invalid file."""
     cold: list[float] = []
     warm: list[float] = []
     with tempfile.TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""The list of benchmarks, and the loop that runs them. To add one: write its module and add a line here."""
+"""Registry of benchmarks, and the loop that runs them. To add one, write its module and add a line here."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ class Group:
     """Figures that are measured together, by `measure(tiny)` of a module.
 
     Attributes:
-        tiny: of `measure`: sizes that end in seconds and mean nothing, for the tests.
+        tiny: of `measure`: meaningless sizes that take seconds, for the tests.
     """
 
     module: str
     names: tuple[str, ...]
 
     def measure(self, tiny: bool) -> list[Figure]:
-        """Run it; a failure is a figure without a value."""
+        """Measure; a failure becomes a figure without a value."""
         start_time, ticks = time.perf_counter(), processor_ticks()
         try:
             figures: list[Figure] = importlib.import_module(self.module).measure(tiny)
-        except Exception as error:  # the other groups shall be measured
+        except Exception as error:  # the other groups must still run
             traceback.print_exc()
             return [Figure(name, None, "", {"failed": f"{type(error).__name__}: {error}"[:500]}) for name in self.names]
         details = {
@@ -206,12 +206,12 @@ _NOTEWORTHY = 0.02
 
 
 def names() -> list[str]:
-    """All figures, in the order they are measured."""
+    """All figures, in order of measurement."""
     return [name for group in GROUPS for name in group.names]
 
 
 def measure(prefix: str, tiny: bool = False) -> Iterator[Figure]:
-    """Measure the groups that have a figure whose name starts with `prefix`; yields those figures."""
+    """Measure the groups with a figure whose name starts with `prefix`; yield those figures."""
     for group in GROUPS:
         names = [name for name in group.names if name.startswith(prefix)]
         if names:
@@ -219,15 +219,15 @@ def measure(prefix: str, tiny: bool = False) -> Iterator[Figure]:
 
 
 def run(prefix: str, as_json: bool, tiny: bool = False) -> int:
-    """Measure and print; 1 where something failed or nothing has such a name.
+    """Measure and print; 1 if something failed or no figure has such a name.
 
     Args:
-        prefix: figures whose name starts with it are measured; "" for all.
-        as_json: print a list of figures to standard output, and lines for people to standard error.
-        tiny: sizes that end in seconds and mean nothing, for the tests.
+        prefix: of the figures to measure; "" for all.
+        as_json: print a list of figures to stdout, and text to stderr.
+        tiny: meaningless sizes that take seconds, for the tests.
     """
     if not any(name.startswith(prefix) for name in names()):
-        print(f"relume: no benchmark starts with {prefix!r}; there are {', '.join(names())}", file=sys.stderr)
+        print(f"relume: no benchmark starts with {prefix!r}; choose from {', '.join(names())}", file=sys.stderr)
         return 1
     figures = []
     for figure in measure(prefix, tiny):
@@ -248,7 +248,7 @@ def _line(figure: Figure) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Numbers short enough to read, NumPy's as Python's."""
+    """Round numbers for reading, and convert NumPy's to Python's."""
     if isinstance(value, dict):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""Bakes whose light is weighed again: tiles and shadow rays as they were, power and moments those of another map."""
+"""Bakes with replaced light: tiles and shadow rays unchanged, power and moments from another map."""
 
 from __future__ import annotations
 
@@ -28,25 +28,25 @@ F64 = NDArray[np.float64]
 
 
 def documents(kind: str) -> dict[str, dict[str, Any]]:
-    """Complete terms that are compared, by the name of their figure."""
+    """Complete terms to compare, by name of their figure."""
     terms = {"lambert": LAMBERT, "cook_torrance_0.2": cook_torrance(0.2)}
     return {f"accuracy.{kind}_{name}": complete_term(("accuracy",), dict(term), None) for name, term in terms.items()}
 
 
 @dataclass(frozen=True)
 class Bake:
-    """Tiles and where their shadow rays went."""
+    """Tiles, and the directions of their shadow rays."""
 
     tiles: Tiles
     towards: NDArray[np.float32]
 
 
 def bake(environment: Environment, num_lights: int, relightable: bool) -> Bake:
-    """What a bake of this environment keeps.
+    """Tiles and shadow rays of a bake of this environment.
 
     Args:
-        num_lights: tiles into which the sphere is divided, at least.
-        relightable: tiles do not depend on where the light is, and shadow rays go to their middles.
+        environment: to bake. num_lights: minimum number of tiles.
+        relightable: tiles are independent of the light, and shadow rays go to their centers.
     """
     tiles = choose_tiles(environment.radiance, num_lights, relightable)
     centroids = tiles.centroids.astype(np.float32)
@@ -65,14 +65,14 @@ def compare(
     terms: Mapping[str, Mapping[str, Any]],
     spp: int,
 ) -> dict[tuple[str, str], JackknifeEstimate]:
-    """Relative RMSE of each term in each bake, of the same points under one light.
+    """Relative RMSE of each term in each bake, at the same points under one light.
 
     Args:
-        lit_samples: the points; what they see is traced anew for each bake.
-        bakes: by a name for each.
-        light: the map that is shown.
-        terms: complete ones, by the names of their figures.
-        spp: texels of the truth at each point; 0 for every texel.
+        lit_samples: the points; visibility is traced anew for each bake.
+        bakes: by name.
+        light: the map to show.
+        terms: complete ones, by name of their figures.
+        spp: texels of the reference at each point; 0 for every texel.
     Returns:
         By the names of term and bake.
     """
@@ -89,7 +89,7 @@ def compare(
 
 
 def _radiance(lit_samples: LitSamples, baked: Bake, lights: TriangleLights, document: Mapping[str, Any]) -> F64:
-    """Of the points under the lights in a bake's tiles. (n, 3)"""
+    """Radiance of the points under the lights in a bake's tiles. (n, 3)"""
     surface_points, term = lit_samples.surface_points, TERMS[document["model"]]
     visible = trace_visibility(
         lit_samples.geometry.embree, surface_points.position, surface_points.normal, baked.towards
@@ -102,7 +102,7 @@ def _radiance(lit_samples: LitSamples, baked: Bake, lights: TriangleLights, docu
 
 
 def figures(errors_by_name: Mapping[str, Mapping[str, JackknifeEstimate]], context: Mapping[str, Any]) -> list[Figure]:
-    """Each figure's worst error of a relightable bake; all errors, labelled "kind, …", beside it."""
+    """Each figure's worst error of a relightable bake; all errors, labeled "kind, …", in the context."""
     results = []
     for name, errors in errors_by_name.items():
         worst, plain = _worst(errors, "relightable"), _worst(errors, "plain")

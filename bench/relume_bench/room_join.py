@@ -1,8 +1,8 @@
-"""rooms.join_s: from the request for a session in a room to its first message, beside thumbnails and a full batch.
+"""rooms.join_s: from requesting a session in a room to its first message, with queued thumbnails and a full batch.
 
-A real server over a baked scene that has no thumbnail. The one batch process renders pictures that take longer than
-the measurement; so many clients ask for the missing thumbnail, and wait; then a few sessions enter rooms of their own,
-one after another. The figure is the longest of them, `quiet_s` that of the same before anybody asked for anything.
+A real server on a baked scene without a thumbnail. The single batch process renders images that take longer than the
+measurement; several clients request the missing thumbnail, and wait; then a few sessions join rooms of their own, one
+after another. The figure is the longest time, `quiet_s` the same without load.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ _THUMBNAILS = 8
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Bake, serve, enter."""
+    """Bake, serve, join."""
     size, num_lights, frames, rooms = ((32, 32), 30, 2, 2) if tiny else ((512, 512), 1000, 400, 5)
     scene = teapot_on_table(studio(), (LAMBERT, cook_torrance(0.2)), (LAMBERT,))
     with (
         baked_folder(scene, Recipe("direct", ("front",), size, num_lights)) as data_folder,
         serving(data_folder, {"RELUME_PREWARM": "false"}) as server,
     ):
-        _enter(server, data_folder)  # loads what the first session loads
+        _enter(server, data_folder)  # loads the modules of a first session
         quiet_s = max(_enter(server, data_folder) for _ in range(rooms))
         _fill(server, data_folder, frames)
         asking = [threading.Thread(target=_ask, args=(server, data_folder), daemon=True) for _ in range(_THUMBNAILS)]
         for thread in asking:
             thread.start()
-        time.sleep(0.1 if tiny else 2.0)  # they all wait now
+        time.sleep(0.1 if tiny else 2.0)  # all are waiting now
         concurrent_s = max(_enter(server, data_folder) for _ in range(rooms))
         waiting = sum(thread.is_alive() for thread in asking)
     context = {"quiet_s": quiet_s, "rooms": rooms, "thumbnails": _THUMBNAILS, "thumbnails_waiting_at_end": waiting}
@@ -59,12 +59,12 @@ def _enter(server: Server, data_folder: BakedFolder) -> float:
 
 
 def _ask(server: Server, data_folder: BakedFolder) -> None:
-    with suppress(OSError):  # the server ends before it is painted
+    with suppress(OSError):  # the server ends before it is rendered
         urllib.request.urlopen(f"http://127.0.0.1:{server.port}/api/scenes/{data_folder.scene}/thumbnail.webp").close()
 
 
 def _fill(server: Server, data_folder: BakedFolder, frames: int) -> None:
-    """A batch whose pictures are all different."""
+    """Queue a batch whose images are all different."""
     terms = [{"model": "cook_torrance", "params": {"sigma": 0.1 + 0.3 * frame / frames}} for frame in range(frames)]
     looks = [{"materials": {"Teapot": {"terms": [term]}}} for term in terms]
     body = json.dumps({"bake": data_folder.bake, "view": "front", "looks": looks, "format": "png"}).encode()

@@ -1,7 +1,7 @@
-"""accuracy.rotation_*: a bake whose environment is turned, against truth; the worst of the rotations and maps.
+"""accuracy.rotation_*: error of a bake with a rotated environment; the worst of the rotations and maps.
 
-Tiles and shadow rays stay as they were baked, power and moments of the light in each tile are those of the turned map.
-The context has the same for a bake that was not made for it, and for a fresh bake of the turned map.
+Tiles and shadow rays are unchanged, power and moments of the light in each tile are those of the rotated map. The
+context has the same for a bake that is not relightable, and for a new bake of the rotated map.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from relume_bench.points import sample_lit_surface
 from relume_bench.relighting import bake, compare, documents, figures
 from relume_bench.scenes import LAMBERT, environments, teapot_on_table
 
-_ROTATIONS = (0, 1 / 32, 1 / 8, 1 / 4, 1 / 2)  # whole texels of any map as wide as a multiple of 32
+_ROTATIONS = (0, 1 / 32, 1 / 8, 1 / 4, 1 / 2)  # whole texels of any map whose width is a multiple of 32
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Compare the bakes of each map at every turn, all by one truth."""
+    """Compare the bakes of each map at every rotation, all with one reference."""
     num_positions, num_lights = (20, 100) if tiny else (1000, 4000)
     terms = documents("rotation")
     errors: dict[str, dict[str, JackknifeEstimate]] = {name: {} for name in terms}
@@ -40,6 +40,6 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _rotate_map(environment: Environment, rotation: float) -> Environment:
-    """The map turned by a share of a whole turn, as an image."""
+    """Rotate the map by a fraction of a full turn, as an image."""
     columns = round(rotation * environment.radiance.shape[1])
     return replace(environment, radiance=np.roll(environment.radiance, -columns, axis=1))

@@ -1,8 +1,8 @@
-"""roughness.rmse: surfaces as rough as maps say, against Mitsuba with the same maps as textures of its own conductors.
+"""roughness.rmse: surfaces with roughness maps, against Mitsuba with the same maps as textures of its own conductors.
 
-A tiled floor and a spotted ball, both mirrors of another colour but for their roughness, under a sky with a sun: direct
-light alone, so that nothing but levels of roughness and triangles of light is between the two. In the row is what the
-mean roughness in place of the maps would have given.
+A tiled floor and a spotted ball, both tinted mirrors except for their roughness, under an environment with a sun:
+direct light only, so that only roughness levels and environment triangles differ. The context has the error with the
+mean roughness instead of the maps.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def make_roughness_map_scene() -> Scene:
 
 
 def _tiles(side: int = 256) -> F32:
-    """Roughness of squares that are rough, or smoother from left to right. (side, side)"""
+    """Roughness of tiles that are rough, or smoother from left to right. (side, side)"""
     y, x = np.mgrid[0:side, 0:side]
     return np.asarray(np.where((x // 32 + y // 32) % 2, 0.8 - 0.4 * x / side, 0.9), np.float32)
 
@@ -101,7 +101,7 @@ def _mirror(name: str, texels: F32) -> dict[str, object]:
 
 
 def _render_relume(scene: Scene, size: tuple[int, int], lights: int, folder: Path) -> tuple[F64, F64]:
-    """The picture with the maps, and with their means."""
+    """The image with the maps, and with their means."""
     width, height = size
     recipe = Recipe("direct", ("front",), (_FINER * width, _FINER * height), lights)
     transfer = open_transfer(bake(scene, recipe, folder / "rough.zarr").path, Cache(4 << 30))

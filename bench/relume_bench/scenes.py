@@ -1,4 +1,4 @@
-"""Scenes for measuring: a teapot on a table, and environments, real ones where they are at hand."""
+"""Scenes for measurements: a teapot on a table, and environments, real ones if available."""
 
 from __future__ import annotations
 
@@ -31,41 +31,45 @@ def cook_torrance(sigma: float) -> dict[str, Any]:
 
 
 def shared_data() -> Path:
-    """Folder of real data beside the checkout, or where RELUME_SHARED_DATA says; it may not exist."""
+    """Folder of real data next to the checkout, or RELUME_SHARED_DATA; it may not exist."""
     data_folder = Path(__file__).resolve().parents[3] / "shared" / "data"
     return Path(os.environ.get("RELUME_SHARED_DATA", data_folder))
 
 
 def environments() -> list[Environment]:
-    """Three real maps, or the studio and two skies made by code where they are not there."""
+    """Three real maps, or the studio and two generated ones if they are missing."""
     paths = [shared_data() / "envmaps" / f"{name}.hdr" for name in REAL]
     if all(path.is_file() for path in paths):
         return [read_environment(path, path.stem) for path in paths]
-    return [studio(), make_sky("high sun (made by code)", 0.8), make_sky("low sun (made by code)", 0.15)]
+    return [
+        studio(),
+        *(make_sun_environment(f"{name} sun (generated)", y) for name, y in (("high", 0.8), ("low", 0.15))),
+    ]
 
 
-def make_sky(name: str, height: float, num_rows: int = 256, spread: float = 0.0004) -> Environment:
-    """A sky with a sun whose radiance falls to 1/e where 1 − cos = spread, the same power whatever the spread.
+def make_sun_environment(name: str, height: float, num_rows: int = 256, spread: float = 0.0004) -> Environment:
+    """An environment with a sun whose radiance falls to 1/e at 1 − cos = spread, with constant power.
 
     Args:
         name: of the environment.
-        height: of the sun; the tangent of its elevation is about 1.28 of it.
+        height: of the sun; the tangent of its elevation is about 1.28 times this.
         num_rows: of the map, which is twice as wide.
+        spread: 1 − cos of the sun's angular radius.
     """
     d = texel_directions(num_rows, 2 * num_rows)
     sun_direction = np.array([0.6, height, 0.5]) / np.linalg.norm([0.6, height, 0.5])
     glow = np.exp((d @ sun_direction - 1) / spread)[..., None] * np.array([1.6, 1.4, 1.04]) / spread
-    sky_radiance = np.where(d[..., 1:2] > 0, 0.4 + 0.6 * d[..., 1:2], 0.1) * [0.5, 0.7, 1.0]
-    return Environment(name, (sky_radiance + glow).astype(np.float32))
+    environment_radiance = np.where(d[..., 1:2] > 0, 0.4 + 0.6 * d[..., 1:2], 0.1) * [0.5, 0.7, 1.0]
+    return Environment(name, (environment_radiance + glow).astype(np.float32))
 
 
 def teapot_on_table(environment: Environment, pot: Terms, table: Terms, camera_distance: float = 1.0) -> Scene:
-    """Newell's teapot, 0.16 m high, on a table of 3 × 3 m; view "front", square pictures frame the pot.
+    """Newell's teapot, 0.16 m high, on a table of 3 × 3 m; view "front", square images frame the pot.
 
     Args:
-        environment: around it.
+        environment: of the scene.
         pot, table: terms of the two materials, "Teapot" and "Table".
-        camera_distance: 1 for a pot that covers about a third of the picture.
+        camera_distance: 1 for a pot that covers about a third of the image.
     """
     pot_surface = teapot(12, 0.16)
     corners = np.array([[-1.5, 0, 1.5], [1.5, 0, 1.5], [1.5, 0, -1.5], [-1.5, 0, -1.5]], float)

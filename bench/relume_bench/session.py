@@ -1,8 +1,8 @@
-"""session.edit_to_socket_ms: from an edit's arrival at the server to its frame at the socket, while σ is dragged.
+"""session.edit_to_socket_ms: from receiving an edit at the server to sending its frame, while σ is dragged.
 
-A real server in its own process, a picture of 512×512 in which one material covers about 30 %; a client that drags σ of
-its cook_torrance term to and fro, 60 edits a second, and acknowledges each frame. The times are the server's own (see
-`relume_bench.recording_server`); those of the freeze before the drag are not among them.
+A real server in its own process, an image of 512×512 in which one material covers about 30 %; a client that drags σ of
+its cook_torrance term back and forth, 60 edits per second, and acknowledges each frame. The times are the server's own
+(see `relume_bench.recording_server`); those of the freeze before the drag are excluded.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _drag(client: SessionClient, num_edits: int) -> list[tuple[dict[str, Any], int]]:
-    """Move σ on a steady clock, reading frames in between; returns their headers and sizes."""
+    """Change σ at a constant rate, reading frames in between; return their headers and sizes."""
     start_time, frames = time.perf_counter(), []
     for k in range(num_edits):
         sigma = 0.2 + 0.15 * np.sin(2 * np.pi * k / 90)

@@ -1,9 +1,9 @@
-"""shade.pairs_per_s_vs_limit and shade.vs_operator_sums: how fast a term's picture is made without an operator.
+"""shade.pairs_per_s_vs_limit and shade.vs_operator_sums: speed of shading a term without an operator.
 
-17,700 view samples of the teapot × 4,000 light triangles; pairs are those of a sample and a light that it sees. The
-limit: as many pairs whose angles at three nodes, one for each curve, are computed from arrays in a row by the same
-threads: arithmetic alone, nothing listed, looked up or weighed. `shade.vs_operator_sums`: the time of the sums that
-operators are made by (`Projector` with no curve free), over that of `shade`. The smallest of three terms counts.
+17,700 view samples of the teapot × 4,000 environment triangles; pairs are those of a sample and a visible light. The
+limit: as many pairs whose angles at three nodes, one per curve, are computed from contiguous arrays by the same
+threads: arithmetic alone, without lists, lookups or weights. `shade.vs_operator_sums`: the time of the sums that make
+operators (`Projector` without a free curve), over that of `shade`. The smallest of three terms counts.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _NUM_POINTS_PER_STEP = 512
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _angles(angle_types, wi, num_pairs, gamma):  # type: ignore[no-untyped-def]
-    """Compute angles of curves at nodes, of a row of pairs again and again. wi: (3, row), gamma: (row,)"""
+    """Compute angles of curves at nodes, for a row of pairs repeatedly. wi: (3, row), gamma: (row,)"""
     for _ in range(num_pairs // wi.shape[1]):
         for kind in angle_types:
             for _ in range(_NODES):
@@ -52,7 +52,7 @@ def _angles(angle_types, wi, num_pairs, gamma):  # type: ignore[no-untyped-def]
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Shade, sum by leaves, and compute angles alone, in turn."""
+    """Shade, sum for operators, and compute angles alone, alternating."""
     documents = [complete_term(("shade",), dict(term), None) for term in _TERMS]
     lit_samples = lit_teapot(documents[0], tiny)
     num_pairs = int(np.bitwise_count(lit_samples.receivers.visible).sum())
@@ -119,6 +119,6 @@ def _limit(angle_types: NDArray[np.int64], num_pairs: int) -> None:
 
 
 def _difference(lit_samples: LitSamples, document: dict[str, Any]) -> float:
-    """Relative RMSE of the two pictures."""
+    """Relative RMSE of the two images."""
     shaded, summed = _shade(lit_samples, document).astype(float), _sum_operator(lit_samples, document).astype(float)
     return float(np.sqrt(np.square(shaded - summed).mean() / np.square(summed).mean()))

@@ -1,11 +1,11 @@
-"""slider.sharp_*: what a hand sees while a highlight is dragged through the sharpest tenth of its slider.
+"""slider.sharp_*: error while a highlight is dragged through the sharpest tenth of its slider.
 
 Samples of the teapot, in real light; its highlight alone, by the nodes of the slider
-(`relume.operators.parameter_operator`), at values between those that nodes were chosen from,
-against the same shaded. `slider.sharp_error`: the largest error of a
-sample, as a share of itself and of a hundredth of what it would show if the highlight were spread evenly over its
-angle. `slider.sharp_levels`: the largest after the tone map `agx`, the brightest twentieth white, of 255. The context
-has both for each light and slider, with the 99th percentile and the share of samples that are below zero.
+(`relume.operators.parameter_operator`), at values between those from which nodes were chosen, against the same shaded.
+`slider.sharp_error`: the largest error of a sample, relative to itself plus a hundredth of its value for a highlight
+spread evenly over its angle. `slider.sharp_levels`: the largest after the tone map `agx`, with the brightest twentieth
+white, of 255. The context has both for each light and slider, with the 99th percentile and the fraction of negative
+samples.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _errors(lit_samples: LitSamples, model: str, parameter: str, num: int) -> dict[str, float]:
-    """Over values in the sharpest tenth, of which exponents have theirs at the upper end."""
+    """Errors over values in the sharpest tenth, for exponents at the upper end."""
     declared = TERMS[model].parameter(parameter)
     values = slider_values(declared, 10 * num, at_midpoints=True)
     tenth = values[-num:] if parameter == "exponent" else values[:num]
@@ -90,7 +90,7 @@ def _bands(document: dict[str, Any]) -> dict[str, F64]:
 
 
 def _spread(along: ParameterOperator, bands: dict[str, F64]) -> dict[str, F64]:
-    """The curves that a slider moves, each spread evenly over all directions."""
+    """The curves that a slider changes, each spread evenly over all directions."""
     spread = dict(bands)
     for curve in curves_of_parameter(TERMS[along.model], along.parameter):
         weights = solid_angles(curve) / solid_angles(curve).sum()

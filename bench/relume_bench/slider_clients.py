@@ -1,4 +1,4 @@
-"""Hands of many sessions in one process, light enough to leave the cores to the server."""
+"""Dragging clients of many sessions in one process, light enough to leave the cores to the server."""
 
 from __future__ import annotations
 
@@ -12,17 +12,18 @@ from websockets.asyncio.client import ClientConnection
 
 from relume.core.errors import PlanError
 
-_MAX_PENDING_EDITS = 2  # edits that wait for a frame, as in the editor: while one is painted the next is there
+_MAX_PENDING_EDITS = 2  # unacknowledged edits, as in the editor: while one is painted the next is there
 _NUM_EDITS_PER_PERIOD = 90  # edits from one end of a slider to the other and back
 
 
 class SliderClient:
-    """Drags one slider to and fro, each edit when the frame of the one before the last is there.
+    """Drags one slider back and forth, each edit after the frame of the one before the last.
 
     Args:
-        slider: pointer to a parameter. span: what its value moves in. phase: where on its way it begins, in turns.
+        connection: of the session. slider: pointer to a parameter. span: range of its value. phase: starting point, in
+            periods.
     Attributes:
-        num_frames: that have come.
+        num_frames: received so far.
     """
 
     def __init__(self, connection: ClientConnection, slider: str, span: tuple[float, float], phase: float) -> None:
@@ -31,7 +32,7 @@ class SliderClient:
         self._is_dragging, self._is_exact, self._has_first_frame = False, asyncio.Event(), asyncio.Event()
 
     async def run(self) -> None:
-        """Acknowledge every frame, until cancelled."""
+        """Acknowledge every frame, until canceled."""
         while True:
             message = await self._connection.recv()
             if isinstance(message, bytes):
@@ -52,13 +53,13 @@ class SliderClient:
             await self._edit()
 
     async def release(self) -> None:
-        """Let go, and wait for the exact picture."""
+        """Release the slider, and wait for the exact image."""
         self._is_dragging = False
         await self._edit(0.0)
         await self._is_exact.wait()
 
     async def drag(self) -> None:
-        """See the exact picture, take the slider in hand and begin to move it; until a frame has shown that."""
+        """Wait for the exact image, announce the drag and start it; returns when a frame shows it."""
         await self._is_exact.wait()
         self._is_dragging = True
         await self._send_message(type="prepare", parameter=self._slider)
@@ -66,7 +67,7 @@ class SliderClient:
         await self._has_first_frame.wait()
 
     async def _edit(self, phase: float | None = None) -> None:
-        """Move it to where it is next, or so many turns from its middle."""
+        """Move the slider to its next value, or to a phase in periods from its center."""
         self._revision += 1
         self._is_exact.clear()
         along = 0.5 + 0.5 * np.sin(

@@ -1,11 +1,11 @@
-"""slider.*: a hand drags one slider, along the parameter and along a curve alone.
+"""slider.*: dragging one slider, along the parameter and along a curve alone.
 
 320×320, the teapot on a table; its highlight, `ggx`, is dragged from roughness 0.15 to 0.75. Error: the worst relative
-RMSE of a shown frame over the pixels of the teapot, its highlight alone lit, against the same look made exact, frame by
-frame. Time: look → picture brought on, median. `one_curve` is the same drag with the operator of θh alone and 64
-coefficients a frame, which was how a slider of several curves was followed before. In the context of the error: both
-drags, the second a slider that moves one curve (σ of `cook_torrance`), by nodes and by wavelets.
-`slider.freeze_ratio`: making the operator along the parameter ÷ along its θh, medians in turn.
+RMSE of a displayed frame over the pixels of the teapot, only its highlight lit, against the same look made exact, frame
+by frame. Time: look → updated image, median. `one_curve` is the same drag with the operator of θh alone and 64
+coefficients per frame. In the context of the error: both drags, the second a slider that changes one curve (σ of
+`cook_torrance`), by nodes and by wavelets. `slider.freeze_ratio`: making the operator along the parameter ÷ along its
+θh, medians, alternating.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _BUDGETS = (16, 64, None)
 
 @dataclass(frozen=True)
 class _Drag:
-    """A slider, and the looks that a drag of it goes through."""
+    """A slider, and the looks of its drag."""
 
     model: str
     parameter: str
@@ -58,7 +58,7 @@ class _Drag:
         return {"model": self.model, "color": [0.9, 0.9, 0.9], "params": {self.parameter: float(self.values[0])}}
 
     def looks(self, transfer: FixedViewTransfer) -> list[Look]:
-        """The highlight alone, so that errors are of what moves."""
+        """Looks with the highlight alone, so that errors are relative to the change."""
         looks = []
         for value in self.values:
             document = copy.deepcopy(transfer.default_look)
@@ -100,7 +100,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _measure_strategies(transfer: FixedViewTransfer, drag: _Drag) -> dict[str, dict[str, float]]:
-    """The drag with nodes, and with the wavelets of θh, so many of them a frame."""
+    """Drag with nodes, and with the wavelets of θh, a limited number per frame."""
     exact = _exact(transfer, drag)
     results = {"nodes": _measure_drag(transfer, drag, "params/" + drag.parameter, None, exact)}
     for budget in _BUDGETS:
@@ -110,7 +110,7 @@ def _measure_strategies(transfer: FixedViewTransfer, drag: _Drag) -> dict[str, d
 
 
 def _exact(transfer: FixedViewTransfer, drag: _Drag) -> list[NDArray[np.float32]]:
-    """The pictures of the drag, each of them shaded."""
+    """Images of the drag, each shaded."""
     pictures = []
     for look in drag.looks(transfer):
         picture = Picture(transfer, "front", Cache(4 << 30))
@@ -123,13 +123,13 @@ def _exact(transfer: FixedViewTransfer, drag: _Drag) -> list[NDArray[np.float32]
 def _measure_drag(
     transfer: FixedViewTransfer, drag: _Drag, touched: str, budget: int | None, exact: list[NDArray[np.float32]]
 ) -> dict[str, float]:
-    """Drag with what is touched frozen beforehand, and nothing else made."""
+    """Drag with the precomputed operator and without other jobs."""
     looks, is_edited = drag.looks(transfer), transfer.views["front"].material_ids() == 0
     picture = Picture(transfer, "front", Cache(4 << 30))
     picture.set_look(looks[0])
     _run_until_exact(picture)
     picture.prepare(f"{_TERM}/{touched}")
-    while picture.next_job() is not None:  # a rough operator may come first
+    while picture.next_job() is not None:  # a merged-light operator may come first
         picture.run_next_job(lambda share: None, lambda: False)
     errors, durations = [], []
     for look, right in zip(looks[1:], exact[1:], strict=True):

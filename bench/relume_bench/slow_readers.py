@@ -1,8 +1,8 @@
-"""slow_readers.mb: memory of a server beside clients that ask for a large answer and read nothing of it, above before.
+"""slow_readers.mb: growth of a server's memory with clients that request a large response and do not read it.
 
-A real server over a bake of a moving view. So many connections ask for the same array, the largest of the bake, and
-take no byte; the figure is the resident memory of the server's process when all of them wait, less that of before,
-where as many had read the same answer whole at the same time. `answer_mb` is the size of the answer.
+A real server on a free-camera bake. Many connections request the same array, the largest of the bake, and read nothing;
+the figure is the resident memory of the server's process when all wait, minus that after as many have read the same
+response completely at the same time. `answer_mb` is the size of the response.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from relume_bench.figure import Figure
 
 _NAME = "slow_readers.mb"
 _NUM_STABLE_READINGS = 5
-"""Looks at the memory, one after another, in which it no longer grows."""
+"""Number of consecutive readings without growth."""
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Bake, serve, ask."""
+    """Bake, serve, request."""
     readers, num_probes = (3, 2_000) if tiny else (60, 200_000)
     scene = built_in("cornell_box")
     recipe = Recipe("probes", (scene.cameras[0].name,), (64, 64), 60, num_probes=num_probes)
@@ -44,7 +44,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 
 def _largest(server: Server, data_folder: BakedFolder) -> tuple[str, int]:
-    """Path and size of the largest array, each read whole once."""
+    """Path and size of the largest array; all are read once."""
     root = f"/api/bakes/{data_folder.bake}/probes"
     sizes = {}
     with urllib.request.urlopen(f"http://127.0.0.1:{server.port}{root}") as answer:
@@ -55,7 +55,7 @@ def _largest(server: Server, data_folder: BakedFolder) -> tuple[str, int]:
 
 
 def _read(server: Server, path: str) -> int:
-    """Size of an answer, read piece by piece."""
+    """Size of a response, read in pieces."""
     with urllib.request.urlopen(f"http://127.0.0.1:{server.port}{path}") as answer:
         return sum(iter(lambda: len(answer.read(1 << 16)), 0))
 
@@ -68,7 +68,7 @@ def _ask(connections: ExitStack, server: Server, path: str) -> None:
 
 
 def _measure_settled_bytes(server: Server) -> int:
-    """The server's memory when it no longer grows."""
+    """Memory of the server once it no longer grows."""
     max_bytes, num_stable = 0, 0
     while num_stable < _NUM_STABLE_READINGS:
         time.sleep(0.5)

@@ -1,4 +1,4 @@
-"""Figures that are estimates, with their standard errors: each independent part is left out in turn (the jackknife)."""
+"""Estimates with their standard errors, by the jackknife: each independent part is left out in turn."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ F64 = NDArray[np.float64]
 
 
 class NoiseCorrectedError(NamedTuple):
-    """A picture against independent noisy ones of the truth, their noise taken off.
+    """An image against independent noisy reference images, with their noise removed.
 
     Attributes:
-        error: relative RMSE of the picture; 0 where its estimated square is negative.
-        bias: the picture's mean over the truth's, less one.
-        noise: relative RMS of the noise that the mean of all passes has.
-        limit: what the relative RMSE is very likely below, by two standard errors of its square.
+        error: relative RMSE of the image; 0 if its estimated square is negative.
+        bias: the image's mean over the reference's, minus one.
+        noise: relative RMS noise of the mean of all passes.
+        limit: upper bound of the relative RMSE, by two standard errors of its square.
     """
 
     error: JackknifeEstimate
@@ -31,17 +31,17 @@ class NoiseCorrectedError(NamedTuple):
 
     @property
     def is_significant(self) -> bool:
-        """Whether the error can be told from the noise: its square is more than two of its standard errors."""
+        """True if the error is above the noise: its square is more than two of its standard errors."""
         return self.error.value > 0 and self.limit**2 < 2 * self.error.value**2
 
     @property
     def summary(self) -> str:
-        """Error and bias in words, for the row of another figure."""
+        """Error and bias as text, for the context of another figure."""
         return f"{100 * self.error.value:.1f} % (bias {100 * self.bias.value:.1f} %)"
 
     @property
     def context(self) -> dict[str, float]:
-        """All but the error, for the row of a figure."""
+        """All fields except the error, for the context of a figure."""
         return {
             "bias": self.bias.value, "bias_standard_error": self.bias.standard_error,
             "noise": self.noise, "limit": self.limit,
@@ -49,7 +49,7 @@ class NoiseCorrectedError(NamedTuple):
 
 
 def estimate_point_error(values: NDArray[np.floating], reference: NDArray[np.floating]) -> JackknifeEstimate:
-    """Relative RMSE √(Σ (found − truth)² / Σ truth²) over points that were drawn at random.
+    """Relative RMSE √(Σ (value − reference)² / Σ reference²) over randomly chosen points.
 
     Args:
         values, reference: radiance or irradiance. (n, channels), n at least 2
@@ -60,13 +60,13 @@ def estimate_point_error(values: NDArray[np.floating], reference: NDArray[np.flo
 
 
 def compare_with_passes(rendered: F64, passes: F32) -> NoiseCorrectedError:
-    """Relative RMSE of a picture against the mean that noisy pictures share: E[(o − a)(o − b)] = (o − mean)².
+    """Relative RMSE of an image against the common mean of noisy images: E[(o − a)(o − b)] = (o − mean)².
 
-    The standard error is that of the passes' noise; the picture itself is taken as it is.
+    The standard error is that of the passes' noise; the image itself is taken as exact.
 
     Args:
         rendered: (height, width, 3).
-        passes: (passes, height, width, 3), at least 2 of them.
+        passes: (passes, height, width, 3), at least 2.
     """
     num, mean_squared_radiance = len(passes), error_squared(np.zeros_like(rendered), passes)[0]
     relative_squared_error, deviation = (term / mean_squared_radiance for term in error_squared(rendered, passes))

@@ -1,6 +1,6 @@
-"""accuracy.swap_*: a bake whose environment is exchanged for another, against truth; the worst of all pairs of maps.
+"""accuracy.swap_*: error of a bake with a replaced environment; the worst of all pairs of maps.
 
-As `relume_bench.rotation`. A fresh bake of each map stands beside those that were made for another.
+As `relume_bench.rotation`. The context also has a new bake of each map.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from relume_bench.scenes import LAMBERT, environments, teapot_on_table
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Compare all bakes that are shown in a map, by one truth."""
+    """Compare all bakes under each map, with one reference."""
     num_positions, num_lights = (20, 100) if tiny else (400, 4000)
     terms = documents("swap")
     errors: dict[str, dict[str, JackknifeEstimate]] = {name: {} for name in terms}

@@ -1,7 +1,7 @@
 """Merge figures into docs/performance.json and docs/accuracy.json, and write the tables of both pages from them.
 
-`relume bench --json | python -m relume_bench.table`. A file holds the list that `relume bench --json` prints, with the
-context of each figure; figures that a run did not measure keep their entries. A table stands between two marks.
+`relume bench --json | python -m relume_bench.table`. A file has the list that `relume bench --json` prints, with the
+context of each figure; figures that a run did not measure keep their entries. Tables are between two marks.
 """
 
 from __future__ import annotations
@@ -158,7 +158,7 @@ PEERS = {
     "probes.all_vs_sun": "1, Sun 2007",
     "probes.brdf_vs_sun": "1, Sun 2007",
     "probes.canvas_fps": "11.1 frames/s, the server",
-    "probes.incremental_error": "the change at rest",
+    "probes.incremental_error": "the converged change",
     "probes.probe_rmse": "path tracing",
     "probes.rmse_": "Mitsuba 3",
     "reference.mitsuba": "Mitsuba 3",
@@ -170,11 +170,11 @@ PEERS = {
     "slider.sharp_": "the same look, shaded",
     "slow_readers.mb": "14.3 MB × 60 readers",
 }
-"""What a figure is compared with, by its name or the beginning of it: a limit of the machine, a paper, a renderer."""
+"""Peer of a figure, by its name or prefix: a limit of the machine, a paper, a renderer."""
 
 
 def find_peer(name: str) -> str:
-    """Limit or peer of a figure; empty for none."""
+    """Limit or peer of a figure; empty if there is none."""
     return next((peer for start, peer in PEERS.items() if name.startswith(start)), "")
 
 
@@ -208,7 +208,7 @@ def find_document(name: str) -> str:
 
 
 def row(figure: dict[str, Any]) -> str:
-    """One line of a table."""
+    """One row of a table."""
     if figure["value"] is None:
         value = "not measured"
     elif figure["unit"] == "relative RMSE" and figure["value"] > 1e-3:
@@ -221,23 +221,23 @@ def row(figure: dict[str, Any]) -> str:
 
 
 def _spread(figure: dict[str, Any], scale: float = 1.0) -> str:
-    """The standard error of an estimate, to two digits."""
+    """Standard error of an estimate, to two digits."""
     error = figure.get("standard_error")
     return "" if error is None else f" ± {scale * error:.2g}"
 
 
 def merge(stored: list[dict[str, Any]], measured: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Stored figures, replaced by measured ones of the same name, in the order of names."""
+    """Stored figures, replaced by measured ones of the same name, sorted by name."""
     figures = {figure["name"]: figure for figure in [*stored, *measured]}
     return [figures[name] for name in sorted(figures)]
 
 
 def filled(text: str, figures: list[dict[str, Any]]) -> str:
-    """A page with these figures in its table. Raises ValueError if the page has no marks."""
+    """Fill a page with these figures. Raises ValueError if the page has no marks."""
     before, _, suffix = text.partition(BEGIN)
     _, mark, after = suffix.partition(END)
     if not mark:
-        raise ValueError("the page has no table of figures; put the two marks of relume_bench.table into it")
+        raise ValueError("the page has no table of figures; add the two marks of relume_bench.table")
     return "\n".join([before + BEGIN, *HEAD, *map(row, figures), END]) + after
 
 

@@ -1,4 +1,4 @@
-"""Seconds of a call, and calls taken in turn, so that what disturbs the machine disturbs both sides of a ratio."""
+"""Time calls, alternating between them, so that other load disturbs both sides of a ratio."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def seconds(call: Callable[[], object]) -> float:
 
 
 def time_interleaved(calls: Sequence[Callable[[], object]], rounds: int) -> list[list[float]]:
-    """Seconds of each call in each round; the first round, which compiles and warms caches, is not counted."""
+    """Seconds of each call in each round; the first round, which compiles and warms caches, is excluded."""
     for call in calls:
         call()
     durations: list[list[float]] = [[] for _ in calls]

@@ -1,7 +1,7 @@
-"""bake.two_workers_speedup: the same bake by one worker process and by two, each with one thread.
+"""bake.two_workers_speedup: the same bake with one worker process and with two, each with one thread.
 
-The start of the cluster is not counted: a smaller bake runs first in the same service. Counted is the time from
-submitting to `ready`, scheduling, the store and publishing included.
+The start of the cluster is excluded: a smaller bake runs first in the same service. The time is from submitting to
+`ready`, including scheduling, store and publishing.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def bake_s(service: BakeService, scene: str, recipe: Recipe) -> float:
     """Seconds from submitting a bake to `ready`.
 
     Args:
-        service: that bakes. scene: id of a registered one. recipe: how.
+        service: of the bake. scene: id of a registered one. recipe: of the bake.
     Raises:
         PlanError: the bake has failed.
     """
@@ -37,7 +37,7 @@ def bake_s(service: BakeService, scene: str, recipe: Recipe) -> float:
 
 
 def measure(tiny: bool) -> list[Figure]:
-    """Time the same bake by one worker process, then by two."""
+    """Time the same bake with one worker process, then with two."""
     scene = demo_scene()
     views = tuple(camera.name for camera in scene.cameras)
     warm = Recipe("direct", views, (320, 240), 500 if not tiny else 8)

@@ -1,4 +1,4 @@
-"""`relume audit`: what was changed, and by whom."""
+"""`relume audit`: list changes, and the users who made them."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from relume_cli.tokens import open_access
 
 def audit(
     data: Data = None,
-    last: Annotated[int, typer.Option("--last", min=1, max=1_000, help="How many changes.")] = 50,
-    who: Annotated[str | None, typer.Option("--who", help="Only of this user.")] = None,
+    last: Annotated[int, typer.Option("--last", min=1, max=1_000, help="Number of changes.")] = 50,
+    who: Annotated[str | None, typer.Option("--who", help="Only changes by this user.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Show what was changed, and by whom; the newest last."""
+    """List changes and their users, the newest last."""
     for entry in reversed(open_access(data, is_used=True).audit.list(last, actor=who)):
         at = datetime.fromtimestamp(entry.at, UTC).strftime("%Y-%m-%d %H:%M:%S")
         line = f"{at}  {entry.who:20}  {entry.what}  {entry.object}  {entry.status}  {entry.request}"

@@ -1,4 +1,4 @@
-"""Goes on with one bake without a terminal: RELUME_DATABASE=URL python -m relume_cli.background DATA SCHEDULER BAKE."""
+"""Continue one bake without a terminal: RELUME_DATABASE=URL python -m relume_cli.background DATA SCHEDULER BAKE."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from relume_worker.service import BakeService
 
 
 def main() -> None:
-    """Bake until that bake has ended, whoever ends it."""
+    """Bake until the bake has ended, here or on another machine."""
     os.umask(0o077)
     data, scheduler, identity = sys.argv[1:]
     bakes = BakeService(Path(data), os.environ["RELUME_DATABASE"], scheduler or None)

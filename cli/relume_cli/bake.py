@@ -1,4 +1,4 @@
-"""`relume bake`: queues a bake and follows it."""
+"""`relume bake`: queue a bake and follow it."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from relume.core.errors import bytes_text
 from relume_cli.options import Data, DryRun, SceneName, Scheduler, Size, parse_size, read_camera
-from relume_cli.terminal.printing import Json, note, print_result, size_text
+from relume_cli.terminal.printing import Json, note, print_result
 
 if TYPE_CHECKING:
     from relume.store.bake_protocol import Recipe
@@ -29,16 +30,18 @@ Preset = Literal["preview", "good", "final"]
 
 def bake(
     scene: SceneName,
-    method: Annotated[Method, typer.Option(help="Transfer method.")] = "direct",
+    method: Annotated[Method, typer.Option(help="Direct light; gather adds bounces; probes a free camera.")] = "direct",
     preset: Annotated[
-        Preset, typer.Option(help="How fine: preview 320x240 and 300 lights, good 640x480, 2000, final 1024x768, 4000.")
+        Preset, typer.Option(help="Quality: preview 320x240 and 300 lights, good 640x480, 2000, final 1024x768, 4000.")
     ] = "good",
     view: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="View to bake, several times for several; else all.")
+        list[str] | None, typer.Option(metavar="NAME", help="View to bake; repeat for several. [default: all]")
     ] = None,
     camera: Annotated[
         list[Path] | None,
-        typer.Option(metavar="FILE.json", help='View from here: {"name", "to_world": 16 numbers, "yfov": degrees}.'),
+        typer.Option(
+            metavar="FILE.json", help='New view from a camera: {"name", "to_world": 16 numbers, "yfov": degrees}.'
+        ),
     ] = None,
     size: Size = None,
     lights: Annotated[
@@ -48,16 +51,16 @@ def bake(
         int | None, typer.Option(metavar="N", help="Probes on surfaces (free camera), method probes. [default: 50000]")
     ] = None,
     patches: Annotated[
-        int | None, typer.Option(metavar="N", help="Surface patches for indirect light. [default: as fits]")
+        int | None, typer.Option(metavar="N", help="Surface patches for indirect light. [default: automatic]")
     ] = None,
     gather_rays: Annotated[
-        int | None, typer.Option(metavar="N", help="Gather rays of a view sample or probe. [default: 610; probes: 377]")
+        int | None, typer.Option(metavar="N", help="Gather rays per view sample or probe. [default: 610; probes: 377]")
     ] = None,
     relightable: Annotated[
         bool, typer.Option("--relightable", help="Prepare for rotating or replacing the environment.")
     ] = False,
     watch: Annotated[
-        bool, typer.Option(help="Bake here and show it; --no-watch leaves it to a running server and returns.")
+        bool, typer.Option(help="Bake here and show progress; --no-watch queues it for a running server.")
     ] = True,
     scheduler: Scheduler = None,
     dry_run: DryRun = False,
@@ -66,10 +69,10 @@ def bake(
 ) -> int:
     """Queue a bake and follow it; print its id.
 
-    The same recipe twice is the same bake; an interrupted one goes on where it stopped.
+    The same recipe is the same bake. An interrupted bake resumes.
 
-    This process bakes, unless a server on the same data folder is quicker to take it. Ctrl-C asks whether to keep going
-    in the background or to cancel.
+    This process bakes, unless a server on the same data directory starts first. Ctrl-C asks whether to continue in the
+    background or to cancel.
     """
     from relume_cli.data_folder import find_scene, open_bakes, open_settings
     from relume_cli.name_lookup import match_name
@@ -97,14 +100,14 @@ def bake(
 
 
 def _view_names(service: BakeService, record: SceneRecord) -> list[str]:
-    """Names of views that a bake of a scene may show: its own, and those of cameras that people placed."""
+    """Names of the views that a bake of a scene can have: those of the file, and those of placed cameras."""
     from relume_worker.cameras import list_cameras
 
     return [*record.views, *(camera.name for camera in list_cameras(service.ledger, record.id))]
 
 
 def _print_plan(service: BakeService, record: SceneRecord, recipe: Recipe, *, as_json: bool) -> None:
-    """Say what a bake would cost, as POST /api/bakes does with `dry_run`."""
+    """Print the cost of a bake, as POST /api/bakes returns it with `dry_run`."""
     from relume_cli.terminal.documents import plan_document, plan_lines, recipe_document, recipe_text
     from relume_worker.status import bake_id
 
@@ -151,7 +154,7 @@ def _watch(service: BakeService, settings: Settings, identity: str, label: str, 
     except KeyboardInterrupt:
         return _interrupted(service, settings, identity)
     if status.state != "ready":
-        typer.echo(f"relume: the bake {status.state}: {status.problem or 'somebody stopped it'}", err=True)
+        typer.echo(f"relume: the bake {status.state}: {status.problem or 'it was stopped'}", err=True)
         return 1
     print_result(bake_document(status, service), status.id, as_json=as_json)
     _report(status, settings, time.monotonic() - start_s)
@@ -159,11 +162,11 @@ def _watch(service: BakeService, settings: Settings, identity: str, label: str, 
 
 
 def _report(status: BakeStatus, settings: Settings, seconds: float) -> None:
-    """Say how well it went."""
+    """Print size, time and error of a finished bake."""
     from relume_worker.paths import bake_path
     from relume_worker.storage import fetch_if_missing
 
-    note(f"{size_text(status.bytes)} in {seconds:.1f} s")
+    note(f"{bytes_text(status.bytes)} in {seconds:.1f} s")
     if status.recipe.method == "direct":
         _report_rays(fetch_if_missing(bake_path(settings.data, status.id)))
     if status.recipe.method == "probes":
@@ -177,7 +180,7 @@ def _report_rays(store: Path) -> None:
     rays = read_rays(open_store(store))
     note(
         f"{rays.num_traced / 1e6:,.1f} of {rays.num_full / 1e6:,.1f} M shadow rays traced, the others predicted; "
-        f"wrong by the bake's own check: {100 * rays.error_rate:.2g} %"
+        f"about {100 * rays.error_rate:.2g} % wrong"
     )
 
 
@@ -188,27 +191,27 @@ def _report_free_camera_error(store: Path) -> None:
     free_camera_error = read_free_camera_error(open_store(store))
     if free_camera_error is not None:
         error_percent, deviation = 100 * free_camera_error.value, 100 * free_camera_error.standard_error
-        note(f"free camera: {error_percent:.1f} ± {deviation:.1f} % RMS error on surfaces; exact when the camera stops")
+        note(f"free camera: {error_percent:.1f} ± {deviation:.1f} % RMS error on surfaces; exact once it stops")
 
 
 def _interrupted(service: BakeService, settings: Settings, identity: str) -> int:
-    """Ask what Ctrl-C was meant to do."""
+    """Ask whether Ctrl-C cancels the bake or leaves it running."""
     keeps_baking = sys.stdin.isatty() and typer.confirm(
-        "\nKeep baking in the background? (no cancels the bake)", default=True
+        "\nContinue in the background? (no cancels the bake)", default=True
     )
     if not keeps_baking:
         service.cancel(identity)
-        typer.echo("cancelled; finished parts are kept, the same command goes on with them", err=True)
+        typer.echo("canceled; finished tasks are saved, and the same command resumes", err=True)
         return 130
     service.close()
     command = [sys.executable, "-m", "relume_cli.background", str(settings.data)]
     subprocess.Popen(  # noqa: S603
         [*command, settings.scheduler or "", identity],
-        env={**os.environ, "RELUME_DATABASE": settings.database_url},  # arguments are read by everybody on the machine
+        env={**os.environ, "RELUME_DATABASE": settings.database_url},  # other users can read the arguments of a process
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         start_new_session=True,
     )
-    typer.echo(f"{identity} goes on in the background; the same command shows it again", err=True)
+    typer.echo(f"{identity} continues in the background; the same command shows it again", err=True)
     return 0

@@ -1,4 +1,4 @@
-"""Shows a bake's progress in the terminal."""
+"""Progress of a bake in the terminal."""
 
 from __future__ import annotations
 
@@ -15,25 +15,27 @@ def follow(changes: Subscription, label: str, interrupted: Callable[[], bool] = 
     """Show progress until the bake ends, and return its last status.
 
     Args:
-        changes: of the bake. label: of the progress. interrupted: asked now and then.
+        changes: of the bake. label: of the progress. interrupted: polled; true stops.
     Raises:
-        KeyboardInterrupt: `interrupted` said so. NotFoundError: somebody has deleted the bake.
+        KeyboardInterrupt: `interrupted` returned true. NotFoundError: the bake was deleted.
     """
     with progress(label) as report:
         while not (status := changes.latest).final:
             report(status.progress, detail(status))
             changes.get(timeout=0.5)
             if changes.is_closed:
-                raise NotFoundError(f"bake {status.id} was deleted; import the scene again where it is gone, too")
+                raise NotFoundError(
+                    f"bake {status.id} was deleted; bake again, and import the scene first if it was deleted as well"
+                )
             if interrupted():
                 raise KeyboardInterrupt
     return status
 
 
 def detail(status: BakeStatus) -> str:
-    """What it does, rate and time left, in words."""
+    """Phase, rate and remaining time of a bake."""
     if status.state == "queued":
-        return "waiting" if status.queue_position == 0 else f"waiting for {status.queue_position} before it"
+        return "waiting" if status.queue_position == 0 else f"waiting, {status.queue_position} before it in the queue"
     if status.phase is None:
         return "starting"
     since_s = time.time() - (status.phase_since or time.time())

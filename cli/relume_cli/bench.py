@@ -1,4 +1,4 @@
-"""`relume bench`: the project's own figures."""
+"""`relume bench`: run the benchmarks."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ import typer
 
 
 def bench(
-    name: Annotated[str, typer.Argument(metavar="[NAME]", help="Run those whose name starts with this.")] = "",
+    name: Annotated[str, typer.Argument(metavar="[NAME]", help="Run benchmarks whose name starts with this.")] = "",
     json: Annotated[bool, typer.Option("--json", help="Print a JSON list of name, value, unit, context.")] = False,
 ) -> int:
-    """Measure; ratios have both sides measured in the same run."""
+    """Run the benchmarks.
+
+    Both sides of a ratio are measured in the same run.
+    """
     from relume_bench.registry import run
 
     result = run(name, json)

@@ -1,4 +1,4 @@
-"""What commands need of the rest: settings, the bake service, a scene by the name people give it."""
+"""Settings, bake service, scenes and bakes of a data directory, for commands."""
 
 from __future__ import annotations
 
@@ -20,12 +20,14 @@ if TYPE_CHECKING:
     from relume_worker.service import BakeService
     from relume_worker.status import BakeStatus
 
+MIN_BAKE_ID_LENGTH = 8  # shortest prefix of a bake's id that is accepted
+
 
 def open_settings(data: Path | None, **overrides: Any) -> Settings:
-    """Settings from the environment, with what the command line says in their place; what was imported can be named.
+    """Settings from the environment and the command line, which takes precedence. Also registers the asset stores.
 
     Raises:
-        ParameterError: a setting cannot be what it is.
+        ParameterError: a setting is invalid.
     """
     if data is not None and re.match(r"[A-Za-z0-9+]+:/", str(data)):
         _refuse_url()
@@ -36,6 +38,7 @@ def open_settings(data: Path | None, **overrides: Any) -> Settings:
     from relume.image_io.ocio.active_config import use_config
     from relume_server.runtime.assets import list_asset_stores
     from relume_server.settings import Settings
+    from relume_server.validation_errors import describe_allowed
 
     values = {key: value for key, value in {"data": data, **overrides}.items() if value is not None}
     try:
@@ -44,10 +47,10 @@ def open_settings(data: Path | None, **overrides: Any) -> Settings:
         first = error.errors()[0]
         field, *within = map(str, first["loc"])
         name = ".".join((f"RELUME_{field.upper()}", *within))
-        raise ParameterError(name, first["input"], _allowed(first["msg"])) from None
-    except SettingsError as error:  # which tells the field in its words alone
+        raise ParameterError(name, first["input"], describe_allowed(first["loc"], [first])) from None
+    except SettingsError as error:  # names the field only in its message
         variable = "RELUME_" + "".join(str(error).split('"')[1:2]).upper()
-        allowed = """JSON, as '["10.0.0.5"]' or '{"Ann": "edit"}', in quotes of the shell"""
+        allowed = """JSON, as '["10.0.0.5"]' or '{"Ann": "edit"}', quoted for the shell"""
         raise ParameterError(variable, os.environ.get(variable), allowed) from None
     settings.data.mkdir(mode=0o700, parents=True, exist_ok=True)
     for store, folder in list_asset_stores(settings.data):
@@ -57,15 +60,15 @@ def open_settings(data: Path | None, **overrides: Any) -> Settings:
 
 
 def _refuse_url() -> None:
-    """Raise ParameterError: everybody on the machine reads the arguments of a process, and a URL has a password."""
+    """Raise ParameterError: other users can read the arguments of a process, and a URL contains a password."""
     from relume.core.errors import ParameterError
 
-    raise ParameterError("--data", "a URL", "a folder; the database's URL goes into the variable RELUME_DATABASE")
+    raise ParameterError("--data", "a URL", "a directory; set RELUME_DATABASE to the database's URL")
 
 
 @contextmanager
 def private_files() -> Iterator[None]:
-    """What is written inside, by processes that are started as well, is for this user alone."""
+    """Files written inside, also by child processes, are readable by this user only."""
     previous_mask = os.umask(0o077)
     try:
         yield
@@ -73,51 +76,52 @@ def private_files() -> Iterator[None]:
         os.umask(previous_mask)
 
 
-def _allowed(message: str) -> str:
-    """What pydantic says of a value, to stand behind "give"."""
-    text = message.removeprefix("Input should be ").removeprefix("Value error, ")
-    return text[:1].lower() + text[1:]
-
-
 def open_bakes(settings: Settings) -> BakeService:
-    """The bake service of a data folder, not started."""
+    """Bake service of a data directory, not started."""
     from relume_worker.service import BakeService
 
     return BakeService(settings.data, settings.database_url, settings.scheduler)
 
 
 def check_used(settings: Settings) -> None:
-    """Raise ParameterError where a data folder has neither a ledger nor anything that was imported."""
+    """Raise ParameterError if a data directory has neither a database nor imported assets."""
     from relume.core.errors import ParameterError
     from relume_server.runtime.assets import list_asset_stores
 
     paths = settings.data / "relume.db", *(folder for _, folder in list_asset_stores(settings.data))
     if not settings.database and not any(path.exists() for path in paths):
-        raise ParameterError("--data", str(settings.data), "a folder that relume has used; this one is empty")
+        raise ParameterError("--data", str(settings.data), "a directory that relume has used; this one is empty")
 
 
 def find_scene(ledger: Ledger, name: str) -> SceneRecord:
-    """A scene by id, start of an id, or name. Raises NotFoundError where there is none or more than one."""
+    """Find a scene by id, start of an id, or name. Raises NotFoundError if there is none, or more than one."""
     from relume_cli.name_lookup import pick
     from relume_worker.scenes import list_scenes
 
     scenes = {scene.id: scene for scene in list_scenes(ledger)}
     candidates = [(scene.id, scene.name) for scene in scenes.values()]
-    return scenes[pick("scene", name, candidates, "relume import adds one")]
+    return scenes[pick("scene", name, candidates, "relume import adds scenes")]
+
+
+def bakes_by_prefix(service: BakeService, name: str) -> list[BakeStatus]:
+    """Bakes whose id begins with a name of at least `MIN_BAKE_ID_LENGTH` characters."""
+    return [bake for bake in service.bakes() if len(name) >= MIN_BAKE_ID_LENGTH and bake.id.startswith(name)]
 
 
 def find_bake_and_view(
     service: BakeService, name: str, view: str | None, *, is_free_camera: bool = False
 ) -> tuple[SceneRecord, BakeStatus, str]:
-    """What a bake's id, the start of one, or a scene's name stands for: the scene, a finished bake of it, and the view.
+    """Find a finished bake by its id, the start of its id, or a scene's name.
 
     Args:
-        service: where to look. name: of the bake, or of a scene: then the finest one. view, is_free_camera: as of
-            `find_bake`.
+        service: of the data directory. name: of a bake or a scene; the finest bake of a scene is taken.
+        view, is_free_camera: as for `find_bake`.
+    Returns:
+        The scene, the bake, and the view.
     Raises:
         NotFoundError: there is none, it is not finished, or it does not have the view.
     """
-    matches = [bake for bake in service.bakes() if len(name) >= 8 and bake.id.startswith(name)]
+    matches = bakes_by_prefix(service, name)
     if len(matches) != 1:
         scene = find_scene(service.ledger, name)
         return scene, *find_bake(service, scene, view, is_free_camera=is_free_camera)
@@ -128,24 +132,24 @@ def find_bake_and_view(
 
 
 def _check_bake_and_view(bake: BakeStatus, view: str | None, is_free_camera: bool) -> None:
-    """Raise NotFoundError where a bake that was asked for by its id is not finished, or lacks what is to be shown."""
+    """Raise NotFoundError if a bake is not finished, lacks the view, or has fixed cameras only."""
     from relume_worker.status import FREE_CAMERA_METHODS
 
     if bake.state != "ready":
-        raise NotFoundError(f"bake {bake.id} is {bake.state}, not ready; go on with it: relume bake {bake.scene}")
+        raise NotFoundError(f"bake {bake.id} is {bake.state}, not ready; resume it: relume bake {bake.scene}")
     if view is not None and view not in bake.recipe.views:
         raise NotFoundError(f"bake {bake.id} has no view {view[:80]!r}; its views are {', '.join(bake.recipe.views)}")
     if is_free_camera and bake.recipe.method not in FREE_CAMERA_METHODS:
-        raise NotFoundError(f"bake {bake.id} is of fixed views; run: relume bake {bake.scene} --method probes")
+        raise NotFoundError(f"bake {bake.id} has fixed cameras only; run: relume bake {bake.scene} --method probes")
 
 
 def find_bake(
     service: BakeService, scene: SceneRecord, view: str | None, *, is_free_camera: bool = False
 ) -> tuple[BakeStatus, str]:
-    """The finest finished bake of a scene that has the view, and the view. Raises NotFoundError.
+    """Return the finest finished bake of a scene that has the view, and the view. Raises NotFoundError.
 
     Args:
-        service, scene: where to look, and what for. view: its name; None: any. is_free_camera: its eye must.
+        service, scene: of the data directory. view: name; None: any. is_free_camera: accept free-camera bakes only.
     """
     from relume_worker.status import FREE_CAMERA_METHODS
 
@@ -165,12 +169,12 @@ def find_bake(
 
 
 def complete_look(partial: dict[str, Any], default: dict[str, Any], name: str = "--look") -> Look:
-    """A checked look from what a file says and the scene's default.
+    """Complete a look document with the scene's default, and validate it.
 
     Args:
         partial, default: documents. name: of the look, in messages.
     Raises:
-        ParameterError: naming the look and the place in it.
+        ParameterError: with the name of the look and the JSON pointer.
     """
     from relume.core.errors import ParameterError
     from relume.look import complete, validate

@@ -1,4 +1,4 @@
-"""`relume demo`: the built-in scene, baked, served, in the browser."""
+"""`relume demo`: bake and serve the built-in scene, and open the editor."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     from relume_server.settings import Settings
 
 WAIT_FOR_SERVER_S = 60.0
-# What the editor opens with: a highlight that fills a part of the picture.
+# Selection when the editor opens: a highlight that fills part of the image.
 SELECTED = {"material": "Bowl", "term": "1", "curve": "theta_h"}
 
 
 def demo(
     data: Data = None,
     port: Port = None,
-    browser: Annotated[bool, typer.Option(help="Open the editor in a browser.")] = True,
+    browser: Annotated[bool, typer.Option(help="Open the editor in the browser.")] = True,
 ) -> None:
-    """Bake the built-in scene if it is not there, serve it, and open the editor."""
+    """Bake the built-in scene if needed, serve it, and open the editor."""
     from relume.image_io.ocio.active_config import get_config
     from relume_cli.data_folder import open_settings, private_files
     from relume_server.app import serve
@@ -37,25 +37,25 @@ def demo(
     settings = open_settings(data, port=port)
     check_openness(settings)
     check_port(settings.host, settings.port)
-    get_config()  # what is wrong with a config is said before anything runs
+    get_config()  # fail early if the config is invalid
     threading.Thread(target=_bake, args=(settings, browser), name="relume-demo", daemon=True).start()
     with private_files():
         serve(settings)
 
 
 def _bake(settings: Settings, browser: bool) -> None:
-    """Queue the demo's bake for the server that is starting, and show here what the browser shows too."""
+    """Queue the demo's bake for the starting server, and show its progress in the terminal, too."""
     from relume_cli.error_message import error_message
 
     try:
         identity, editor = _queue_and_follow(settings, browser)
-        typer.echo(f"bake {identity} is ready: {editor}   Ctrl-C ends", err=True)
-    except Exception as error:  # the server lives on, so this must be said here
+        typer.echo(f"bake {identity} is ready: {editor}   Ctrl-C stops the server", err=True)
+    except Exception as error:  # the server keeps running, so report the error here
         typer.echo(f"relume: {error_message(error)}", err=True)
 
 
 def _queue_and_follow(settings: Settings, browser: bool) -> tuple[str, str]:
-    """Returns the bake, and the address of the editor on its scene."""
+    """Return the bake's id, and the editor's URL for its scene."""
     from relume.core.errors import PlanError
     from relume.scene.examples.still_life import demo_scene
     from relume_cli.bake_progress import follow
@@ -74,16 +74,16 @@ def _queue_and_follow(settings: Settings, browser: bool) -> tuple[str, str]:
         with service.subscribe(identity) as changes:
             status = follow(changes, scene.name)
         if status.state != "ready":
-            raise PlanError(f"the bake {status.state}: {status.problem or 'somebody stopped it'}")
+            raise PlanError(f"the bake {status.state}: {status.problem or 'it was stopped'}")
         return identity, editor
     finally:
         service.close()
 
 
 def demo_recipes(scene: Scene) -> list[Recipe]:
-    """Of what is baked: a preview, with which people begin, and the bake that takes its place.
+    """Recipes of the demo: a preview, and the bake that replaces it.
 
-    Both are as the editor asks for them, so that it finds these.
+    Identical to the editor's requests, so that the editor finds these bakes.
     """
     from relume.store.bake_protocol import Recipe
     from relume_worker.presets import PRESETS
@@ -93,7 +93,7 @@ def demo_recipes(scene: Scene) -> list[Recipe]:
 
 
 def _wait_for_server(settings: Settings) -> None:
-    """Return when the server accepts connections, at the latest after a minute."""
+    """Return when the server accepts connections, or after a minute."""
     deadline = time.monotonic() + WAIT_FOR_SERVER_S
     while time.monotonic() < deadline:
         try:

@@ -1,4 +1,4 @@
-"""`relume environment import`: keeps an environment that any baked scene can be shown in."""
+"""`relume environment import`: import an environment that looks of any scene can use."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from relume_cli.terminal.printing import Json, print_result
 
 
 def environment_import(
-    file: Annotated[Path, typer.Argument(metavar="FILE.hdr", help="Equirectangular light, .hdr or .exr.")],
-    name: Annotated[str | None, typer.Option(help="What to call it; else the file's name.")] = None,
+    file: Annotated[Path, typer.Argument(metavar="FILE.hdr", help="Equirectangular .hdr or .exr file.")],
+    name: Annotated[str | None, typer.Option(help="Name of the environment. [default: file name]")] = None,
     as_json: Json = False,
     data: Data = None,
 ) -> None:
     """Import an environment; print its name in looks.
 
-    There is a warning for each thing that was changed.
+    Prints a warning for each change to its pixels.
     """
     from relume.assets.asset_store import check_name
     from relume.assets.environments.environment_store import store_environment

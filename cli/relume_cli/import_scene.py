@@ -1,4 +1,4 @@
-"""`relume import`: registers a scene."""
+"""`relume import`: import a scene."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ if TYPE_CHECKING:
 def import_scene(
     file: Annotated[
         Path | None,
-        typer.Argument(metavar="FILE.glb", help="A .glb, .gltf, .obj, .ply or .zip file; may name files beside it."),
+        typer.Argument(
+            metavar="FILE.glb", help="Scene: .glb, .gltf, .obj, .ply or .zip, with the files it references."
+        ),
     ] = None,
     environment: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.hdr", help="Equirectangular light, .hdr or .exr; else the demo's studio."),
+        Path | None, typer.Option(metavar="FILE.hdr", help="Equirectangular .hdr or .exr file. [default: studio]")
     ] = None,
-    name: Annotated[str | None, typer.Option(help="What to call it; else the file's name.")] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the scene. [default: file name]")] = None,
     built_in: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="In place of a file: a scene made by code; relume list built-ins has them."),
+        str | None, typer.Option(metavar="NAME", help="Built-in scene instead of a file; see relume list built-ins.")
     ] = None,
-    ground: Annotated[bool, typer.Option("--ground", help="Put it on a ground, which catches its shadows.")] = False,
+    ground: Annotated[bool, typer.Option("--ground", help="Add a ground plane that catches shadows.")] = False,
     as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """Register a scene; print its id, and what was read of it.
+    """Import a scene; print its id.
 
-    What was not read is a warning each: "unsupported" is missing or looks other than the file says, "approximated"
-    looks much the same, "ignored" does not change the picture.
+    Prints a warning for each feature that was not read: "unsupported" is missing or differs from the file,
+    "approximated" looks much the same, "ignored" does not change the image.
     """
     from relume.scene.shadow_catcher_ground import with_ground
     from relume_cli.data_folder import open_bakes, open_settings
@@ -58,12 +58,13 @@ def import_scene(
 
 
 def _summary_lines(scene: Scene) -> Iterator[str]:
-    """What was read of a file, a line each."""
+    """Summary of an imported scene, one line each."""
     height, width, _ = scene.environment.radiance.shape
     low = [min(float(mesh.positions[:, axis].min()) for mesh in scene.meshes) for axis in range(3)]
     high = [max(float(mesh.positions[:, axis].max()) for mesh in scene.meshes) for axis in range(3)]
     sides = " × ".join(f"{b - a:.3g}" for a, b in zip(low, high, strict=True))
-    yield f"  {scene.name}: {sum(len(mesh.faces) for mesh in scene.meshes):,} triangles in {len(scene.meshes):,} meshes"
+    num_triangles, num_meshes = sum(len(mesh.faces) for mesh in scene.meshes), len(scene.meshes)
+    yield f"  {scene.name}: {num_triangles:,} triangles in {num_meshes:,} mesh{'es' if num_meshes != 1 else ''}"
     yield f"  {sides} m, +Y is up"
     for material in scene.materials:
         yield f"  material {material.name}: {', '.join(_describe_material(material))}"
@@ -76,14 +77,14 @@ def _summary_lines(scene: Scene) -> Iterator[str]:
 
 
 def _describe_material(material: Material) -> Iterator[str]:
-    """What a material is made of."""
+    """Models, textures and features of a material."""
     yield " + ".join(str(term["model"]) for term in material.terms) or "no terms"
     if material.textures:
         yield f"textures of {' and '.join(sorted(material.textures))}"
     if material.normal_map is not None:
         yield "a normal map"
     if material.opacity is not None:
-        yield "holes"
+        yield "alpha-tested"
     if material.glass is not None:
         yield "glass"
 
@@ -97,7 +98,7 @@ def _read_scene(file: Path | None, environment: Path | None, name: str | None, b
 
     if built_in_name is not None:
         if any(argument is not None for argument in (file, environment, name)):
-            raise ParameterError("--built-in", built_in_name, "alone: such a scene has its own light and name")
+            raise ParameterError("--built-in", built_in_name, "it alone: it has its own environment and name")
         return built_in(match_name(built_in_name, BUILT_IN))
     if file is None:
         raise PlanError("nothing to import; give a scene file, or --built-in NAME")

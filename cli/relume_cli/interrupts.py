@@ -1,4 +1,4 @@
-"""Ctrl-C that takes effect where it is asked for."""
+"""Ctrl-C that is polled instead of raised."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ Made = TypeVar("Made")
 
 @contextlib.contextmanager
 def capture_interrupts() -> Iterator[threading.Event]:
-    """The event is set where Python would raise KeyboardInterrupt; for the main thread alone.
+    """Yield an event that is set instead of raising KeyboardInterrupt; main thread only.
 
-    Raised between two lines of an import it may leave the interpreter's import lock held for ever, and then the threads
-    that bake wait for it and this one waits for them.
+    If it were raised during an import, the interpreter's import lock could stay locked, and the baking threads and this
+    one would wait for each other.
     """
     interrupted = threading.Event()
     previous_handler = signal.signal(signal.SIGINT, lambda *_: interrupted.set())
@@ -27,12 +27,13 @@ def capture_interrupts() -> Iterator[threading.Event]:
 
 
 def until_interrupted(label: str, work: Callable[[Callable[[float], object], Callable[[], bool]], Made]) -> Made:
-    """Do long work and show how far it is.
+    """Do long work and show its progress.
 
     Args:
-        label: it is, in words. work: told whom to tell the share that is done, and whom to ask whether to stop.
+        label: of the work. work: called with a function that reports the fraction done, and one that returns true to
+            stop.
     Raises:
-        KeyboardInterrupt: it was interrupted, and has stopped.
+        KeyboardInterrupt: the work was interrupted, and has stopped.
     """
     from relume.core.errors import CancelledError
     from relume_cli.terminal.progress import progress

@@ -1,4 +1,4 @@
-"""The `relume` command. Each subcommand is a file of its own; what is heavy is imported when a command runs."""
+"""The `relume` command. Each subcommand is a module; heavy modules are imported when a command runs."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def _print_version(is_asked: bool) -> None:
 
 app = typer.Typer(
     name="relume",
-    epilog="Data lie in the folder that RELUME_DATA names, else in your user data folder. "
-    "Every command takes --verbose: then a failure shows its trace; and --quiet: then neither progress nor notes are "
-    "shown, results and warnings are.",
+    epilog="Data are in the directory RELUME_DATA, by default in your user data directory. "
+    "Every command accepts --verbose (tracebacks of errors) and --quiet (neither progress nor notes; results and "
+    "warnings remain).",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
@@ -46,7 +46,7 @@ app.command("cancel")(cancel.cancel)
 app.command("render")(render.render)
 app.command("delete")(delete.delete)
 app.command("serve", short_help="Serve the editor and the API.")(serve.serve)
-app.command("worker", short_help="Bake for others until stopped.")(worker.worker)
+app.command("worker", short_help="Bake for servers until stopped.")(worker.worker)
 app.command("backup")(backup.backup)
 app.command("restore")(restore.restore)
 app.command("reference")(reference.reference)
@@ -57,16 +57,12 @@ token.command("add")(tokens.token_add)
 token.command("list")(tokens.token_list)
 token.command("revoke")(tokens.token_revoke)
 app.add_typer(token, name="token")
-materials = typer.Typer(
-    help="Measured materials and BTFs.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-)
+materials = typer.Typer(help="Measured materials and BTFs.", no_args_is_help=True, rich_markup_mode=None)
 materials.command("import")(importing.material_import)
 materials.command("make-btf")(make_btf.material_make_btf)
 materials.command("export")(exporting.material_export)
 app.add_typer(materials, name="material")
-environments = typer.Typer(help="Environments that looks may use.", no_args_is_help=True, rich_markup_mode=None)
+environments = typer.Typer(help="Environments for looks.", no_args_is_help=True, rich_markup_mode=None)
 environments.command("import")(environment_import.environment_import)
 app.add_typer(environments, name="environment")
 database = typer.Typer(help="The database of scenes, bakes and looks.", no_args_is_help=True, rich_markup_mode=None)
@@ -81,18 +77,18 @@ FOR_ALL = ("--verbose", "--quiet")
 @app.callback()
 def root(
     is_version: Annotated[
-        bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version, and end.")
+        bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version.")
     ] = False,
 ) -> None:
-    """Edit materials and lights in the finished picture, with its real shadows, while you drag a curve."""
+    """Edit materials and lights in the finished render. Every drag updates the real shadows and reflections."""
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run one command and return its exit code; a failure is one line on stderr."""
+    """Run one command and return its exit code; an error is one line on stderr."""
     verbose = "--verbose" in arguments
     is_quiet.set("--quiet" in arguments)
     handler = logging.StreamHandler()
-    handler.setLevel(logging.INFO if verbose else logging.ERROR)  # of the handler: libraries set their loggers' own
+    handler.setLevel(logging.INFO if verbose else logging.ERROR)  # libraries set the levels of their loggers
     logging.basicConfig(level=handler.level, format="%(levelname)s %(name)s: %(message)s", handlers=[handler])
     try:
         result = app([a for a in arguments if a not in FOR_ALL], prog_name="relume", standalone_mode=False)

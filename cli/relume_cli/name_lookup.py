@@ -1,4 +1,4 @@
-"""Things by the names that people give them: spelled a little otherwise they are still found."""
+"""Match names as people type them: case and separators do not matter."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from collections.abc import Iterable, Sequence
 
 from relume.core.errors import NotFoundError
 
-MIN_ID_LENGTH = 4  # characters that an id may be cut to
+MIN_ID_LENGTH = 4  # shortest prefix of an id that is accepted
 _MAX_LISTED = 10
 
 
 def fold_name(name: str) -> str:
-    """What two spellings of a name have in common: neither case, nor underscores, hyphens and spaces, count."""
+    """Fold a name for comparison: case, underscores, hyphens and spaces do not count."""
     folded = unicodedata.normalize("NFKC", name).casefold()
     return re.sub(r"[\s_\u2010-\u2015-]+", " ", folded).strip()
 
 
 def pick(kind: str, query: str, candidates: Sequence[tuple[str, str]], remedy: str) -> str:
-    """The id of what is meant: by its id, its name, the start of its id, or a name that is spelled alike.
+    """Return the id that matches a query: an id, a name, the start of an id, or another spelling of a name.
 
     Args:
-        kind: it is, in a message. query: what was typed. candidates: id and name of each that there is.
-        remedy: what to do where there is none, in a message.
+        kind: of the things, in messages. query: as typed. candidates: all ids and names.
+        remedy: what to do if nothing matches, in messages.
     Raises:
         NotFoundError: there is none, or more than one.
     """
@@ -42,11 +42,11 @@ def pick(kind: str, query: str, candidates: Sequence[tuple[str, str]], remedy: s
         raise NotFoundError(f"{query[:80]!r} names {len(matches)} {kind}s; give one of {labels}")
     labels = ", ".join(_label(identity, name) for identity, name in candidates[:_MAX_LISTED]) or "none yet"
     suffix = f" and {len(candidates) - _MAX_LISTED} more" if len(candidates) > _MAX_LISTED else ""
-    raise NotFoundError(f"there is no {kind} {query[:80]!r}; known are: {labels}{suffix}; {remedy}")
+    raise NotFoundError(f"there is no {kind} {query[:80]!r}; choose from {labels}{suffix}; {remedy}")
 
 
 def match_name(query: str, candidates: Iterable[str]) -> str:
-    """The name that is meant, of those that there are; the given one where none is, or more than one might be."""
+    """Return the candidate that a query is a spelling of; the query itself if there is none, or more than one."""
     names = list(dict.fromkeys(candidates))
     matches = [name for name in names if fold_name(name) == fold_name(query)]
     return matches[0] if query not in names and len(matches) == 1 else query

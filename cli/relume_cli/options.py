@@ -1,4 +1,4 @@
-"""Options that several commands share."""
+"""Options shared by several commands."""
 
 from __future__ import annotations
 
@@ -16,29 +16,31 @@ if TYPE_CHECKING:
     from relume.scene.custom_camera import CustomCamera
 
 Data = Annotated[
-    Path | None, typer.Option("--data", metavar="DIR", help="Data folder. [default: RELUME_DATA or user data]")
+    Path | None, typer.Option("--data", metavar="DIR", help="Data directory. [default: RELUME_DATA or user data]")
 ]
-SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="Id of a scene, the start of one, or its name.")]
+SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="Scene: id, start of an id, or name.")]
 BakeName = Annotated[
-    str,
-    typer.Argument(metavar="BAKE", help="Id of a bake, the start of one, or a scene, of which the finest is meant."),
+    str, typer.Argument(metavar="BAKE", help="Bake: id or start of an id; or a scene, for its finest bake.")
 ]
-View = Annotated[str | None, typer.Option("--view", metavar="NAME", help="View; the first one where not given.")]
+View = Annotated[str | None, typer.Option("--view", metavar="NAME", help="View. [default: the first]")]
 Size = Annotated[str | None, typer.Option("--size", metavar="WxH", help="Width and height in pixels.")]
 LookFile = Annotated[
-    Path | None, typer.Option("--look", metavar="LOOK.json", help="Look document, may be partial; else the default.")
+    Path | None,
+    typer.Option("--look", metavar="LOOK.json", help="Look document, may be partial. [default: the scene's]"),
 ]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="Check all of it and say what would be done; do nothing.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Validate and print what would be done; do nothing.")]
 Scheduler = Annotated[
     str | None,
-    typer.Option("--scheduler", metavar="tcp://…", help="Dask scheduler to bake on; else processes of this machine."),
+    typer.Option(
+        "--scheduler", metavar="tcp://…", help="Dask scheduler to bake on. [default: processes on this machine]"
+    ),
 ]
 
 MAX_DOCUMENT_BYTES = 16 << 20
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """Width and height from "640x480". Raises ParameterError."""
+    """Parse a width and height such as "640x480". Raises ParameterError."""
     match = re.fullmatch(r"([1-9]\d{0,4})[x×]([1-9]\d{0,4})", text)
     if match is None:
         raise ParameterError("--size", text, "width and height in pixels, such as 640x480")
@@ -46,7 +48,7 @@ def parse_size(text: str) -> tuple[int, int]:
 
 
 def check_readable(option: str, path: Path) -> Path:
-    """The same path. Raises ParameterError where there is no file, or none that may be read."""
+    """Return the path. Raises ParameterError if it is not a readable file."""
     try:
         with path.open("rb"):
             return path
@@ -55,7 +57,7 @@ def check_readable(option: str, path: Path) -> Path:
 
 
 def read_look(path: Path | None) -> dict[str, object]:
-    """A look document from a file; an empty one where there is no file. Raises ParameterError."""
+    """Read a look document; empty without a path. Raises ParameterError."""
     if path is None:
         return {}
     document = read_json("--look", path)
@@ -65,14 +67,14 @@ def read_look(path: Path | None) -> dict[str, object]:
 
 
 def read_camera(path: Path) -> CustomCamera:
-    """A camera from a file. Raises ParameterError."""
+    """Read a camera from a file. Raises ParameterError."""
     from relume.scene.custom_camera import read_custom_camera
 
     return read_custom_camera(read_json("--camera", path))
 
 
 def read_json(option: str, path: Path | None) -> object:
-    """A JSON document of bounded size, from a file, or from stdin where there is none. Raises ParameterError."""
+    """Read a JSON document of bounded size from a file, or from stdin without a path. Raises ParameterError."""
     if path is None:
         text = sys.stdin.buffer.read(MAX_DOCUMENT_BYTES + 1)
     else:

@@ -1,4 +1,4 @@
-"""`relume render`: exact frames of a bake without a server."""
+"""`relume render`: render exact images of a bake without a server."""
 
 from __future__ import annotations
 
@@ -26,41 +26,42 @@ def render(
         Path,
         typer.Option(
             metavar="FILE.exr|.png|.webp",
-            help="Where to write the picture; of several looks with {look} in it, which stands for the name of each. "
-            "Of a turntable: a folder, or FILE.mp4.",
+            help="Image file to write; {look} in it stands for the name of each look. "
+            "Turntable: a folder, or FILE.mp4.",
         ),
     ],
     look: Looks = None,
     view: View = None,
-    layers: Annotated[bool, typer.Option("--layers", help="EXR: add a layer for each light and light path.")] = False,
+    layers: Annotated[bool, typer.Option("--layers", help="EXR: add one layer per light and per light path.")] = False,
     light_groups: Annotated[
-        bool, typer.Option("--light-groups", help="EXR: layers of direct and of indirect light of each light instead.")
+        bool, typer.Option("--light-groups", help="EXR: add direct and indirect layers per light.")
     ] = False,
-    full_float: Annotated[bool, typer.Option("--float", help="EXR: full floats instead of half ones.")] = False,
+    full_float: Annotated[bool, typer.Option("--float", help="EXR: 32-bit floats instead of 16-bit.")] = False,
     color_space: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="EXR: a linear color space of the config RELUME_OCIO. [default: Rec. 709]"),
+        typer.Option(
+            metavar="NAME", help="EXR: linear color space of the OpenColorIO config (RELUME_OCIO). [default: Rec. 709]"
+        ),
     ] = None,
     turntable: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="N frames once around: PNG files in a folder, or a video."),
+        int | None, typer.Option(metavar="N", help="Render N frames of a turntable: PNG files in a folder, or a video.")
     ] = None,
     rotate: Annotated[
         TurntableSubject | None,
-        typer.Option(help="Turntable: what rotates: the camera, the object, or the environment. [default: camera]"),
+        typer.Option(help="Turntable: rotate the camera, the object, or the environment. [default: camera]"),
     ] = None,
-    fps: Annotated[int | None, typer.Option(min=1, max=120, help="Video: frames a second. [default: 25]")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Leave out what is written already.")] = False,
+    fps: Annotated[int | None, typer.Option(min=1, max=120, help="Video: frames per second. [default: 25]")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Skip files that exist.")] = False,
     approximate: Annotated[
-        bool, typer.Option("--approximate", help="Free camera: the approximate image, as while moving.")
+        bool, typer.Option("--approximate", help="Free camera: render the approximate image shown while it moves.")
     ] = False,
     dry_run: DryRun = False,
     as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """Render exact frames of one look, of many, or all around.
+    """Render exact images of looks, or turntables.
 
-    Prints the names of the files that were written.
+    Prints the names of the written files.
     """
     from relume_cli.data_folder import open_bakes, open_settings
     from relume_cli.pictures.files import exr_options
@@ -93,14 +94,14 @@ def render(
 def _check(
     source: RenderSource, planned_files: Sequence[PlannedFile], turntable_plan: TurntablePlan | None
 ) -> list[dict[str, Any]]:
-    """What is written, as JSON. Raises ParameterError before anything is where a look, or the turntable, cannot be."""
+    """Return the files to write, as JSON. Raises ParameterError if a look or the turntable is invalid."""
     from relume_cli.pictures.plans import complete_plan
     from relume_cli.pictures.write_images import check_turntable
 
     view = source.transfer.views[source.view]
     looks = [complete_plan(planned_file, source.transfer.default_look) for planned_file in planned_files]
     if any(look.environment.map is not None for look in looks):
-        note("note: shadows were baked before this light was known: small lamps' are less exact")
+        note("note: this environment was not baked, so shadows of small light sources are approximate")
     if turntable_plan is not None:
         check_turntable(source, planned_files[0], turntable_plan)
     common = {"scene": source.scene.id, "bake": source.bake.id, "view": source.view, "size": [view.width, view.height]}
@@ -119,7 +120,7 @@ def _write(
     *,
     resumes: bool,
 ) -> None:
-    """Paint all that is planned, and say how far it is."""
+    """Render all planned files, with progress."""
     from relume_cli.pictures.plans import complete_plan
     from relume_cli.pictures.write_images import write_picture, write_turntable
     from relume_cli.terminal.progress import progress, report_part
@@ -140,7 +141,7 @@ def _write(
 def _open(
     service: BakeService, bake: str, view: str | None, *, is_free_camera: bool, approximate: bool
 ) -> RenderSource:
-    """Open what was asked for, and say what its pictures are not."""
+    """Open a bake, and note the limits of its images."""
     from relume.core.cache import Cache
     from relume.methods.free_camera_transfer import BakedFreeCamera
     from relume.methods.registry import open_bake
@@ -153,10 +154,10 @@ def _open(
     scene, bake_status, view_name = find_bake_and_view(service, bake, view, is_free_camera=is_free_camera)
     transfer = open_cached(service.store_path(bake_status.id), lambda store: open_bake(store, Cache(4 << 30)))
     if not bake_status.is_current:
-        note(f"note: another version of relume made this bake; anew: relume bake {scene.id}")
+        note(f"note: another version of relume made this bake; update it: relume bake {scene.id}")
     static_views = None
     if isinstance(transfer, BakedFreeCamera) and approximate:
-        note("note: the image is approximate, as while the camera moves; exact without --approximate")
+        note("note: --approximate renders the image shown while the camera moves; leave it out for the exact one")
     elif isinstance(transfer, BakedFreeCamera):
         static_views = StaticViewBuilder(transfer.light_transport, load_registered_scene(service.data_dir, scene.id))
     return RenderSource(scene, bake_status, view_name, transfer, static_views)

@@ -1,4 +1,4 @@
-"""`relume serve`: the server."""
+"""`relume serve`: start the server."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Port = Annotated[int | None, typer.Option(min=1, max=65535, help="Port to listen
 
 
 def serve(data: Data = None, host: Host = None, port: Port = None, scheduler: Scheduler = None) -> None:
-    """Serve the editor and the API, with an embedded worker unless --scheduler names a cluster."""
+    """Serve the editor and the API, with an embedded worker unless --scheduler is given."""
     from relume.image_io.ocio.active_config import get_config
     from relume_cli.data_folder import open_settings, private_files
     from relume_server.app import serve as run_server
@@ -28,15 +28,15 @@ def serve(data: Data = None, host: Host = None, port: Port = None, scheduler: Sc
     check_openness(settings)
     check_port(settings.host, settings.port)
     with private_files():
-        open_database(settings.database_url).dispose()  # what is wrong with it is said before anything runs
-        get_config()  # likewise
-        get_storage()  # likewise
+        open_database(settings.database_url).dispose()  # all three fail early if they are misconfigured
+        get_config()
+        get_storage()
         url = address(settings.host, settings.port)
         run_server(settings, on_started=lambda: announce(f"relume listens on {url}", settings.log_format))
 
 
 def announce(line: str, log_format: str) -> None:
-    """Say something that is to be seen whatever is logged; where machines read the log, as a line of it."""
+    """Print a line at any log level; in JSON logs, as a log record."""
     if log_format == "json":
         log.warning(line)
     else:
@@ -44,17 +44,17 @@ def announce(line: str, log_format: str) -> None:
 
 
 def check_port(host: str, port: int) -> None:
-    """Raise ParameterError where the address cannot be listened on."""
+    """Raise ParameterError if the address cannot be bound."""
     from relume.core.errors import ParameterError
 
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         socket.create_server((host, port), family=family).close()
     except OSError as error:
-        raise ParameterError("--port", port, f"one that is free on {host} ({error.strerror})") from None
+        raise ParameterError("--port", port, f"a free port of {host} ({error.strerror})") from None
 
 
 def address(host: str, port: int) -> str:
-    """What to type into a browser on this machine."""
+    """URL of the server for a browser on this machine."""
     browser_host = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)  # noqa: S104
     return f"http://{browser_host}:{port}/"

@@ -1,4 +1,4 @@
-"""`relume token …`: who may do what."""
+"""`relume token …`: manage access tokens."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ if TYPE_CHECKING:
 
     from relume_server.auth.services import AuthServices
 
-Name = Annotated[str, typer.Argument(metavar="NAME", help="Who it is for; the audit and quotas know them by it.")]
+Name = Annotated[str, typer.Argument(metavar="NAME", help="User of the token, for audit and quotas.")]
 RoleOption = Annotated[str, typer.Option("--role", metavar="ROLE", help="view, edit or admin.")]
-Days = Annotated[float | None, typer.Option("--days", help="How long it opens anything; for ever where not given.")]
+Days = Annotated[float | None, typer.Option("--days", help="Days until it expires. [default: never]")]
 
 
 def token_add(
     name: Name, role: RoleOption = "view", days: Days = None, as_json: Json = False, data: Data = None
 ) -> None:
-    """Hand out a token; it is shown this once."""
+    """Create a token; it is shown only once."""
     access = open_access(data)
     text = access.tokens.add(name, role, days)
     audit_change(access, f"token add --role {role}", name)
     print_result({"name": name, "role": role, "token": text}, text, as_json=as_json)
     if not as_json:
-        note("Keep it: it is shown this once. RELUME_LOGIN=true makes the server ask for tokens.")
+        note("Store it: it is shown only once. Servers require tokens with RELUME_LOGIN=true.")
 
 
 def token_list(as_json: Json = False, data: Data = None) -> None:
-    """List the tokens that were handed out."""
+    """List the tokens."""
     now = datetime.now(UTC).timestamp()
     for token in open_access(data, is_used=True).tokens.all():
-        state = "valid" if token.is_valid(now) else "revoked" if token.revoked is not None else "run out"
+        state = "valid" if token.is_valid(now) else "revoked" if token.revoked is not None else "expired"
         until = "" if token.expires is None else f"  until {_day(token.expires)}"
         document = {
             "id": token.id,
@@ -52,11 +52,12 @@ def token_list(as_json: Json = False, data: Data = None) -> None:
 
 
 def token_revoke(
-    name: Annotated[str, typer.Argument(metavar="NAME|ID", help="As relume token list shows it.")], data: Data = None
+    name: Annotated[str, typer.Argument(metavar="NAME|ID", help="Name or id from relume token list.")],
+    data: Data = None,
 ) -> None:
     """Revoke a token.
 
-    Within seconds it opens nothing, and its sessions end.
+    Within seconds it is invalid, and its sessions end.
     """
     access = open_access(data)
     access.tokens.revoke(name)
@@ -64,7 +65,7 @@ def token_revoke(
 
 
 def open_access(data: Path | None, *, is_used: bool = False) -> AuthServices:
-    """Tokens and audit of a data folder. Raises ParameterError where `is_used` is to be and nothing is there yet."""
+    """Tokens and audit of a data directory. Raises ParameterError if `is_used` and nothing is there."""
     from relume_cli.data_folder import check_used, open_settings
     from relume_server.auth.services import AuthServices
     from relume_worker.database import open_database
@@ -77,7 +78,7 @@ def open_access(data: Path | None, *, is_used: bool = False) -> AuthServices:
 
 
 def audit_change(access: AuthServices, action: str, target: str) -> None:
-    """Note in the audit what somebody at this machine's shell has changed."""
+    """Record a change in the audit, by the user of this shell."""
     from relume_server.auth.audit import Change
 
     access.audit.add(Change(f"{getpass.getuser()} (shell)", "admin", "", action, target, 0, ""))

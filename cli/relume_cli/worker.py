@@ -1,4 +1,4 @@
-"""`relume worker`: bakes for others, from the ledger or for a cluster."""
+"""`relume worker`: bake for servers, from the database or for a Dask cluster."""
 
 from __future__ import annotations
 
@@ -13,16 +13,18 @@ from relume_cli.options import Data
 
 def worker(
     scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="tcp://…", help="Address of the Dask scheduler to join; else the ledger's own."),
+        str | None, typer.Option(metavar="tcp://…", help="Dask scheduler to join. [default: queue in the database]")
     ] = None,
-    processes: Annotated[int | None, typer.Option(min=1, max=1024, help="Worker processes; else one per core.")] = None,
+    processes: Annotated[
+        int | None, typer.Option(min=1, max=1024, help="Worker processes. [default: one per core]")
+    ] = None,
     data: Data = None,
 ) -> int:
-    """Bake for others until stopped: what waits in the ledger (RELUME_DATABASE), or what a Dask scheduler hands out.
+    """Bake for servers until stopped.
 
-    From the ledger this machine takes whole bakes; it needs the server's data folder, or RELUME_STORAGE and a folder of
-    its own. For a scheduler every worker needs the data folder at the same path as the server.
+    Takes whole bakes from the queue in the database (RELUME_DATABASE), and needs the server's data directory, or
+    RELUME_STORAGE and a directory of its own. With --scheduler it takes tasks of a Dask scheduler, and every worker
+    needs the data directory at the same path as the server.
     """
     if scheduler is not None:
         from relume_worker.cluster import join

@@ -158,7 +158,7 @@ export const DEFAULTS: Readonly<Pick<Look, "environment" | "background" | "trans
   display: { exposure: 0, tone_map: "agx" },
 };
 
-/** What numbers may be, each of those of a field. */
+/** Ranges of the numbers of each field. */
 export const RANGES = {
   environment: { intensity: { minimum: 0, maximum: 10000 }, color: { minimum: 0, maximum: 10000 }, rotation: { minimum: -360, maximum: 360 } },
   background: { color: { minimum: 0, maximum: 10000 }, blur: { minimum: 2, maximum: 60 } },

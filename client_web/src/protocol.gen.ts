@@ -23,13 +23,13 @@ export const LUT_SIZE = 65;
 
 export const LUT_GAIN = 9;
 
-/** client → server: this frame was received and shown. */
+/** client → server: this frame was received and displayed. */
 export interface AckMessage {
   type: "ack";
   frame: number;
 }
 
-/** What to bake. A preset gives size and lights; what is named beside it wins. `aspect`: width ÷ height of the preset's picture, of as many pixels; beside a `size` it says nothing. `views`: names of the scene's cameras, or cameras, which become part of the recipe; all that came with the scene where none are named. `probes`: surface probes of a free camera (method `probes`); refused for fixed views, which have none. `patches`: surface patches that indirect light is stored for; `gather_rays`: of a view sample or probe; by default as many as fit the picture (methods `gather` and `probes`). `relightable`: divide the light so that turning or exchanging the environment errs little. */
+/** A bake to queue. The preset gives size and lights; explicit fields override it. `aspect`: width ÷ height of the image with as many pixels as the preset's; ignored with `size`. `views`: names of the scene's cameras, or cameras, which become part of the recipe; default: all cameras of the file. `probes`: surface probes of a free camera (method `probes`); refused for fixed cameras. `patches`: surface patches of indirect light; `gather_rays`: per view sample or probe; by default both fit the image size (methods `gather` and `probes`). `relightable`: tile the environment so that rotating or replacing it causes little error. */
 export interface BakeRequest {
   scene: string;
   method?: string;
@@ -45,20 +45,20 @@ export interface BakeRequest {
   dry_run?: boolean;
 }
 
-/** A camera that a person placed, by name. */
+/** A camera that a user placed, by name. */
 export interface CameraBody {
   to_world: number[];
   yfov: number;
   name: string;
 }
 
-/** Where a camera is and how wide it looks. `to_world`: camera to world, 16 numbers by row, looking along -Z; scale is taken out. `yfov`: vertical, degrees. */
+/** Pose and field of view of a camera. `to_world`: camera to world, 16 numbers, row by row, looking along -Z; scale is removed. `yfov`: vertical, degrees. */
 export interface CameraFrame {
   to_world: number[];
   yfov: number;
 }
 
-/** client → server: see a view whose camera is "free" from here, in a picture of this size; the latest wins, and frames name its `seq` as `camera_seq`. `to_world`, by row, and `yfov`: as in `CameraInfo`. `active_control`: as in an edit; nothing is prepared for it. `refine`: "exact", an exact picture from there follows when the camera stops, and edits go on in it; "none", none does. */
+/** client → server: move the "free" camera of a view, with this image size; the latest message counts, and frames repeat its `seq` as `camera_seq`. `to_world`, row by row, and `yfov` as in `CameraInfo`. `active_control`: as in an edit; nothing is prepared for it. `refine`: "exact": an exact image follows when the camera stops, and edits continue in it; "none": none follows. */
 export interface CameraMessage {
   type: "camera";
   view: string;
@@ -70,17 +70,17 @@ export interface CameraMessage {
   refine?: "exact" | "none";
 }
 
-/** From camera to camera, at even shares of the frames; one frame each where no number of frames is given. */
+/** Interpolate cameras, spaced evenly over the frames; one frame each if no number of frames is given. */
 export interface CameraPath {
   cameras: CameraFrame[];
 }
 
-/** Whether a comment is settled. */
+/** Resolve or reopen a comment. */
 export interface CommentChange {
   resolved: boolean;
 }
 
-/** Pin words to a pixel. `x`, `y`: of the picture of `view` as it was `size` large, from its upper left corner. `camera`: where a view was seen from whose eye moves. `text`: plain. `author`: taken where nobody logs in. `picture`: of the moment, a PNG, JPEG or WebP in Base64, at most 1024 pixels a side. */
+/** Pin a comment to a pixel. `x`, `y`: pixel of the image of `view` at `size`, from its upper left corner. `camera`: free camera of the view, if any. `text`: plain. `author`: used if the server has no login. `picture`: snapshot, a PNG, JPEG or WebP in Base64, at most 1024 pixels a side. */
 export interface CommentRequest {
   bake: string;
   view: string;
@@ -93,7 +93,7 @@ export interface CommentRequest {
   picture?: string | null;
 }
 
-/** Compare a look with brute force, in so many passes; figures come from the second on. `paths`: "all" that the scene has, and those that the bake's method follows beside them; or "method", these alone, which is sooner done. Where the eye moves: `camera`, from where it is seen, and `size` of the picture; by default as it was baked. */
+/** Compare a look with the reference, in so many passes; errors are available from the second pass on. `paths`: "all" compares with all light paths of the scene, and with those of the bake's method; "method" only with the latter, which is faster. For a free camera: `camera` and `size` of the image; by default as baked. */
 export interface ComparisonRequest {
   bake: string;
   view: string;
@@ -105,7 +105,7 @@ export interface ComparisonRequest {
   dry_run?: boolean;
 }
 
-/** client → server: change the look; `revision` must be newer than the last. `active_control` is what is being dragged: a curve, or what `PrepareMessage` may name as `parameter`, in the look after the edit; null for all other edits. `solo` names sources of light, local lights and "environment", that alone are shown from now on, without being part of the look; null: all. Left out, it stays as it was. An edit that says `solo` may have an empty patch. */
+/** client → server: change the look; `revision` must be newer than the last. `active_control` is the control that is dragged: a curve, or a `parameter` as in `PrepareMessage`, in the look after the edit; null for all other edits. `solo` lists the lights, local ones and "environment", that are shown alone from now on, without being part of the look; null: all; left out: unchanged. An edit with `solo` may have an empty patch. */
 export interface EditMessage {
   type: "edit";
   revision: number;
@@ -114,20 +114,20 @@ export interface EditMessage {
   solo?: string[] | null;
 }
 
-/** client → server: how pictures are sent. "auto": HDR, JPEG while moving where the link is too slow for it. */
+/** client → server: encoding of images. "auto": HDR, but JPEG while moving if the connection is too slow for it. */
 export interface EncodingMessage {
   type: "encoding";
   format: "hdr" | "jpeg" | "auto";
   quality?: number;
 }
 
-/** client → server: the pointer is in this view, one of those that are shown: its frames and freezes go first. */
+/** client → server: the pointer is in this visible view: its frames and operators have priority. */
 export interface FocusMessage {
   type: "focus";
   view: string;
 }
 
-/** client → server: which pixels does this stretch of a curve light? Each shown view answers by a frame "highlight". */
+/** client → server: show the pixels that an interval of a curve affects. Each visible view answers with a frame "highlight". */
 export interface HighlightMessage {
   type: "highlight_curve_range";
   curve: string;
@@ -135,7 +135,7 @@ export interface HighlightMessage {
   to: number;
 }
 
-/** client → server: what makes up this pixel? Of a shown view, the focused one by itself; see `InspectAnswer`. */
+/** client → server: read a pixel of a visible view, by default the focused one; see `InspectAnswer`. */
 export interface InspectMessage {
   type: "inspect";
   view?: string | null;
@@ -143,7 +143,7 @@ export interface InspectMessage {
   y: number;
 }
 
-/** What each frame of an animation shows; `view`: of which `path` is a way. */
+/** Request the look of each frame of an animation; `view`: of the `path`. */
 export interface LooksRequest {
   bake: string;
   looks: Record<string, unknown>[];
@@ -153,7 +153,7 @@ export interface LooksRequest {
   view?: string | null;
 }
 
-/** client → server: first message, and sent once. All of it may be left out; null is the same. `room`, or to watch only `view_token`, names the room in which others share the look; the address then has the first eight characters of it as `room_prefix`. `participant_token`: this client's in that room. `name`: how to be called, where nobody logs in. `share`, or `look`: the shared or saved look to begin with. `resume`: token of a session that was lost. */
+/** client → server: first message, sent once. All fields are optional; null is the same as leaving them out. `room`, or `view_token` for a view-only link, is the id of the room to join; the URL then has its first eight characters as `room_prefix`. `participant_token`: of this client in the room. `name`: display name if the server has no login. `share`, or `look`: the shared or saved look to start with. `resume`: token of a lost session. */
 export interface OpenMessage {
   type: "open";
   room?: string | null;
@@ -172,33 +172,33 @@ export interface PatchOperation {
   value?: unknown;
 }
 
-/** client → server: is anybody there? Answered by a `PongMessage` at once, whatever is being computed. */
+/** client → server: keep-alive. Answered by a `PongMessage` at once, whatever is being computed. */
 export interface PingMessage {
   type: "ping";
 }
 
-/** client → server: one of two: the user opened this `curve`: freeze it ahead and send its `CurveMessage` from now on; or has in hand what moves this `parameter`, which may also be a light (/lights/NAME) or a field of the environment: prepare for it, the open curve stays open. */
+/** client → server: announce an edit. Either of `curve`: precompute it and send its `CurveMessage` from now on; or of `parameter`, also a light (/lights/NAME) or a field of the environment: prepare it; the open curve stays open. */
 export interface PrepareMessage {
   type: "prepare";
   curve?: string | null;
   parameter?: string | null;
 }
 
-/** client → server: what others in the room see of this one: the name, where nobody logs in (left out: as it was), and the selected material. */
+/** client → server: own presence for others in the room: name, if the server has no login (left out: unchanged), and selected material. */
 export interface PresenceMessage {
   type: "presence";
   name?: string | null;
   material?: string | null;
 }
 
-/** client → server: of a view whose camera is "fixed" this region is on the screen: x, y, width, height in pixels of its picture. It is exact before all else, frames of what is on its way bring its tiles alone, and `fidelity` is that of what is in it. null: all of the picture, as it is before anything is said. */
+/** client → server: visible region of a view with a "fixed" camera: x, y, width, height in pixels of its image. It is computed first, approximate frames contain only its tiles, and `fidelity` refers to it. null: the whole image, the default. */
 export interface RegionMessage {
   type: "region";
   view: string;
   rect: [number, number, number, number] | null;
 }
 
-/** A batch of exact pictures; looks may be partial. `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by default the scene and the view. Of EXR alone: `layers` beside the picture, one for each light and each kind of light path, or "light_groups", direct and reflected light of each light, together the picture; `precision` of the values; and `color_space`, a linear one of the server's OpenColorIO config (GET /api/color), else linear Rec. 709. Of an animation: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video of them, `fps` frames a second. `quality`: "interactive" renders frames of a free camera as they look while it moves, a hundred times sooner. */
+/** A batch of exact images; looks may be partial. `size`: at most the baked one, the default; any for a free camera. `name`: of downloads; default: scene and view. Only for EXR: `layers`, true for one per light and per light path, or "light_groups" for direct and indirect light of each light, which add up to the image; `precision` of the values; and `color_space`, a linear one of the server's OpenColorIO config (GET /api/color), by default linear Rec. 709. For animations: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video with `fps` frames per second. `quality`: "interactive" renders a free camera as it looks while moving, about a hundred times faster. */
 export interface RenderRequest {
   bake: string;
   looks: Record<string, unknown>[];
@@ -216,13 +216,13 @@ export interface RenderRequest {
   quality?: "exact" | "interactive";
 }
 
-/** client → server: who renders views whose camera is "free" while they move. "client": from now on frames of kind "scene_update" bring what a shader needs, beside what GET /api/bakes/{id}/probes gave once, each part again where it has changed; no frame comes for a camera alone. Exact pictures come as ever. */
+/** client → server: who renders views with a "free" camera while they move. "client": from now on frames of kind "scene_update" contain the shader inputs that GET /api/bakes/{id}/probes does not, each when it changes; moving the camera sends no frame. Exact images are sent as before. */
 export interface RendererMessage {
   type: "renderer";
   renderer: "client" | "server";
 }
 
-/** What a link shows: a look of a bake, the views beside each other and the one in hand. `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. `paths`: the light paths that are looked at; null: those of the look. `cameras`: of views whose camera is free, by name; `sizes`: of their pictures, pixels, where they are not as large as was baked. */
+/** Content of a share link: a look of a bake, the views side by side, and the focused one. `solo`, `solo_light`: the material or the light ("" is the environment) that is shown alone. `paths`: visible light paths; null: those of the look. `cameras`: free cameras by view; `sizes`: image sizes in pixels by view, if not the baked size. */
 export interface ShareRequest {
   bake: string;
   view: string;
@@ -235,13 +235,13 @@ export interface ShareRequest {
   sizes?: Record<string, [number, number]>;
 }
 
-/** Light paths that are looked at; as a look's `transport`. */
+/** Visible light paths; as a look's `transport`. */
 export interface SharedPaths {
   show: "all" | "direct" | "indirect" | "first_bounce" | "further_bounces";
   bounces: number;
 }
 
-/** A BTF to be rendered from a small geometry, `size` texels wide; nothing of it is measured. */
+/** A synthetic BTF to render from a small geometry, `size` texels wide. */
 export interface SyntheticBtfRequest {
   geometry: "weave" | "pebbles" | "corduroy";
   size?: number;
@@ -249,12 +249,12 @@ export interface SyntheticBtfRequest {
   name?: string | null;
 }
 
-/** Terms as they stand in a look. */
+/** Terms, as in a look. */
 export interface TermsRequest {
   terms: Record<string, unknown>[];
 }
 
-/** Once around an upright line, in so many frames; `start_camera`: the first of them, by default where the view begins. `pivot`: a place on the line, metres; by default in the middle of the first picture, as deep as what it shows. `rotate`: the `camera`; or, before a camera that stays, the `object`, under an environment and lights that stay, too; or the `environment` alone, which needs no bake with a free camera. */
+/** One revolution about a vertical axis, in so many frames; `start_camera`: of the first frame, by default the view's. `pivot`: a point on the axis, meters; by default the center of the first image, at the depth of its surface. `rotate`: the `camera`; or the `object`, with fixed camera, environment and lights; or the `environment` alone, which needs no free camera. */
 export interface Turntable {
   turntable: number;
   start_camera?: CameraFrame | null;
@@ -262,34 +262,34 @@ export interface Turntable {
   rotate?: "camera" | "object" | "environment";
 }
 
-/** client → server: show this view alone. `size` is the space that the client has, in pixels: JPEGs are scaled down to fit into it, until views are shown otherwise; all other frames come in the baked size. */
+/** client → server: show this view alone. `size` is the client's area in pixels: JPEGs are scaled down to it until the next such message; all other frames have the baked size. */
 export interface ViewMessage {
   type: "view";
   name: string;
   size?: [number, number] | null;
 }
 
-/** client → server: show these views side by side; every edit changes all of them. */
+/** client → server: show these views side by side; edits apply to all. */
 export interface ViewsMessage {
   type: "views";
   names: string[];
 }
 
-/** What share of even light a material sends back, its textures white: the `mean` over all directions, and the `max` in any channel, at `max_angle_degrees` from the normal. */
+/** Albedo of a material with white textures: `mean` over all view directions, and the `max` in any channel, at `max_angle_degrees` from the normal. */
 export interface AlbedoBody {
   mean: number[];
   max: number;
   max_angle_degrees: number;
 }
 
-/** An array of a payload or of GET /api/bakes/{id}/probes: so many texels of 1, 2 or 4 numbers. */
+/** An array of a payload or of GET /api/bakes/{id}/probes: number of texels, each of 1, 2 or 4 numbers. */
 export interface ArrayInfo {
   name: string;
   dtype: "float32" | "float16" | "uint32" | "int32";
   shape: [number, number];
 }
 
-/** A bake; `progress` 0…1, `problem` one sentence where it failed, or had to start again. `phase`: what it does while it runs, and for how many seconds already. `queue_position`: bakes that a queued one waits for. `is_current`: whether the code that made it, which `code` names, is the server's own; others can be used, but might come out otherwise if it were baked again. `user` asked for it first, `created` says when. */
+/** A bake; `progress` 0…1, `problem` is a sentence if it failed or had to restart. `phase`: current step, for `phase_seconds` already. `queue_position`: number of bakes before a queued one. `is_current`: made by the server's own code version (`code`); older bakes can be used, but might differ if they were baked again. `user`: who submitted it first, `created`: when. */
 export interface BakeBody {
   id: string;
   user: string;
@@ -310,7 +310,7 @@ export interface BakeBody {
   plan: PlanBody | null;
 }
 
-/** server → client: another bake of the same scene goes on or is ready; open a session on it and send the look. */
+/** server → client: another bake of the same scene is running or ready; to use it, open a session on it and send the look. */
 export interface BakeMessage {
   type: "bake";
   bake: string;
@@ -321,7 +321,7 @@ export interface BakeMessage {
   seconds_left: number | null;
 }
 
-/** A bidirectional texture; looks name it by `data`, `terms` is how it begins. `synthetic` says which geometry it was rendered from; null where it was measured. `error` is the relative RMS of the compression by how many components are used, from none on; `ratio` what is saved by it. */
+/** A BTF; looks refer to it by `data`, `terms` are its initial terms. `synthetic` describes the geometry that it was rendered from; null if it was measured. `error` is the relative RMS of the compression by number of components, starting with none; `ratio` is the compression ratio. */
 export interface BtfBody {
   id: string;
   data: string;
@@ -338,7 +338,7 @@ export interface BtfBody {
   ratio: number;
 }
 
-/** A BTF in the making. `material`: its id where it is ready. `geometry`: null where images were sent. `user` asked for it; `created`, `started` and `ended` are times; null: not yet. */
+/** A BTF job. `material`: its id when ready. `geometry`: null for uploaded images. `user`: who requested it; `created`, `started` and `ended` are times; null: not yet. */
 export interface BtfJobBody {
   id: string;
   name: string;
@@ -354,7 +354,7 @@ export interface BtfJobBody {
   problem: string | null;
 }
 
-/** A camera of a scene; `is_placed`: somebody placed it, it did not come with the scene. */
+/** A camera of a scene; `is_placed`: placed by a user, not from the scene's file. */
 export interface CameraEntry {
   to_world: number[];
   yfov: number;
@@ -362,13 +362,13 @@ export interface CameraEntry {
   is_placed: boolean;
 }
 
-/** Looks along its -Z. `to_world`: camera to world, 4 × 4 by row, rigid, metres. `yfov`: vertical, radians. */
+/** A camera that looks along its -Z. `to_world`: camera to world, 4 × 4, row by row, rigid, meters. `yfov`: vertical, radians. */
 export interface CameraInfo {
   to_world: number[];
   yfov: number;
 }
 
-/** Without a config all of it is null or empty. `id` changes with the config; `default`: the view that the config shows unasked; `working`: its name of linear Rec. 709; `spaces`: its linear colour spaces, in which EXR files may be rendered. */
+/** OpenColorIO config of the server; all fields are null or empty without one. `id` changes with the config; `default`: its default view; `working`: its name of linear Rec. 709; `spaces`: its linear color spaces, for EXR files. */
 export interface ColorBody {
   id: string | null;
   name: string | null;
@@ -378,7 +378,7 @@ export interface ColorBody {
   spaces: string[];
 }
 
-/** A comment. `picture`: address of the picture of the moment, relative to the server, null where there is none. */
+/** A comment. `picture`: URL of the snapshot, relative to the server, null if there is none. */
 export interface CommentBody {
   id: string;
   bake: string;
@@ -395,12 +395,12 @@ export interface CommentBody {
   picture: string | null;
 }
 
-/** server → client: somebody has written, settled or deleted a comment on the scene; read the list again. */
+/** server → client: a comment of the scene was added, resolved or deleted; read the list again. */
 export interface CommentsMessage {
   type: "comments";
 }
 
-/** A comparison; `completed` of `total` passes are done. `seconds_left`: null where it does not run or nothing was measured yet. `user` asked for it; `created`, `started` and `ended` are times; null: not yet. `error_all_paths`: against all light paths, null where only the method's were asked for; `error_method_paths`: against those that the method follows. `omitted_paths`: which paths the method leaves out of what the look shows; `unsupported_paths`: which brute force leaves out, too. In sentences; both are empty before the first pass. */
+/** A comparison; `completed` of `total` passes are done. `seconds_left`: null if it is not running or nothing has been measured yet. `user`: who requested it; `created`, `started` and `ended` are times; null: not yet. `error_all_paths`: against all light paths, null if only the method's were requested; `error_method_paths`: against those of the method. `omitted_paths`: light paths of the look that the method does not simulate; `unsupported_paths`: light paths that the reference does not simulate either. Sentences; both empty before the first pass. */
 export interface ComparisonBody {
   id: string;
   user: string;
@@ -422,7 +422,7 @@ export interface ComparisonBody {
   problem: string | null;
 }
 
-/** Each relative to the truth's root mean square over pixels and channels; see docs/accuracy.md. `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off, and its `standard_error`: null where that cannot be told from the noise, `error_upper_bound` is what it is below then. `significant_pixel_fraction`: share of pixels whose difference the noise does not explain, at most a hundredth of them by chance. */
+/** Errors, each relative to the RMS of the reference over pixels and channels; see docs/accuracy.md. `rmse`: of the difference. `noise`: of the reference. `error`: of the frame, with the noise removed, and its `standard_error`: null if below the noise; `error_upper_bound` is its upper bound then. `significant_pixel_fraction`: fraction of pixels whose difference the noise does not explain, by chance at most 1 %. */
 export interface ComparisonFigures {
   rmse: number;
   noise: number;
@@ -432,14 +432,14 @@ export interface ComparisonFigures {
   significant_pixel_fraction: number;
 }
 
-/** The answer to a dry run: nothing was queued. `seconds` that it will take, once it has its turn. `is_measured`: false where nothing of this view was timed yet, and pictures of others tell; ask again in a moment. */
+/** Response to a dry run: nothing was queued. `seconds`: duration once it starts. `is_measured`: false while no pass of this view has been timed and the estimate is from other views; ask again later. */
 export interface ComparisonPlanBody {
   passes: number;
   seconds: number;
   is_measured: boolean;
 }
 
-/** An editable factor of a term; a `view_dependent` one multiplies the finished pixel. */
+/** An editable curve of a term; a `view_dependent` one multiplies the shaded pixel. */
 export interface CurveBody {
   name: string;
   label: string;
@@ -449,7 +449,7 @@ export interface CurveBody {
   view_dependent: boolean;
 }
 
-/** server → client: the touched curve at this revision, band averages per channel, over 0…`max_degrees`. */
+/** server → client: the active curve at this revision, band averages per channel, over 0…`max_degrees`. */
 export interface CurveMessage {
   type: "curve";
   curve: string;
@@ -465,20 +465,20 @@ export interface DisplayBody {
   views: string[];
 }
 
-/** server → client: the server is being stopped. Open the session again, there or on another server, within so many seconds; until then it goes on. The look is the client's to bring, where the new server does not know the token. */
+/** server → client: the server is stopping. Open the session again, here or on another server, within so many seconds; until then this one continues. Send the look if the new server does not know the resume token. */
 export interface DrainMessage {
   type: "server_draining";
   seconds: number;
 }
 
-/** The answer to a dry run: nothing was queued. */
+/** Response to a dry run: nothing was queued. */
 export interface DryRunBody {
   id: string;
   recipe: RecipeBody;
   plan: PlanBody;
 }
 
-/** An environment that looks may name, by `map`, in place of the scene's own; `created` is null for a built-in one. `warnings`: what was changed when its file was read. */
+/** An environment that looks can use instead of the scene's own, by `map`; `created` is null for built-in ones. `warnings`: changes made when its file was read. */
 export interface EnvironmentBody {
   id: string;
   map: string;
@@ -488,7 +488,7 @@ export interface EnvironmentBody {
   thumbnail: string;
 }
 
-/** A scene made by code; `size` and `method` of a bake show it well. */
+/** A built-in scene; `size` and `method` suit its bake. */
 export interface ExampleSceneBody {
   name: string;
   label: string;
@@ -497,7 +497,7 @@ export interface ExampleSceneBody {
   method: string;
 }
 
-/** Header of a binary frame. `room_revision`: of the last `RoomUpdate` whose look it shows. `camera_seq`: of the camera that it shows, null before the first and of fixed views. `exact`: all that the client has of the picture is; `fidelity`: of what is in its region. `complete`: something of every term is shown. `previous_error`: of the first exact frame after the camera stopped, how far the approximate picture was from it, relative RMS. `scene_update`: of kind "scene_update" alone. */
+/** Header of a binary frame. `room_revision`: of the last `RoomUpdate` that it shows. `camera_seq`: of the camera that it shows, null before the first one and for fixed cameras. `exact`: the client's whole image is exact; `fidelity`: of its visible region. `complete`: every term is shown. `previous_error`: of the first exact frame after the camera stopped: error of the approximate image before it, relative RMS. `scene_update`: only for kind "scene_update". */
 export interface FrameHeader {
   frame: number;
   revision: number;
@@ -518,14 +518,14 @@ export interface FrameHeader {
   ms: FrameTimes;
 }
 
-/** Milliseconds spent on a frame: edit waiting, updating the picture, encoding. */
+/** Milliseconds spent on a frame: waiting, updating the image, encoding. */
 export interface FrameTimes {
   wait: number;
   update: number;
   encode: number;
 }
 
-/** Sizes of the tables: `num_basis` K functions, rows over θo, columns over φo. `gradient_basis` for mapped normals, (3, K). `first_probes`: where those of each material begin, and one more at the end. `arrays` are the names of what GET /api/bakes/{id}/probes/{array} gives. `has_alpha_test`: some surfaces are not everywhere, which the arrays do not say: pictures of the server show it. */
+/** Sizes of the tables: `num_basis` K functions, rows over θo, columns over φo. `gradient_basis` for mapped normals, (3, K). `first_probes`: index of the first probe of each material, and the total. `arrays` are the names for GET /api/bakes/{id}/probes/{array}. `has_alpha_test`: some surfaces are alpha-tested, which the arrays do not contain; only images of the server show it. */
 export interface FreeCameraBody {
   num_basis: number;
   table_rows: number;
@@ -539,13 +539,13 @@ export interface FreeCameraBody {
   arrays: string[];
 }
 
-/** How far pictures are from the exact ones while an eye moves, measured in the bake: relative RMS over the surfaces that a few eyes see, in the scene's own look. */
+/** Error of free-camera images, measured in the bake: relative RMS over the surfaces visible to a few cameras, in the scene's default look. */
 export interface FreeCameraError {
   value: number;
   standard_error: number;
 }
 
-/** server → client: first message. `revision` and `solo` are the last ones of a resumed session, else 0 and null. `visible_views` are the views that frames come of, `focused_view` is one of them; `views` are all that were baked. `method`: the light of the bake; `axes`: what can be changed in its pictures. `role`: who may only `view` sends no edits. `room`: where others share the look, null for a session of one. `free_camera_error`: null where no camera is free, and where it could not be measured. */
+/** server → client: first message. `revision` and `solo` are the last ones of a resumed session, otherwise 0 and null. `visible_views`: views whose frames are sent, `focused_view` one of them; `views`: all baked views. `method`: of the bake; `axes`: what edits can change. `role`: with `view` no edits are accepted. `room`: the shared room, null if there is none. `free_camera_error`: null without a free camera, and if it could not be measured. */
 export interface HelloMessage {
   type: "hello";
   session: string;
@@ -567,7 +567,7 @@ export interface HelloMessage {
   free_camera_error: FreeCameraError | null;
 }
 
-/** An image that looks may name in the place of a material's own: `texture` or `roughness_map` of its terms, its `normal_map`. `size`: width and height. `warnings`: what was changed when its file was read. `roughness`: the mean of its green, how rough a material is that has it as its map. `metalness`: of one that was made and not sent, the image that says where it is metal; `base`: its base colour, an image, "diffuse" or "scene" of the scene's own textures, or null where that is the same everywhere. */
+/** An image that looks can use instead of a material's own: as `texture` or `roughness_map` of its terms, or as its `normal_map`. `size`: width and height. `warnings`: changes made when its file was read. `roughness`: mean of its green channel, the roughness of a material that uses it as a map. For images made from a metallic map: `metalness` is the id of that map; `base` is its base color: an image, "diffuse" or "scene" for the scene's own textures, or null if it is constant. */
 export interface ImageBody {
   id: string;
   texture: string;
@@ -581,7 +581,7 @@ export interface ImageBody {
   thumbnail: string;
 }
 
-/** server → client: one pixel; `bands` is each band's contribution of the active curve, per channel. `position` and `normal` are of the surface that covers most of it, world space; null for background. */
+/** server → client: one pixel; `bands` is the contribution of each band of the active curve, per channel. `position` and `normal`: of the surface that covers most of the pixel, world space; null for background. */
 export interface InspectAnswer {
   type: "inspect";
   view: string;
@@ -595,7 +595,7 @@ export interface InspectAnswer {
   bands: number[][] | null;
 }
 
-/** Lists of lights that lobes look for: `bins_per_side` of the map of directions, `max_listed` for each bin, `lights_per_bright_light`; `min_width` is the least σ, radians, of so many `widths`, each √2 times the one before. */
+/** Light lists for lobes: `bins_per_side` of the map of direction bins, `max_listed` lights per bin, `lights_per_bright_light`; `min_width` is the smallest σ in radians of `widths` steps, each √2 times the one before. */
 export interface LobeListsBody {
   bins_per_side: number;
   max_listed: number;
@@ -604,7 +604,7 @@ export interface LobeListsBody {
   widths: number;
 }
 
-/** Sizes of tables of highlights, see `relume.live.free_camera.basis.lobe_shapes`. Rings, half an octave each, from the float that has the bits `min_bits`; azimuths; widths of lights. */
+/** Sizes of the highlight tables, see `relume.live.free_camera.basis.lobe_shapes`. Rings of half an octave, starting at the float with the bits `min_bits`; azimuths; light widths. */
 export interface LobeShapesBody {
   elevation_rings: number;
   azimuths: number;
@@ -612,7 +612,7 @@ export interface LobeShapesBody {
   min_bits: number;
 }
 
-/** A saved look in the list of them. `created`: when it was saved first, which editors sort by. `thumbnail`: address of the picture of this version, relative to the server, null where there is none. */
+/** A saved look in a list. `created`: when it was first saved, the sort key of editors. `thumbnail`: URL of this version's image, relative to the server, null if there is none. */
 export interface LookEntry {
   name: string;
   etag: string;
@@ -622,20 +622,20 @@ export interface LookEntry {
   thumbnail: string | null;
 }
 
-/** The complete look of each frame, and from where it is seen; null where no `path` was given. */
+/** Complete look and camera of each frame; cameras are null without a `path`. */
 export interface LooksBody {
   looks: Record<string, unknown>[];
   cameras: CameraFrame[] | null;
 }
 
-/** A material in the plane of reflectance seen head-on and roughness; `id` is that of its library entry. */
+/** A material in the plane of reflectance at normal incidence and roughness; `id` is that of its library entry. */
 export interface MapPoint {
   id: string;
   f0: number;
   sigma: number;
 }
 
-/** A library material under one model: what stands in a look, and how a list shows it. `id` is "table/material", `group` what it is made of, `model` that of its highlight, `swatch` its colour "#rrggbb". */
+/** A library material under one model, as terms for a look and as a list entry. `id` is "table/material", `group` its category, `model` that of its highlight, `swatch` its color "#rrggbb". */
 export interface MaterialBody {
   id: string;
   name: string;
@@ -646,13 +646,13 @@ export interface MaterialBody {
   terms: Record<string, unknown>[];
 }
 
-/** Sun's navigation map; `triangles` are indices of points, counter-clockwise where x is f0 and y is log sigma. */
+/** Sun's navigation map; `triangles` are indices of points, counter-clockwise with x = f0 and y = log sigma. */
 export interface MaterialMapBody {
   points: MapPoint[];
   triangles: [number, number, number][];
 }
 
-/** Who calls. `login`: whether people log in here; `auth_method`: how this one is known (`open`: nobody is asked). `allow_viewer_comments`: whether those who only look may write comments. */
+/** The caller. `login`: whether this server has a login; `auth_method`: how the caller was identified (`open`: no login). `allow_viewer_comments`: whether the role view may write comments. */
 export interface MeBody {
   login: boolean;
   name: string;
@@ -661,7 +661,7 @@ export interface MeBody {
   allow_viewer_comments: boolean;
 }
 
-/** A measured material; looks name it by `data`, `terms` is how it begins. `lobes_error` (measured_lv + measured_hd) and `homomorphic_error` (measured_hf): of the curves alone, per channel. */
+/** A measured material; looks refer to it by `data`, `terms` are its initial terms. `lobes_error` (measured_lv + measured_hd) and `homomorphic_error` (measured_hf): of the curves alone, per channel. */
 export interface MeasuredBody {
   id: string;
   data: string;
@@ -673,12 +673,12 @@ export interface MeasuredBody {
   homomorphic_error: [number, number, number];
 }
 
-/** What its terms become: textures of what scatters light and of highlights, and their mean f0. */
+/** Terms that use the metallic map: textures of diffuse terms and highlights, and their mean f0. */
 export interface MetalnessBody {
   terms: Record<string, unknown>[];
 }
 
-/** A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured, `width_parameter` the one that maps of roughness scale, `width_power` the power of a roughness that it grows with, `specular_below` where it makes a mirror, and `data_prefix` how the names of such data begin (see `data`). */
+/** A BRDF model; `texture` is its default texture channel, `needs_data` whether it is measured, `width_parameter` the parameter that roughness maps scale, `width_power` the power of roughness that it grows with, `specular_below` the value below which it is a mirror, and `data_prefix` the prefix of its data names (see `data`). */
 export interface ModelBody {
   model: string;
   label: string;
@@ -694,7 +694,7 @@ export interface ModelBody {
   curves: CurveBody[];
 }
 
-/** A number that generates curves; `scale` says how a slider moves. One that `requires_new_operator` has one value for all channels; a change of it precomputes the operator anew. Values are multiples of `step`, where it is given. */
+/** A numeric parameter that generates curves; `scale` is the scale of its slider. If `requires_new_operator`, it has one value for all channels, and a change precomputes the operator anew. Values are multiples of `step`, if given. */
 export interface ParameterBody {
   name: string;
   label: string;
@@ -708,7 +708,7 @@ export interface ParameterBody {
   requires_new_operator: boolean;
 }
 
-/** Somebody in a room. `id`: theirs as long as they are in it. `online`: false while their connection is lost. */
+/** A participant. `id`: constant while in the room. `online`: false while the connection is lost. */
 export interface Person {
   id: number;
   name: string;
@@ -718,12 +718,12 @@ export interface Person {
   online: boolean;
 }
 
-/** World space, metres; null where nothing is there. */
+/** Point and normal in world space, meters; null if nothing is there. */
 export interface PickBody {
   position: number[] | null;
 }
 
-/** What a bake will cost; upper bounds, but for `store_bytes`, on disk, as a little of it takes, rounded up; and `seconds`: judged by finished bakes, null where there are none. */
+/** Cost of a bake. Upper bounds, except `store_bytes`, which is estimated from a sample and rounded up, and `seconds`, which is estimated from finished bakes and null if there are none. */
 export interface PlanBody {
   view_samples: number;
   rays: number;
@@ -732,12 +732,12 @@ export interface PlanBody {
   seconds: number | null;
 }
 
-/** server → client: the answer to a `PingMessage`. */
+/** server → client: answer to a `PingMessage`. */
 export interface PongMessage {
   type: "pong";
 }
 
-/** RFC 9457. `type` names the kind, `detail` says what happened and what to do. */
+/** RFC 9457 problem. `type` is the kind, `detail` says what happened and what to do. */
 export interface Problem {
   type: string;
   title: string;
@@ -746,14 +746,14 @@ export interface Problem {
   [extra: string]: unknown;
 }
 
-/** server → client: a message was refused; the look stays as it was. */
+/** server → client: a message was rejected; the look is unchanged. */
 export interface ProblemMessage {
   type: "problem";
   revision: number | null;
   problem: Problem;
 }
 
-/** What was asked for, complete; `cameras` are those of the `views` that somebody placed. `probes`: null for fixed cameras. `patches`, `gather_rays`: null where the method chooses. */
+/** The complete recipe; `cameras` are those of placed or custom `views`. `probes`: null for fixed cameras. `patches`, `gather_rays`: null if the method chooses. */
 export interface RecipeBody {
   method: string;
   views: string[];
@@ -766,7 +766,7 @@ export interface RecipeBody {
   cameras: CameraBody[];
 }
 
-/** How the functions of the Zernike basis follow from each other; see `relume.math.zernike.Recurrence`. */
+/** Recurrence table of the Zernike basis; see `relume.math.zernike.Recurrence`. */
 export interface RecurrenceBody {
   order: number[];
   norm: number[];
@@ -777,7 +777,7 @@ export interface RecurrenceBody {
   c: number[];
 }
 
-/** A batch; `completed` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too. `seconds_left`: null where it does not run or nothing was measured yet. `user` asked for it; "" where nobody logs in. `created`, `started` and `ended` are times; null: not yet. */
+/** A batch; `completed` of `total` frames are finished, `progress` 0…1 includes part of the current one. `seconds_left`: null if it is not running or nothing has been measured yet. `user`: who requested it; "" without login. `created`, `started` and `ended` are times; null: not yet. */
 export interface RenderBody {
   id: string;
   name: string | null;
@@ -797,7 +797,7 @@ export interface RenderBody {
   problem: string | null;
 }
 
-/** The room of a session. `id` opens it to edit, null for who only watches; `view_token` opens it to watch. `participant_token` comes back as the same person, `self_id` is their id. `is_new`: nobody was in it, so that it has the look that this session brings. `default_look`: the scene's own look, as everything is that nobody has edited. */
+/** The room of a session. `id` opens it for editing, null for view-only participants; `view_token` opens it view-only. `participant_token` rejoins as the same participant, `self_id` is its id. `is_new`: the room was empty, so it has the look of this session. `default_look`: the scene's default look. */
 export interface RoomInfo {
   id: string | null;
   view_token: string;
@@ -808,14 +808,14 @@ export interface RoomInfo {
   default_look: Record<string, unknown>;
 }
 
-/** server → client: who is in the room now, of these oneself at `self_id`. */
+/** server → client: current participants; `self_id` is oneself. */
 export interface RoomMessage {
   type: "room";
   self_id: number;
   people: Person[];
 }
 
-/** server → client: what the room's look has become since the last such message, or `hello`, with this session's own edits up to `revision` in it. The `patch` is empty where there were no others. `room_revision` counts its changes, and frames say which they show. `edited_by`: ids of those who edited. */
+/** server → client: changes of the room's look since the last such message, or `hello`, including this session's own edits up to `revision`. The `patch` is empty if there were no others. `room_revision` counts the changes, and frames repeat it. `edited_by`: ids of the participants who edited. */
 export interface RoomUpdate {
   type: "room_update";
   revision: number;
@@ -824,7 +824,7 @@ export interface RoomUpdate {
   edited_by: number[];
 }
 
-/** A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first. `warnings`: the worst first. */
+/** A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first. `warnings`: most severe first. */
 export interface SceneBody {
   id: string;
   name: string;
@@ -839,7 +839,7 @@ export interface SceneBody {
   bakes: string[];
 }
 
-/** A material and its default terms, in look-document form. `catcher`: it is the ground, which looks may show by its shadows alone. `is_projected`: most of its triangles have no texture coordinates, and take a projection. `is_glass`: light passes it, as the scene's file says and no look changes. */
+/** A material and its default terms, as in look documents. `catcher`: it is the ground, which looks may show as a shadow catcher. `is_projected`: most of its triangles have no texture coordinates and use a projection. `is_glass`: it transmits light, as defined by the scene's file; looks cannot change it. */
 export interface SceneMaterial {
   name: string;
   terms: Record<string, unknown>[];
@@ -848,7 +848,7 @@ export interface SceneMaterial {
   is_glass: boolean;
 }
 
-/** What a shader needs for a look besides arrays. `gain`: of the picture; `environment_gain`, `background_gain`: of the prefiltered environment that lobes look up, and of the background, per channel. `environment_rotation`: added to u. `environment_mips`: first texel, height and width of each. `bright_lights`: of the environment, which lobes evaluate separately: direction, radiance, spread. `shows_direct`: direct light is shown, and with it the background. `arrays` are those of the payload; those that are not named are as they were. */
+/** Shader constants of a look, besides arrays. `gain`: of the image; `environment_gain`, `background_gain`: of the prefiltered environment for lobes, and of the background, per channel. `environment_rotation`: added to u. `environment_mips`: first texel, height and width of each. `bright_lights`: bright environment lights, which lobes evaluate separately: direction, radiance, spread. `shows_direct`: direct light and the background are visible. `arrays`: those in the payload; all others are unchanged. */
 export interface SceneUpdate {
   gain: [number, number, number];
   environment_gain: [number, number, number];
@@ -863,26 +863,26 @@ export interface SceneUpdate {
   arrays: ArrayInfo[];
 }
 
-/** A look that came with the scene's file; partial, in look-document form. */
+/** A material variant of the scene's file, as a partial look document. */
 export interface SceneVariant {
   name: string;
   look: Record<string, unknown>;
 }
 
-/** A camera; `aspect` is width ÷ height. `is_placed`: somebody placed it, it did not come with the scene. */
+/** A camera; `aspect` is width ÷ height. `is_placed`: placed by a user, not from the scene's file. */
 export interface SceneView {
   name: string;
   aspect: number;
   is_placed: boolean;
 }
 
-/** A warning of the import. `severity`: what `text` is about is missing or wrong in the picture ("unsupported"), looks much the same ("approximated"), or does not change the picture ("ignored"). */
+/** An import warning. `severity`: the feature is missing or wrong in the image ("unsupported"), looks much the same ("approximated"), or does not change the image ("ignored"). */
 export interface SceneWarning {
   text: string;
   severity: "unsupported" | "approximated" | "ignored";
 }
 
-/** What a link shows; `missing`: what of it is not here any more, one sentence each. */
+/** Content of a share link; `missing`: one sentence for each deleted part of it. */
 export interface ShareBody {
   bake: string;
   view: string;
@@ -899,20 +899,20 @@ export interface ShareBody {
   missing: string[];
 }
 
-/** A link that was made; `url` is relative to the server. */
+/** A new share link; `url` is relative to the server. */
 export interface ShareEntry {
   id: string;
   url: string;
 }
 
-/** One operation of what a shared look has become. A path may be there already where it says `add`, and gone where it says `remove`. */
+/** One operation of a change of the shared look. A path may already exist for `add`, or be missing for `remove`. */
 export interface SharedOperation {
   op: "replace" | "add" | "remove";
   path: string;
   value: unknown;
 }
 
-/** server → client: something takes time; `progress` 0…1. A curve is precomputed for its edits (`label` names it), or a term is shaded because the picture has no image of it yet; "ready": that has ended. What does not wait for it goes on meanwhile. */
+/** server → client: something takes time; `progress` 0…1. A curve is precomputed for edits (`label` names it), or a term is shaded for the first time; "ready" ends it. Other work continues meanwhile. */
 export interface StatusMessage {
   type: "status";
   state: "precomputing" | "shading" | "ready";
@@ -921,13 +921,13 @@ export interface StatusMessage {
   progress: number;
 }
 
-/** A view of a display, as looks name it in `display.tone_map`. */
+/** A view of a display, as in a look's `display.tone_map`. */
 export interface ViewBody {
   display: string;
   view: string;
 }
 
-/** A view, its size in pixels and its camera; `camera_mode`: seen from where it was baked alone, or from anywhere. Then `bounds` are the lowest and the highest corner of what there is to see, metres. */
+/** A view, its size in pixels and its camera; `camera_mode`: fixed at the baked camera, or free. For a free camera `bounds` are the minimum and maximum corner of the scene, meters. */
 export interface ViewInfo {
   name: string;
   width: number;
@@ -937,14 +937,14 @@ export interface ViewInfo {
   bounds: [number[], number[]] | null;
 }
 
-/** The bounds of a scene, metres, and a camera that sees all of it. */
+/** Bounds of a scene, meters, and a camera that sees all of it. */
 export interface ViewportBody {
   bounds_min: number[];
   bounds_max: number[];
   default_camera: CameraFrame;
 }
 
-/** How a term is sent in views whose eye moves: by so many `functions` of the incident light, with a `residual` (cosine-weighted relative RMS); `required_functions`: how many would miss a twentieth, null where more than these; `is_mirror`: as a blurred mirror instead. */
+/** Factorization of a term for free cameras: `functions` basis functions of the incident light, with a `residual` (cosine-weighted relative RMS); `required_functions`: number with a residual of at most 5 %, null if more than available; `is_mirror`: drawn as a blurred mirror instead. */
 export interface ZernikeFitBody {
   functions: number;
   residual: number;

@@ -1,4 +1,4 @@
-"""Puts the server together: `create_app(settings)`."""
+"""Assemble the server: `create_app(settings)`."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ ROUTE_GROUPS = (
     color,
     models,
     materials,
-    btf_jobs,  # before btfs, which would take "jobs" for an id
+    btf_jobs,  # before btfs, whose route would match "jobs" as an id
     btfs,
     library,
     balls,
@@ -88,12 +88,12 @@ def create_app(
     open_batches: OpenBatches = open_batches,
     clock: Callable[[], float] = time.monotonic,
 ) -> FastAPI:
-    """The ASGI app; opens its data at startup and closes it at shutdown.
+    """Create the ASGI app; it opens its data at startup and closes it at shutdown.
 
     Args:
         settings: None: from the environment.
-        open_library, open_bakes, open_batches: what sessions, bakes and renders stand on; tests put stand-ins here.
-        clock: seconds, by which things that nobody uses grow old.
+        open_library, open_bakes, open_batches: factories, which tests replace.
+        clock: monotonic seconds, for the eviction of unused data.
     """
     settings = settings or Settings()
     metrics, drain = Metrics(), DrainState()
@@ -101,7 +101,7 @@ def create_app(
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         with using_asset_stores(settings.data), using_config(settings.ocio, settings.ocio_space):
-            get_config()  # what is wrong with it is said now
+            get_config()  # fail at startup if the config is invalid
             opening = open_services(settings, metrics, drain, open_library, open_bakes, open_batches, clock)
             async with opening as services:
                 app.state.services = services
@@ -110,7 +110,7 @@ def create_app(
 
     app = FastAPI(
         title="relume",
-        summary="Edit materials and lights in the finished picture.",
+        summary="Edit materials and lights in the finished render.",
         version=version("relume"),
         openapi_url="/api/openapi.json",
         docs_url=None,  # the documentation pages load scripts from other sites
@@ -122,7 +122,7 @@ def create_app(
     openapi.install(app)
     app.state.drain = drain
     errors.install(app, methods_at)
-    # the last that is added is the first that a request passes
+    # requests pass the last added middleware first
     app.add_middleware(Idempotency, store=lambda: app.state.services.idempotency)
     app.add_middleware(
         UploadMiddleware,
@@ -143,21 +143,21 @@ def create_app(
     )
     app.add_middleware(RequestIds)
     for group in ROUTE_GROUPS:
-        takes_any = group in (session, health)  # what a session's address may say it checks itself
+        takes_any = group in (session, health)  # a session's address is checked by the session
         app.include_router(group.router, dependencies=[] if takes_any else [Depends(check_query)])
-    app.router.default = client.Client(settings.client)  # not a mount, which would hide a call's 405
+    app.router.default = client.Client(settings.client)  # not a mount, which would hide 405 responses
     return app
 
 
 def serve(settings: Settings, on_started: Callable[[], object] = lambda: None) -> None:
-    """Run the server until it is stopped, and tell once when it answers; blocks."""
+    """Run the server until it is stopped; call `on_started` once it accepts connections. Blocks."""
     set_up(settings.log_format, settings.log_level)
     limit_malloc_arenas()
     create_server(create_app(settings), settings, on_started).run()
 
 
 def create_server(app: FastAPI, settings: Settings, on_started: Callable[[], object] = lambda: None) -> ServerProcess:
-    """The server that runs the app, and takes leave of its sessions before it ends."""
+    """Create the server, which drains sessions before it stops."""
     return ServerProcess(
         configure(app, settings),
         drain=app.state.drain,
@@ -169,7 +169,7 @@ def create_server(app: FastAPI, settings: Settings, on_started: Callable[[], obj
 
 
 def configure(app: FastAPI, settings: Settings) -> uvicorn.Config:
-    """How uvicorn runs the app."""
+    """Return the uvicorn configuration of the app."""
     return uvicorn.Config(
         app,
         host=settings.host,
@@ -178,10 +178,10 @@ def configure(app: FastAPI, settings: Settings) -> uvicorn.Config:
         http=Connection,
         ws=Socket,
         ws_max_size=MAX_MESSAGE_BYTES,
-        ws_per_message_deflate=False,  # frames are dense numbers: compressing costs more than it saves
-        log_config=None,  # `relume_server.telemetry.logs` has set it up
-        access_log=False,  # it would show resume tokens
+        ws_per_message_deflate=False,  # frames are dense numbers: compression costs more than it saves
+        log_config=None,  # configured by `relume_server.telemetry.logs`
+        access_log=False,  # would log resume tokens
         server_header=False,
-        proxy_headers=False,  # `relume_server.auth.identity` reads them, of proxies that are trusted
+        proxy_headers=False,  # read by `relume_server.auth.identity`, from trusted proxies only
         timeout_graceful_shutdown=5,
     )

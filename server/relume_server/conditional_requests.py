@@ -1,7 +1,7 @@
-"""HEAD on all that GET answers, and 304 for what a client has already (RFC 9110, section 13).
+"""HEAD for every GET, and 304 Not Modified (RFC 9110, section 13).
 
-One middleware, so that no route has to think of either: it asks for a HEAD as for a GET and keeps the body back, and
-compares the validators that an answer has with those that the request brought. JSON gets an ETag of its own here.
+A middleware, so that routes handle neither: it forwards a HEAD as a GET and drops the body, and compares the response's
+validators with those of the request. JSON responses get an ETag here.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ _MAX_HASHED_BYTES = 4 << 20
 
 
 class Conditional:
-    """The middleware; outside of it nobody sees a HEAD."""
+    """Middleware for HEAD and conditional requests; the app sees GET only."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer, without a body where none is wanted."""
+        """Forward the request, and drop the body if the client does not need it."""
         if scope["type"] != "http" or scope["method"] not in ("GET", "HEAD"):
             await self._app(scope, receive, send)
             return
@@ -35,7 +35,7 @@ class Conditional:
 
 
 class _ConditionalResponse:
-    """One answer on its way; its start waits for the first part of its body."""
+    """One response; its start is held until the first part of its body."""
 
     running: CancelScope
 
@@ -45,12 +45,12 @@ class _ConditionalResponse:
         self._is_over = False
 
     async def send(self, message: Message) -> None:
-        """Takes what the app sends."""
+        """Receive an ASGI message of the app."""
         if self._is_over:
             return
         if message["type"] == "http.response.start":
             self._start = message
-            if self._is_head and _is_stream(message):  # its first part may be long in coming
+            if self._is_head and _is_stream(message):  # the first part may take long
                 await self._end(message, is_not_modified=False)
                 self.running.cancel()
             return
@@ -66,7 +66,7 @@ class _ConditionalResponse:
         await self._send(message)
 
     async def _end(self, start: Message, *, is_not_modified: bool) -> None:
-        """Answer without a body."""
+        """Send the response without a body."""
         self._is_over = True
         if is_not_modified:
             headers = [(name, value) for name, value in start["headers"] if name.lower() not in _CONTENT]
@@ -75,7 +75,7 @@ class _ConditionalResponse:
         await self._send({"type": "http.response.body", "body": b"", "more_body": False})
 
     def _is_not_modified(self, start: Message) -> bool:
-        """Whether the client has what the answer would bring."""
+        """True if the client already has this version."""
         headers = Headers(raw=start["headers"])
         if start["status"] != 200:
             return False
@@ -86,7 +86,7 @@ class _ConditionalResponse:
         if (since := self._request_headers.get("if-modified-since")) is not None and "last-modified" in headers:
             try:
                 return parsedate_to_datetime(headers["last-modified"]) <= parsedate_to_datetime(since)
-            except (ValueError, TypeError):  # no date, or one without a zone: passed over
+            except (ValueError, TypeError):  # not a date, or without time zone: ignored
                 return False
         return False
 
@@ -96,7 +96,7 @@ def _is_stream(start: Message) -> bool:
 
 
 def _add_etag(start: Message, body: Message) -> None:
-    """Give whole JSON that has no ETag one."""
+    """Add an ETag to a complete JSON response that has none."""
     headers = MutableHeaders(raw=start["headers"])
     content = body.get("body", b"")
     is_json = headers.get("content-type", "").partition(";")[0] == "application/json"

@@ -1,4 +1,4 @@
-"""The one table from exceptions to HTTP status and WebSocket close code, and the RFC 9457 bodies made from it."""
+"""Map exceptions to HTTP status, WebSocket close code and RFC 9457 problem, in one table."""
 
 from __future__ import annotations
 
@@ -46,79 +46,81 @@ CLOSE_DAMAGED = 4410
 
 
 class NotReadyError(RelumeError):
-    """It is here, but it is not in the state that the call needs."""
+    """A resource is not in the state that the call needs."""
 
 
 class InUseError(RelumeError):
-    """Something else names it, and would be broken without it."""
+    """Another object uses the resource."""
 
 
 class BusyError(RelumeError):
-    """The server has all it can take; later it may have room."""
+    """The server is at capacity; retrying may succeed."""
 
 
 class NearlyFullError(RelumeError):
-    """The disk has less room than the server is to leave."""
+    """The disk has less free space than the configured minimum."""
 
 
 class TooLargeError(RelumeError):
-    """More was sent than is taken."""
+    """The request is larger than the limit."""
 
 
 class PreconditionFailedError(RelumeError):
-    """Somebody else changed it in the meantime."""
+    """The resource changed since the version in If-Match."""
 
 
 class PreconditionRequiredError(RelumeError):
-    """A change must say which version it changes."""
+    """A change must name the version that it replaces."""
 
 
 class ForbiddenOriginError(RelumeError):
-    """A page of another site called."""
+    """The request comes from a page of another site."""
 
 
 class RangeError(RelumeError):
-    """The file has nothing of the bytes that are asked for; `has` says how many there are, as HTTP does."""
+    """No requested byte is in the file; `has` is the Content-Range header."""
 
     def __init__(self, has: str) -> None:
-        super().__init__(f"the file has {has.rpartition('/')[2]} bytes, and none of those; ask for fewer, or for all")
+        super().__init__(
+            f"the file has {has.rpartition('/')[2]} bytes, none in this range; request another one, or the whole file"
+        )
         self.has = has
 
 
 class LoginError(RelumeError):
-    """Who calls has to say who they are."""
+    """The caller must log in."""
 
 
 class ForbiddenError(RelumeError):
-    """Who calls may not do that."""
+    """The caller's role does not allow the call."""
 
 
 class QuotaError(RelumeError):
-    """Who calls has as much as one may."""
+    """The caller has reached a quota."""
 
 
 class DrainingError(RelumeError):
-    """The server is being stopped; another, or it itself in a while, serves what was asked."""
+    """The server is stopping; another server, or this one after its restart, can take the request."""
 
 
 class OtherServerError(RelumeError):
-    """Another server has the room; a balancer finds it by trying one after the other."""
+    """Another server has the room; a load balancer finds it by trying each server."""
 
 
 class InProgressError(RelumeError):
-    """The same call came before, and is not answered yet."""
+    """An earlier call with the same idempotency key is not answered yet."""
 
 
 class KeyReusedError(RelumeError):
-    """Another call had the same key."""
+    """The idempotency key was used for a different call."""
 
 
 class OpennessError(RelumeError):
-    """A server would let in more people than its settings sound like."""
+    """The settings would let in more people than they suggest."""
 
 
 class RateError(RelumeError):
-    """Who calls calls too often; `wait_s` from now there is room."""
+    """The caller exceeds the rate limit; a call is accepted `wait_s` seconds from now."""
 
     def __init__(self, message: str, wait_s: float) -> None:
         super().__init__(message)
@@ -127,11 +129,11 @@ class RateError(RelumeError):
 
 @dataclass(frozen=True)
 class ErrorMapping:
-    """What a client is told about one kind of exception.
+    """HTTP and WebSocket response to one kind of exception.
 
     Attributes:
         slug: last part of the problem's `type`.
-        close_code: how a session ends that cannot go on because of it.
+        close_code: of a session that the exception ends.
     """
 
     status: int
@@ -140,39 +142,39 @@ class ErrorMapping:
     close_code: int
 
 
-# The first row whose exception fits is taken: subclasses stand before their bases.
+# The first matching row is taken: subclasses come before their bases.
 TABLE: Sequence[tuple[type[Exception], ErrorMapping]] = (
     (relume_errors.NotFoundError, ErrorMapping(404, "not-found", "Not found", CLOSE_NOT_FOUND)),
     (NotReadyError, ErrorMapping(409, "not-ready", "Not ready", CLOSE_NOT_READY)),
-    (InProgressError, ErrorMapping(409, "in-progress", "Not answered yet", CLOSE_POLICY)),
-    (KeyReusedError, ErrorMapping(422, "key-reused", "Key of another call", CLOSE_POLICY)),
+    (InProgressError, ErrorMapping(409, "in-progress", "In progress", CLOSE_POLICY)),
+    (KeyReusedError, ErrorMapping(422, "key-reused", "Idempotency key reused", CLOSE_POLICY)),
     (InUseError, ErrorMapping(409, "in-use", "In use", CLOSE_NOT_READY)),
-    (DrainingError, ErrorMapping(503, "draining", "Being stopped", CLOSE_RESTART)),
+    (DrainingError, ErrorMapping(503, "draining", "Server is stopping", CLOSE_RESTART)),
     (OtherServerError, ErrorMapping(404, "other-server", "On another server", CLOSE_RESTART)),
-    (BusyError, ErrorMapping(503, "busy", "Too busy", CLOSE_BUSY)),
+    (BusyError, ErrorMapping(503, "busy", "Server is busy", CLOSE_BUSY)),
     (NearlyFullError, ErrorMapping(507, "disk", "Disk is nearly full", CLOSE_INTERNAL)),
     (TooLargeError, ErrorMapping(413, "too-large", "Too large", CLOSE_TOO_BIG)),
-    (PreconditionFailedError, ErrorMapping(412, "changed", "Changed in the meantime", CLOSE_POLICY)),
+    (PreconditionFailedError, ErrorMapping(412, "changed", "Changed since", CLOSE_POLICY)),
     (PreconditionRequiredError, ErrorMapping(428, "precondition-required", "Precondition required", CLOSE_POLICY)),
     (ForbiddenOriginError, ErrorMapping(403, "forbidden-origin", "Origin not allowed", CLOSE_POLICY)),
-    (LoginError, ErrorMapping(401, "login", "Log in first", CLOSE_LOGIN)),
-    (ForbiddenError, ErrorMapping(403, "forbidden", "Not allowed to you", CLOSE_FORBIDDEN)),
-    (RangeError, ErrorMapping(416, "range", "No such bytes", CLOSE_POLICY)),
-    (QuotaError, ErrorMapping(429, "quota", "As much as one may have", CLOSE_BUSY)),
-    (RateError, ErrorMapping(429, "rate", "Too many calls", CLOSE_BUSY)),
+    (LoginError, ErrorMapping(401, "login", "Login required", CLOSE_LOGIN)),
+    (ForbiddenError, ErrorMapping(403, "forbidden", "Forbidden", CLOSE_FORBIDDEN)),
+    (RangeError, ErrorMapping(416, "range", "Range not satisfiable", CLOSE_POLICY)),
+    (QuotaError, ErrorMapping(429, "quota", "Quota exceeded", CLOSE_BUSY)),
+    (RateError, ErrorMapping(429, "rate", "Too many requests", CLOSE_BUSY)),
     (relume_errors.SceneError, ErrorMapping(422, "scene", "Scene cannot be used", CLOSE_INTERNAL)),
     (relume_errors.MaterialError, ErrorMapping(422, "material", "Measured material cannot be used", CLOSE_INTERNAL)),
     (relume_errors.ParameterError, ErrorMapping(422, "parameter", "Value not allowed", CLOSE_POLICY)),
-    (relume_errors.ShapeMismatchError, ErrorMapping(422, "shape", "Shapes do not fit", CLOSE_POLICY)),
-    (relume_errors.MemoryBudgetError, ErrorMapping(422, "memory-budget", "Needs too much memory", CLOSE_INTERNAL)),
-    (relume_errors.DiskBudgetError, ErrorMapping(507, "disk", "Disk is too full", CLOSE_INTERNAL)),
+    (relume_errors.ShapeMismatchError, ErrorMapping(422, "shape", "Array shapes do not match", CLOSE_POLICY)),
+    (relume_errors.MemoryBudgetError, ErrorMapping(422, "memory-budget", "Not enough memory", CLOSE_INTERNAL)),
+    (relume_errors.DiskBudgetError, ErrorMapping(507, "disk", "Not enough disk space", CLOSE_INTERNAL)),
     (relume_errors.PlanError, ErrorMapping(422, "plan", "Cannot be planned", CLOSE_INTERNAL)),
     (relume_errors.StoreNotFoundError, ErrorMapping(404, "store-not-found", "No such bake store", CLOSE_NOT_FOUND)),
     (relume_errors.StoreError, ErrorMapping(409, "store", "Bake store cannot be used", CLOSE_DAMAGED)),
     (relume_errors.EditNotSupportedError, ErrorMapping(409, "edit-not-supported", "Edit not supported", CLOSE_POLICY)),
     (relume_errors.ResultUnavailableError, ErrorMapping(409, "generation-failed", "Generation failed", CLOSE_INTERNAL)),
     (relume_errors.EditError, ErrorMapping(422, "edit", "Edit cannot be applied", CLOSE_POLICY)),
-    (relume_errors.ProtocolError, ErrorMapping(400, "protocol", "Protocol broken", CLOSE_PROTOCOL)),
+    (relume_errors.ProtocolError, ErrorMapping(400, "protocol", "Protocol error", CLOSE_PROTOCOL)),
     (relume_errors.CancelledError, ErrorMapping(409, "cancelled", "Cancelled", CLOSE_GOING_AWAY)),
     (relume_errors.DiskFullError, ErrorMapping(507, "disk", "Disk is full", CLOSE_INTERNAL)),
     (relume_errors.StorageError, ErrorMapping(503, "storage", "Object storage cannot be used", CLOSE_BUSY)),
@@ -183,22 +185,22 @@ TABLE: Sequence[tuple[type[Exception], ErrorMapping]] = (
     (OSError, ErrorMapping(507, "disk", "Disk cannot be read or written", CLOSE_INTERNAL)),
 )
 NOT_LOGGED = (BusyError, DrainingError, NearlyFullError)
-"""No faults: the log says once when they begin, or metrics how much there is, however often somebody asks meanwhile."""
-DEFECT = ErrorMapping(500, "defect", "Defect in the server", CLOSE_INTERNAL)
+"""No faults: a log line marks the start of such a period, and metrics count the refusals."""
+DEFECT = ErrorMapping(500, "defect", "Internal error", CLOSE_INTERNAL)
 
 
 def find_mapping(error: Exception) -> ErrorMapping:
-    """The table's row for an exception; `DEFECT` for what nobody foresaw."""
+    """Return the table's row for an exception, `DEFECT` for an unexpected one."""
     return next((mapping for kind, mapping in TABLE if isinstance(error, kind)), DEFECT)
 
 
 def find_close_code(error: Exception) -> int:
-    """The WebSocket close code with which a session ends."""
+    """Return the WebSocket close code for an exception."""
     return error.close_code if isinstance(error, ProtocolError) else find_mapping(error).close_code
 
 
 def make_problem(error: Exception) -> Problem:
-    """The RFC 9457 body; only messages that relume wrote itself reach the client, never a path or a trace."""
+    """Build the RFC 9457 body. Only relume's own messages reach the client, never a path or a traceback."""
     mapping = find_mapping(error)
     extra: dict[str, Any] = {}
     if isinstance(error, relume_errors.ParameterError):
@@ -208,20 +210,20 @@ def make_problem(error: Exception) -> Problem:
     if isinstance(error, RelumeError):
         detail = str(error)
     elif isinstance(error, OperationalError | PoolTimeoutError):
-        detail = "try again in a while; if it stays so, the server's log says why"
+        detail = "try again later; if it persists, the server's log has the cause"
     elif isinstance(error, OSError) and is_disk_full(error):
         detail = "the disk is full; free some space, then try again"
     elif isinstance(error, OSError):
-        detail = f"{error.strerror or 'the disk failed'}; free some space or look into the server's log"
+        detail = f"{error.strerror or 'the disk failed'}; free some space, or see the server's log"
     else:
-        detail = "look into the server's log and report it"
+        detail = "internal error; see the server's log, and report it"
     return Problem(
         type=f"urn:relume:problem:{mapping.slug}", title=mapping.title, status=mapping.status, detail=detail, **extra
     )
 
 
 def make_problem_headers(error: Exception) -> dict[str, str]:
-    """What HTTP wants said beside the body."""
+    """Return the HTTP headers that belong to the problem."""
     if isinstance(error, LoginError):
         return {"WWW-Authenticate": "Bearer"}
     if isinstance(error, InProgressError):
@@ -234,13 +236,13 @@ def make_problem_headers(error: Exception) -> dict[str, str]:
 def validation_problem(
     errors: Sequence[Any], document: object = None, status: int = 422, *, is_message: bool = False
 ) -> Problem:
-    """The body for a request or message that does not have the declared form; arguments as of `list_field_errors`."""
+    """Build the problem for an invalid request or message; arguments as for `list_field_errors`."""
     fields = list_field_errors(errors, document, is_message=is_message)
     more = f"; and {len(fields) - _MAX_LISTED_FIELDS} more" if len(fields) > _MAX_LISTED_FIELDS else ""
     detail = "; ".join(field["detail"] for field in fields[:_MAX_LISTED_FIELDS]) + more
     return Problem(
         type="urn:relume:problem:invalid-request",
-        title="Not of the declared form",
+        title="Invalid request",
         status=status,
         detail=detail,
         errors=fields,
@@ -248,29 +250,29 @@ def validation_problem(
 
 
 def http_problem(error: HTTPException, method: str, allowed_methods: Sequence[str]) -> Problem:
-    """The body for what the framework refuses before a route has it: no such call, or a body that is none.
+    """Build the problem for a request that the framework rejected: unknown address, wrong method, unreadable body.
 
     Args:
-        method: of the call. allowed_methods: methods that its address takes.
+        error: of the framework. method: of the request. allowed_methods: of the address.
     """
     status, detail = error.status_code, str(error.detail)
     if status == HTTPStatus.BAD_REQUEST:
-        detail = f"the body cannot be read ({detail.rstrip('.')}); send what /api/openapi.json describes"
+        detail = f"the body cannot be read ({detail.rstrip('.')}); send the format of /api/openapi.json"
     if status == HTTPStatus.METHOD_NOT_ALLOWED:
-        detail = f"{method} is not taken at this address; use {' or '.join(allowed_methods) or 'another'}"
+        detail = f"{method} is not allowed here; use {' or '.join(allowed_methods) or 'another'}"
     slug = {400: "invalid-request", 405: "method"}.get(status, "not-found")
     title = HTTPStatus(status).phrase
     return Problem(type=f"urn:relume:problem:{slug}", title=title, status=status, detail=detail)
 
 
 def problem_response(problem: Problem, headers: Mapping[str, str] | None = None) -> Response:
-    """A problem as an HTTP response; half a surrogate pair that it repeats is no UTF-8, and becomes its number."""
+    """Make the HTTP response of a problem; unpaired surrogates, which UTF-8 cannot encode, are escaped."""
     document = json.dumps(problem.model_dump(), ensure_ascii=False, separators=(",", ":"))
     return Response(document.encode(errors="backslashreplace"), problem.status, dict(headers or {}), MEDIA_TYPE)
 
 
 def message_problem(error: ValidationError, text: str) -> Problem:
-    """The body for a session message that does not have the declared form. text: of the message."""
+    """Build the problem for an invalid session message; `text` is the message."""
     try:
         document = json.loads(text)
     except (ValueError, RecursionError):
@@ -279,22 +281,22 @@ def message_problem(error: ValidationError, text: str) -> Problem:
 
 
 OPENAPI_RESPONSES: dict[int | str, dict[str, Any]] = {
-    status: {"description": said, "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}}
-    for status, said in (("4XX", "Refused"), ("5XX", "Failed"))
+    status: {"description": description, "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}}
+    for status, description in (("4XX", "Refused"), ("5XX", "Failed"))
 }
-"""`relume_server.openapi` adds the component."""
+"""The component is added by `relume_server.openapi`."""
 
 
 def install(app: FastAPI, methods_at: Callable[[str], Sequence[str]]) -> None:
-    """Make every failure of the app an `application/problem+json` response.
+    """Turn every exception of the app into an `application/problem+json` response.
 
     Args:
-        methods_at: what a path takes.
+        app: to install the handlers in. methods_at: allowed methods of a path.
     """
 
     async def on_mapped_error(_: Request, error: Exception) -> Response:
-        is_said = is_unavailable(error) or isinstance(error, NOT_LOGGED)
-        if find_mapping(error).status >= 500 and not is_said:
+        is_logged = is_unavailable(error) or isinstance(error, NOT_LOGGED)
+        if find_mapping(error).status >= 500 and not is_logged:
             log.error("%s: %s", type(error).__name__, describe_error(error))
         return problem_response(make_problem(error), make_problem_headers(error))
 
@@ -303,10 +305,10 @@ def install(app: FastAPI, methods_at: Callable[[str], Sequence[str]]) -> None:
 
     async def on_http(request: Request, error: Exception) -> Response:
         assert isinstance(error, HTTPException)
-        able = methods_at(request.url.path)
-        allowed = ", ".join([*able, "HEAD"] if "GET" in able else able)
+        methods = methods_at(request.url.path)
+        allowed = ", ".join([*methods, "HEAD"] if "GET" in methods else methods)
         headers = {"Allow": allowed} if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED else error.headers
-        return problem_response(http_problem(error, request.method, able), headers)
+        return problem_response(http_problem(error, request.method, methods), headers)
 
     async def on_validation(_: Request, error: Exception) -> Response:
         assert isinstance(error, RequestValidationError)

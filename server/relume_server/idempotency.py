@@ -1,7 +1,8 @@
-"""`Idempotency-Key`: a call that makes something makes it once, however often a client that has lost the answer asks.
+"""`Idempotency-Key`: a call that creates something runs once; retries get the same response.
 
-Middleware behind the gate, which knows who calls; the answers lie in the database, so that any server gives them. A
-form's bytes are compared without the boundary between its parts, which clients choose anew each time.
+A middleware behind authentication, so that it knows the caller. Responses are stored in the database, so that any
+server can replay them. Form bodies are compared without the boundary between parts, which clients choose anew for each
+request.
 """
 
 from __future__ import annotations
@@ -34,22 +35,22 @@ class _OverError(Exception):
 
 
 class Idempotency:
-    """The middleware.
+    """Middleware for idempotency keys.
 
     Args:
-        store: asked for with each request, because it is opened after the app is made.
+        app: to protect. store: called for each request, because the store is opened after the app is created.
     """
 
     def __init__(self, app: ASGIApp, *, store: Callable[[], IdempotencyStore]) -> None:
         self._app, self._store = app, store
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Hand on, or answer as before."""
+        """Forward the call, or replay the stored response."""
         key = Headers(scope=scope).get(HEADER) if scope["type"] == "http" else None
         if key is None or scope["method"] != "POST" or not is_change("POST", scope["path"]):
             await self._app(scope, receive, send)
         elif _FORM.fullmatch(key) is None:
-            error = ParameterError(HEADER, key, "1 to 200 printable ASCII characters without blanks")
+            error = ParameterError(HEADER, key, "1 to 200 printable ASCII characters without spaces")
             await problem_response(make_problem(error))(scope, receive, send)
         else:
             call = _Call(self._store(), scope, key, receive, send)
@@ -57,7 +58,7 @@ class Idempotency:
 
 
 class _Call:
-    """One call that has a key, from its first byte to its answer."""
+    """One call with a key, from its first byte to its response."""
 
     def __init__(self, store: IdempotencyStore, scope: Scope, key: str, receive: Receive, send: Send) -> None:
         self._store, self._scope, self._receive, self._send = store, scope, receive, send
@@ -70,9 +71,9 @@ class _Call:
         self._status, self._headers, self._body = 0, Headers(), bytearray()
 
     async def run(self, app: ASGIApp) -> None:
-        """Do it, or answer as before."""
+        """Run the call, or replay the stored response."""
         try:
-            if not self._is_form:  # small, and routes that take none would not ask for it
+            if not self._is_form:  # small; routes without a body would not read it
                 messages = [await self._receive_hashed()]
                 while messages[-1].get("more_body", False):
                     messages.append(await self._receive_hashed())
@@ -85,7 +86,7 @@ class _Call:
                 await run_sync(self._store.drop, *self._client_and_key)
 
     async def _receive_hashed(self) -> Message:
-        """The body on its way to the app, which gets the end of it only where the call is to be done."""
+        """Pass the body to the app while hashing it; the app gets the last part only if the call is to run."""
         if self._early:
             return self._early.pop(0)
         message = await self._receive()
@@ -96,12 +97,12 @@ class _Call:
         return message
 
     async def _claim_key(self) -> None:
-        """Take the key. Raises _OverError where the call is answered already: as before, or by a refusal."""
+        """Claim the key. Raises _OverError if the call is already answered: replayed, or rejected."""
         try:
             before = await run_sync(self._store.claim, *self._client_and_key, self._digest.hex())
         except DATABASE_ERRORS as error:
             if not is_unavailable(error):
-                log.error("a key cannot be claimed (%s)", describe_error(error))
+                log.error("an idempotency key cannot be stored (%s)", describe_error(error))
             response = problem_response(make_problem(error))
         else:
             if before is None:
@@ -114,16 +115,16 @@ class _Call:
 
     def _response(self, before: EarlierCall) -> Response:
         if before.digest != self._digest.hex():
-            error: Exception = KeyReusedError(f"this {HEADER} was used for another call; give each call its own")
+            error: Exception = KeyReusedError(f"this {HEADER} was used for another call; give each call its own key")
         elif before.answer is None:
-            error = InProgressError(f"a call with this {HEADER} is not answered yet; ask again in a while")
+            error = InProgressError(f"a call with this {HEADER} is not answered yet; try again later")
         else:
             return _replay_answer(before.answer)
         return problem_response(make_problem(error), make_problem_headers(error))
 
     async def _send_and_store(self, message: Message) -> None:
-        """The answer on its way to the client, which gets the end of it when it is kept."""
-        if self._is_answered:  # the app says that it could not read the body
+        """Pass the response to the client; the last part waits until the response is stored."""
+        if self._is_answered:  # the app reports an unreadable body
             return
         if message["type"] == "http.response.start":
             self._status, self._headers = message["status"], Headers(raw=message["headers"])
@@ -138,12 +139,12 @@ class _Call:
     async def _store_answer(self, answer: Answer) -> None:
         try:
             await run_sync(self._store.end, *self._client_and_key, answer)
-        except DATABASE_ERRORS as error:  # it was made all the same
-            log.error("the answer to a call with a key could not be kept (%s)", describe_error(error))
+        except DATABASE_ERRORS as error:  # the call has taken effect anyway
+            log.error("the response to a call with an idempotency key could not be stored (%s)", describe_error(error))
 
 
 def _replay_answer(answer: Answer) -> Response:
-    """What was answered before; where that was too large to be kept, the way to what was made."""
+    """Replay a stored response; if it was too large to store, redirect to the created resource."""
     has_body = answer.body is not None
     response = Response(answer.body or b"", answer.status if has_body or answer.location is None else 303)
     headers = MutableHeaders(raw=response.raw_headers)
@@ -156,25 +157,25 @@ def _replay_answer(answer: Answer) -> Response:
 
 
 class _Digest:
-    """SHA-256 of bytes that come in parts, without what stands between the parts of a form."""
+    """SHA-256 of a streamed form body, without the boundaries between its parts."""
 
     def __init__(self, boundary: bytes) -> None:
         self._hash, self._boundary, self._tail = hashlib.sha256(), boundary, b""
 
     def add(self, data: bytes) -> None:
-        """The next bytes."""
+        """Add the next bytes."""
         if not self._boundary:
             self._hash.update(data)
             return
         *pieces, remainder = (self._tail + data).split(self._boundary)
         for piece in pieces:
             self._hash.update(piece + b"\0")
-        num_pending = len(self._boundary) - 1  # a boundary may go on in the next part
+        num_pending = len(self._boundary) - 1  # a boundary may continue in the next part
         self._tail = remainder[len(remainder) - num_pending :] if len(remainder) > num_pending else remainder
         self._hash.update(remainder[: len(remainder) - len(self._tail)])
 
     def hex(self) -> str:
-        """Of all so far."""
+        """Digest of all bytes so far."""
         whole = self._hash.copy()
         whole.update(self._tail)
         return whole.hexdigest()

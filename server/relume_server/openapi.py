@@ -1,4 +1,4 @@
-"""The API's description as programs want it that write clients from it: binary files, one `Problem`, who may call."""
+"""Complete the OpenAPI description for client generators: binary files, `Problem`, security schemes."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from relume_server.schemas.protocol import Problem
 LOOK = "#/components/schemas/Look"
 _BINARY = {"type": "string", "format": "binary"}
 _SCHEMES = {
-    "token": {"type": "http", "scheme": "bearer", "description": "a token, where people log in"},
-    "cookie": {"type": "apiKey", "in": "cookie", "name": COOKIE, "description": "which POST /api/login sets"},
+    "token": {"type": "http", "scheme": "bearer", "description": "access token, if the server requires login"},
+    "cookie": {"type": "apiKey", "in": "cookie", "name": COOKIE, "description": "set by POST /api/login"},
 }
 _KEY_PARAMETER = {
     "name": HEADER,
     "in": "header",
     "required": False,
-    "description": "the same call with the same key makes it once, and is answered as before for a day",
+    "description": "a repeated call with the same key has no further effect, and gets the same response for a day",
     "schema": {"type": "string", "minLength": 1, "maxLength": 200},
 }
 
 
 def files(*media_types: str) -> dict[int | str, dict[str, Any]]:
-    """What a route says that answers files of some types."""
+    """OpenAPI responses of a route that returns files of these media types."""
     return {200: {"description": "The file", "content": {each: {"schema": _BINARY} for each in media_types}}}
 
 
 def install(app: FastAPI) -> None:
-    """Have the app described so."""
+    """Install the description in the app."""
 
     def describe() -> dict[str, Any]:
         if app.openapi_schema is None:
@@ -66,7 +66,7 @@ def _description(app: FastAPI) -> dict[str, Any]:
 
 
 def _looks() -> dict[str, Any]:
-    """Schemas of a look and its parts. Most that are sent are partial, so that nothing is required."""
+    """Schemas of a look and its parts. Nothing is required, because looks in requests may be partial."""
     look = Look.model_json_schema(ref_template="#/components/schemas/{model}")
     schemas = {**look.pop("$defs"), "Look": look}
     for schema in schemas.values():
@@ -88,7 +88,7 @@ def _operations(document: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, 
 
 
 def _name_binary(schema: object) -> None:
-    """OpenAPI 3.1 says `contentMediaType` of a file in a form, which is no longer enough for most generators."""
+    """Add `format: binary` to files in forms, which most generators need in addition to `contentMediaType`."""
     if isinstance(schema, dict):
         if schema.get("contentMediaType") == "application/octet-stream":
             schema["format"] = "binary"

@@ -1,11 +1,12 @@
-"""What every request passes first: known host name, no foreign page, no body beyond the limit; and the safe headers.
+"""First middleware: known host name, no foreign origin, limited body size; adds the security headers.
 
-Pure ASGI, so that streaming and WebSockets pass without a detour. A page of another site must neither open a session
-(WebSockets know no same-origin policy) nor send a form; a DNS name that an attacker points here is refused by its Host.
+Pure ASGI, so that streams and WebSockets pass without buffering. A page of another site must neither open a session
+(WebSockets have no same-origin policy) nor send a form; a DNS name that an attacker points here is rejected by its Host
+header.
 
-Starlette's own middleware does not do instead: TrustedHostMiddleware answers in plain text where every refusal here is
-a problem document, and looks at no Origin; CORSMiddleware adds headers for browsers to obey, but lets a foreign page's
-request and its WebSocket through. None counts the bytes of a body.
+Starlette's middleware cannot replace it: TrustedHostMiddleware answers in plain text instead of a problem document and
+ignores Origin; CORSMiddleware adds headers for browsers, but lets foreign requests and WebSockets through. Neither
+limits the body.
 """
 
 from __future__ import annotations
@@ -19,23 +20,23 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from relume.assets.measured.merl import FILE_BYTES
-from relume.core.errors import ParameterError
+from relume.core.errors import ParameterError, bytes_text
 from relume_server.errors import ForbiddenOriginError, TooLargeError, make_problem, problem_response
 
-# as large as the settings allow: an environment of 4K is 25 MB, one of 8K some 100
+# up to the setting: a 4K environment is 25 MB, an 8K one about 100
 UPLOADS = (
     "/api/scenes", "/api/environments", "/api/images", "/api/materials/btf/jobs", "/api/materials/btf/jobs/geometry",
 )  # fmt: skip
-MAX_MATERIAL_BYTES = FILE_BYTES + 64 * 1024  # the file and the form around it
+MAX_MATERIAL_BYTES = FILE_BYTES + 64 * 1024  # the file and its form
 # documents with many looks
 LARGER = ("/api/renders", "/api/renders/looks")
 MAX_JSON_BYTES = 1024**2
-"""Of any other body. JSON is read on the event loop, some 40 MB a second, while nobody else is served."""
+"""Limit of all other bodies. JSON is parsed on the event loop at about 40 MB per second, which blocks all others."""
 MAX_LOGIN_BYTES = 4 * 1024
 LOGINS = ("/api/login", "/api/logout")
 PRIVATE = ("/api/", "/metrics")
 HTTPS_ONLY = {"Strict-Transport-Security": "max-age=31536000"}
-_NULL = re.compile(rb"%00|\0")  # no name has it, and PostgreSQL takes no text with it
+_NULL = re.compile(rb"%00|\0")  # not in any valid name, and PostgreSQL rejects text with it
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 SECURITY_HEADERS = {
     "Content-Security-Policy": (
@@ -51,12 +52,12 @@ SECURITY_HEADERS = {
 
 
 def host_is_allowed(host: str, allowed_hosts: Sequence[str]) -> bool:
-    """Whether a Host header names this server."""
+    """True if a Host header names this server."""
     return "*" in allowed_hosts or (urlsplit(f"//{host}").hostname or "") in {h.lower() for h in allowed_hosts}
 
 
 def origin_is_allowed(headers: Headers, allowed_origins: Sequence[str]) -> bool:
-    """Whether the calling page, if it is one, is ours: its origin's host and port are those of the request."""
+    """True if the calling page, if any, is ours: its origin's host and port equal those of the request."""
     origin = headers.get("origin")
     if origin is None or origin in allowed_origins:
         return True
@@ -84,7 +85,7 @@ class Guard:
         self._headers = SECURITY_HEADERS | (HTTPS_ONLY if https_only else {})
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Refuse, or hand on with counted body and safe headers."""
+        """Refuse the request, or forward it with a counted body and security headers."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
@@ -102,21 +103,21 @@ class Guard:
         headers = Headers(scope=scope)
         try:
             if not host_is_allowed(headers.get("host", ""), self._allowed_hosts):
-                return ForbiddenOriginError("this server is not known by that name; add it to RELUME_ALLOWED_HOSTS")
+                return ForbiddenOriginError("this host name is not allowed; add it to RELUME_ALLOWED_HOSTS")
             is_safe = scope["type"] == "http" and scope["method"] in SAFE_METHODS
             if not is_safe and not origin_is_allowed(headers, self._allowed_origins):
-                return ForbiddenOriginError("calls from pages of other sites are refused; see RELUME_ALLOWED_ORIGINS")
+                return ForbiddenOriginError("requests from other origins are not allowed; see RELUME_ALLOWED_ORIGINS")
             if "\0" in scope["path"] or _NULL.search(scope["query_string"]) is not None:
-                return ParameterError("the address", "with a null character", "one without %00")
+                return ParameterError("the address", "contains a null character", "one without %00")
             length = headers.get("content-length", "0")
             if not length.isdecimal() or int(length[:20]) > self._limit(scope):
                 return self._too_large(scope)
-        except ValueError:  # urlsplit on a malformed host or origin
-            return ForbiddenOriginError("the Host or Origin header cannot be read; send a proper one")
+        except ValueError:  # raised by urlsplit for a malformed host or origin
+            return ForbiddenOriginError("the Host or Origin header is malformed; send a valid one")
         return None
 
     def _with_safe_headers(self, scope: Scope, send: Send) -> Send:
-        """Adds the safe headers to whatever is answered, and counts it."""
+        """Add the security headers to every response, and count it."""
 
         start_s = time.perf_counter()
 
@@ -126,7 +127,7 @@ class Guard:
                 headers = MutableHeaders(scope=message)
                 for name, value in self._headers.items():
                     headers.setdefault(name, value)
-                if scope["path"].startswith(PRIVATE):  # a cache between hands it to nobody else
+                if scope["path"].startswith(PRIVATE):  # shared caches must not serve it to others
                     headers.setdefault("Cache-Control", "private")
                     headers.add_vary_header("Cookie, Authorization")
             await send(message)
@@ -143,10 +144,10 @@ class Guard:
         return min(max_bytes, self._max_body_bytes)
 
     def _too_large(self, scope: Scope) -> TooLargeError:
-        return TooLargeError(f"the request is larger than {self._limit(scope):,} bytes; send less")
+        return TooLargeError(f"the request is larger than {bytes_text(self._limit(scope))}; send less")
 
     async def _pass(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Count the body as it streams in; a limit passed on the way ends in 413 whatever the app makes of it."""
+        """Count the body while it streams in; exceeding the limit ends in 413 whatever the app does with it."""
         num_bytes, is_over, is_started = 0, False, False
 
         async def counted() -> Message:

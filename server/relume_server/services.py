@@ -1,4 +1,4 @@
-"""Everything that lives as long as the server: opened at start, closed at the end; routes ask for `ServicesDep`."""
+"""Services that live as long as the server: opened at startup, closed at shutdown; routes use `ServicesDep`."""
 
 from __future__ import annotations
 
@@ -58,13 +58,13 @@ from relume_worker.tasks import cached_bytes
 
 @dataclass(frozen=True)
 class Services:
-    """What routes use.
+    """Services for routes.
 
     Attributes:
-        drain: whether the server is taking it. access: who may do what, how much of it, and the audit.
-        pictures: makes small pictures, and what else takes its time and several may ask for at once.
-        answers: large ones.
-        intake: has files read, and takes over what comes of it.
+        drain: whether the server is draining. access: users, roles, quotas, and the audit.
+        pictures: renders thumbnails, and merges identical concurrent requests.
+        answers: large responses.
+        intake: runs imports, and stores their results.
     """
 
     settings: Settings
@@ -97,12 +97,12 @@ OpenBatches = Callable[[Settings, Library], Batches]
 
 
 def open_bakes(settings: Settings) -> BakeService:
-    """relume's own bake service."""
+    """Create the bake service."""
     return BakeService(settings.data, settings.database_url, settings.scheduler, client_weights=settings.fair_shares)
 
 
 def open_batches(settings: Settings, library: Library) -> Batches:
-    """Processes of their own, which have a library of their own."""
+    """Create the batch processes, which have a library of their own."""
     num, num_threads = settings.batch_processes, max(1, num_cores() // settings.batch_processes)
     limits = settings.batch_bytes, num_threads, settings.batch_nice
     return ProcessPool(settings.data, num, *limits, settings.idle_seconds)
@@ -118,7 +118,7 @@ async def open_services(
     batches: OpenBatches,
     clock: Callable[[], float],
 ) -> AsyncIterator[Services]:
-    """Open everything; close it in the reverse order, what there is of it where something cannot be opened."""
+    """Open all services; close them in reverse order, also after a failure to open one."""
     settings.data.mkdir(mode=0o700, parents=True, exist_ok=True)
     remove_strays(settings.data, older_than_s=2 * settings.import_seconds)
     async with AsyncExitStack() as ends:
@@ -140,7 +140,7 @@ async def open_services(
         transfers = TransferPool(library.open_transfer, threads.long, settings.idle_seconds, clock)
         thumbnails = Thumbnails(settings.data / "thumbnails", batch.run)
         at_end(thumbnails.close)
-        at_end(batch.close)  # before them: they wait for it
+        at_end(batch.close)  # closed first, because they use the others
         pictures, answers = SingleFlight(NUM_PICTURES, "relume-picture"), Answers(settings.data)
         at_end(pictures.close)
         at_end(answers.close)
@@ -192,7 +192,7 @@ async def open_services(
 
 
 class _Queues(NamedTuple):
-    """Of long work that is done in processes of their own."""
+    """Queues of long work in separate processes."""
 
     renders: RenderQueue
     comparisons: ComparisonQueue
@@ -225,7 +225,7 @@ def _live(
     settings: Settings, metrics: Metrics, traces: Traces | None, library: Library, threads: Threads,
     service: BakeService, access: AuthServices, drain: DrainState, rooms: Rooms, room_lease: RoomLease,
 ) -> SessionServices:  # fmt: skip
-    """What live sessions need of all this."""
+    """Create the services of live sessions."""
     return SessionServices(
         library=library,
         threads=threads,
@@ -243,14 +243,14 @@ def _live(
 
 
 def _watch_jobs(metrics: Metrics, settings: Settings, service: BakeService, batch: Batches, drain: DrainState) -> None:
-    """Have it shown what works and waits, and whether there is room for more."""
+    """Register metrics of running and queued jobs, and of capacity."""
     metrics.watch_workers(lambda: service.workers_resident_bytes() + batch.resident_bytes())
     metrics.watch_jobs(lambda: count_jobs(service.ledger.sessions))
     metrics.watch_readiness(lambda: drain.is_draining, lambda: free_bytes(settings.data), settings.min_free_bytes)
 
 
 def _watch_memory(metrics: Metrics, library: Library, transfers: TransferPool) -> None:
-    """Have it shown who holds memory in this process."""
+    """Register metrics of memory in this process."""
     metrics.watch_cache(library.cache_used_bytes, library.bytes_by_owner)
     metrics.watch_owners(
         {
@@ -263,7 +263,7 @@ def _watch_memory(metrics: Metrics, library: Library, transfers: TransferPool) -
 
 
 def get_services(connection: HTTPConnection) -> Services:
-    """The app's services, for routes."""
+    """Return the app's services, for routes."""
     app_services: Services = connection.app.state.services
     return app_services
 

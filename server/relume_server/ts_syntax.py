@@ -1,4 +1,4 @@
-"""Models and values as TypeScript: what `relume_server.typescript` writes its files from."""
+"""Write models and values as TypeScript, for `relume_server.typescript`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 
 def interface(name: str, schema: Mapping[str, Any], mode: str) -> str:
-    """One model as an interface; an input's defaulted fields are optional, an output's are always there."""
+    """Write a model as an interface; defaulted fields are optional in inputs, and required in outputs."""
     required = set(schema.get("required", ()))
     lines = [f"/** {' '.join(schema['description'].split())} */"] if "description" in schema else []
     lines.append(f"export interface {name} {{")
@@ -23,7 +23,7 @@ def interface(name: str, schema: Mapping[str, Any], mode: str) -> str:
 
 
 def ts_type(schema: Mapping[str, Any]) -> str:
-    """A JSON schema as a TypeScript type."""
+    """Write a JSON schema as a TypeScript type."""
     if "$ref" in schema:
         return str(schema["$ref"]).rsplit("/", 1)[-1]
     if "const" in schema:
@@ -46,7 +46,7 @@ def ts_type(schema: Mapping[str, Any]) -> str:
 
 
 def literal(value: Any) -> str:
-    """A value of JSON as it stands in TypeScript; whole numbers have no decimal point."""
+    """Write a JSON value as a TypeScript literal; whole numbers have no decimal point."""
     if isinstance(value, Mapping):
         fields = ", ".join(f"{name}: {literal(item)}" for name, item in value.items())
         return f"{{ {fields} }}"
@@ -56,5 +56,5 @@ def literal(value: Any) -> str:
 
 
 def union(name: str, models: Iterable[type[BaseModel]]) -> str:
-    """The type of a value of any of these models."""
+    """Write the union of these models."""
     return f"export type {name} =\n" + "\n".join(f"  | {m.__name__}" for m in models) + ";"

@@ -124,7 +124,7 @@ OUTPUTS: tuple[type[BaseModel], ...] = (
 
 
 def generate_protocol() -> str:
-    """Messages and bodies; the same models give the same text."""
+    """Messages and bodies; deterministic."""
     blocks = [HEAD]
     limits = "MAX_MESSAGE_BYTES", "MAX_FRAMES_IN_FLIGHT", "MAX_VISIBLE_VIEWS", "MAX_CAMERA_PIXELS"
     for name in ("SUBPROTOCOL", *limits, "PROBES_LAYOUT"):
@@ -138,14 +138,14 @@ def generate_protocol() -> str:
     for mode, mode_models in (("validation", INPUTS), ("serialization", OUTPUTS)):
         _, schema = models_json_schema([(m, mode) for m in mode_models], by_alias=True)  # type: ignore[misc]
         blocks.extend(interface(name, body, mode) for name, body in sorted(schema["$defs"].items()))
-    blocks = list(dict.fromkeys(blocks))  # a part of inputs and outputs alike is written once
+    blocks = list(dict.fromkeys(blocks))  # a definition that inputs and outputs share is written once
     blocks.append(union("ClientMessage", CLIENT_MESSAGES))
     blocks.append(union("ServerMessage", SERVER_MESSAGES))
     return "\n\n".join(blocks) + "\n"
 
 
 def generate_look() -> str:
-    """The look document: its types, what of it is as nobody has said anything, and the ranges of its numbers."""
+    """The look document: types, default values, and ranges of numbers."""
     _, schema = models_json_schema([(Look, "validation")])
     lights: tuple[type[BaseModel], ...] = get_args(get_args(LightLook)[0])
     blocks = [HEAD, *(interface(name, body, "validation") for name, body in sorted(schema["$defs"].items()))]
@@ -160,9 +160,7 @@ def generate_look() -> str:
     names = " | ".join(literal(name) for name in DEFAULTS)
     blocks.append(f"export const DEFAULTS: Readonly<Pick<Look, {names}>> = {{\n{sections}}};")
     ranges = "".join(f"  {name}: {_ranges(fields)},\n" for name, fields in {**RANGES, **_EXTRA_RANGES}.items())
-    blocks.append(
-        f"/** What numbers may be, each of those of a field. */\nexport const RANGES = {{\n{ranges}}} as const;"
-    )
+    blocks.append(f"/** Ranges of the numbers of each field. */\nexport const RANGES = {{\n{ranges}}} as const;")
     blocks.append("\n".join(f"export const {name} = {literal(value)};" for name, value in _MAXIMA.items()))
     return "\n\n".join(blocks) + "\n"
 
@@ -183,9 +181,9 @@ def _ranges(fields: Mapping[str, tuple[float, float]]) -> str:
 
 
 def main() -> int:
-    """Write the files, or with --check say which of them are stale."""
+    """Write the files, or with --check report stale ones."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--check", action="store_true", help="write nothing; fail when a file is stale")
+    parser.add_argument("--check", action="store_true", help="write nothing; fail if a file is stale")
     is_check = parser.parse_args().check
     stale = [path for path, generate in TARGETS.items() if _text(path) != generate()]
     for path in stale:

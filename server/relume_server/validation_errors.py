@@ -1,7 +1,7 @@
-"""What of a body, a query or a message is not as declared: pydantic's errors in the sentences that all else speaks.
+"""Turn pydantic's errors on bodies, queries and messages into relume's wording.
 
-Each says which field by a JSON pointer, what was given, and what is allowed. Where a field may be of several forms,
-pydantic has an error for each of them and names the form in its place; here that is one sentence, of the field alone.
+Each entry names the field by a JSON pointer, its value, and the allowed values. For a field with several forms pydantic
+reports one error per form, with the form in the location; here they become one sentence on the field.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _ALLOWED: Mapping[str, str] = {
     "model_type": "an object",
     "string_too_long": "at most {max_length} characters",
     "string_too_short": "at least {min_length} characters",
-    "string_type": "a text",
+    "string_type": "text",
     "too_long": "at most {max_length} entries",
     "too_short": "at least {min_length} entries",
     "tuple_type": "a list",
@@ -47,11 +47,11 @@ _PATTERNS = {
     "^[a-z2-7]+$": "the id of a link",
     "^/": "a JSON pointer, which begins with /",
 }
-_LISTS = {"size": "[width, height] in pixels", "to_world": "16 numbers, by row", "pivot": "[x, y, z] in metres"}
+_LISTS = {"size": "[width, height] in pixels", "to_world": "16 numbers, row by row", "pivot": "[x, y, z] in meters"}
 
 
 class _LocatedError(NamedTuple):
-    """An error, the part of the call that it is in, its path there, and whether it is of one of several forms."""
+    """An error, the part of the request, the path in it, and whether it belongs to one of several forms."""
 
     location: str
     path: tuple[str | int, ...]
@@ -60,22 +60,22 @@ class _LocatedError(NamedTuple):
 
 
 def list_field_errors(errors: Sequence[_Error], document: object, *, is_message: bool = False) -> list[dict[str, str]]:
-    """One entry for each field that is not as declared: `pointer` into the body, or `parameter` of the query, the path
-    or the headers, and `detail`, a sentence.
+    """Return one entry per invalid field: `pointer` into the body, or `parameter` of query, path or headers, and
+    `detail`.
 
     Args:
-        errors: of pydantic. document: the body or message as it was parsed. is_message: it is one of a session.
+        errors: of pydantic. document: the parsed body or message. is_message: true for a session message.
     """
     fields: dict[tuple[str, tuple[str | int, ...]], list[_Error]] = defaultdict(list)
     located = [_locate_error(error, document, is_message) for error in errors]
     for error_entry in located:
-        is_outdone = error_entry.is_union_branch and any(
+        is_superseded = error_entry.is_union_branch and any(
             deeper.location == error_entry.location
             and len(deeper.path) > len(error_entry.path)
             and deeper.path[: len(error_entry.path)] == error_entry.path
             for deeper in located
         )
-        if not is_outdone:  # another of the forms was meant, which has an error farther in
+        if not is_superseded:  # another form was meant, whose error is deeper
             fields[error_entry.location, error_entry.path].append(error_entry.error)
     return [
         _describe_field(location, path, field_errors)
@@ -103,7 +103,7 @@ def _locate_error(error: _Error, document: object, is_message: bool) -> _Located
 
 
 def _existing_path(path: Sequence[str | int], value: object, is_absent: bool) -> tuple[str | int, ...]:
-    """The longest path of fields that are there; what is no field names one of several forms."""
+    """The longest existing path; a step that is not a field names one of several forms."""
     if not path:
         return ()
     first, remaining = path[0], path[1:]
@@ -134,26 +134,26 @@ def _sentence(name: str, path: Sequence[str | int], errors: Sequence[_Error]) ->
         at = f", character {first['loc'][-1]}" if first["loc"] and isinstance(first["loc"][-1], int) else ""
         return f"{name} is not JSON ({reason}{at}); send JSON"
     if first["type"] in ("missing", "union_tag_not_found"):
-        return f"{name} is missing; it is needed" if path else f"{name} is missing; send JSON"
+        return f"{name} is missing; add it" if path else f"{name} is missing; send JSON"
     if first["type"] == "extra_forbidden":
-        return f"{name} is not known here; leave it out"
+        return f"{name} is unknown; remove it"
     if first["type"].startswith("model_") and not path:
-        return f"{name} is no JSON object; send one, with Content-Type: application/json"
+        return f"{name} is not a JSON object; send one with Content-Type: application/json"
     if first["type"] in ("value_error", "assertion_error"):
         return _describe_validator_error(
             name, str(first["msg"]).removeprefix("Value error, ").removeprefix("Assertion failed, ")
         )
-    return f"{name} is {format_value(first['input'])}; give {_allowed(path, errors)}"
+    return f"{name} is {format_value(first['input'])}; give {describe_allowed(path, errors)}"
 
 
 def _describe_validator_error(name: str, message: str) -> str:
     if message.startswith("Expected UploadFile"):
-        return f"{name} is a text; give a file, with a file name in its part of the form"
+        return f"{name} is text; give a file, with a file name in its part of the form"
     return f"{name}: {message[:300]}"
 
 
-def _allowed(path: Sequence[str | int], errors: Sequence[_Error]) -> str:
-    """What the forms that a field may have allow together."""
+def describe_allowed(path: Sequence[str | int], errors: Sequence[_Error]) -> str:
+    """Describe the values that all forms of a field allow together."""
     choices = [choice for error in errors for choice in _choices(error)]
     descriptions = [_allowed_by(error, path) for error in errors if not _choices(error)]
     alternatives = [_join_alternatives([f"'{choice}'" for choice in dict.fromkeys(choices)])] if choices else []
@@ -173,9 +173,10 @@ def _allowed_by(error: _Error, path: Sequence[str | int]) -> str:
     if kind in ("tuple_type", "list_type", "too_short", "too_long") and path and path[-1] in _LISTS:
         return _LISTS[str(path[-1])]
     if kind == "string_pattern_mismatch":
-        return _PATTERNS.get(context["pattern"], f"a text of the form {context['pattern']}")
+        return _PATTERNS.get(context["pattern"], f"text of the form {context['pattern']}")
     if kind in _ALLOWED:
-        return _ALLOWED[kind].format(**{name: _plain(value) for name, value in context.items()})
+        text = _ALLOWED[kind].format(**{name: _plain(value) for name, value in context.items()})
+        return re.sub(r"\b1 entries", "1 entry", text)
     message = str(error["msg"])
     return message.removeprefix("Input should be ").removeprefix("Value error, ")[:200]
 
@@ -193,7 +194,7 @@ def _join_alternatives(alternatives: Sequence[str]) -> str:
 
 
 def format_value(value: object) -> str:
-    """A value as a sentence repeats it, at most 80 characters."""
+    """Format a value for a sentence, at most 80 characters."""
     if isinstance(value, str):
         text = repr(value[: 2 * _MAX_VALUE_CHARS])
     elif value is None or isinstance(value, bool | int | float):
@@ -201,5 +202,5 @@ def format_value(value: object) -> str:
     elif isinstance(value, Mapping | list | tuple):
         text = "an object" if isinstance(value, Mapping) else f"a list of {len(value)}"
     else:
-        text = "a file" if hasattr(value, "filename") else "of another kind"
+        text = "a file" if hasattr(value, "filename") else "of another type"
     return text if len(text) <= _MAX_VALUE_CHARS else text[: _MAX_VALUE_CHARS - 3] + "..."

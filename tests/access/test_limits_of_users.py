@@ -67,7 +67,7 @@ class TestRates:
         assert [client.get("/api/me", headers=ann).status_code for _ in range(4)] == [200, 200, 200, 429]
         refused = client.get("/api/me", headers=ann)
         assert int(refused.headers["retry-after"]) > 100
-        assert "too many calls; wait" in refused.json()["detail"]
+        assert "too many requests; wait" in refused.json()["detail"]
         with monkeypatch.context() as patch:
             patch.setattr(TokenBuckets, "take", lambda *_: 0.001)
             assert "wait 0.1 s" in client.get("/api/me", headers=ann).json()["detail"]
@@ -124,7 +124,7 @@ class TestBytes:
         request = {"bake": baked.bake, "view": "front", "looks": [{}], "format": "exr", "size": [16, 16]}
         large = client.post("/api/renders", json={**request, "frames": 3600}, headers=ann)
         assert large.status_code == 429
-        assert "a render of yours" in large.json()["detail"]
+        assert "render of yours" in large.json()["detail"]
         url = client.post("/api/renders", json=request, headers=ann).headers["location"]
         while client.get(url, headers=ann).json()["state"] != "ready":
             time.sleep(0.01)
@@ -258,7 +258,7 @@ class TestQueues:
         ann, bob = bearer("edit", "Ann"), bearer("edit", "Bob")
         answers = [client.post("/api/renders", json=request, headers=who) for who in (ann, ann, ann, bob)]
         assert [answer.status_code for answer in answers] == [202, 202, 429, 202]
-        assert "may, 2; " in answers[2].json()["detail"]
+        assert "limit of 2 unfinished renders; " in answers[2].json()["detail"]
 
 
 def test_without_names_all_are_one_client_who_may_fill_a_queue() -> None:

@@ -44,7 +44,7 @@ def test_nobody_gets_in_anywhere(client: TestClient) -> None:
         assert refused.status_code == 401, (method, path)
         assert refused.headers["www-authenticate"] == "Bearer"
         assert refused.json()["type"] == "urn:relume:problem:login"
-        assert "log in first" in refused.json()["detail"]
+        assert "login required" in refused.json()["detail"]
 
 
 def test_viewers_change_nothing(client: TestClient, bearer: Bearer) -> None:
@@ -216,7 +216,7 @@ class TestProxy:
 
 def test_names_of_tokens_are_unique_while_they_open(access: AuthServices) -> None:
     access.tokens.add("Ann", "view")
-    with pytest.raises(Exception, match="one that no valid token has"):
+    with pytest.raises(Exception, match="revoke the valid token of this name first"):
         access.tokens.add("Ann", "edit")
     access.tokens.revoke("Ann")
     access.tokens.add("Ann", "edit")
@@ -241,7 +241,7 @@ def test_while_the_database_is_damaged_nobody_is_let_in_and_one_line_says_why(
     assert answer.json()["type"] == "urn:relume:problem:database"
     assert client.get("/livez").status_code == 200
     (line,) = [record for record in caplog.records if record.name.startswith("relume_server.auth")]
-    assert "who calls cannot be told" in line.getMessage()
+    assert "the caller cannot be identified" in line.getMessage()
     assert not line.exc_info
 
 

@@ -119,9 +119,9 @@ class TestStart:
     @pytest.mark.parametrize(
         ("given", "said"),
         [
-            ({"user_header": "X-Forwarded-User", "trusted_proxies": ["10.0.0.5"]}, "nobody logs in"),
-            ({"proxy_roles": {"Ann": "edit"}}, "nobody logs in"),
-            ({"proxy_role": "edit"}, "nobody logs in"),
+            ({"user_header": "X-Forwarded-User", "trusted_proxies": ["10.0.0.5"]}, "there is no login"),
+            ({"proxy_roles": {"Ann": "edit"}}, "there is no login"),
+            ({"proxy_role": "edit"}, "there is no login"),
             ({"login": True, "proxy_roles": {"Ann": "edit"}, "trusted_proxies": ["10.0.0.5"]}, "RELUME_USER_HEADER="),
             ({"login": True, "user_header": "X-Forwarded-User"}, "RELUME_TRUSTED_PROXIES"),
             ({"host": "0.0.0.0"}, "RELUME_LOGIN=true"),

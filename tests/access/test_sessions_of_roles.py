@@ -33,7 +33,7 @@ def test_nobody_opens_a_session(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session, pytest.raises(ConnectionError) as ended:
         session.receive()
     assert ended.value.args[0] == 4401
-    assert "log in first" in ended.value.args[1]
+    assert "login required" in ended.value.args[1]
 
 
 def test_editors_edit_and_the_audit_says_what(
@@ -99,7 +99,7 @@ def test_viewers_watch_and_are_told_why_they_do_not_edit(client: TestClient, bak
         session.send_message(type="edit", revision=1, patch=[SEEN, {"op": "replace", "path": SIGMA, "value": 0.3}])
         told = session.text("problem")
         assert (told["revision"], told["problem"]["status"]) == (1, 403)
-        assert told["problem"]["detail"].startswith("Vera may look at this picture but not edit it; ask an admin")
+        assert told["problem"]["detail"].startswith("Vera has view-only access; ask an admin")
         session.send_message(type="prepare", parameter=SIGMA)
         assert session.text("problem")["problem"]["status"] == 403
         session.send_message(type="edit", revision=1, patch=[SEEN], active_control=SIGMA)  # which would prepare it
@@ -181,7 +181,7 @@ def test_revoking_a_token_ends_its_sessions_and_no_others(
         access.tokens.revoke("Ann")
         with pytest.raises(ConnectionError) as ended:
             of_ann.text("never")
-        assert ended.value.args == (4401, "your token has run out or was revoked; log in with another one")
+        assert ended.value.args == (4401, "your token expired or was revoked; log in with a new one")
         of_bob.edit(1, SIGMA, 0.3)
         of_bob.exact(1)
 

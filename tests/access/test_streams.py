@@ -67,7 +67,7 @@ def check_bound(found: Quotas, caller: Caller) -> None:
     held = [found.stream(caller) for _ in range(quotas.MAX_STREAMS_EACH)]
     for each in held:
         each.__enter__()
-    with pytest.raises(QuotaError, match="as many bakes as may be, 32"), found.stream(caller):
+    with pytest.raises(QuotaError, match="limit of 32 event streams"), found.stream(caller):
         pass
     held[0].__exit__(None, None, None)
     with found.stream(caller):

@@ -211,7 +211,7 @@ class TestDisk:
         quotas = access.quotas
         ann, bob = Reservation(quotas, "Ann"), Reservation(quotas, "Bob")
         ann.reserve(3_000)
-        with pytest.raises(NearlyFullError, match="beside what else is sent now"):
+        with pytest.raises(NearlyFullError, match="besides other uploads"):
             bob.reserve(3_000)
         bob.reserve(1_000)
         ann.release()

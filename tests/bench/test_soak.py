@@ -27,5 +27,5 @@ def test_what_leaks_is_told() -> None:
 
 
 def test_a_look_is_too_short_to_tell() -> None:
-    with pytest.raises(ValueError, match="soak for longer"):
+    with pytest.raises(ValueError, match="run longer"):
         trends(samples(lambda s: 1e8, lambda s: 40, number=10))

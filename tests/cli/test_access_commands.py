@@ -78,5 +78,5 @@ def test_a_folder_that_nobody_has_used_is_said(
 ) -> None:
     code, out, err = run(capsys, tmp_path / "mistyped", *command)
     assert (code, out) == (1, "")
-    assert "a folder that relume has used" in err
+    assert "a directory that relume has used" in err
     assert not (tmp_path / "mistyped" / "relume.db").exists()

@@ -115,8 +115,8 @@ def test_scenes_made_by_code_are_imported_by_name(data: Path, capsys: pytest.Cap
         (["bake", "quad", "--size", "0x9"], "640x480"),
         (["bake", "quad", "--size", "99999x99999"], "pixels"),
         (["bake", "quad", "--lights", "0"], "at least 1"),
-        (["bake", "quad", "--lights", "many"], "--lights is 'many'; give a valid integer"),
-        (["bake", "quad", "--lights=many"], "--lights is 'many'; give a valid integer"),
+        (["bake", "quad", "--lights", "many"], "--lights is 'many'; give a whole number"),
+        (["bake", "quad", "--lights=many"], "--lights is 'many'; give a whole number"),
         (["bake", "quad", "--gather-rays", "100"], "direct"),
         (["bake", "quad", "--method", "gather", "--gather-rays", "9"], "16 to 4,096"),
         (["bake", "quad", "--method", "probes", "--patches", "9"], "64 to"),
@@ -129,9 +129,9 @@ def test_scenes_made_by_code_are_imported_by_name(data: Path, capsys: pytest.Cap
         (["import", "--built-in", "nowhere"], "cornell_box"),
         (["import", "--built-in", "interior", "--name", "mine"], "alone"),
         (["reference", "nowhere", "--spp", "4", "--output", "x.exr"], "no scene"),
-        (["reference", "quad", "--spp", "0", "--output", "x.exr"], "--spp is 0; give a number in the range 1<="),
+        (["reference", "quad", "--spp", "0", "--output", "x.exr"], "--spp is 0; give a number from 1 to "),
         (["worker", "--scheduler", "nonsense"], "tcp://"),
-        (["serve", "--port", "0"], "--port is 0; give a number in the range 1<=x<=65535"),
+        (["serve", "--port", "0"], "--port is 0; give a number from 1 to 65535"),
         (["serve", "--data", "postgresql://ann:secret@db/relume"], "RELUME_DATABASE"),
         (["worker", "--data", "sqlite:////tmp/relume.db"], "RELUME_DATABASE"),
         (["serve", "--host", "0.0.0.0"], "RELUME_LOGIN=true"),
@@ -271,7 +271,7 @@ def test_a_turntable_is_numbered_frames_that_a_second_run_goes_on_with(
     assert main(turntable) == 1
     assert "--method probes" in capsys.readouterr().err
     assert main(["bake", "quad", "--view", "front", "--probes", "200", *TINY]) == 1
-    assert "method direct has none" in capsys.readouterr().err
+    assert "method direct has no probes" in capsys.readouterr().err
     assert main(["bake", "quad", "--view", "front", "--method", "probes", "--probes", "200", *TINY]) == 0
     assert main(turntable) == 0
     frames = [np.asarray(Image.open(folder / f"{k:04d}.png")) for k in range(3)]
@@ -305,10 +305,10 @@ def test_a_server_with_a_damaged_database_says_one_sentence(data: Path, capsys: 
     ("variable", "value", "said"),
     [
         ("RELUME_FAIR_SHARES", "{bad", "RELUME_FAIR_SHARES is '{bad'; give JSON"),
-        ("RELUME_FAIR_SHARES", '{"Ann": -1}', "RELUME_FAIR_SHARES.Ann is -1; give greater than 0"),
+        ("RELUME_FAIR_SHARES", '{"Ann": -1}', "RELUME_FAIR_SHARES.Ann is -1; give more than 0"),
         ("RELUME_TRUSTED_PROXIES", '["10.0.0.300"]', "RELUME_TRUSTED_PROXIES.0 is '10.0.0.300'; give an address"),
         ("RELUME_LOG_LEVEL", "loud", "RELUME_LOG_LEVEL is 'loud'; give 'debug', 'info', "),
-        ("RELUME_STORAGE", "s3://", "RELUME_STORAGE is 's3://'; give one that can be used (Generic URL error: "),
+        ("RELUME_STORAGE", "s3://", "RELUME_STORAGE is 's3://'; give one that works (Generic URL error: "),
         ("RELUME_STORAGE", "ftp://x", "RELUME_STORAGE is 'ftp://x'; give a URL such as s3://bucket/prefix"),
         ("RELUME_DATABASE", "postgresql://ann@127.0.0.1:9/x", "the database cannot be used (network error: "),
     ],
@@ -396,7 +396,7 @@ def test_interrupt_without_a_terminal_cancels_and_the_same_command_goes_on(data:
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=120)
     assert process.returncode == 130
-    assert "cancelled; finished parts are kept" in err
+    assert "canceled; finished tasks are saved" in err
     assert "Traceback" not in err
     assert only_bake(data).state == "cancelled"
     again = subprocess.run([*RELUME, *LONG], capture_output=True, check=False, text=True)

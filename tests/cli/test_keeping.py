@@ -40,7 +40,7 @@ def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_an_upgrade_says_what_it_does(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["db", "upgrade"]) == 0
     said = capsys.readouterr().out.splitlines()
-    assert said[0] == "0001: The tables as they were before there were revisions"
+    assert said[0] == "0001: The tables before revisions were introduced"
     assert main(["db", "upgrade"]) == 0
     assert capsys.readouterr().out.splitlines() == said[-1:] == [f"the database is at revision {latest_revision()}"]
 
@@ -51,7 +51,7 @@ def test_a_backup_says_what_is_not_in_it_and_comes_back(
     backups = str(tmp_path / "backups")
     assert main(["backup", backups]) == 1
     said = capsys.readouterr()
-    assert said.err.count("is not in the data directory, though the ledger names it") == 2
+    assert said.err.count("is missing in the data directory, although the database names it") == 2
     assert main(["backup", backups, "--verify"]) == 0
     assert "0 of 1 files are damaged" in capsys.readouterr().err
     assert main(["restore", backups, "--snapshot", said.out.strip(), "--data", str(tmp_path / "new")]) == 0
@@ -110,7 +110,7 @@ def test_what_cannot_be_restored_is_one_line(data: Path, tmp_path: Path, capsys:
     assert main(["restore", str(tmp_path / "nothing"), "--data", str(tmp_path / "new")]) == 1
     said = capsys.readouterr().err.strip()
     assert said.startswith("relume: ")
-    assert "holds no backup; make one with: relume backup" in said
+    assert "contains no backup; make one with: relume backup" in said
     assert "\n" not in said
 
 

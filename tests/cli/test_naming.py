@@ -33,7 +33,7 @@ def test_a_thing_is_found_by_its_id_its_name_and_spellings_of_it(given: str, ide
     ("given", "said"),
     [
         ("BOX", "'BOX' names 2 scenes; give one of cccc3333 \\(Box\\), dddd4444 \\(box\\)"),
-        ("aaa", "there is no scene 'aaa'; known are: aaaa1111 \\(Still life\\), .*; import one"),
+        ("aaa", "there is no scene 'aaa'; choose from aaaa1111 \\(Still life\\), .*; import one"),
         ("", "there is no scene ''"),
     ],
 )

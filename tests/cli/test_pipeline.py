@@ -104,7 +104,7 @@ def test_a_dry_run_says_what_it_costs_and_queues_nothing(run: Any) -> None:
     code, text, said = run("bake", "quad one", "--preset", "final", "--lights", "9", "--dry-run")
     assert text.strip() not in ("", plan["id"])
     assert "1024×768, 9 lights" in said
-    assert "on the disk" in said
+    assert "of disk" in said
 
 
 def test_the_same_bake_again_is_one_line_of_json(run: Any) -> None:
@@ -125,7 +125,7 @@ def test_a_queued_bake_is_cancelled_and_deleted_and_the_audit_knows(run: Any, ba
     assert f"{bake}  queued" in run("list", "bakes", "--state", "queued")[1]
     assert run("cancel", bake)[:2] == (0, f"{bake}\n")
     code, text, said = run("cancel", bake)
-    assert (code, text, said) == (0, "", f"bake {bake} was cancelled already\n")
+    assert (code, text, said) == (0, "", f"bake {bake} is already canceled\n")
     assert run("delete", "bake", bake)[2] == (
         f"relume: there is no terminal to ask at; give --yes to delete bake {bake} "
         "(direct, 24×16, 50 lights, views Front)\n"
@@ -165,14 +165,14 @@ def test_a_scene_goes_with_its_bakes_and_looks_by_their_names(tmp_path: Path, ru
     assert (run("list", data=tmp_path)[1], run("list", "bakes", data=tmp_path)[1]) == ("", "")
     assert not (tmp_path / "scenes" / scene).exists()
     assert "no scene" in run("cancel", bake, data=tmp_path)[2]
-    assert "built-in ones stay" in run("delete", "environment", "sunset", "--yes", data=tmp_path)[2]
+    assert "built-in environments cannot" in run("delete", "environment", "sunset", "--yes", data=tmp_path)[2]
 
 
 @pytest.mark.parametrize("command", [["list"], ["status"], ["cancel", "x"], ["delete", "look", "x"]])
 def test_a_folder_that_nobody_has_used_is_said(run: Any, tmp_path: Path, command: list[str]) -> None:
     code, _, said = run(*command, data=tmp_path / "typo")
     assert code == 1
-    assert "a folder that relume has used" in said
+    assert "a directory that relume has used" in said
 
 
 def mean_of(path: Path) -> list[int]:
@@ -226,12 +226,12 @@ def test_a_dry_run_of_a_render_checks_all_and_writes_nothing(run: Any, tmp_path:
     [
         (["--look", "Blue", "--look", "Red night", "--output", "x.png"], "{look}"),
         (["--look", "Blue", "--look", "blue", "--output", "{look}.png"], "two would be written to Blue.png"),
-        (["--look", "Blue", "--look", "Red night", "--turntable", "2", "--output", "round"], "one with --turntable"),
-        (["--look", "Green", "--output", "x.png"], "no saved look; saved are: 'Blue', 'Red night'"),
+        (["--look", "Blue", "--look", "Red night", "--turntable", "2", "--output", "round"], "look with --turntable"),
+        (["--look", "Green", "--output", "x.png"], "folder or saved look; saved looks: 'Blue', 'Red night'"),
         (["--look", "/no/look.json", "--output", "x.png"], "--look is '/no/look.json'; give a file that exists"),
         (["--output", "x.mp4"], "a video needs --turntable"),
-        (["--rotate", "object", "--output", "x.png"], "--rotate is 'object'; give --turntable N with it"),
-        (["--fps", "10", "--output", "x.png"], "--fps is 10; give --turntable N with it"),
+        (["--rotate", "object", "--output", "x.png"], "--rotate is 'object'; give it with --turntable N"),
+        (["--fps", "10", "--output", "x.png"], "--fps is 10; give it with --turntable N"),
         (["--turntable", "2", "--output", "x.png"], "a folder for the numbered frames, or a name ending in .mp4"),
         (["--turntable", "2", "--output", "x.mov"], "a folder for the numbered frames, or a name ending in .mp4"),
         (["--float", "--output", "x.png"], "--output is 'x.png'; give a file name that ends in .exr"),
@@ -263,7 +263,7 @@ def test_quiet_leaves_results_alone(run: Any, tmp_path: Path) -> None:
     look = tmp_path / "look.json"
     look.write_text('{"environment": {"map": "sunset"}}')
     words = ["render", "quad one", "--look", str(look), "--output", str(tmp_path / "x.png")]
-    assert "small lamps' are less exact" in run(*words)[2]
+    assert "small light sources are approximate" in run(*words)[2]
     assert run(*words, "--quiet") == (0, f"{tmp_path / 'x.png'}\n", "")
 
 

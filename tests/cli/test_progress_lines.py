@@ -84,6 +84,6 @@ def test_a_copy_says_how_much_is_there(capsys: pytest.CaptureFixture[str]) -> No
         advance(1_000_000)
         advance(2_000_000)
     assert capsys.readouterr().err.splitlines() == [
-        "backing up: 25%, 1.0 MB of 4.0 MB",
-        "backing up: 75%, 3.0 MB of 4.0 MB",
+        "backing up: 25%, 1 MB of 4 MB",
+        "backing up: 75%, 3 MB of 4 MB",
     ]

@@ -45,9 +45,9 @@ def test_all_paths_are_brighter_than_those_of_the_method_and_what_it_leaves_out_
 ) -> None:
     common = [*ASKED, str(look), "--spp", "64", "--size", "32x24", "--output"]
     assert main([*common, str(tmp_path / "all.exr")]) == 0
-    assert "left out" not in capsys.readouterr().err
+    assert "not simulated" not in capsys.readouterr().err
     assert main([*common, str(tmp_path / "method.exr"), "--paths", "method"]) == 0
-    assert "left out by the method: Light that surfaces reflect" in capsys.readouterr().err
+    assert "not simulated by the method: Light that surfaces reflect" in capsys.readouterr().err
     assert main([*common, str(tmp_path / "direct.exr"), "--method", "direct"]) == 0
     whole, method, direct = (picture(tmp_path / f"{name}.exr") for name in ("all", "method", "direct"))
     assert whole.mean() > 1.05 * method.mean()
@@ -61,22 +61,22 @@ def test_a_bake_is_compared_with_both_kinds_of_paths(
     assert main([*ASKED, str(look), "--spp", "512", "--output", output, "--compare"]) == 0
     against_all, against_method, left_out = capsys.readouterr().out.splitlines()
     found = re.fullmatch(
-        r"against all light paths: errs by ([\d.]+) ± ([\d.]+) % \(relative RMSE\); noise .*", against_all
+        r"against all light paths: error ([\d.]+) ± ([\d.]+) % \(relative RMSE\); noise .*", against_all
     )
     assert found is not None
     assert float(found[1]) > 5
     assert 0 < float(found[2]) < 2
-    of_method = re.fullmatch(r"against the light paths of its method: .*(?:by|below) ([\d.]+) .*", against_method)
+    of_method = re.fullmatch(r"against the light paths of its method: .*(?:error|below) ([\d.]+) .*", against_method)
     assert of_method is not None
     assert float(of_method[1]) < 5
-    assert left_out.startswith("left out by the method: Light that surfaces reflect")
+    assert left_out.startswith("not simulated by the method: Light that surfaces reflect")
     assert main([*ASKED, str(look), "--spp", "256", "--output", output, "--compare", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert (document["path"], document["size"]) == (output, [32, 24])
     assert document["error_all_paths"]["error"] == pytest.approx(float(found[1]) / 100, rel=0.2)
     assert document["error_method_paths"]["rmse"] < document["error_all_paths"]["rmse"]
     assert main([*ASKED, str(look), "--spp", "4", "--output", output, "--compare", "--size", "8x6"]) == 1
-    assert "a bake has its own" in capsys.readouterr().err
+    assert "the bake has its own" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -204,7 +204,7 @@ def test_names_in_invalid_unicode_are_refused(client: TestClient, path: str) -> 
     ("content", "kind", "message"),
     [
         (b"hello", "multipart/form-data; boundary=b", "the body cannot be read"),
-        (b"\xff\xfe{", "application/json", "send what /api/openapi.json describes"),
+        (b"\xff\xfe{", "application/json", "send the format of /api/openapi.json"),
     ],
 )
 def test_unreadable_bodies_are_a_problem(client: TestClient, content: bytes, kind: str, message: str) -> None:
@@ -216,7 +216,7 @@ def test_unreadable_bodies_are_a_problem(client: TestClient, content: bytes, kin
 
 def test_text_instead_of_a_file_is_refused_with_a_message(client: TestClient) -> None:
     rejected = parse_problem(client.post("/api/scenes", files={"scene": (None, b"text")}))
-    assert rejected["detail"] == "/scene is a text; give a file, with a file name in its part of the form"
+    assert rejected["detail"] == "/scene is text; give a file, with a file name in its part of the form"
 
 
 def test_missing_data_directory_is_a_problem_without_a_traceback(client: TestClient, settings: Any) -> None:

@@ -209,7 +209,8 @@ def test_a_video_shows_the_colours_of_its_frames_and_says_by_which_matrix(tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("does", "said"), [("kill -9 $$", "ended by signal 9"), ("exit 3", "ended with 3"), ("echo odd >&2; exit 1", "odd")]
+    ("does", "said"),
+    [("kill -9 $$", "killed by signal 9"), ("exit 3", "ended with 3"), ("echo odd >&2; exit 1", "odd")],
 )
 def test_an_encoder_that_ends_early_leaves_no_video_and_is_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, does: str, said: str

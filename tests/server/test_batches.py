@@ -96,7 +96,7 @@ def test_a_step_is_tried_once_more_and_then_fails_in_words(pool: ProcessPool, tm
     values = {"mark": str(tmp_path / "once")}
     assert pool.run(Step("die once", values=values), ignore, always)["pid"] > 0
     mark = tmp_path / "twice"
-    with pytest.raises(RelumeError, match=r"was killed twice.*; make the picture smaller"):
+    with pytest.raises(RelumeError, match=r"was killed twice.*; give a smaller size"):
         pool.run(Step("die", values={"mark": str(mark)}), ignore, always)
     assert mark.read_text() == "died died "
     assert pool.run(Step("work"), ignore, always)["pid"] > 0
@@ -236,7 +236,7 @@ def test_steps_of_clients_alternate_and_each_client_has_a_quota(tmp_path: Path) 
         with pytest.raises(QuotaError, match=r"of yours .*RELUME_MAX_QUEUED_PER_USER"):
             submit("x", "ann")
         submit("b", "bob")
-        with pytest.raises(BusyError, match=r"renders wait or run as may, 3; .*RELUME_MAX_QUEUED\)"):
+        with pytest.raises(BusyError, match=r"limit of 3 unfinished renders is reached; .*RELUME_MAX_QUEUED\)"):
             submit("x", "cem")
         queue.start()
         wait_for(lambda: queue.get(last).state == "ready")

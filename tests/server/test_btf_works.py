@@ -110,7 +110,7 @@ def test_a_mesh_that_is_sent_is_rendered_with_its_period(
 @pytest.mark.parametrize(
     ("mesh", "form", "said"),
     [
-        (SQUARE.replace("-2", "-3"), {}, "2 × 3 metres"),
+        (SQUARE.replace("-2", "-3"), {}, "2 × 3 met"),
         (SQUARE, {"period": "nan"}, "finite"),
         (SQUARE, {"period": -1}, "more than 0"),
         (SQUARE, {"size": 10**9}, "256"),

@@ -59,7 +59,7 @@ def test_a_disk_that_is_nearly_full_is_not_ready_and_said_once(
     said = [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
     assert len(said) == 2
     assert "12 MB left" in said[0]
-    assert "room again" in said[1]
+    assert "enough space again" in said[1]
 
 
 @pytest.mark.parametrize("error", [DiskFullError("a.webp"), OSError(errno.ENOSPC, "No space left on device")])

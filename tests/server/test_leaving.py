@@ -53,7 +53,7 @@ def test_sessions_are_told_and_the_server_goes_when_they_have_left(running: Runn
         assert text(session, "server_draining") == {"type": "server_draining", "seconds": 60.0}
         with pytest.raises(HTTPError, match="503") as refused:
             urllib.request.urlopen(f"http://127.0.0.1:{running.port}/readyz")
-        assert "being stopped" in json.load(refused.value)["detail"]
+        assert "is restarting" in json.load(refused.value)["detail"]
         with pytest.raises(InvalidStatus) as elsewhere, open_socket(url):
             pass
         answer = elsewhere.value.response

@@ -218,7 +218,7 @@ def test_a_server_without_a_colour_config_has_no_views(client: TestClient, baked
     look = {"display": {"tone_map": {"display": "a", "view": "b"}}}
     refused = client.post("/api/renders", json={"bake": baked.bake, "view": "front", "looks": [look], "format": "png"})
     assert (refused.status_code, refused.json()["parameter"]) == (422, "/looks/0/display/tone_map")
-    assert "there is no OpenColorIO config here" in refused.json()["detail"]
+    assert "no OpenColorIO config" in refused.json()["detail"]
 
 
 def test_models_are_listed(client: TestClient) -> None:

@@ -152,7 +152,7 @@ def test_a_session_is_opened_at_the_address_of_its_room(client: TestClient, bake
             with pytest.raises(ConnectionError) as ended:
                 session.receive()
         assert ended.value.args[0] == 1008
-        assert "together, as the room's name begins" in ended.value.args[1]
+        assert "together, the first characters of the room's id" in ended.value.args[1]
 
 
 def test_a_name_that_is_none_is_refused_as_ever(client: TestClient, baked: Baked) -> None:

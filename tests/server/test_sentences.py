@@ -27,7 +27,7 @@ def refused(client: TestClient, url: str, **call: Any) -> dict[str, Any]:
     ("url", "body", "said"),
     [
         (RENDERS, {"format": "tiff"}, "/format is 'tiff'; give 'exr', 'png', 'webp' or 'mp4'"),
-        (RENDERS, {"looks": []}, "/looks is a list of 0; give at least 1 entries"),
+        (RENDERS, {"looks": []}, "/looks is a list of 0; give at least 1 entry"),
         (RENDERS, {"looks": [1]}, "/looks/0 is 1; give an object"),
         (RENDERS, {"fps": 0}, "/fps is 0; give at least 1"),
         (RENDERS, {"fps": "x"}, "/fps is 'x'; give a whole number"),
@@ -37,19 +37,19 @@ def refused(client: TestClient, url: str, **call: Any) -> dict[str, Any]:
         (
             RENDERS,
             {"path": {"turntable": 4, "start_camera": {"yfov": 40}}},
-            "/path/start_camera/to_world is missing; it is needed",
+            "/path/start_camera/to_world is missing; add it",
         ),
-        (RENDERS, {"path": {"cameras": []}}, "/path/cameras is a list of 0; give at least 1 entries"),
+        (RENDERS, {"path": {"cameras": []}}, "/path/cameras is a list of 0; give at least 1 entry"),
         (RENDERS, {"size": "1920x1080"}, "/size is '1920x1080'; give [width, height] in pixels"),
         (RENDERS, {"size": [0, 4]}, "/size/0 is 0; give at least 1"),
-        (RENDERS, {"sizes": 3}, "/sizes is not known here; leave it out"),
-        (RENDERS, {"a/b~c": 3}, "/a~1b~0c is not known here; leave it out"),
+        (RENDERS, {"sizes": 3}, "/sizes is unknown; remove it"),
+        (RENDERS, {"a/b~c": 3}, "/a~1b~0c is unknown; remove it"),
         (RENDERS, {"bake": "Teapot"}, "/bake is 'Teapot'; give its id, 16 hexadecimal digits"),
         (BAKES, {"scene": "still_life"}, "/scene is 'still_life'; give its id, 16 hexadecimal digits"),
-        (BAKES, {"scene": SCENE, "views": [5]}, "/views/0 is 5; give a text, or an object"),
-        (BAKES, {"scene": SCENE, "views": [{"name": "a", "yfov": 3}]}, "/views/0/to_world is missing; it is needed"),
-        (BAKES, {}, "/scene is missing; it is needed"),
-        (BAKES, [], "the body is no JSON object; send one, with Content-Type: application/json"),
+        (BAKES, {"scene": SCENE, "views": [5]}, "/views/0 is 5; give text, or an object"),
+        (BAKES, {"scene": SCENE, "views": [{"name": "a", "yfov": 3}]}, "/views/0/to_world is missing; add it"),
+        (BAKES, {}, "/scene is missing; add it"),
+        (BAKES, [], "the body is not a JSON object; send one with Content-Type: application/json"),
         (SYNTHETIC, {"geometry": "fur"}, "/geometry is 'fur'; give 'weave', 'pebbles' or 'corduroy'"),
     ],
 )
@@ -67,13 +67,13 @@ def test_bodies_that_are_none(client: TestClient) -> None:
     assert refused(client, BAKES, content="scene", headers=json_type)["detail"] == (
         "the body is not JSON (Expecting value, character 0); send JSON"
     )
-    assert refused(client, BAKES, data={"scene": SCENE})["detail"].startswith("the body is no JSON object; send one")
+    assert refused(client, BAKES, data={"scene": SCENE})["detail"].startswith("the body is not a JSON object; send one")
     assert refused(client, BAKES)["detail"] == "the body is missing; send JSON"
 
 
 def test_forms(client: TestClient) -> None:
     assert refused(client, "/api/scenes", data={"scene": "a text"})["detail"] == (
-        "/scene is a text; give a file, with a file name in its part of the form"
+        "/scene is text; give a file, with a file name in its part of the form"
     )
     sent = {"geometry": ("a.obj", b"v 0 0 0")}
     problem = refused(client, "/api/materials/btf/jobs/geometry", files=sent, data={"size": "10000", "period": "x"})
@@ -89,11 +89,11 @@ def test_what_is_refused_later_is_said_alike(client: TestClient, baked: Baked) -
     problem = refused(client, RENDERS, json={**body, "color_space": "ACEScg"})
     assert problem["detail"] == "color_space is 'ACEScg'; give none: there is no OpenColorIO config here (RELUME_OCIO)"
     problem = refused(client, RENDERS, json={**body, "path": {"turntable": 8}})
-    assert problem["detail"].startswith("path is 'turntable 8'; give no path, or bake by method probes")
+    assert problem["detail"].startswith("path is 'turntable 8'; give no path, or bake with method probes")
     problem = refused(client, RENDERS, json={**body, "looks": [{"display": {"exposure": "x"}}]})
     assert problem["errors"][0]["pointer"] == "/looks/0/display/exposure"
     wrong_key = client.put("/api/looks/a", json={"materialz": {}})
-    assert parse_problem(wrong_key)["detail"].startswith("/materialz is {}; give nothing of that name: a look has ")
+    assert parse_problem(wrong_key)["detail"].startswith("/materialz is {}; give a known name: a look has ")
 
 
 def test_queries_and_methods(client: TestClient) -> None:
@@ -102,7 +102,7 @@ def test_queries_and_methods(client: TestClient) -> None:
     assert problem["errors"][1]["parameter"] == "state"
     method = client.patch("/api/renders")
     assert method.status_code == 405
-    assert parse_problem(method)["detail"] == "PATCH is not taken at this address; use GET or POST"
+    assert parse_problem(method)["detail"] == "PATCH is not allowed here; use GET or POST"
 
 
 def test_many_faults_are_counted(client: TestClient) -> None:

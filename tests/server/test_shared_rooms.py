@@ -241,7 +241,7 @@ class TestComingBack:
             ann.text("hello")
             bob.text("hello")
             code, reason = refused(client, baked, ROOM_FIELDS)
-            assert (code, reason) == (1013, "2 people are in this room; one of them has to leave first")
+            assert (code, reason) == (1013, "2 people are in this room, its limit; wait until one leaves")
 
 
 def test_who_watches_follows_and_cannot_edit(client: TestClient, baked: Baked) -> None:
@@ -256,7 +256,7 @@ def test_who_watches_follows_and_cannot_edit(client: TestClient, baked: Baked) -
         vera.exact(0)
         vera.edit(1, SIGMA, 0.9)
         problem = vera.text("problem")["problem"]
-        assert (problem["status"], problem["detail"][:26]) == (403, "this link is for watching;")
+        assert (problem["status"], problem["detail"][:23]) == (403, "this link is view-only;")
         ann.edit(1, SIGMA, 0.31)
         picture(vera, 0, 810)
         assert people(ann, lambda them: len(them) == 2)[1]["role"] == "view"
@@ -321,7 +321,7 @@ def test_rooms_are_bounded_and_end_with_the_last_who_leaves(client: TestClient, 
         first.text("hello")
         second.text("hello")
         code, reason = refused(client, baked, {"room": "c" * 24})
-        assert (code, reason) == (1013, "2 rooms are open; one of them has to be left first")
+        assert (code, reason) == (1013, "2 rooms are open, the limit; wait until one is closed")
     while True:  # those who have left have their place for a moment
         with open_session(client, baked.bake, opening={"room": "c" * 24}) as third:
             message = third.websocket.receive()

@@ -106,5 +106,5 @@ def test_a_collector_that_is_away_is_said_once_and_that_it_is_back(
     collector.shutdown()
     (lost, found) = caplog.records
     assert (lost.levelname, found.levelname) == ("ERROR", "WARNING")
-    assert "the collector of traces does not answer" in lost.getMessage()
+    assert "the trace collector does not answer" in lost.getMessage()
     assert len(sent) == 2

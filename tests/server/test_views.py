@@ -178,7 +178,7 @@ def test_what_is_on_the_screen_comes_first_and_the_rest_when_the_hand_rests(
         assert len(session.exact(2).header["tiles"]) == len(whole)
         for rect in ([width, 0, 1, 1], [0, height, 9, 9]):
             session.send_message(type="region", view="front", rect=rect)
-            assert "some of the picture's" in session.text("problem")["problem"]["detail"]
+            assert "a region of the image" in session.text("problem")["problem"]["detail"]
 
 
 def test_what_is_out_of_sight_does_not_come_while_the_picture_is_on_its_way(

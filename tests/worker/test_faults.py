@@ -65,7 +65,7 @@ def test_calls_that_overlap_a_change_say_nothing_new(caplog: pytest.LogCaptureFi
         outage.report_failure(away, time.monotonic())
     assert [record.getMessage() for record in caplog.records] == [
         "it does not answer (away); trying again",
-        "it does not answer: that is over",
+        "it answers again",
         "it does not answer (away); trying again",
     ]
 
@@ -82,7 +82,7 @@ def test_a_loop_says_each_fault_once_and_that_it_is_over(caplog: pytest.LogCaptu
     assert [record.getMessage().split(" (")[0] for record in caplog.records] == [
         "it cannot be read",
         "it cannot be read",
-        "it cannot be read: that is over",
+        "it cannot be read: resolved",
         "it cannot be read",
     ]
     assert [bool(record.exc_info) for record in caplog.records] == [False, False, False, True]

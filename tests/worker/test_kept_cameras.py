@@ -68,9 +68,9 @@ def test_names_of_the_scene_itself_and_too_many_are_refused(
     ledger: Ledger, scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     own = scene.cameras[0].name
-    with pytest.raises(ParameterError, match="own cameras"):
+    with pytest.raises(ParameterError, match="camera of the scene's file"):
         store_camera(ledger, scene.id, alike(scene, own))
-    with pytest.raises(ParameterError, match="own cameras"):
+    with pytest.raises(ParameterError, match="camera of the scene's file"):
         delete_camera(ledger, scene.id, own)
     monkeypatch.setattr(cameras, "MAX_CAMERAS", 1)
     store_camera(ledger, scene.id, alike(scene, "Hero"))
@@ -88,9 +88,9 @@ def test_views_are_chosen_by_name_or_as_they_are(ledger: Ledger, scene: Scene, r
     assert resolve_views(ledger, record, ["Hero", own, behind, own]) == (("Hero", own, "Behind"), (hero, behind))
     with pytest.raises(ParameterError, match="Hero"):
         resolve_views(ledger, record, ["Nobody"])
-    with pytest.raises(ParameterError, match="a name of its own"):
+    with pytest.raises(ParameterError, match="a different name for each camera"):
         resolve_views(ledger, record, ["Hero", alike(scene, "Hero", 60)])
-    with pytest.raises(ParameterError, match="own cameras"):
+    with pytest.raises(ParameterError, match="camera of the scene's file"):
         resolve_views(ledger, record, [alike(scene, own)])
 
 

@@ -101,7 +101,7 @@ def test_command_line_says_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPa
             seconds_left=seconds_left, recipe=RECIPE, plan=plan, **none,
         )  # fmt: skip
 
-    assert detail(status("queued", None, ahead=2)) == "waiting for 2 before it"
+    assert detail(status("queued", None, ahead=2)) == "waiting, 2 before it in the queue"
     assert detail(status("running", "compiling", 5.0)) == "compiling kernels, once on this machine, 12 s"
     assert detail(status("running", "tracing")) == "tracing, estimating the time left"
     assert detail(status("running", "tracing", 41.4)) == "tracing, 41 s left"

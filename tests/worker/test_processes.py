@@ -89,11 +89,11 @@ def test_worker_killed_during_a_task_is_replaced_and_a_task_that_kills_all_fails
             assert (tmp_path / "log.died").exists()
             if method == "fake":
                 said = [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
-                assert said == ["a worker process died; what it was at is given to another"]
+                assert said == ["a worker process died; its tasks go to another"]
     assert last["fake"].state == "ready"
     assert tree_hash(bake_path(tmp_path / "data", IDENTITY)) == expected
     assert last["deadly"].state == "failed"
-    assert "worker processes died of the same task" in last["deadly"].problem
+    assert "worker processes died in the same task" in last["deadly"].problem
     assert not bake_path(tmp_path / "data", identity).exists()
 
 

@@ -179,7 +179,7 @@ def test_closed_service_leaves_the_bake_for_the_next_start(tmp_path: Path, expec
 
 @pytest.mark.parametrize(
     ("problem", "sentence"),
-    [("disk full", "disk full; free .* MB, then bake again; finished parts are kept"), ("memory", "out of memory")],
+    [("disk full", "disk full; free .* MB, then bake again; finished tasks are saved"), ("memory", "out of memory")],
 )
 def test_failure_is_one_sentence_and_a_second_try_finishes(
     tmp_path: Path, expected: str, problem: str, sentence: str
@@ -218,7 +218,7 @@ def test_a_lane_that_cannot_go_on_says_so_once_while_the_other_is_well(
         monkeypatch.setattr(service, "_run_next", fails)
         assert tried.wait(60)
     assert caplog.text.count("trying again") == 1
-    assert "that is over" not in caplog.text
+    assert "resolved" not in caplog.text
 
 
 def test_a_bake_that_the_ledger_cannot_be_told_of_says_why_it_waits(
@@ -237,7 +237,7 @@ def test_a_bake_that_the_ledger_cannot_be_told_of_says_why_it_waits(
     with service, service.subscribe(service.submit(SCENE.id, RECIPE)) as changes:
         waiting = next(status for status in changes if status.problem)
         assert "disk is full" in (waiting.problem or "")
-        assert "goes on by itself" in (waiting.problem or "")
+        assert "resumes by itself" in (waiting.problem or "")
         assert service.bakes() == [waiting]
         has_room.set()
         assert list(changes)[-1].state == "ready"

@@ -227,7 +227,7 @@ def test_a_storage_that_does_not_answer_is_said_and_the_bake_can_go_on(
         with service.subscribe(service.submit(SCENE.id, RECIPE)) as changes:
             failed = list(changes)[-1]
         assert failed.state == "failed"
-        assert failed.problem == "the object storage cannot be used now; try again in a while"
+        assert failed.problem == "the object storage cannot be used now; try again later"
         with pytest.raises(StorageError) as failure:
             fetch_if_missing(service.store_path("0" * 16))
         assert make_problem(failure.value).status == 503
@@ -237,7 +237,7 @@ def test_a_storage_that_does_not_answer_is_said_and_the_bake_can_go_on(
     said = [record.getMessage() for record in caplog.records if "127.0.0.1:9" in record.getMessage()]
     assert len(said) == 1
     assert said[0].startswith("the object storage does not answer (")
-    assert "that is over" in caplog.text
+    assert "answers again" in caplog.text
 
 
 def test_a_scene_that_is_deleted_is_deleted_there_too(

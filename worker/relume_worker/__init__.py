@@ -1,1 +1,1 @@
-"""Bakes: the ledger, the service that runs them on Dask, storage, database, backup."""
+"""Bakes: ledger, bake service on Dask, storage, database, backup."""

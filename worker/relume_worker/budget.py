@@ -1,4 +1,4 @@
-"""Refuses a bake that does not fit, before anything is computed."""
+"""Reject a bake that exceeds memory or disk before anything is computed."""
 
 from __future__ import annotations
 
@@ -10,43 +10,43 @@ from relume.core.errors import DiskBudgetError, MemoryBudgetError
 from relume.store.bake_protocol import Plan
 from relume.store.room import RESERVE_BYTES
 
-REMEDY = "take fewer lights, a smaller size or fewer views at once"
+REMEDY = "give fewer lights, a smaller size or fewer views"
 
-MEMORY_FRACTION = 0.9  # the rest is left for the server's own work and for the system
+MEMORY_FRACTION = 0.9  # the rest is for the server and the system
 
 _GROUPS = Path("/sys/fs/cgroup")
 _PROCESS_GROUPS = Path("/proc/self/cgroup")
 
 
 def machine_bytes() -> int:
-    """Memory that the machine has, or that the control group (a container) allows this process in all."""
+    """Total memory of the machine, or of the control group (container) of this process, in bytes."""
     try:
         machine = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (ValueError, OSError, AttributeError):  # not every system tells
+    except (ValueError, OSError, AttributeError):  # not on every system
         machine = 4 << 30
     return min([machine, *(limit for limit, _ in _groups())])
 
 
 def available_bytes() -> int:
-    """Memory that may be taken now: the system's, or what the control group (a container) still allows."""
+    """Memory available now, of the system or within the control group (container), in bytes."""
     return min(
         [_system_available_bytes(), *(max(0, limit_bytes - used_bytes) for limit_bytes, used_bytes in _groups())]
     )
 
 
 def _groups() -> list[tuple[int, int]]:
-    """Limit and use of memory of this process's control groups that have one, of version 2 and 1, bytes."""
+    """Memory limit and use of this process's control groups, version 2 and 1, in bytes."""
     limits = []
     for folder, limit_name, usage_name in _group_folders():
         try:
             limits.append((int((folder / limit_name).read_text()), int((folder / usage_name).read_text())))
-        except (OSError, ValueError):  # none there, or "max"
+        except (OSError, ValueError):  # no such file, or "max"
             continue
     return limits
 
 
 def _group_folders() -> list[tuple[Path, str, str]]:
-    """Where they may be: in a container the group is the root of what is seen, else it and all above it count."""
+    """Folders of the control groups: in a container the root, otherwise the own group and all its parents."""
     folders = []
     try:
         lines = _PROCESS_GROUPS.read_text().splitlines()
@@ -70,7 +70,7 @@ def _group_folders() -> list[tuple[Path, str, str]]:
 
 
 def _system_available_bytes() -> int:
-    """Memory that processes may take without pushing others out; where the system does not tell, all it has."""
+    """Memory that processes can take without swapping, in bytes; total memory if the system does not report it."""
     try:
         for line in Path("/proc/meminfo").read_text().splitlines():
             if line.startswith("MemAvailable:"):
@@ -81,26 +81,26 @@ def _system_available_bytes() -> int:
 
 
 def check_budget(plan: Plan, data_dir: Path, num_processes: int) -> None:
-    """Refuse a plan that needs more memory or disk than there is.
+    """Reject a plan that needs more memory or disk than there is.
 
     Args:
         plan: of the bake.
-        data_dir: on whose disk the store will stand.
-        num_processes: worker processes on this machine at once; 0 where they run elsewhere.
+        data_dir: on the disk for the store.
+        num_processes: concurrent worker processes on this machine; 0 if they run elsewhere.
     Raises:
-        MemoryBudgetError, DiskBudgetError: it does not fit; the message says what is needed, what there is, and what
-            to do.
+        MemoryBudgetError, DiskBudgetError: the plan exceeds it; the message has needed and available bytes, and
+            remedies.
     """
     allowed_bytes = int(available_bytes() * MEMORY_FRACTION)
     needed_bytes = (plan.peak_bytes - plan.lone_bytes) * num_processes + plan.lone_bytes
     if num_processes > 0 and needed_bytes > allowed_bytes:
         label = f"the memory of this bake in {num_processes} process{'es' if num_processes > 1 else ''}"
-        raise MemoryBudgetError(label, needed_bytes, allowed_bytes, f"{REMEDY}, or a scene of fewer triangles")
+        raise MemoryBudgetError(label, needed_bytes, allowed_bytes, f"{REMEDY}, or a scene with fewer triangles")
     free_disk_bytes, required_disk_bytes = (
         max(0, shutil.disk_usage(data_dir).free - RESERVE_BYTES),
         plan.planned_bytes + plan.scratch_bytes,
     )
     if required_disk_bytes > free_disk_bytes:
         raise DiskBudgetError(
-            "the store of this bake on disk", required_disk_bytes, free_disk_bytes, f"free some disk, or {REMEDY}"
+            "the store of this bake on disk", required_disk_bytes, free_disk_bytes, f"free disk space, or {REMEDY}"
         )

@@ -1,4 +1,4 @@
-"""Cameras that people placed in a scene, beside those that came with it."""
+"""Cameras that users placed in a scene, besides those of its file."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from relume_worker.ledger import Ledger
 from relume_worker.scenes import SceneRecord, get_scene
 
 Views: TypeAlias = tuple[tuple[str, ...], tuple[CustomCamera, ...]]
-"""Names of views, and those of them that somebody placed, as a recipe has them."""
+"""Names of views, and the custom cameras among them, as in a recipe."""
 
-MAX_CAMERAS = 200  # of a scene, placed by people
+MAX_CAMERAS = 200  # placed cameras per scene
 
 
 def list_cameras(ledger: Ledger, scene_id: str) -> list[CustomCamera]:
-    """The cameras that people placed in a scene, by name."""
+    """Placed cameras of a scene, by name."""
     with ledger.sessions() as session:
         rows = session.scalars(select(CameraRow).where(CameraRow.scene_id == scene_id).order_by(CameraRow.name))
         return [read_custom_camera(json.loads(row.document)) for row in rows]
 
 
 def camera_names_by_scene(ledger: Ledger) -> dict[str, list[str]]:
-    """Names of the cameras that people placed, by scene, in order."""
+    """Names of placed cameras by scene, sorted."""
     names: dict[str, list[str]] = defaultdict(list)
     with ledger.sessions() as session:
         for scene_id, name in session.execute(select(CameraRow.scene_id, CameraRow.name).order_by(CameraRow.name)):
@@ -40,14 +40,14 @@ def camera_names_by_scene(ledger: Ledger) -> dict[str, list[str]]:
 
 
 def store_camera(ledger: Ledger, scene_id: str, camera: CustomCamera) -> bool:
-    """Keep a camera under its name; bakes of an earlier one stay what they are.
+    """Store a camera under its name; bakes of its previous version are unchanged.
 
     Args:
-        ledger: where it is listed. scene_id: of its scene.
+        ledger: of the scene. scene_id: of the scene. camera: with its name.
     Returns:
-        Whether there was none of this name.
+        True if the name is new.
     Raises:
-        NotFoundError: there is no such scene. ParameterError: the file's own camera has this name, or there are too
+        NotFoundError: there is no such scene. ParameterError: a camera of the file has this name, or there are too
             many.
     """
     _reject_scene_camera(get_scene(ledger, scene_id), camera.name)
@@ -60,18 +60,18 @@ def store_camera(ledger: Ledger, scene_id: str, camera: CustomCamera) -> bool:
                 raise ParameterError("name", camera.name, allowed)
             session.merge(new_row)
     except IntegrityError:
-        get_scene(ledger, scene_id)  # it was deleted in this moment
-        return False  # or somebody else has kept one under this name
+        get_scene(ledger, scene_id)  # deleted at this moment
+        return False  # or stored under this name by someone else
     return row is None
 
 
 def delete_camera(ledger: Ledger, scene_id: str, name: str) -> None:
-    """Forget a camera that somebody placed.
+    """Delete a placed camera.
 
     Args:
-        ledger: where it is listed. scene_id: of its scene. name: its own.
+        ledger: of the scene. scene_id: of the scene. name: of the camera.
     Raises:
-        NotFoundError: there is none. ParameterError: the file's own camera has this name.
+        NotFoundError: there is none. ParameterError: a camera of the file has this name.
     """
     _reject_scene_camera(get_scene(ledger, scene_id), name)
     with ledger.sessions.begin() as session:
@@ -79,19 +79,19 @@ def delete_camera(ledger: Ledger, scene_id: str, name: str) -> None:
             delete(CameraRow).where(CameraRow.scene_id == scene_id, CameraRow.name == name).returning(CameraRow.name)
         )
         if session.scalars(statement).first() is None:
-            raise NotFoundError(f"the scene has no camera {name[:80]!r} that somebody placed")
+            raise NotFoundError(f"the scene has no camera {name[:80]!r} that a user placed")
 
 
 def resolve_views(ledger: Ledger, record: SceneRecord, requested: Sequence[str | CustomCamera]) -> Views:
-    """What a recipe says of views.
+    """Resolve the views of a recipe.
 
     Args:
-        ledger: that lists the scene's cameras. record: of the scene.
-        requested: names of the scene's own or kept cameras, or cameras; empty for all that came with the scene.
+        ledger: with the placed cameras. record: of the scene.
+        requested: names of file or placed cameras, or cameras; empty: all cameras of the file.
     Returns:
-        Names of all views, each once, in order; and those of them that somebody placed.
+        Names of all views, each once, in order; and the custom cameras among them.
     Raises:
-        ParameterError: there is no such view, or two cameras of one name.
+        ParameterError: there is no such view, or two cameras have one name.
     """
     stored = {camera.name: camera for camera in list_cameras(ledger, record.id)}
     custom_cameras: dict[str, CustomCamera] = {}
@@ -103,14 +103,14 @@ def resolve_views(ledger: Ledger, record: SceneRecord, requested: Sequence[str |
             continue
         _reject_scene_camera(record, camera.name)
         if custom_cameras.setdefault(camera.name, camera) != camera:
-            raise ParameterError("views", camera.name, "each camera a name of its own")
+            raise ParameterError("views", camera.name, "a different name for each camera")
     names = dict.fromkeys(view if isinstance(view, str) else view.name for view in requested or record.views)
     return tuple(names), tuple(custom_cameras.values())
 
 
 def _reject_scene_camera(record: SceneRecord, name: str) -> None:
     if name in record.views:
-        raise ParameterError("name", name, "a name that none of the scene's own cameras has")
+        raise ParameterError("name", name, "a name that no camera of the scene's file has")
 
 
 def _count(session: Session, scene_id: str) -> int:

@@ -1,4 +1,4 @@
-"""Worker processes that join somebody else's scheduler."""
+"""Worker processes that join an existing scheduler."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ def join(scheduler: str, num_processes: int | None = None) -> int:
         scheduler: tcp://host:port, or tls://.
         num_processes: None: one per core.
     Returns:
-        The exit code: 0 where it was asked to end, 1 where the scheduler went away.
+        Exit code: 0 after a signal, 1 if the scheduler is gone.
     Raises:
-        ParameterError: the address is malformed. PlanError: nobody answers there, or there are no certificates.
+        ParameterError: the address is malformed. PlanError: the scheduler does not answer, or certificates are missing.
     """
     address = urlsplit(scheduler)
     if address.scheme not in ("tcp", "tls") or not address.hostname:

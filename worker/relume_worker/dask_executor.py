@@ -1,7 +1,7 @@
-"""`concurrent.futures` on a Dask cluster, where every future ends.
+"""`concurrent.futures` on a Dask cluster, in which every future completes.
 
-Dask's own executor leaves a future pending for ever when a worker dies with a result that nobody had fetched yet and
-the repeated task then fails: a bake would wait for it without end.
+Dask's own executor leaves a future pending forever if a worker dies with an unfetched result and the repeated task
+fails: a bake would never end.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from relume.core.errors import RelumeError
 
 @dataclass(frozen=True)
 class _FailedCall:
-    """What a call has raised, on its way back."""
+    """Exception of a call, returned as a value."""
 
     error: Exception
 
 
 def _attempt(fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
-    """Call it in the worker. A full disk is what the bake says, once; raised here, Dask would log it with its trace."""
+    """Run the call in the worker. The bake reports a full disk once; raised here, Dask would log its traceback."""
     try:
         return fn(*args, **kwargs)
     except (RelumeError, OSError, MemoryError) as error:
@@ -32,17 +32,17 @@ def _attempt(fn: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
 
 
 class DaskExecutor(Executor):
-    """Tasks of one Dask client, each run even where its like has run before."""
+    """Tasks of one Dask client; each runs even if an identical one has run before."""
 
     def __init__(self, client: Any) -> None:
         """
         Args:
-            client: a connected `distributed.Client`; whoever made it closes it.
+            client: a connected `distributed.Client`, which its creator closes.
         """
         self._client = client
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Hand a call out. Its future raises KilledWorker where the worker died, CancelledError where all went away."""
+        """Submit a call. Its future raises KilledWorker if the worker died, CancelledError if the cluster is gone."""
         task = self._client.submit(_attempt, fn, *args, pure=False, **kwargs)
         outcome: Future[Any] = Future()
         self._client.loop.add_callback(_forward_outcome, task, outcome)
@@ -50,12 +50,12 @@ class DaskExecutor(Executor):
 
 
 async def _forward_outcome(task: Any, outcome: Future[Any]) -> None:
-    """Give a Dask future's outcome to `outcome`; runs in the client's loop."""
+    """Copy a Dask future's outcome to `outcome`; runs in the client's loop."""
     try:
         result = await task
     except (concurrent.futures.CancelledError, asyncio.CancelledError):
         outcome.cancel()
-        outcome.set_running_or_notify_cancel()  # or nobody who waits would wake
+        outcome.set_running_or_notify_cancel()  # otherwise waiting threads would never wake
     except Exception as error:
         outcome.set_exception(error)
     else:

@@ -1,4 +1,4 @@
-"""How long a bake will take, judged by what finished ones took of their plans, and by how busy the machine is."""
+"""Estimate the time of a bake from finished bakes, their plans, and the load of the machine."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from dataclasses import dataclass
 from relume.store.bake_protocol import Plan
 from relume_worker.executor import is_tiny, num_cores
 
-_MAX_EXTRAPOLATION = 8.0  # times as much work as any that was measured
+_MAX_EXTRAPOLATION = 8.0  # a bake may have so many times the work of the largest measured one
 
 
 @dataclass(frozen=True)
 class CompletedBake:
-    """What a finished bake took.
+    """Measured work of a finished bake.
 
     Attributes:
-        task_s: seconds of its tasks, as if they had run one after another.
-        crowding: how many wanted each core at its end.
+        task_s: total seconds of its tasks, as if run one after another.
+        crowding: threads per core at its end.
     """
 
     plan: Plan
@@ -27,7 +27,7 @@ class CompletedBake:
 
 
 def machine_load() -> float:
-    """How many threads want to run, the mean of the last minute; 0 where the system does not tell."""
+    """Runnable threads, mean of the last minute; 0 if the system does not report it."""
     try:
         return os.getloadavg()[0]
     except (OSError, AttributeError):
@@ -35,26 +35,25 @@ def machine_load() -> float:
 
 
 def crowding(load: float) -> float:
-    """How many of so many threads want each core, at least one: by so much does each of them take longer."""
+    """Threads per core, at least one: the factor by which each of them slows down."""
     return max(1.0, load / num_cores())
 
 
 def estimate_seconds(
     plan: Plan, completed: Sequence[CompletedBake], num_workers: int, load_factor: float = 1.0
 ) -> float | None:
-    """Wall seconds that a bake will take; None where nothing was measured yet.
+    """Estimate the wall time of a bake; None if nothing has been measured yet.
 
-    A plan counts rays that are never traced: edges that are not there, lights behind the surface, shadows that are
-    predicted. So the rate is that of planned work. Plans of before tell rays alone and judge where there is no other.
-    Tiny bakes run one task at a time, others `num_workers`; the others' rate includes their own overhead, so a bake is
-    judged by its like where there is one. Of what is far smaller most was overhead: what a bake has more of than they
-    had takes as long as its plan says, where they were not faster than that.
+    A plan counts rays that are never traced: missing edges, lights behind the surface, predicted shadows. So the rate
+    is that of planned work. Older plans have rays only, and are used if there are no others. Tiny bakes run one task at
+    a time, others `num_workers`; their rate includes overhead, so a bake is estimated from similar ones if there are
+    any. Much smaller bakes are mostly overhead: additional work takes the planned time, unless they were faster.
 
     Args:
         plan: of the bake.
-        completed: bakes that were measured, of any scenes.
-        num_workers: tasks that run at once.
-        load_factor: how many will want each core while it runs.
+        completed: measured bakes of any scenes.
+        num_workers: concurrent tasks.
+        load_factor: expected threads per core.
     """
     timed = [bake for bake in completed if bake.plan.work_s] if plan.work_s else []
     completed, get_work = (timed, _work_s) if timed else (completed, _num_rays)

@@ -1,8 +1,8 @@
-"""Where tasks run: this process for tiny bakes, a Dask cluster for all others.
+"""Run tasks: in this process for tiny bakes, on a Dask cluster for all others.
 
-A cluster takes seconds to start (spawn, imports, compiled kernels); a preview bake takes fewer. So a bake of at most
+A cluster takes seconds to start (spawn, imports, compiled kernels); a preview bake takes less. So a bake of at most
 `TINY_BAKE_S`, or of `TINY_BAKE_RAYS` and `TINY_BAKE_BYTES`, runs in this process, one task at a time on the kernels'
-own threads, and the cluster starts with the first larger one. Its processes yield to what people look at.
+own threads, and the cluster starts with the first larger one. Its processes yield to interactive work.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from relume_worker.dask_executor import DaskExecutor
 
 log = logging.getLogger(__name__)
 
-# As planned, of one core: half of that on two, what starting a cluster costs on a busy machine. A preview with indirect
-# light of as many views as are shown at once is below it.
+# As planned, on one core: half of it on two, about the start of a cluster on a busy machine. A preview with indirect
+# light of as many views as are visible at once is below it.
 TINY_BAKE_S = 20.0
 TINY_BAKE_RAYS = 400_000_000
-TINY_BAKE_BYTES = 512 << 20  # on disk: points on millions of triangles take longer to place than rays to trace
+TINY_BAKE_BYTES = 512 << 20  # on disk: with millions of triangles placing probes takes longer than tracing
 CONNECT_S = 10
-# Shading that somebody waits for is at 5 (`relume.core.thread_pools`): at 0, two processes left it a quarter of two
+# Interactive shading is at 5 (`relume.core.thread_pools`): at 0, two processes left it a quarter of two
 # cores.
 BAKE_NICE = 10
 WORKER_PRELOAD = ["relume_worker.executor"]  # Dask's name for modules whose `dask_setup` runs in each process
@@ -41,8 +41,8 @@ SINGLE_THREAD_ENV = dict.fromkeys(
     ("RELUME_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
 
-# Our ledger decides about retries; results are a few numbers, so nothing is ever spilled to disk. Dask's profile of
-# tasks, a hundred samples a second that nobody looks at, took a fiftieth of a core from each worker that traces.
+# The ledger decides about retries; results are a few numbers, so nothing is spilled to disk. Dask's profiler, with a
+# hundred samples per second, took 2 % of a core from each tracing worker.
 DASK_CONFIG: dict[str, Any] = {
     "distributed.scheduler.allowed-failures": 0,
     "distributed.worker.profile.enabled": False,
@@ -51,19 +51,19 @@ DASK_CONFIG: dict[str, Any] = {
     "distributed.worker.memory.pause": False,
     "distributed.comm.timeouts.connect": f"{CONNECT_S}s",
 }
-# Pages that tell whoever connects what runs here.
+# Dashboard pages would show anyone who connects what runs here.
 NO_HTTP_ROUTES: dict[str, Any] = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
 
 
 def is_tiny(plan: Plan) -> bool:
-    """Whether a bake is done before a cluster would have started, or nearly so."""
+    """True if a bake is about done before a cluster would have started."""
     if 0 < plan.work_s <= TINY_BAKE_S:
         return True
     return plan.num_rays <= TINY_BAKE_RAYS and plan.store_bytes <= TINY_BAKE_BYTES
 
 
 def dask_setup(_: object) -> None:
-    """Make a worker process yield; its threads start later and inherit that."""
+    """Make a worker process yield; its later threads inherit this."""
     os.nice(BAKE_NICE)
 
 
@@ -73,7 +73,7 @@ def num_cores() -> int:
 
 
 class Executors:
-    """The executors of one service, started when they are first needed."""
+    """Executors of one service, started on demand."""
 
     def __init__(self, scheduler: str | None = None, num_workers: int | None = None) -> None:
         """
@@ -96,10 +96,10 @@ class Executors:
             return self._local
 
     def cluster(self) -> Executor:
-        """The Dask cluster. Raises PlanError where the scheduler does not answer."""
+        """The Dask cluster. Raises PlanError if the scheduler does not answer."""
         with self._lock:
-            if self._client is not None and self._client.status != "running":  # the scheduler went away
-                with contextlib.suppress(Exception):  # nobody is there to say goodbye to
+            if self._client is not None and self._client.status != "running":  # the scheduler is gone
+                with contextlib.suppress(Exception):  # nobody is connected any more
                     self._client.close(timeout=1)
                 self._client = None
             if self._client is None:
@@ -108,29 +108,29 @@ class Executors:
 
     @property
     def has_cluster(self) -> bool:
-        """Whether the cluster is there, so that the next bake need not start it."""
+        """True if the cluster is running."""
         return self._client is not None
 
     def cluster_threads(self) -> int:
-        """How many tasks the cluster runs at once; at least 1."""
+        """Concurrent tasks of the cluster; at least 1."""
         with self._lock:
             counts = self._client.nthreads() if self._client is not None else {}
         return max(1, int(sum(counts.values())))
 
     def stop_cluster(self) -> None:
-        """End worker processes of our own; the next bake that needs them starts others. No task may be running."""
+        """End the embedded worker processes; the next bake starts new ones if needed. No task may be running."""
         with self._lock:
             if self._cluster is not None:
                 self._stop_cluster()
 
     def resident_bytes(self) -> int:
-        """Memory of our own worker processes."""
+        """Resident memory of the embedded worker processes, in bytes."""
         cluster = self._cluster  # the lock may be held while processes start
         pids = [] if cluster is None else [nanny.pid for nanny in list(cluster.workers.values())]
         return sum(resident_bytes(pid) for pid in pids if pid is not None)
 
     def close(self) -> None:
-        """Stop what was started; running tasks are abandoned, their shards are whole or absent."""
+        """Stop everything; running tasks are abandoned, their shards are complete or absent."""
         with self._lock:
             if self._local is not None:
                 self._local.shutdown(wait=False, cancel_futures=True)
@@ -149,7 +149,7 @@ class Executors:
         import dask
         from distributed import Client
 
-        logging.getLogger("distributed").setLevel(logging.WARNING)  # which sets its own when it is imported
+        logging.getLogger("distributed").setLevel(logging.WARNING)  # Dask sets its own when it is imported
         with dask.config.set(DASK_CONFIG):
             check_certificates(self.scheduler)
             address = self.scheduler or self._start_cluster()
@@ -161,14 +161,15 @@ class Executors:
                 ) from None
 
     def _start_cluster(self) -> Any:
-        """Processes of this machine. Every local account reaches its ports, and whoever speaks to Dask runs what they
-        like: so each start has a key of its own, which never leaves the memory of these processes."""
+        """Start processes on this machine. Every local account can reach their ports, and Dask runs anything for its
+        clients: so each start has a key of its own, which stays in the memory of these processes.
+        """
         import dask
         from distributed import LocalCluster
         from distributed.security import Security
 
         for name in ("distributed.scheduler", "distributed.nanny", "distributed.client"):
-            # of a process that died the bake speaks itself
+            # the bake itself reports a dead process
             logging.getLogger(name).setLevel(logging.CRITICAL)
         with _without_interrupts(), dask.config.set(NO_HTTP_ROUTES):
             self._cluster = LocalCluster(  # type: ignore[no-untyped-call]
@@ -178,7 +179,7 @@ class Executors:
                 host="127.0.0.1",
                 security=Security.temporary(),  # type: ignore[no-untyped-call]
                 scheduler_kwargs={"dashboard": False},
-                dashboard_address="127.0.0.1:0",  # None would take Dask's usual port, and warn where it is taken
+                dashboard_address="127.0.0.1:0",  # None would use Dask's default port, and warn if it is taken
                 local_directory=tempfile.gettempdir(),
                 silence_logs=logging.ERROR,
                 env=SINGLE_THREAD_ENV,
@@ -188,39 +189,39 @@ class Executors:
 
 
 def check_certificates(scheduler: str | None) -> None:
-    """Raises PlanError where a scheduler speaks TLS and Dask has no certificates to show."""
+    """Raise PlanError if a scheduler uses TLS and Dask has no certificates."""
     import dask
 
     if (scheduler or "").startswith("tls:") and not dask.config.get("distributed.comm.tls.ca-file", None):
         raise PlanError(
-            f"the scheduler {scheduler} speaks TLS, and no certificates are set here; set "
-            "DASK_DISTRIBUTED__COMM__TLS__CA_FILE and the certificates and keys beside it (docs/operations.md)"
+            f"the scheduler {scheduler} uses TLS, but no certificates are set here; set "
+            "DASK_DISTRIBUTED__COMM__TLS__CA_FILE and the related certificates and keys (docs/operations.md)"
         )
 
 
 def _attempt(stop: Callable[..., object], *args: object, **kwargs: object) -> None:
-    """Stop a part of the cluster. One that does not stop must not keep the others, or the service, from stopping."""
+    """Stop a part of the cluster. A failure must not keep the others, or the service, from stopping."""
     try:
         stop(*args, **kwargs)
-    except Exception as error:  # Dask raises whatever it meets, AssertionError too
-        log.warning("a part of the cluster did not stop in order (%s: %s)", type(error).__name__, error)
+    except Exception as error:  # Dask raises anything, AssertionError included
+        log.warning("a part of the cluster did not stop cleanly (%s: %s)", type(error).__name__, error)
 
 
 async def _kill_workers(cluster: Any) -> None:
-    """Kill a cluster's worker processes and start no others; runs in the cluster's loop.
+    """Kill a cluster's worker processes without restarting them; runs in the cluster's loop.
 
-    Asked to close while a process is only just starting, after another died, a nanny fails and leaves it running.
+    If a nanny is closed while its process is starting after another died, it fails and leaves the process running.
     """
     for nanny in cluster.workers.values():
         nanny.close_gracefully()
         worker_process = nanny.process
         if worker_process is not None and worker_process.process is not None:
-            await worker_process.process.kill()  # waits its turn behind a start
+            await worker_process.process.kill()  # waits behind a start
 
 
 @contextlib.contextmanager
 def _without_interrupts() -> Iterator[None]:
-    """Threads and processes started here never see SIGINT: a terminal's Ctrl-C is for us, who then stop them."""
+    """Threads and processes started here never receive SIGINT: this process stops them after Ctrl-C."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

@@ -1,4 +1,4 @@
-"""Whose turn it is: what somebody waits for first, then user by user as their shares say, then who came first."""
+"""Fair scheduling: interactive work first, then by users' shares, then first come, first served."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class WaitingBake:
-    """Work that is not done.
+    """Work that is waiting.
 
     Attributes:
-        client: who asked for it. is_first: it is a small one. created: when it was asked for.
+        client: who submitted it. is_first: it is small. created: time of submission.
     """
 
     id: str
@@ -21,23 +21,23 @@ class WaitingBake:
 
 
 class FairShare:
-    """Remembers whose turns have been.
+    """Schedules clients by their shares.
 
-    Each client has a time of their own, which a turn puts on by 1 / share; the earliest is next (stride scheduling:
-    Waldspurger and Weihl, *Stride scheduling: deterministic proportional-share resource management*, 1995). Whoever
-    comes new begins where the earliest of those who wait is: nobody saves turns up.
+    Each client has a virtual time that advances by 1 / share per turn; the earliest is next (stride scheduling:
+    Waldspurger and Weihl, *Stride scheduling: deterministic proportional-share resource management*, 1995). New clients
+    start at the earliest waiting client's time: turns cannot be saved up.
     """
 
     def __init__(self, client_weights: Mapping[str, float]) -> None:
         """
         Args:
-            client_weights: turns of some clients, to one of each other.
+            client_weights: shares of some clients; 1 for all others.
         """
         self._client_weights = dict(client_weights)
         self._virtual_times: dict[str, float] = {}
 
     def sort(self, waiting_bakes: Sequence[WaitingBake]) -> list[WaitingBake]:
-        """In the order of their turns, if each took none before the next."""
+        """Sort by turn, if each client took none before the next."""
         clients = {work.client for work in waiting_bakes}
         earliest = min(
             (self._virtual_times[client] for client in clients if client in self._virtual_times), default=0.0
@@ -48,5 +48,5 @@ class FairShare:
         )
 
     def pick_next(self, client: str) -> None:
-        """A client of those that were ordered has a turn."""
+        """Record a turn of a client."""
         self._virtual_times[client] += 1.0 / self._client_weights.get(client, 1.0)

@@ -1,4 +1,4 @@
-"""What a process keeps between tasks is forgotten when no task has come for a while."""
+"""Release a process's caches between tasks after some idle time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ DEFAULT_IDLE_S = 60.0
 
 
 def idle_seconds() -> float:
-    """How long things that nobody uses are kept: `RELUME_IDLE_SECONDS`, which worker processes inherit."""
+    """Lifetime of unused data in seconds: `RELUME_IDLE_SECONDS`, which worker processes inherit."""
     try:
         return max(1.0, float(os.environ.get("RELUME_IDLE_SECONDS", "")))
     except ValueError:
@@ -19,7 +19,7 @@ def idle_seconds() -> float:
 
 
 class IdleTimer:
-    """Calls `release` once nothing has been at work for `after_s()` seconds; safe to use from several threads."""
+    """Calls `release` after `after_s()` idle seconds. Thread-safe."""
 
     def __init__(self, after_s: Callable[[], float], release: Callable[[], None]) -> None:
         self._after_s, self._release = after_s, release
@@ -29,7 +29,7 @@ class IdleTimer:
 
     @contextmanager
     def keep_awake(self) -> Iterator[None]:
-        """Nothing is forgotten while the block runs, and for a while after it."""
+        """Keep everything inside the block, and for a while afterwards."""
         with self._lock:
             self._num_active += 1
             self._stop()
@@ -44,7 +44,7 @@ class IdleTimer:
                     self._timer.start()
 
     def end(self) -> None:
-        """What is kept is kept until the process ends: nobody will ask for more."""
+        """Stop the timer: nothing is released until the process ends."""
         with self._lock:
             self._stop()
 

@@ -1,9 +1,8 @@
-"""Who runs a bake, or a step of another work. Several services may share one ledger; a lease keeps each with one
-of them.
+"""Leases of bakes and job steps. Several services may share one ledger; a lease assigns each job to one of them.
 
-An owner is named place/process/nonce/number. Its lease ends when it stops renewing it, and at once when it ran in this
-place and its process is gone, so that a restart after a crash does not wait. A place is where a process number means
-one process: host names alone do not say that, because two machines or containers may have the same.
+An owner is named location/process/nonce/number. Its lease expires when it is not renewed, and at once if its location
+is this one and its process is gone, so that a restart after a crash does not wait. A location is where process numbers
+are unique: host names are not enough, because two machines or containers may share one.
 """
 
 from __future__ import annotations
@@ -29,8 +28,9 @@ _numbers = itertools.count()
 
 
 def _process_location() -> str:
-    """The host's name, for people, and what makes it unique: this start of the kernel and the namespace of process
-    numbers; the network card's address on systems that say neither."""
+    """Host name, for people, and its unique part: boot id and process namespace, or the network card's address on
+    systems without these.
+    """
     try:
         boot = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
         namespace = os.readlink("/proc/self/ns/pid")
@@ -43,12 +43,12 @@ _LOCATION = _process_location()
 
 
 def new_owner() -> str:
-    """A name for a service of this process that no other has."""
+    """Create a unique owner name for a service of this process."""
     return f"{_LOCATION}/{os.getpid()}/{_NONCE}/{next(_numbers)}"
 
 
 def owner_text(owner: str) -> str:
-    """An owner as logs name it: host and process."""
+    """Format an owner for logs: host and process."""
     location, pid, *_ = owner.split("/")
     return f"{location.split(':')[0]}, process {pid}"
 
@@ -56,31 +56,30 @@ def owner_text(owner: str) -> str:
 def log_taken_over(noun: str, identity: str, previous_owner: str) -> None:
     """Log that this process takes a job over. noun, identity: the job; previous_owner: its last owner."""
     log.warning(
-        "%s %s is taken over from %s, which renews its lease no more", noun, identity, owner_text(previous_owner),
+        "%s %s is taken over from %s, which has stopped renewing its lease", noun, identity, owner_text(previous_owner),
         extra={"fields": {noun.lower(): identity}},
     )  # fmt: skip
 
 
 def log_lost_lease(noun: str, identity: str) -> None:
-    """Say that this process was paused, or cut off from the database, for longer than its lease. noun, identity: the
-    work that it was at."""
+    """Log that this process was suspended or cut off for longer than its lease. noun, identity: of its job."""
     log.warning(
-        "%s %s was taken over by another process while this one stood still: what it was doing here is dropped",
+        "%s %s was taken over by another process while this one was suspended: its work here is dropped",
         noun, identity, extra={"fields": {noun.lower(): identity}},
     )  # fmt: skip
 
 
 def is_alive(owner: str, heartbeat: float, now: float) -> bool:
-    """Whether an owner still holds its lease, by what can be known from here.
+    """True if an owner still holds its lease, as far as this process can tell.
 
     Args:
-        heartbeat, now: seconds since 1970, of one clock: the database's.
+        owner: of the lease. heartbeat, now: seconds since 1970 by the database's clock.
     """
     return now - heartbeat <= LEASE_S and may_run(owner)
 
 
 def may_run(owner: str) -> bool:
-    """Whether an owner is there, as far as can be known from here: of other machines and containers nothing can."""
+    """True if an owner's process may exist; for other machines and containers this is unknown, hence true."""
     location, pid, nonce, _ = owner.split("/")
     if location != _LOCATION:
         return True
@@ -96,11 +95,7 @@ def may_run(owner: str) -> bool:
 
 
 class LeaseRenewer:
-    """Calls `renew` for the lease of a bake or another work while it runs, also through long steps such as the check
-    before publishing.
-
-    The work and its owner are those that the ledger knows.
-    """
+    """Renews the lease of a job while it runs, also through long steps such as the check before publishing."""
 
     def __init__(self, renew: Callable[[str, str], object], work_id: str, owner: str) -> None:
         self._renew, self._work_id, self._owner = renew, work_id, owner
@@ -121,5 +116,5 @@ class LeaseRenewer:
             try:
                 self._renew(self._work_id, self._owner)
                 database_error.report_recovered()
-            except DATABASE_ERRORS as error:  # a database that is away for some seconds costs no lease
+            except DATABASE_ERRORS as error:  # a short database outage costs no lease
                 database_error.report_failure(error)

@@ -1,7 +1,7 @@
-"""The ledger: which bakes exist, how far they are, who runs them. It is the truth; the scheduler is disposable.
+"""The ledger: all bakes, their progress and their owners. It is authoritative; the scheduler is disposable.
 
     queued ──claim──▶ running ──▶ ready
-      ▲                 │ └─────▶ failed     submitting a failed or cancelled bake again queues it; finished tasks stay
+      ▲                 │ └─────▶ failed     submitting a failed or canceled bake queues it again; finished tasks stay
       └───submit────────┴───────▶ cancelled
 
 Every change is one statement that names the state it expects, so that processes which race cannot both win.
@@ -33,7 +33,7 @@ from relume_worker.status import BakeState, BakeStatus, Phase, TaskCost, bake_id
 
 
 class Ledger:
-    """Bakes and their tasks in a database; safe to use from several threads and processes."""
+    """Bakes and their tasks in a database. Safe for several threads and processes."""
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
@@ -44,11 +44,11 @@ class Ledger:
         self._engine.dispose()
 
     def submit(self, scene_id: str, recipe: Recipe, plan: Plan, client: str = "") -> str:
-        """Queue a bake; the same recipe under the same code is the same bake, and a failed or cancelled one is resumed.
+        """Queue a bake; the same recipe under the same code is the same bake, and a failed or canceled one resumes.
 
         Args:
-            scene_id: of a scene that is kept. recipe: what to bake of it.
-            plan: what it will cost. client: who asks; clients have their turns one after another.
+            scene_id: of an existing scene. recipe: of the bake.
+            plan: its cost. client: for fair scheduling.
         Returns:
             The bake's id.
         Raises:
@@ -72,17 +72,17 @@ class Ledger:
                     session.add(row)
                 return identity
             except IntegrityError:
-                if self._get(identity) is None:  # not somebody else's same recipe: the scene is gone
+                if self._get(identity) is None:  # not a duplicate: the scene was deleted
                     raise NotFoundError(f"there is no scene {scene_id}; import it first") from None
         self.requeue(identity, ("failed", "cancelled"))
         return identity
 
     def requeue(self, identity: str, states: Sequence[BakeState]) -> None:
-        """Put a bake that is in one of `states` back into the queue."""
+        """Queue a bake that is in one of `states` again."""
         self._change(identity, states, state="queued", problem=None, queued=time.time(), seconds_left=None, phase=None)
 
     def bake(self, identity: str) -> BakeStatus:
-        """A bake by id. Raises NotFoundError."""
+        """Return a bake. Raises NotFoundError."""
         row = self._get(identity)
         if row is None:
             raise NotFoundError(f"there is no bake {identity[:40]}; queue one first")
@@ -99,14 +99,13 @@ class Ledger:
         return [_status(row, queue_positions) for row in rows]
 
     def ready_bakes(self) -> list[str]:
-        """Ids of all bakes that are, newest first."""
+        """Ids of all ready bakes, newest first."""
         query = select(BakeRow.id).where(BakeRow.state == "ready").order_by(BakeRow.created.desc(), BakeRow.id)
         with self.sessions() as session:
             return list(session.scalars(query))
 
     def _queue_positions(self, rows: Sequence[BakeRow]) -> dict[str, int]:
-        """How many bakes will run before each of those that are queued: tiny ones never wait for others, and clients
-        have their turns, here as if their shares were equal."""
+        """Number of bakes before each queued one: tiny ones never wait for others; clients count with equal shares."""
         if not any(row.state == "queued" for row in rows):
             return {}
         query = select(BakeRow).where(BakeRow.state.in_(("queued", "running"))).order_by(BakeRow.queued)
@@ -117,18 +116,18 @@ class Ledger:
         return {identity: k for rows in lanes.values() for k, identity in enumerate(_fair_order(rows))}
 
     def cancel(self, identity: str) -> bool:
-        """Cancel a bake that is queued or running; whoever runs it sees that at its next heartbeat."""
+        """Cancel a queued or running bake; its owner notices at its next heartbeat."""
         return self._change(identity, ("queued", "running"), state="cancelled", seconds_left=None, phase=None)
 
     def claimable(self) -> list[WaitingBake]:
-        """Bakes that wait for somebody to run them, longest waiting first: queued, or left by an owner that is gone."""
+        """Bakes without a live owner, longest waiting first: queued, or left by a dead owner."""
         query = select(BakeRow, epoch_s()).where(BakeRow.state.in_(("queued", "running"))).order_by(BakeRow.queued)
         with self.sessions() as session:
             rows = [row for row, now in session.execute(query) if not _is_owned(row, now)]
         return [WaitingBake(row.id, row.client or "", False, row.queued) for row in rows]
 
     def claim(self, identity: str, owner: str) -> bool:
-        """Take the lease of a bake and make it running. False where somebody else has it."""
+        """Take the lease of a bake and set it running. False if another owner has it."""
         with self.sessions() as session:
             row_and_time = session.execute(select(BakeRow, epoch_s()).where(BakeRow.id == identity)).first()
         if row_and_time is None or _is_owned(*row_and_time):
@@ -150,24 +149,24 @@ class Ledger:
         return is_claimed
 
     def heartbeat(self, identity: str, owner: str, **progress: float | str | None) -> bool:
-        """Record progress. False where the bake was cancelled or taken over: stop."""
+        """Record progress. False if the bake was canceled or taken over: stop."""
         is_owner = BakeRow.owner == owner
         return self._change(identity, ("running",), is_owner, heartbeat=epoch_s(), **progress)
 
     def renew_lease(self, identity: str, owner: str) -> bool:
-        """Renew the lease of a bake in whatever state it is. False where somebody else holds it."""
+        """Renew the lease of a bake in any state. False if another owner has it."""
         return self._change(identity, None, BakeRow.owner == owner, heartbeat=epoch_s())
 
     def finish(
         self, identity: str, owner: str, state: BakeState, problem: str | None = None, num_bytes: int = 0
     ) -> bool:
-        """Give up the lease; a bake that is still running becomes `state`, a cancelled one stays cancelled.
+        """Give up the lease; a running bake changes to `state`, a canceled one stays canceled.
 
         Args:
-            identity: of the bake. owner: who holds its lease; nothing changes where that is somebody else.
-            state: that it ends in.
-            problem: a sentence for people, where it has failed.
-            num_bytes: of the store, where it is ready.
+            identity: of the bake. owner: of its lease; otherwise nothing changes.
+            state: final state.
+            problem: a sentence, if it has failed.
+            num_bytes: of the store, if it is ready.
         Returns:
             As `release`.
         """
@@ -178,32 +177,32 @@ class Ledger:
         return self.release(identity, owner)
 
     def release(self, identity: str, owner: str) -> bool:
-        """Give up the lease and leave the state as it is: whoever comes next may claim the bake at once. False where it
-        was lost before."""
+        """Give up the lease and leave the state: another owner may claim the bake. False if it was lost before."""
         return self._change(identity, None, BakeRow.owner == owner, owner=None)
 
     def delete_bakes(self, ids: Sequence[str]) -> None:
-        """Forget bakes, in whatever states they are."""
+        """Delete bakes in any state."""
         with self.sessions.begin() as session:
             session.execute(delete(TaskRow).where(TaskRow.bake_id.in_(ids)))
             session.execute(delete(BakeRow).where(BakeRow.id.in_(ids)))
 
     def finished_tasks(self, identity: str) -> dict[tuple[int, int], TaskCost]:
-        """What the finished tasks of a bake took, by (stage, index)."""
+        """Costs of a bake's finished tasks by (stage, index)."""
         with self.sessions() as session:
             rows = session.scalars(select(TaskRow).where(TaskRow.bake_id == identity))
             return {(row.stage, row.index): TaskCost(row.rays, row.trace_s, row.seconds) for row in rows}
 
     def finish_task(self, identity: str, owner: str, task: Task, cost: TaskCost, attempts: int) -> bool:
-        """Record that a task's shards are on disk; once more changes nothing.
+        """Record that a task's shards are on disk; idempotent.
 
         Args:
-            identity: of the bake. owner: who holds its lease. task: that is done.
-            cost: seconds and rays of it.
-            attempts: how often it was begun, this time included.
+            identity: of the bake. owner: of its lease. task: finished one.
+            cost: seconds and rays.
+            attempts: including this one.
         Returns:
-            False where somebody else holds the lease, whose unfinished store may be another, or the bake is deleted:
-            nothing is recorded.
+            False if another owner, perhaps with another unfinished store, has the lease, or the bake is deleted:
+                nothing is
+            recorded.
         """
         row = TaskRow(bake_id=identity, stage=task.stage, index=task.index, attempts=attempts, **asdict(cost))
         with self.sessions.begin() as session:
@@ -213,12 +212,12 @@ class Ledger:
         return True
 
     def delete_tasks(self, identity: str, owner: str | None = None) -> bool:
-        """Start a bake from nothing: its unfinished store is gone or damaged.
+        """Delete the task rows of a bake whose unfinished store is missing or damaged.
 
         Args:
-            identity: of the bake. owner: who holds its lease; None: nobody runs it.
+            identity: of the bake. owner: of its lease; None: nobody runs it.
         Returns:
-            False where somebody else holds the lease: nothing is forgotten.
+            False if another owner has the lease: nothing is deleted.
         """
         with self.sessions.begin() as session:
             if owner is not None and not _renew(session, identity, owner):
@@ -228,26 +227,26 @@ class Ledger:
         return True
 
     def get_run(self, identity: str) -> str | None:
-        """The name of a bake's beginning."""
+        """Run marker of a bake."""
         row = self._get(identity)
         return None if row is None else row.run
 
     def restart(self, identity: str, owner: str, code: str, run: str, reason: str | None) -> bool:
-        """Start a bake from nothing, under this code.
+        """Restart a bake from nothing, under this code.
 
         Args:
-            identity: of the bake. owner: the process that runs it. code: that will make all of it.
-            run: names this beginning.
-            reason: one sentence for people where it had been begun before.
+            identity: of the bake. owner: process that runs it. code: its code version.
+            run: new run marker.
+            reason: one sentence, if it had finished tasks.
         Returns:
-            False where somebody else holds the lease, or it was cancelled.
+            False if another owner has the lease, or the bake was canceled.
         """
         if not self.delete_tasks(identity, owner):
             return False
         return self._change(identity, ("running",), BakeRow.owner == owner, code=code, run=run, problem=reason)
 
     def finished_bakes(self, limit: int) -> list[CompletedBake]:
-        """What the newest ready bakes took."""
+        """Measured work of the newest ready bakes."""
         task_s = func.sum(TaskRow.seconds)
         query = (
             select(BakeRow.plan, task_s, BakeRow.crowding)
@@ -262,14 +261,14 @@ class Ledger:
         return [CompletedBake(_plan(plan), float(seconds), crowded or 1.0) for plan, seconds, crowded in rows]
 
     def stage_seconds(self, scene_id: str, method: str, num_workers: int, limit: int) -> dict[int, float]:
-        """What each stage took of the newest ready bakes of a method, of this scene where there are any.
+        """Time per stage of the newest ready bakes of a method, of this scene if there are any.
 
         Args:
-            scene_id: whose own bakes count before others. method: name of the transfer method.
-            num_workers: tasks that ran at once in bakes that are not tiny.
-            limit: number of bakes that are looked at.
+            scene_id: whose bakes are preferred. method: name of the transfer method.
+            num_workers: concurrent tasks of bakes that are not tiny.
+            limit: number of bakes to read.
         Returns:
-            Wall seconds by stage, those of all bakes together; empty where there was none.
+            Total wall seconds by stage; empty if there are none.
         """
         is_like = BakeRow.recipe.contains(f'"method":{json.dumps(method)}', autoescape=True)
         newest = select(BakeRow.id, BakeRow.scene_id, BakeRow.plan).where(BakeRow.state == "ready", is_like)
@@ -299,7 +298,7 @@ class Ledger:
 
 
 def _renew(session: Session, identity: str, owner: str) -> bool:
-    """Whether an owner holds the lease of a bake until the transaction ends."""
+    """Renew a lease; true if the owner holds it until the transaction ends."""
     statement = update(BakeRow).where(BakeRow.id == identity, BakeRow.owner == owner).values(heartbeat=epoch_s())
     return cast("CursorResult[Any]", _execute(session, statement)).rowcount == 1
 
@@ -313,7 +312,7 @@ def _is_owned(row: BakeRow, now: float) -> bool:
 
 
 def _fair_order(rows: Sequence[BakeRow]) -> list[str]:
-    """Ids, those that run first, then each client's first, each one's second, …; `rows` are in the order of coming."""
+    """Ids in scheduling order: priority first, then each client's first, each one's second, …; `rows` by submission."""
     counts = Counter[str]()
     ranks = []
     for row in sorted(rows, key=lambda row: row.state != "running"):
@@ -324,7 +323,7 @@ def _fair_order(rows: Sequence[BakeRow]) -> list[str]:
 
 def _plan_json(plan: Plan) -> str:
     document = asdict(plan)
-    del document["lone_bytes"]  # of no use any more; an older relume on the same ledger does not know it
+    del document["lone_bytes"]  # obsolete; older versions on the same ledger do not know it
     return json.dumps(document)
 
 

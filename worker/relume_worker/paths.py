@@ -1,4 +1,4 @@
-"""Where things lie in the data directory. Ids are checked here: no other string becomes part of a path."""
+"""Paths in the data directory. Ids are validated here: no other string becomes part of a path."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ def _check_id(identity: str) -> str:
 
 
 def scene_path(data_dir: Path, scene_id: str) -> Path:
-    """Folder of a scene. Raises NotFoundError where the id is malformed, as all of these do."""
+    """Folder of a scene. Raises NotFoundError if the id is malformed, as do all functions here."""
     return data_dir / "scenes" / _check_id(scene_id)
 
 
 def materials_path(data_dir: Path) -> Path:
-    """Folder of the measured materials; `relume.assets.measured.measured_store` names what is in it."""
+    """Folder of measured materials; see `relume.assets.measured.measured_store`."""
     return data_dir / "materials"
 
 
 def btfs_path(data_dir: Path) -> Path:
-    """Folder of the BTFs; `relume.assets.btf.btf_store` names what is in it."""
+    """Folder of BTFs; see `relume.assets.btf.btf_store`."""
     return data_dir / "btfs"
 
 
 def environments_path(data_dir: Path) -> Path:
-    """Folder of the imported environments; `relume.assets.environments.environment_store` names what is in it."""
+    """Folder of imported environments; see `relume.assets.environments.environment_store`."""
     return data_dir / "environments"
 
 
 def images_path(data_dir: Path) -> Path:
-    """Folder of the images that looks may name; `relume.images.image_store` names what is in it."""
+    """Folder of images for looks; see `relume.images.image_store`."""
     return data_dir / "images"
 
 
@@ -47,10 +47,10 @@ def bake_path(data_dir: Path, bake_id: str) -> Path:
 
 
 def staging_path(data_dir: Path, bake_id: str) -> Path:
-    """The store of a bake that is not finished."""
+    """The store of an unfinished bake."""
     return data_dir / "bakes" / "staging" / f"{_check_id(bake_id)}.zarr"
 
 
 def scene_path_of_bake(bake: Path, scene_id: str) -> Path:
-    """Folder of the scene that a published store was baked of, in the same data directory."""
+    """Folder of the scene of a published store, in the same data directory."""
     return scene_path(bake.parents[1], scene_id)

@@ -1,4 +1,4 @@
-"""How fine a bake is, by name or by number."""
+"""Quality presets of bakes."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ PresetName = Literal["preview", "good", "final"]
 
 @dataclass(frozen=True)
 class Preset:
-    """Width and height in pixels, and triangles of light."""
+    """Width and height in pixels, and number of environment triangles."""
 
     size: tuple[int, int]
     num_lights: int
 
     def fit_aspect(self, aspect: float) -> tuple[int, int]:
-        """Width and height of about as many pixels. aspect: width ÷ height."""
+        """Width and height with about as many pixels. aspect: width ÷ height."""
         width = max(_STEP, _STEP * round(math.sqrt(math.prod(self.size) * aspect) / _STEP))
         return width, max(_STEP, round(width / aspect))
 
@@ -35,11 +35,11 @@ PRESETS: dict[PresetName, Preset] = {
 
 
 def resolve_num_probes(method: str, requested: int | None) -> int:
-    """The `num_probes` of a recipe; as many as usual where no number is asked for.
+    """Return `num_probes` for a recipe; the default if no number is requested.
 
     Raises:
-        PlanError: a number is asked for, and the method has no free camera.
+        PlanError: a number is requested, and the method has no free camera.
     """
     if requested is not None and method not in FREE_CAMERA_METHODS:
-        raise PlanError(f"{requested} probes were asked for; method {method} has none, leave them out")
+        raise PlanError(f"method {method} has no probes; leave out the {requested} probes")
     return requested or Recipe.num_probes

@@ -1,4 +1,4 @@
-"""How far a bake is, and how long it still takes."""
+"""Progress and remaining time of a bake."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from dataclasses import dataclass
 from relume.store.bake_protocol import Plan, Task
 from relume_worker.status import TaskCost
 
-# Between two finished tasks the bar moves on at the rate so far, but never past this part of the next task.
+# Between two finished tasks the progress advances at the rate so far, but at most by this fraction of the next task.
 MAX_EXTRAPOLATION = 0.9
-# Once so much of a bake is done, its time left follows from its own rate alone; before, also from what others took.
+# From this fraction on, the remaining time follows from the bake's own rate alone; before, also from other bakes.
 FULL_TRUST_FRACTION = 0.08
-# Before so much of a bake is done, nobody can say how long the rest takes: others' bakes were of other scenes.
+# Below this fraction there is no estimate of the rest: other bakes were of other scenes.
 MIN_ESTIMATE_FRACTION = 0.1
 
 
 @dataclass(frozen=True)
 class ExpectedWork:
-    """What finished bakes tell of one that begins.
+    """Expected times of a bake, from finished ones.
 
     Attributes:
-        seconds: that it will take, None where nothing is known.
-        stage_fractions: of each stage in its time, None where that is not known.
-        parallel: tasks that run at once.
+        seconds: total, None if unknown.
+        stage_fractions: of the time, by stage, None if unknown.
+        parallel: concurrent tasks.
     """
 
     seconds: float | None = None
@@ -34,11 +34,11 @@ class ExpectedWork:
 
 
 class Progress:
-    """Fraction done, rate and time left of one run of a bake.
+    """Fraction done, rate and remaining time of one run of a bake.
 
-    Stages count by their share of the time of finished bakes, and within a stage tasks by their rows. Where no bake has
-    ended yet, earlier stages count by their rays against the plan's, and the last one, by far the longest, has what is
-    left; rate and time left are then those of the stage that runs.
+    Stages are weighted by their fraction of the time of finished bakes, and tasks within a stage by their rows. If
+    there are no finished bakes, earlier stages are weighted by their rays in the plan, and the last one, by far the
+    longest, has the rest; rate and remaining time then refer to the current stage.
     """
 
     def __init__(
@@ -50,8 +50,8 @@ class Progress:
     ) -> None:
         """
         Args:
-            initial: what people have seen already, before an interruption.
-            clock: seconds.
+            plan: of the bake. initial: progress before an interruption. expected_work: from finished bakes.
+            clock: monotonic seconds.
         """
         self._clock, self._expected_work = clock, expected_work or ExpectedWork()
         self._num_rays = max(1, plan.num_rays)
@@ -64,7 +64,7 @@ class Progress:
         self._restart()
 
     def begin_stage(self, tasks: Collection[Task], last: bool) -> None:
-        """Note the tasks of a stage."""
+        """Set the tasks of a stage."""
         stage_fractions = self._expected_work.stage_fractions
         self._stage += 1
         weights = [_weight(task) for task in tasks]
@@ -83,7 +83,7 @@ class Progress:
             self._restart()
 
     def begin_work(self) -> None:
-        """Tasks begin only now: the time so far was spent on getting ready, and tells nothing of their rate."""
+        """Restart the clock: the time so far was preparation, which does not affect the rate."""
         self._is_working = True
         self._restart()
 
@@ -95,8 +95,8 @@ class Progress:
         """Count a finished task.
 
         Args:
-            task: that is done. cost: seconds and rays of it.
-            is_local: it was done in this run, not in one before an interruption.
+            task: finished one. cost: seconds and rays.
+            is_local: true if it was done in this run, not before an interruption.
         """
         previous = self._done
         self._rays += cost.rays
@@ -113,8 +113,7 @@ class Progress:
             self._last = self._clock()
 
     def fields(self) -> dict[str, float | None]:
-        """As the ledger keeps them: progress from 0 to 1 that never falls, rays per second, and seconds left, once a
-        tenth of the bake is done."""
+        """Fields for the ledger: monotonic progress 0 to 1, rays per second, and remaining seconds, from a tenth on."""
         since_s, worked_s = self._clock() - self._last, self._last - self._began
         per_second = self._rate()
         if per_second:
@@ -132,16 +131,16 @@ class Progress:
         return self._done >= MIN_ESTIMATE_FRACTION
 
     def _remaining_s(self, per_second: float, since_s: float) -> float:
-        """At a rate; but at least as many as where all tasks in hand ended just now."""
+        """Remaining seconds at a rate, at least as many as if all running tasks ended now."""
         in_progress = self._span * min(1.0, self._parallel * self._largest / max(1, self._total))
         gain = self._gain + in_progress
         lower_bound = (1 - self._done - in_progress) * (self._clock() - self._began) / gain if gain else 0.0
         return max(0.0, lower_bound, (1 - self._done) / per_second - since_s)
 
     def _rate(self) -> float | None:
-        """Share of the bake that is done in a second; None where nothing tells.
+        """Fraction of the bake done per second; None if unknown.
 
-        What finished bakes took counts less and less as this one goes on.
+        Finished bakes count less and less as this one advances.
         """
         if not self._is_measurable:
             return None
@@ -155,10 +154,9 @@ class Progress:
         return math.exp(trust * math.log(observed_rate) + (1 - trust) * math.log(expected_rate))
 
     def _worked_s(self) -> float:
-        """Seconds that the finished tasks took, all together.
+        """Total seconds of the finished tasks.
 
-        Tasks that run side by side end together: when the first of them has ended, the wall clock would count the time
-        of all for one alone.
+        Parallel tasks end together: after the first one, the wall clock would count all their time for a single task.
         """
         wall_s, parallel = self._last - self._stage_began, self._parallel
         finished_s = wall_s * self._num_local / max(1, self._num_local + parallel - 1)

@@ -1,7 +1,7 @@
-"""Which unfinished store the finished tasks of a bake are in: machines that share a ledger need not share a folder.
+"""Run markers tie finished tasks to an unfinished store: machines that share a ledger need not share a folder.
 
-Whoever begins a bake from nothing names that beginning, in the ledger and in a file beside the unfinished store. Where
-the two differ, the ledger's tasks are in another machine's folder, or in object storage
+The process that starts a bake from nothing stores a new marker in the ledger and in a file next to the unfinished
+store. If the two differ, the ledger's tasks are in another machine's folder, or in object storage
 (`relume_worker.storage.partial_uploads`).
 """
 
@@ -15,21 +15,21 @@ from relume.core.filesystem import atomic_write
 
 
 def start_run(staging: Path) -> str:
-    """Name a beginning, beside the unfinished store that it will be in."""
+    """Create a marker next to a new unfinished store."""
     run = uuid.uuid4().hex
     set_run(staging, run)
     return run
 
 
 def set_run(staging: Path, run: str) -> None:
-    """Say which beginning an unfinished store is of."""
+    """Set the marker of an unfinished store."""
     staging.parent.mkdir(parents=True, exist_ok=True)
     with atomic_write(_path(staging)) as unfinished:
         unfinished.write_text(run)
 
 
 def get_run(staging: Path) -> str | None:
-    """The name; None where there is none, or from before there were any."""
+    """Read the marker; None if there is none, or the store is older than markers."""
     try:
         return _path(staging).read_text()
     except OSError:
@@ -37,7 +37,7 @@ def get_run(staging: Path) -> str | None:
 
 
 def delete_run(staging: Path) -> None:
-    """Remove the name, where there is one."""
+    """Remove the marker, if there is one."""
     with suppress(OSError):
         _path(staging).unlink(missing_ok=True)
 

@@ -1,7 +1,7 @@
-"""Runs one bake: stages in order, what is not done goes to an executor, what is finished goes into the ledger.
+"""Run one bake: stages in order, unfinished tasks to an executor, finished ones to the ledger.
 
-Killed at any moment, the next run continues where the ledger stands and the published store is the same, bit for bit:
-a task is pure, its shards appear by rename, and only a recorded task counts as done.
+It can be killed at any time: the next run continues where the ledger is, and the published store is the same, bit for
+bit: a task is pure, its shards appear by rename, and only a recorded task counts as done.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ from relume_worker.storage.partial_uploads import PartialUploads, delete_partial
 from relume_worker.task_notes import delete_note, read_note
 from relume_worker.tasks import Job, idle_timer, load_registered_scene, run_task
 
-SCHEDULER_LOST_MESSAGE = "the scheduler went away; start it, then bake again; finished parts are kept"
+SCHEDULER_LOST_MESSAGE = "the scheduler is gone; start it, then bake again; finished tasks are saved"
 CODE_CHANGED_MESSAGE = (
-    "relume has changed since this bake was begun; it starts again, so that its parts are of one version"
+    "relume was updated since this bake started; it starts again, because one version must make all of it"
 )
-TAKEN_OVER_MESSAGE = "another machine had begun this bake; it starts again here"
+TAKEN_OVER_MESSAGE = "another machine had started this bake; it starts again here"
 log = logging.getLogger(__name__)
 
 MAX_ATTEMPTS = 3
@@ -59,15 +59,14 @@ LOSS_LOG_INTERVAL_S = 1.0
 
 @dataclass
 class BakeRunner:
-    """One run of a bake whose lease `owner` holds.
+    """One run of a bake whose lease is `owner`'s.
 
     Attributes:
-        max_in_flight: how many tasks may be handed out at once now; the rest wait here, so that a cancel takes effect
-            at once.
+        max_in_flight: maximum number of submitted tasks; the rest wait here, so that canceling is immediate.
         on_change: called after every change of the ledger.
         is_stopped: the service is closing; the bake stays `running` for the next start.
-        expected_work: what finished bakes tell of this one.
-        working_since: when its first task began, by `time.monotonic`; None before.
+        expected_work: from finished bakes.
+        working_since: start of its first task, by `time.monotonic`; None before.
     """
 
     ledger: Ledger
@@ -85,7 +84,7 @@ class BakeRunner:
     _last_loss_s: float = -inf
 
     def run(self) -> None:
-        """Bake and publish; every failure ends in the ledger as a state and a sentence."""
+        """Bake and publish; every failure is recorded in the ledger as a state and a sentence."""
         with LeaseRenewer(self.ledger.renew_lease, self.job.bake_id, self.owner), idle_timer.keep_awake():
             delete_note(self._staging)  # of an earlier run
             self._run()
@@ -99,14 +98,14 @@ class BakeRunner:
             push(self._target)
             self._renew_lease()
             delete_run(self._staging)
-            with suppress(StorageError):  # the bake is there; what is left over is deleted with its scene
+            with suppress(StorageError):  # the bake is published; leftovers are deleted with its scene
                 delete_partial(identity)
         except CancelledError:
             self._drain()
             has_lease = self._call_ledger(self.ledger.release, identity, self.owner)
-        except Exception as error:  # whatever a method raises must not end the service
+        except Exception as error:  # errors of a method must not end the service
             self._drain()
-            if not self._exists():  # deleted in the middle of a task, with what that wrote to
+            if not self._exists():  # deleted during a task, with its files
                 return
             if not isinstance(error, RelumeError | OSError):
                 log.exception("bake %s failed", identity, extra={"fields": {"bake": identity}})
@@ -119,17 +118,17 @@ class BakeRunner:
             log_lost_lease("bake", identity)
 
     def _renew_lease(self) -> None:
-        """Renew the lease before files are changed that another process, if it has the bake now, goes on with.
+        """Renew the lease before changing files that another process, if it has the bake now, uses.
 
         Raises:
-            CancelledError: it has.
+            CancelledError: another process has the bake.
         """
         if not self._call_ledger(self.ledger.renew_lease, self.job.bake_id, self.owner):
             raise CancelledError("another process has the bake")
 
     def _bake(self) -> int:
         job, target, staging = self.job, self._target, self._staging
-        if target.exists():  # published, and then killed before the ledger knew
+        if target.exists():  # published, and then killed before the ledger was updated
             return folder_bytes(target)
         self._start_or_resume()
         status = self._call_ledger(self.ledger.bake, job.bake_id)
@@ -149,7 +148,7 @@ class BakeRunner:
             raise
 
     def _start_or_resume(self) -> None:
-        """Keep what an earlier run has finished where it is here and of the same code; else start from nothing."""
+        """Resume an earlier run if it is here and by the same code; otherwise start from nothing."""
         identity, staging = self.job.bake_id, self._staging
         run = self._call_ledger(self.ledger.get_run, identity)
         is_local = staging.exists() and get_run(staging) == run
@@ -160,7 +159,7 @@ class BakeRunner:
         if is_local and read_code(staging) == self.job.code:
             self._partial_uploads = PartialUploads(staging, identity, run, finished_tasks) if run is not None else None
             return
-        # where nothing is finished, what is here is left of one that was deleted
+        # without finished tasks, files here are leftovers of a deleted bake
         reason = None if not finished_tasks else CODE_CHANGED_MESSAGE if is_local else TAKEN_OVER_MESSAGE
         if reason is not None:
             log.warning("bake %s: %s", identity, reason, extra={"fields": {"bake": identity}})
@@ -196,13 +195,14 @@ class BakeRunner:
             self._heartbeat(progress, self._phase(stage, progress))
 
     def _num_free_slots(self, num_pending: int) -> int:
-        """How many tasks more may be handed out. Of the last none waits behind another at one process while the next is
-        idle: a stage may have but one long task for each view."""
+        """Number of tasks to submit now. The last ones are spread, so that none waits behind another in one process
+        while the next is idle: a stage may have a single long task per view.
+        """
         num_in_flight, max_tasks = len(self._in_flight), self.max_in_flight()
         return (max_tasks if num_pending + num_in_flight > max_tasks else max(1, max_tasks // 2)) - num_in_flight
 
     def _phase(self, stage: int, progress: Progress) -> Phase:
-        """What the processes are at: until one of them works, what they do to get ready."""
+        """Current phase: until a process computes, its preparation."""
         note = read_note(self._staging)
         if note == "compiling":
             return note
@@ -218,15 +218,15 @@ class BakeRunner:
         try:
             cost = future.result()
         except FutureCancelledError as error:  # nobody here cancels a task
-            self._in_flight.clear()  # handed out while the scheduler went away, they would never end
+            self._in_flight.clear()  # submitted while the scheduler disappeared, they would never end
             raise RelumeError(SCHEDULER_LOST_MESSAGE) from error
         except Exception as error:
             if not _is_lost_process(error):
                 raise
             if attempt == MAX_ATTEMPTS:
                 raise RelumeError(
-                    f"{attempt} worker processes died of the same task, most likely for want of memory; free memory "
-                    "or take fewer lights or a smaller size, then bake again; finished parts are kept"
+                    f"{attempt} worker processes died in the same task, most likely because memory ran out; free "
+                    "memory, or give fewer lights or a smaller size, then bake again; finished tasks are saved"
                 ) from error
             self._log_lost_worker()
             pending.append((task, attempt + 1))
@@ -236,22 +236,22 @@ class BakeRunner:
         progress.add(task, cost, is_local=True)
 
     def _log_lost_worker(self) -> None:
-        """Once of a process, which had more than one task."""
+        """Log a dead process once, though it had several tasks."""
         now_s = time.monotonic()
         if now_s > self._last_loss_s + LOSS_LOG_INTERVAL_S:
             extra = {"fields": {"bake": self.job.bake_id}}
-            log.warning("a worker process died; what it was at is given to another", extra=extra)
+            log.warning("a worker process died; its tasks go to another", extra=extra)
         self._last_loss_s = now_s
 
     def _record(self, task: Task, cost: TaskCost, attempt: int) -> None:
-        """A task is finished: its shards are stored, where others may go on with them, before it counts."""
+        """Record a finished task, after its shards are stored where other machines find them."""
         if self._partial_uploads is not None:
             self._partial_uploads.store((task.stage, task.index))
         if not self._call_ledger(self.ledger.finish_task, self.job.bake_id, self.owner, task, cost, attempt):
             raise CancelledError("the bake was deleted, or another process has it")
 
     def _heartbeat(self, progress: Progress, phase: Phase) -> None:
-        """Record progress; raise CancelledError where somebody wants this run to end."""
+        """Record progress; raise CancelledError if this run should end."""
         if phase != self._phase_entered[0]:
             self._phase_entered = phase, time.time()
         phase_fields = dict(zip(("phase", "phase_since"), self._phase_entered, strict=True))
@@ -262,7 +262,7 @@ class BakeRunner:
         self.on_change()
 
     def _drain(self) -> None:
-        """Wait for the tasks that run and keep what they finished; they would write after us otherwise."""
+        """Wait for running tasks and record them; otherwise they would write after this run has ended."""
         deadline = time.monotonic() + (0 if self.is_stopped() else 600)
         while self._in_flight and time.monotonic() < deadline:
             done_futures, _ = wait(self._in_flight, timeout=HEARTBEAT_S, return_when=FIRST_COMPLETED)
@@ -275,7 +275,7 @@ class BakeRunner:
                         return
 
     def _call_ledger(self, call: Callable[Given, Result], *args: Given.args, **kwargs: Given.kwargs) -> Result:
-        """Call the ledger; one that is away for a while delays the bake and ends nothing."""
+        """Call the ledger; an outage delays the bake, and does not end it."""
         return with_retry(self.is_stopped, call, *args, **kwargs)
 
     def _exists(self) -> bool:
@@ -286,20 +286,20 @@ class BakeRunner:
         return True
 
     def _error_message(self, error: Exception) -> str:
-        """What went wrong and what to do, in one line."""
+        """Error and remedy, in one line."""
         if isinstance(error, DiskFullError) or (isinstance(error, OSError) and is_disk_full(error)):
             needed_bytes = self._call_ledger(self.ledger.bake, self.job.bake_id).plan.planned_bytes
             missing_text = bytes_text(max(1_000_000, needed_bytes - folder_bytes(self._staging)))
-            return f"disk full; free {missing_text}, then bake again; finished parts are kept"
+            return f"disk full; free {missing_text}, then bake again; finished tasks are saved"
         if isinstance(error, RelumeError):
             return " ".join(str(error).split())
-        if type(error).__name__ == "CommClosedError":  # submitting met a closed connection
+        if type(error).__name__ == "CommClosedError":  # the connection closed while submitting
             return SCHEDULER_LOST_MESSAGE
         if isinstance(error, MemoryError):
-            return "out of memory; take fewer lights or a smaller size, then bake again; finished parts are kept"
+            return "out of memory; give fewer lights or a smaller size, then bake again; finished tasks are saved"
         if isinstance(error, OSError):
-            return f"a file cannot be read or written ({error.strerror}); see to it, then bake again"
-        return f"a defect: {type(error).__name__}: {str(error)[:200]}; the log has the trace"
+            return f"a file cannot be read or written ({error.strerror}); fix this, then bake again"
+        return f"internal error: {type(error).__name__}: {str(error)[:200]}; the log has the traceback"
 
     @property
     def _target(self) -> Path:
@@ -311,14 +311,14 @@ class BakeRunner:
 
 
 def _is_lost_process(error: Exception) -> bool:
-    """Whether a task ended because its process did."""
+    """True if a task ended because its process did."""
     if isinstance(error, BrokenExecutor):
         return True
     return type(error).__name__ in ("KilledWorker", "CommClosedError")
 
 
 def check_published(path: Path) -> bool:
-    """Whether a bake's store is there and can be opened; one that cannot is removed, so that it is baked again."""
+    """True if a bake's store exists and can be opened; a damaged one is removed, so that it is baked again."""
     try:
         open_store(path)
     except RelumeError:

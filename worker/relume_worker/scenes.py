@@ -1,4 +1,4 @@
-"""The scene registry: scenes/<id>/ on disk, one row each in the ledger's database."""
+"""Scene registry: scenes/<id>/ on disk, one row each in the ledger's database."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from relume_worker.storage import delete_remote, push
 
 @dataclass(frozen=True)
 class SceneRecord:
-    """What lists show of a scene, without reading its arrays.
+    """Summary of a scene, without its arrays.
 
     Attributes:
         created: seconds since 1970.
-        views: camera names, in order. aspects: of each the width ÷ height that its file says, or None.
+        views: camera names, in order. aspects: width ÷ height of each in its file, or None.
         materials: {"name", "terms", "shadow_catcher", "is_projected", "is_glass"} each, in the order of material ids;
             old ones lack the last three.
-        variants: partial looks that the file brought, by name.
-        lights: names of the scene's own.
+        variants: partial looks of the file, by name.
+        lights: names of the scene's lights.
     """
 
     id: str
@@ -53,11 +53,11 @@ class SceneRecord:
 
 
 def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
-    """Keep a scene; the same content twice is the same scene, its newest name and warnings win.
+    """Store a scene; the same content is the same scene, with its newest name and warnings.
 
     Args:
-        data_dir: where scenes are kept. ledger: where they are listed.
-        scene: as an importer has made it.
+        data_dir: of scenes. ledger: of scenes.
+        scene: from an importer.
     Returns:
         The scene's id.
     """
@@ -67,7 +67,7 @@ def register_scene(data_dir: Path, ledger: Ledger, scene: Scene) -> str:
 
 
 def summarize_scene(scene: Scene) -> dict[str, Any]:
-    """What lists show of a scene, its name too."""
+    """Summarize a scene for lists, with its name."""
     return {
         "name": scene.name,
         "views": [camera.name for camera in scene.cameras],
@@ -90,11 +90,11 @@ def summarize_scene(scene: Scene) -> dict[str, Any]:
 
 
 def insert_scene(data_dir: Path, ledger: Ledger, scene_id: str, summary: Mapping[str, Any]) -> None:
-    """List a scene whose files are in their place.
+    """Insert the row of a scene whose files are in place.
 
     Args:
-        data_dir: where scenes are kept. ledger: where they are listed.
-        scene_id: of the scene. summary: of it, see `summarize_scene`.
+        data_dir: of scenes. ledger: of scenes.
+        scene_id: of the scene. summary: see `summarize_scene`.
     """
     push(scene_path(data_dir, scene_id))
     row = SceneRow(id=scene_id, name=summary["name"], created=time.time(), summary=json.dumps(summary))
@@ -114,7 +114,7 @@ def list_scenes(ledger: Ledger) -> list[SceneRecord]:
 
 
 def get_scene(ledger: Ledger, scene_id: str) -> SceneRecord:
-    """A scene by id. Raises NotFoundError."""
+    """Return a scene. Raises NotFoundError."""
     with ledger.sessions() as session:
         row = session.get(SceneRow, scene_id)
     if row is None:
@@ -123,24 +123,24 @@ def get_scene(ledger: Ledger, scene_id: str) -> SceneRecord:
 
 
 def delete_scene(data_dir: Path, ledger: Ledger, scene_id: str) -> None:
-    """Delete a scene with its bakes and their stores: they are of no use without it.
+    """Delete a scene with its bakes and their stores, which are useless without it.
 
     Args:
-        data_dir: where scenes and stores are kept. ledger: where they are listed.
-        scene_id: of the scene; its bakes that run are cancelled.
+        data_dir: of scenes and stores. ledger: of both.
+        scene_id: of the scene; its running bakes are canceled.
     Raises:
         NotFoundError: there is no such scene.
     """
     get_scene(ledger, scene_id)
     delete_bakes(data_dir, ledger, [status.id for status in ledger.bakes(scene_id)])
-    while not _delete_scene_row(ledger, scene_id):  # somebody has asked for a bake of it meanwhile
+    while not _delete_scene_row(ledger, scene_id):  # a bake of it was submitted meanwhile
         delete_bakes(data_dir, ledger, [status.id for status in ledger.bakes(scene_id)])
     delete_remote(scene_path(data_dir, scene_id))
     _remove(scene_path(data_dir, scene_id))
 
 
 def _delete_scene_row(ledger: Ledger, scene_id: str) -> bool:
-    """Whether a scene is in the ledger no more; false where there is a bake or a camera of it."""
+    """Delete the row of a scene; false if there is a bake or a camera of it."""
     try:
         with ledger.sessions.begin() as session:
             session.execute(delete(CameraRow).where(CameraRow.scene_id == scene_id))
@@ -154,12 +154,12 @@ def delete_bakes(data_dir: Path, ledger: Ledger, ids: Sequence[str]) -> None:
     """Delete bakes with their stores, finished or not.
 
     Args:
-        data_dir: where stores are kept. ledger: where they are listed.
-        ids: of bakes; those that run are cancelled.
+        data_dir: of stores. ledger: of bakes.
+        ids: of bakes; running ones are canceled.
     """
     try:
         _delete_bake_rows(ledger, ids)
-    except DiskFullError:  # to delete takes room, too: theirs
+    except DiskFullError:  # deleting rows needs disk space, too: first free theirs
         _remove_stores(data_dir, ids)
         _delete_bake_rows(ledger, ids)
     for identity in ids:
@@ -181,7 +181,7 @@ def _remove_stores(data_dir: Path, ids: Sequence[str]) -> None:
 
 
 def _remove(store: Path) -> None:
-    """Delete a store that no ledger names any more, where there is one."""
+    """Delete a store that no ledger names any more, if it exists."""
     with suppress(OSError):
         remove_folder(store)
 
@@ -196,7 +196,7 @@ def _record(row: SceneRow) -> SceneRecord:
         materials=tuple(summary["materials"]),
         warnings=tuple(warning_of(warning) for warning in summary["warnings"]),
         num_triangles=summary["num_triangles"],
-        variants=summary.get("variants", {}),  # rows of before there were any
+        variants=summary.get("variants", {}),  # rows from before this field
         lights=tuple(summary.get("lights", ())),
         aspects=tuple(summary.get("aspects", ())),
     )

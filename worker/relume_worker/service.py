@@ -1,5 +1,4 @@
-"""The bake service: what the server and the command line use. It owns the threads that run bakes; the ledger and the
-stores own everything that must survive them."""
+"""Bake service for server and command line; the ledger and the stores own everything that must survive its threads."""
 
 from __future__ import annotations
 
@@ -43,9 +42,9 @@ log = logging.getLogger(__name__)
 
 POLL_S = 1.0
 CLOSE_S = 10.0
-STOPPED_RETENTION_S = 7 * 86_400.0  # what a failed or cancelled bake has finished, for whoever asks for it again
-START_S = 8.0  # until worker processes are at work, where none has been started yet: measured on two cores
-NUM_REFERENCE_BAKES = 8  # finished bakes that an estimate looks at
+STOPPED_RETENTION_S = 7 * 86_400.0  # lifetime of the finished tasks of a failed or canceled bake
+START_S = 8.0  # start of worker processes, if none are running: measured on two cores
+NUM_REFERENCE_BAKES = 8  # finished bakes used for an estimate
 
 
 class BakeService:
@@ -62,15 +61,15 @@ class BakeService:
     ) -> None:
         """
         Args:
-            data_dir: folder of scenes and bakes; made where it is missing.
-            ledger_url: of SQLite or PostgreSQL; None: relume.db in the data directory.
+            data_dir: folder of scenes and bakes; created if missing.
+            ledger_url: SQLite or PostgreSQL; None: relume.db in the data directory.
             scheduler: address of a Dask scheduler; None: an embedded cluster, started by the first bake that needs it.
             num_workers: processes of the embedded cluster; None: one per core.
-            methods: what can be baked, by name; None: relume's registry.
+            methods: available methods by name; None: relume's registry.
             client_weights: of some clients, see `relume_worker.fair_share.FairShare`.
         """
-        get_storage()  # what is wrong with its address is said before anything runs
-        bake_code()  # of what runs now: its files may be exchanged while it does
+        get_storage()  # fail early if its address is invalid
+        bake_code()  # of the running version: its files may be replaced meanwhile
         self.data_dir = data_dir.resolve()
         self.data_dir.mkdir(mode=0o700, parents=True, exist_ok=True)
         refuse_unfinished(self.data_dir)
@@ -80,7 +79,7 @@ class BakeService:
         self._blocked_bakes = BlockedBake()
         self._status_bus = StatusBus(self.get)
         self._database_errors = {
-            tiny: DatabaseError(log, f"the queue of {kind} cannot be worked on")
+            tiny: DatabaseError(log, f"the queue of {kind} cannot be processed")
             for tiny, kind in ((False, "bakes"), (True, "small bakes"))
         }
         self._owner = new_owner()
@@ -92,7 +91,7 @@ class BakeService:
         self._threads: list[threading.Thread] = []
 
     def start(self) -> None:
-        """Start running bakes: those in the queue, and those that a process left behind when it died."""
+        """Start running bakes: queued ones, and those that a dead process left."""
         self._delete_orphans()
         for tiny in (True, False):
             name = "relume-tiny-bakes" if tiny else "relume-bakes"
@@ -104,7 +103,7 @@ class BakeService:
             self._threads[-1].start()
 
     def close(self) -> None:
-        """Stop running bakes; an unfinished one continues at the next start."""
+        """Stop running bakes; an unfinished one resumes at the next start."""
         self._closing.set()
         self._notify_change()
         for thread in self._threads:
@@ -122,9 +121,9 @@ class BakeService:
         self.close()
 
     def plan(self, scene_id: str, recipe: Recipe) -> Plan:
-        """What a bake would cost, checked against this machine's memory and disk.
+        """Cost of a bake, checked against this machine's memory and disk.
 
-        A little of it is baked where its bound on disk is large: a second for the first plan of a scene.
+        If the upper bound of its disk space is large, a small part is baked: a second for the first plan of a scene.
 
         Raises:
             NotFoundError: there is no such scene.
@@ -145,10 +144,10 @@ class BakeService:
         return plan
 
     def submit(self, scene_id: str, recipe: Recipe, client: str = "") -> str:
-        """Queue a bake of `scene_id` by a recipe for a client, and return its id; raises what `plan` raises.
+        """Queue a bake of `scene_id` for a client, and return its id; raises what `plan` raises.
 
-        The same recipe under the same code is the same bake: one that is queued, running or ready stays as it is, one
-        that failed or was cancelled goes on where it stopped.
+        The same recipe under the same code is the same bake: a queued, running or ready one is unchanged, a failed or
+        canceled one resumes.
         """
         identity = bake_id(scene_id, recipe)
         if self._is_ready(identity):
@@ -158,7 +157,7 @@ class BakeService:
         return identity
 
     def get(self, bake_id: str) -> BakeStatus:
-        """A bake. Raises NotFoundError."""
+        """Return a bake. Raises NotFoundError."""
         return self._blocked_bakes.with_reason(self.ledger.bake(bake_id))
 
     def bakes(self, scene_id: str | None = None) -> list[BakeStatus]:
@@ -170,14 +169,14 @@ class BakeService:
         return self._status_bus.subscribe(bake_id)
 
     def cancel(self, bake_id: str) -> bool:
-        """Cancel a bake; finished tasks are kept for a resume. False where it is not under way: it stays as it is."""
+        """Cancel a bake; finished tasks are saved for a resume. False if it is neither queued nor running."""
         self.get(bake_id)
         is_canceled = self.ledger.cancel(bake_id)
         self._notify_change()
         return is_canceled
 
     def delete(self, bake_id: str) -> None:
-        """Delete a bake in whatever state it is, with its store. Raises NotFoundError, StorageError."""
+        """Delete a bake in any state, with its store. Raises NotFoundError, StorageError."""
         from relume_worker.scenes import delete_bakes
 
         self.get(bake_id)
@@ -185,22 +184,24 @@ class BakeService:
         self._notify_change()
 
     def store_path(self, bake_id: str) -> Path:
-        """Where the published store of a bake lies. Raises NotFoundError where the id is malformed."""
+        """Path of the published store of a bake. Raises NotFoundError if the id is malformed."""
         return bake_path(self.data_dir, bake_id)
 
     def estimate_seconds(self, plan: Plan) -> float | None:
-        """Seconds that a bake will take, by those that took place here; None where there were none.
+        """Estimate the seconds of a bake from finished bakes; None if there are none.
 
-        Processes that have to be started for it, and to load the kernels, are part of it.
+        Includes starting processes and loading kernels.
         """
         work_s = self._work_s(plan)
         is_cold = not is_tiny(plan) and not self._executors.has_cluster
         return work_s if work_s is None or not is_cold else work_s + self._start_s
 
     def _work_s(self, plan: Plan) -> float | None:
-        """Seconds from the first task's begin on."""
+        """Seconds from the start of the first task."""
         load = machine_load()
-        if is_tiny(plan) or not self._is_crowding.is_set():  # else a bake that ends before this one is counted already
+        if (
+            is_tiny(plan) or not self._is_crowding.is_set()
+        ):  # otherwise a bake that ends before this one would count twice
             load += self._executors.num_workers
         completed = self.ledger.finished_bakes(NUM_REFERENCE_BAKES)
         return estimate_seconds(plan, completed, self._executors.num_workers, crowding(load))
@@ -213,7 +214,7 @@ class BakeService:
         return ExpectedWork(self._work_s(status.plan), stage_fractions, parallel)
 
     def workers_resident_bytes(self) -> int:
-        """Memory of the worker processes that this service has started."""
+        """Resident memory of this service's worker processes, in bytes."""
         return self._executors.resident_bytes()
 
     def _resolve_scene_id(self, scene_id: str) -> str:
@@ -231,7 +232,7 @@ class BakeService:
         return self._methods[name]
 
     def _is_ready(self, identity: str) -> bool:
-        """Whether a bake is finished and its store usable; a lost or damaged store is queued again."""
+        """True if a bake is finished and its store is usable; a lost or damaged store is queued again."""
         try:
             state = self.ledger.bake(identity).state
         except NotFoundError:
@@ -256,7 +257,7 @@ class BakeService:
             try:
                 self._wakes[tiny].clear()
                 has_run = self._run_next(tiny)
-                if has_run or not self._blocked_bakes:  # a bake that waits for its own lease says nothing of the disk
+                if has_run or not self._blocked_bakes:  # a bake waiting for its own lease is not blocked by the disk
                     self._database_errors[tiny].report_recovered()
                 if has_run:
                     last_active_s = time.monotonic()
@@ -264,7 +265,7 @@ class BakeService:
                 if not tiny and time.monotonic() - last_active_s > idle_seconds():
                     self._executors.stop_cluster()
                 self._wakes[tiny].wait(POLL_S)
-            except Exception as error:  # the database may be away for a while; the lane must outlive that
+            except Exception as error:  # the lane must survive an unavailable database
                 self._database_errors[tiny].report_failure(error)
                 self._closing.wait(POLL_S)
 
@@ -293,7 +294,7 @@ class BakeService:
                 self.ledger.heartbeat(status.id, self._owner, phase="starting", phase_since=time.time())
                 self._status_bus.notify_change()
             executor = self._executors.local() if tiny else self._executors.cluster()
-        except SQLAlchemyError:  # its lease runs out, and it is claimed again
+        except SQLAlchemyError:  # its lease expires, and it is claimed again
             raise
         except Exception as error:
             self.ledger.finish(status.id, self._owner, "failed", str(error))
@@ -321,7 +322,7 @@ class BakeService:
             self._start_s = runner.working_since - start_s
 
     def _store_all(self) -> None:
-        """Store what is here and not in the storage: from before there was one, or from while it was away."""
+        """Upload local data that the storage lacks: from before it was configured, or from an outage."""
         try:
             statuses = self.ledger.bakes()
             scenes = [scene_path(self.data_dir, scene) for scene in dict.fromkeys(bake.scene for bake in statuses)]
@@ -330,16 +331,15 @@ class BakeService:
                 if self._closing.is_set():
                     return
                 push(path)
-        except Exception as error:  # bakes go on
-            DatabaseError(log, "what is in the data directory cannot be put into the object storage").report_failure(
-                error
-            )
+        except Exception as error:  # bakes continue
+            DatabaseError(log, "the data directory cannot be uploaded to the object storage").report_failure(error)
 
     def _delete_orphans(self) -> None:
-        """Delete unfinished stores that no bake in the ledger will finish, or could only by starting again, and those
-        of bakes that were stopped and not asked for again for long."""
+        """Delete unfinished stores that no bake in the ledger can resume, and those of bakes that were stopped long
+        ago.
+        """
         folders = list((self.data_dir / "bakes" / "staging").glob("*.zarr"))
-        # asked after the folders: of a bake that another process begins meanwhile the row comes first
+        # queried after listing: another process inserts the row before it creates the folder
         states = {status.id: status.state for status in self.ledger.bakes()}
         for folder in folders:
             identity = folder.name.removesuffix(".zarr")
@@ -350,9 +350,9 @@ class BakeService:
             ):
                 if is_stopped and get_run(folder) == self.ledger.get_run(
                     identity
-                ):  # else its tasks are another machine's
+                ):  # otherwise its tasks are another machine's
                     self.ledger.delete_tasks(identity)
-                    with suppress(StorageError):  # what is left over is deleted with the bake
+                    with suppress(StorageError):  # leftovers are deleted with the bake
                         delete_partial(identity)
                 shutil.rmtree(folder, ignore_errors=True)
                 delete_note(folder)
@@ -360,6 +360,6 @@ class BakeService:
 
 
 def _age_s(folder: Path) -> float:
-    """How long ago anything was written in a folder."""
+    """Seconds since the last write in a folder."""
     latest = max((path.stat().st_mtime for path in (folder, *folder.rglob("*")) if path.exists()), default=0.0)
     return time.time() - latest

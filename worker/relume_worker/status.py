@@ -1,4 +1,4 @@
-"""What the ledger knows about a bake, as everybody outside sees it."""
+"""State of a bake as the ledger reports it."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ PHASE_LABELS: dict[Phase, str] = {
     "starting": "starting worker processes",
     "loading": "loading the kernels",
     "reading": "reading the scene",
-    "building": "sorting its triangles for tracing",
+    "building": "building the ray-tracing structure",
     "compiling": "compiling kernels, once on this machine",
-    "sampling": "finding what each pixel sees",
+    "sampling": "finding the visible surfaces of each pixel",
     "tracing": "tracing",
     "publishing": "checking and publishing",
 }
@@ -32,18 +32,18 @@ FREE_CAMERA_METHODS = frozenset({"probes"})
 
 @dataclass(frozen=True)
 class BakeStatus:
-    """One bake at one moment.
+    """State of a bake at one moment.
 
     Attributes:
         progress: 0 to 1.
-        phase: what it does now, None where it does not run. phase_since: seconds since 1970.
-        queue_position: bakes that will run before it, where it is queued.
-        rays_per_second, seconds_left: None where nothing was measured yet.
+        phase: current phase, None if it is not running. phase_since: seconds since 1970.
+        queue_position: bakes before it, if it is queued.
+        rays_per_second, seconds_left: None if nothing has been measured yet.
         bytes: size of the published store, 0 before.
-        problem: one sentence with what to do about it, or why it has started again; None where all is well.
-        code: names the code that makes or made it; None where that was not written down yet.
+        problem: one sentence with a remedy, or why it has restarted; None if there is no problem.
+        code: code version that makes or made it; None if unknown.
         created: seconds since 1970.
-        client: who asked for it first; "" where that was not written down, or nobody logs in.
+        client: first user who submitted it; "" if unknown, or without login.
     """
 
     id: str
@@ -65,33 +65,32 @@ class BakeStatus:
 
     @property
     def is_current(self) -> bool:
-        """Whether baking it anew would give the same: no other code has made it."""
+        """True if baking again would give the same result, because the code version is the same."""
         return self.code == bake_code()
 
     @property
     def rank(self) -> tuple[bool, int, bool]:
-        """Sorts a scene's bakes, the best last: one whose pictures are exact at once, the finest, then one that this
-        code has made."""
+        """Sort key of a scene's bakes, the best last: exact while moving, then the finest, then the current code."""
         return self.recipe.method not in FREE_CAMERA_METHODS, self.detail, self.is_current
 
     @property
     def detail(self) -> int:
-        """Pixels times lights: what makes a bake finer."""
+        """Pixels times lights: the fineness of a bake."""
         width, height = self.recipe.size
         return width * height * self.recipe.num_lights
 
     @property
     def final(self) -> bool:
-        """Whether nothing more happens by itself."""
+        """True if nothing more happens by itself."""
         return self.state in FINAL_STATES
 
 
 @dataclass(frozen=True)
 class TaskCost:
-    """What a finished task took.
+    """Cost of a finished task.
 
     Attributes:
-        trace_s: seconds in the tracing kernels. seconds: all of it, writing included.
+        trace_s: seconds in the tracing kernels. seconds: total, including writing.
     """
 
     rays: int
@@ -100,12 +99,12 @@ class TaskCost:
 
 
 def recipe_json(recipe: Recipe) -> str:
-    """A recipe as canonical JSON: equal recipes give equal text."""
+    """Encode a recipe as canonical JSON: equal recipes give equal text."""
     return json.dumps(asdict(recipe), sort_keys=True, separators=(",", ":"))
 
 
 def recipe_from_json(text: str) -> Recipe:
-    """The inverse of `recipe_json`."""
+    """Inverse of `recipe_json`."""
     document: dict[str, Any] = json.loads(text)
     width, height = document["size"]
     return Recipe(
@@ -114,7 +113,7 @@ def recipe_from_json(text: str) -> Recipe:
         (width, height),
         int(document["num_lights"]),
         bool(document["relightable"]),
-        tuple(read_custom_camera(camera) for camera in document.get("cameras", ())),  # recipes of before there were any
+        tuple(read_custom_camera(camera) for camera in document.get("cameras", ())),  # recipes from before this field
         int(document.get("num_probes", Recipe.num_probes)),
         document.get("num_patches"),
         document.get("gather_rays"),
@@ -122,6 +121,6 @@ def recipe_from_json(text: str) -> Recipe:
 
 
 def bake_id(scene_id: str, recipe: Recipe) -> str:
-    """Name of a bake: the first 16 hexadecimal digits of SHA-256 over scene, recipe, schema version and code."""
+    """Id of a bake: the first 16 hexadecimal digits of SHA-256 over scene, recipe, schema version and code."""
     text = json.dumps([scene_id, recipe_json(recipe), SCHEMA_VERSION, bake_code()])
     return hashlib.sha256(text.encode()).hexdigest()[:16]

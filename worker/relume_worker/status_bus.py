@@ -1,4 +1,4 @@
-"""Tells whoever asked when a bake changes, whichever process runs it."""
+"""Notify subscribers of changes of a bake, whichever process runs it."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ log = logging.getLogger(__name__)
 
 
 class Subscription:
-    """Changes of one bake, the state at the time of asking first. Close it, or use it as a context manager.
+    """Changes of one bake, starting with its current state. Close it, or use it as a context manager.
 
     Attributes:
-        latest: the newest state. is_closed: no change follows: it was closed, as where the bake was deleted.
+        latest: newest state. is_closed: no change follows: it was closed, or the bake was deleted.
     """
 
     def __init__(self, bus: StatusBus, bake_id: str, first: BakeStatus) -> None:
@@ -31,27 +31,27 @@ class Subscription:
         self._changes.put(first)
 
     def get(self, timeout: float | None = None) -> BakeStatus | None:
-        """The next change; None where none came within `timeout` seconds, or the subscription was closed."""
+        """Next change; None after `timeout` seconds, or if the subscription was closed."""
         try:
             return self._changes.get(timeout=timeout)
         except queue.Empty:
             return None
 
     def __iter__(self) -> Iterator[BakeStatus]:
-        """Changes until the bake is ready, failed or cancelled, or the subscription is closed."""
+        """Yield changes until the bake is ready, failed or canceled, or the subscription is closed."""
         while (status := self._changes.get()) is not None:
             yield status
             if status.final:
                 return
 
     def put(self, status: BakeStatus) -> None:
-        """Hand over a status where it differs from the last."""
+        """Deliver a status if it differs from the last."""
         if status != self.latest:
             self.latest = status
             self._changes.put(status)
 
     def close(self) -> None:
-        """End the subscription; an iterator over it ends too."""
+        """End the subscription; its iterators end too."""
         self._bus.remove(self)
         self.is_closed = True
         self._changes.put(None)
@@ -64,10 +64,10 @@ class Subscription:
 
 
 class StatusBus:
-    """Looks at bakes for all subscriptions: at once when this process changed any, else every half second.
+    """Polls bakes for all subscriptions: at once after a change by this process, otherwise every half second.
 
     Args:
-        read: a bake as it is now. Raises NotFoundError.
+        read: returns a bake. Raises NotFoundError.
     """
 
     def __init__(self, read: Callable[[str], BakeStatus]) -> None:
@@ -77,7 +77,7 @@ class StatusBus:
         self._wake = threading.Event()
         self._is_closed = False
         self._thread: threading.Thread | None = None
-        self._database_error = DatabaseError(log, "changes of bakes cannot be told")
+        self._database_error = DatabaseError(log, "changes of bakes cannot be read")
 
     def subscribe(self, bake_id: str) -> Subscription:
         """Follow a bake. Raises NotFoundError."""
@@ -91,12 +91,12 @@ class StatusBus:
         return subscription
 
     def remove(self, subscription: Subscription) -> None:
-        """Stop telling a subscription."""
+        """Remove a subscription."""
         with self._lock:
             self._subscriptions.discard(subscription)
 
     def notify_change(self) -> None:
-        """The ledger was changed by this process."""
+        """Poll now, because this process has changed the ledger."""
         self._wake.set()
 
     def close(self) -> None:
@@ -133,29 +133,29 @@ class StatusBus:
 
 
 class BlockedBake:
-    """What hinders bakes that the ledger cannot be told of, as on a full disk, and how far each was then."""
+    """Bakes blocked by an error that the ledger cannot store, such as a full disk, with their progress then."""
 
     def __init__(self) -> None:
         self._blocked: dict[str, tuple[float, str]] = {}
 
     def __bool__(self) -> bool:
-        """Whether anything does."""
+        """True if any bake is blocked."""
         return bool(self._blocked)
 
     def report_blocked(self, status: BakeStatus, error: Exception) -> None:
-        """A bake could not be claimed, or could not go on."""
+        """Record that a bake could not be claimed, or could not continue."""
         if isinstance(error, DiskFullError):
             self._blocked[status.id] = status.progress, str(error)
 
     def report_resumed(self, bake_id: str) -> None:
-        """It goes on."""
+        """Record that a bake continues."""
         self._blocked.pop(bake_id, None)
 
     def with_reason(self, status: BakeStatus) -> BakeStatus:
-        """A status with what hinders it, unless it has gone on elsewhere."""
+        """Add the reason to a blocked bake's status, unless it has continued elsewhere."""
         progress, reason = self._blocked.get(status.id, (status.progress, ""))
         if status.final or status.progress > progress:
             self.report_resumed(status.id)
         elif reason and status.problem is None:
-            return replace(status, problem=f"{reason}; the bake goes on by itself")
+            return replace(status, problem=f"{reason}; the bake resumes by itself")
         return status

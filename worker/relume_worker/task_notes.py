@@ -1,7 +1,7 @@
-"""What the processes of a bake are at before any of their tasks is done, which can take a minute.
+"""Activity of a bake's processes before the first task is done, which can take a minute.
 
-A process that runs a task notes what it is at in a file beside the unfinished store, which every process of a cluster
-sees; whoever runs the bake reads it at each heartbeat.
+A process that runs a task writes its activity into a file next to the unfinished store, visible to all processes of a
+cluster; the runner of the bake reads it at each heartbeat.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ _ACTIVITIES: tuple[Activity, ...] = ("reading", "building", "compiling", "workin
 
 
 def note_path(staging: Path) -> Path:
-    """The file of notes beside an unfinished store."""
+    """Status file next to an unfinished store."""
     return staging.with_suffix(".phase")
 
 
 def read_note(staging: Path) -> Activity | None:
-    """What was noted last; None where nothing was."""
+    """Last activity; None if there is none."""
     try:
         text = note_path(staging).read_text()
     except OSError:
@@ -36,20 +36,20 @@ def read_note(staging: Path) -> Activity | None:
 
 
 def delete_note(staging: Path) -> None:
-    """Remove it, where there is one."""
+    """Remove the file, if it exists."""
     with suppress(OSError):
         note_path(staging).unlink(missing_ok=True)
 
 
 class TaskNotes:
-    """Notes of one task; kernels that are compiled meanwhile are noted as well."""
+    """Activity of one task, including kernels compiled meanwhile."""
 
     def __init__(self, staging: Path) -> None:
         self._path = note_path(staging)
         self._latest: Activity | None = None
 
     def note(self, activity: Activity) -> None:
-        """Say what the process is at. A disk that is full or read-only costs the words alone."""
+        """Set the activity. If the disk is full or read-only, only this message is lost."""
         self._latest = activity
         self._write(activity)
 
@@ -59,7 +59,7 @@ class TaskNotes:
 
     @contextmanager
     def watching_compiler(self) -> Iterator[None]:
-        """While the block runs, kernels that this process compiles are noted."""
+        """Report compiled kernels inside the block."""
         listener = _CompileListener(self)
         event.register("numba:compile", listener)  # type: ignore[no-untyped-call]
         try:
@@ -68,7 +68,7 @@ class TaskNotes:
             event.unregister("numba:compile", listener)  # type: ignore[no-untyped-call]
 
     def set_compiling(self, is_compiling: bool) -> None:
-        """A kernel is being compiled, or was: what was noted before goes on."""
+        """Set whether a kernel is being compiled; afterwards the previous activity continues."""
         if is_compiling:
             self._write("compiling")
         elif self._latest is not None:
@@ -76,7 +76,7 @@ class TaskNotes:
 
 
 class _CompileListener(event.Listener):
-    """Kernels that call others are compiled with them: the outermost counts."""
+    """Counts nested compilations: kernels that call others are compiled with them."""
 
     def __init__(self, notes: TaskNotes) -> None:
         self._notes, self._depth = notes, 0

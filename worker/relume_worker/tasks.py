@@ -1,4 +1,4 @@
-"""One task in one process: load the scene once, compute, write whole shards."""
+"""Run one task in one process: load the scene once, compute, write complete shards."""
 
 from __future__ import annotations
 
@@ -21,18 +21,16 @@ from relume_worker.status import TaskCost
 from relume_worker.storage import fetch_if_missing
 from relume_worker.task_notes import TaskNotes
 
-CODE_MISMATCH_MESSAGE = (
-    "a worker process runs another version of relume than the server; start both again, then bake again"
-)
+CODE_MISMATCH_MESSAGE = "a worker process runs another version of relume than the server; restart both, then bake again"
 
 
 @dataclass(frozen=True)
 class Job:
-    """What a process must know to run any task of a bake; small, it travels with every task.
+    """Input of all tasks of a bake; small, it is sent with every task.
 
     Attributes:
-        data_dir: the data directory, at the same path on every machine of a cluster.
-        code: names the code of the process that hands the tasks out.
+        data_dir: data directory, at the same path on every machine of a cluster.
+        code: code version of the submitting process.
     """
 
     data_dir: Path
@@ -45,7 +43,7 @@ class Job:
 
 @lru_cache(maxsize=2)
 def load_registered_scene(data_dir: Path, scene_id: str) -> Scene:
-    """A registered scene; a process keeps the last two."""
+    """Load a registered scene; a process caches the last two."""
     return load_scene(fetch_if_missing(scene_path(data_dir, scene_id)))
 
 
@@ -53,12 +51,12 @@ _methods: dict[bytes, BakeMethod] = {}
 
 
 def _intern_method(method: BakeMethod) -> BakeMethod:
-    """This process's own copy of a method, which keeps what it built for a scene: each task brings a fresh one."""
+    """This process's own copy of a method with its cached data for a scene; each task brings a fresh copy."""
     return _methods.setdefault(pickle.dumps(method), method)
 
 
 def _release_caches() -> None:
-    """Let go of scenes, of what methods built for them, and of what was read of stores."""
+    """Release cached scenes, methods' data and store contents."""
     load_registered_scene.cache_clear()
     _methods.clear()
     run_bake.open_stage_reader.cache_clear()
@@ -66,19 +64,19 @@ def _release_caches() -> None:
 
 
 idle_timer = IdleTimer(idle_seconds, _release_caches)
-"""Of this process: what it keeps between tasks goes when no task has come for a while."""
+"""Releases the caches of this process after some time without tasks."""
 
 
 def cached_bytes() -> int:
-    """What this process keeps between tasks; Embree's structures, about as much again, are not counted."""
+    """Bytes cached between tasks, without Embree's structures, which take about as much again."""
     return live_bytes(load_registered_scene, _methods, run_bake.open_stage_reader)
 
 
 def run_task(job: Job, task: Task) -> TaskCost:
-    """Compute a task and write its shards into the staging store; doing it twice leaves the same bytes.
+    """Compute a task and write its shards into the unfinished store; repeating it gives the same bytes.
 
     Raises:
-        StoreError: this process runs other code than the one that hands the tasks out; a store has one code's alone.
+        StoreError: this process runs other code than the submitting one; a store must be made by one version.
     """
     if job.code != bake_code():
         raise StoreError(CODE_MISMATCH_MESSAGE)

@@ -1,1 +1,1 @@
-"""The soak: a server under sessions, bakes, deletes and killed processes; memory, handles and disk stay flat."""
+"""Soak test: a server with sessions, bakes, deletes and killed processes; memory, handles and disk stay constant."""

@@ -1,4 +1,4 @@
-"""`make soak MINUTES=120`: exit 0 where nothing failed, and memory, handles, threads and disk stayed flat."""
+"""`make soak MINUTES=120`: exit 0 if nothing failed, and memory, handles, threads and disk stayed constant."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ MINUTES, EVERY_S, SEED = 120.0, 5.0, 1
 
 
 def main() -> int:
-    """Soak, and say what came of it."""
+    """Run the soak test, and print its result."""
     parser = argparse.ArgumentParser(prog="make soak", description=__doc__)
     parser.add_argument("--minutes", type=float, default=MINUTES)
-    parser.add_argument("--samples", type=Path, help="file for what was measured, JSON lines")
+    parser.add_argument("--samples", type=Path, help="file for the measurements, JSON lines")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="relume-soak-") as folder:
         server = Server(Path(folder))
@@ -37,8 +37,8 @@ def main() -> int:
         *(f"{count:7} {event}" for event, count in sorted(users.counts.items())),
         *(each.line() for each in trend_lines),
     ]
-    lines += users.failures + ([] if traces == 0 else [f"{traces} defects in the server's log"])
-    lines += [] if has_stopped else ["the server did not stop in order"]
+    lines += users.failures + ([] if traces == 0 else [f"{traces} internal errors in the server's log"])
+    lines += [] if has_stopped else ["the server did not stop cleanly"]
     sys.stdout.write("\n".join(lines) + "\n")
     return 0 if has_stopped and not users.failures and traces == 0 and all(each.is_flat for each in trend_lines) else 1
 

@@ -1,4 +1,4 @@
-"""The server of a soak, what it holds, and the processes that it has started."""
+"""The server of a soak test, its resources and its child processes."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ SETTINGS = {
     "RELUME_RESUME_SECONDS": "10",
     "RELUME_AUDIT_LINES": "500",
 }
-"""Small enough that what grows is seen in minutes, and not in what may be kept."""
+"""Small limits, so that leaks are visible in minutes."""
 
 
 @dataclass(frozen=True)
 class Sample:
-    """What the server holds at one moment; `at_s` since the soak began.
+    """Resources of the server at one moment; `at_s` since the start.
 
     Attributes:
-        memory_bytes: resident bytes of its process. workers: of those that it has started.
+        memory_bytes: resident bytes of its process. workers: of its child processes.
         handles: open files and sockets. threads: of its process. disk: bytes in the data directory.
     """
 
@@ -71,19 +71,19 @@ class Server:
 
     @property
     def log(self) -> str:
-        """Its lines so far."""
+        """Log so far."""
         return (self.data / "server.log").read_text()
 
     @property
     def is_alive(self) -> bool:
-        """Whether its process runs."""
+        """True if its process runs."""
         return self._process.poll() is None
 
     def call(self, path: str, body: Any = None, method: str | None = None) -> Any:
-        """One call of REST: what a path answers to a method, by default GET, or POST where there is a body.
+        """Call REST and return the JSON, by default with GET, or POST with a body.
 
         Raises:
-            OSError: it is refused.
+            OSError: the call is refused.
         """
         data = None if body is None else json.dumps(body).encode()
         url = f"http://127.0.0.1:{self.port}{path}"
@@ -93,14 +93,14 @@ class Server:
         return json.loads(text) if text[:1] in (b"{", b"[") else None
 
     def sample(self, at_s: float) -> Sample:
-        """What it holds now."""
+        """Take a sample."""
         proc = Path(f"/proc/{self._process.pid}")
         workers = sum(resident_bytes(pid) for pid in self.children())
         handles, threads = (len(list((proc / name).iterdir())) for name in ("fd", "task"))
         return Sample(at_s, resident_bytes(self._process.pid), workers, handles, threads, folder_bytes(self.data))
 
     def children(self) -> list[int]:
-        """Processes that it has started, and those that these have."""
+        """Process ids of its descendants."""
         parents: dict[int, int] = {}
         for entry in Path("/proc").iterdir():
             if entry.name.isdigit():
@@ -115,7 +115,7 @@ class Server:
         return children
 
     def stop(self) -> bool:
-        """End it in order; whether it did in time."""
+        """Stop it cleanly; true if it stopped in time."""
         self._process.send_signal(signal.SIGINT)
         try:
             self._process.wait(STOP_S)

@@ -1,4 +1,4 @@
-"""What people do in a soak: each of these runs again and again in a thread of its own."""
+"""Simulated users: each action repeats in a thread of its own."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ DONE = ("ready", "failed", "cancelled")
 
 
 class Users:
-    """All of them, and what became of what they did.
+    """All users, and the results of their actions.
 
     Attributes:
-        counts: how often each thing was done. failures: what went wrong though nothing had been killed meanwhile.
+        counts: number of each action. failures: errors while no process had been killed.
     """
 
     def __init__(self, server: Server, seed: int) -> None:
@@ -47,12 +47,12 @@ class Users:
         ]
 
     def start(self) -> None:
-        """Begin."""
+        """Start."""
         for thread in self._threads:
             thread.start()
 
     def stop(self) -> None:
-        """Come to an end."""
+        """Stop."""
         self._stop.set()
         for thread in self._threads:
             thread.join()
@@ -74,23 +74,23 @@ class Users:
             self.counts[event] += 1
 
     def _note(self, action: str, start_s: float, reason: str) -> None:
-        """What goes wrong while a process is killed may be because of that; all else may not."""
+        """Record an error; errors while a process is killed are expected, others are not."""
         is_caused_by_kill = self._killed_s >= start_s - 2.0
         self._count("ended by a killed process" if is_caused_by_kill else "failures")
         if not is_caused_by_kill and len(self.failures) < 20:
             self.failures.append(f"{action}: {reason[:300]}")
 
     def _edit(self, rng: random.Random) -> None:
-        """A session by oneself: edits, a question, and an end in order or not."""
+        """Edit in a session alone: edits, a query, and a clean or unclean end."""
         with self._session(self._bake) as session:
             self._drag(session, rng)
             session.send(json.dumps({"type": "inspect", "x": 3, "y": 4}))
             _text(session, "inspect")
             if rng.random() < 0.3:
-                session.socket.close()  # as a lost network does
+                session.socket.close()  # like a lost network
 
     def _share(self, rng: random.Random) -> None:
-        """Two people in a room."""
+        """Edit with two participants in a room."""
         room = rng.randbytes(16).hex()
         with self._session(self._bake, room) as ann, self._session(self._bake, room) as bob:
             _text(bob, "hello")
@@ -98,7 +98,7 @@ class Users:
             _text(bob, "room_update")
 
     def _make_and_delete(self, rng: random.Random) -> None:
-        """A scene comes, is baked and looked at, and goes."""
+        """Import a scene, bake it, open it, and delete it."""
         call = self._server.call
         scene = call(f"/api/example-scenes/{self._transient_scene}", {})["id"]
         bake = self._baked(scene, rng.choice((60, 90, 120)), size=rng.choice((64, 128)))
@@ -108,7 +108,7 @@ class Users:
         call(f"/api/scenes/{scene}", method="DELETE")
 
     def _render(self, rng: random.Random) -> None:
-        """A batch, that is deleted when it is done, or before."""
+        """Render a batch, and delete it before or after it is finished."""
         call = self._server.call
         view = call(f"/api/bakes/{self._bake}")["recipe"]["views"][0]
         batch = {"bake": self._bake, "view": view, "looks": [{}] * 3, "format": "png"}
@@ -119,7 +119,7 @@ class Users:
         call(f"/api/renders/{identity}", method="DELETE")
 
     def _kill(self, rng: random.Random) -> None:
-        """One of the processes that the server has started dies."""
+        """Kill one of the server's child processes."""
         self._stop.wait(rng.uniform(10.0, 30.0))
         children = self._server.children()
         if children and not self._stop.is_set():
@@ -147,7 +147,7 @@ class Users:
 
     @staticmethod
     def _drag(session: ClientConnection, rng: random.Random) -> None:
-        """Edit a colour some times, and wait for the exact picture of the last."""
+        """Edit a color several times, and wait for the last exact image."""
         hello = _text(session, "hello")
         first, revision = hello["materials"][0], hello["revision"]
         path = f"/materials/{first.replace('~', '~0').replace('/', '~1')}/terms/0/color"
@@ -160,7 +160,7 @@ class Users:
 
 
 def _receive(session: ClientConnection) -> dict[str, Any]:
-    """The next message, or a frame's header; frames are acknowledged."""
+    """Receive a message, or a frame's header; frames are acknowledged."""
     message = session.recv(timeout=60)
     if isinstance(message, str):
         content: dict[str, Any] = json.loads(message)

@@ -1,4 +1,4 @@
-"""Whether what a server holds stays flat."""
+"""Check that the server's resources stay constant."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ MIN_SAMPLES = 12
 
 @dataclass(frozen=True)
 class Trend:
-    """Of one number over a soak, without its beginning, while it warms up.
+    """Trend of one number over a soak test, without its warm-up.
 
     Attributes:
-        early, late: medians of the first and the last third. slope_per_hour: of the line through it.
-        error_per_hour: standard error of that. allowed: how much more the late may be.
+        early, late: medians of the first and the last third. slope_per_hour: of the regression line.
+        error_per_hour: its standard error. allowed: growth that is accepted.
     """
 
     name: str
@@ -31,25 +31,25 @@ class Trend:
 
     @property
     def is_flat(self) -> bool:
-        """Whether there is no more of it at the end than at the beginning, but for what is allowed."""
+        """True if there is no growth beyond the accepted one."""
         return self.late - self.early <= self.allowed
 
     def line(self) -> str:
-        """In words."""
+        """Describe the trend."""
         verdict = "flat" if self.is_flat else "GROWS"
         slope = f"{self.slope_per_hour:+,.1f} ± {self.error_per_hour:,.1f} an hour"
         return f"{self.name:14} {self.early:12,.1f} → {self.late:12,.1f}   {slope:32} {verdict}"
 
 
 def trends(samples: Sequence[Sample]) -> list[Trend]:
-    """Of memory, handles, threads and disk; in MB where they are bytes.
+    """Trends of memory, handles, threads and disk; bytes in MB.
 
     Raises:
-        ValueError: there are too few samples to tell.
+        ValueError: there are too few samples.
     """
     warm = [sample for sample in samples if sample.at_s >= WARMUP_FRACTION * samples[-1].at_s]
     if len(warm) < MIN_SAMPLES:
-        raise ValueError(f"{len(warm)} samples after the beginning are too few; soak for longer")
+        raise ValueError(f"{len(warm)} samples after the warm-up are too few; run longer")
     memory_mb = np.array([sample.memory_bytes for sample in warm]) / 1e6
     return [
         _trend("memory MB", warm, memory_mb, 0.05 * float(np.median(memory_mb)) + 20),

@@ -1,4 +1,4 @@
-"""`relume backup`: adds what is new to a folder of backups, or checks one."""
+"""`relume backup`: add new data to a backup folder, or verify a backup."""
 
 from __future__ import annotations
 
@@ -7,25 +7,26 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from relume.core.errors import bytes_text
 from relume_cli.options import Data
-from relume_cli.terminal.printing import Json, print_result, size_text
+from relume_cli.terminal.printing import Json, print_result
 
 if TYPE_CHECKING:
     from relume_worker.backup.repository import BackupRepository, Snapshot
 
-BackupFolder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of backups, on another disk.")]
+BackupFolder = Annotated[Path, typer.Argument(metavar="FOLDER", help="Backup folder, best on another disk.")]
 
 
 def backup(
     folder: BackupFolder,
-    verify: Annotated[bool, typer.Option("--verify", help="Read the newest backup again instead, all of it.")] = False,
+    verify: Annotated[bool, typer.Option("--verify", help="Verify the newest backup instead: read all of it.")] = False,
     as_json: Json = False,
     data: Data = None,
 ) -> int:
-    """Back up the ledger and all files, while a server goes on.
+    """Back up the database and all files.
 
-    Scenes, bakes, looks, materials and renders. The first time copies all, later ones what is new. An interrupted
-    backup is none; run it again, and it goes on.
+    A running server need not stop. Contains scenes, bakes, looks, materials and renders. The first backup copies all
+    files, later ones copy new files. If it is interrupted, run it again: it resumes.
     """
     from relume_cli.backup.transfer_bar import transfer_bar
     from relume_cli.data_folder import open_settings, private_files
@@ -47,20 +48,20 @@ def backup(
         ledger.dispose()
     print_snapshot(snapshot, [*snapshot.left_out], as_json=as_json)
     for sentence in snapshot.left_out:
-        typer.echo(f"left out: {sentence}", err=True)
+        typer.echo(f"not in the backup: {sentence}", err=True)
     return 1 if snapshot.left_out else 0
 
 
 def print_snapshot(snapshot: Snapshot, omitted: list[str], *, as_json: bool) -> None:
-    """Print the name of a backup, and how much is in it.
+    """Print the name of a backup, its number of files and its size.
 
     Args:
-        snapshot: the backup. omitted: sentences, of what is not in it, or did not come back.
+        snapshot: the backup. omitted: one sentence for each file that was not copied.
         as_json: whether JSON was asked for.
     """
     num_bytes = sum(stored_file.num_bytes for stored_file in snapshot.all)
     document = {"name": snapshot.name, "files": len(snapshot.files), "bytes": num_bytes, "left_out": omitted}
-    details = [f"{len(snapshot.files):,} files, {size_text(num_bytes)}"]
+    details = [f"{len(snapshot.files):,} files, {bytes_text(num_bytes)}"]
     print_result(document, snapshot.name, as_json=as_json, details=details)
 
 
@@ -85,5 +86,5 @@ def _verify(repository: BackupRepository, *, as_json: bool) -> int:
     for stored_file in damaged_files:
         repository.quarantine(stored_file)
     if damaged_files:
-        typer.echo("back up again: what is still in the data folder is copied anew", err=True)
+        typer.echo("run relume backup again: files that are still in the data directory are copied again", err=True)
     return 1 if damaged_files else 0

@@ -1,4 +1,4 @@
-"""`relume restore`: puts a backup into an empty data folder."""
+"""`relume restore`: restore a backup into an empty data directory."""
 
 from __future__ import annotations
 
@@ -18,18 +18,21 @@ if TYPE_CHECKING:
 
 
 def restore(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder of backups that relume backup wrote.")],
-    snapshot: Annotated[str | None, typer.Option(metavar="NAME", help="Which one; else the newest.")] = None,
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Folder that relume backup wrote.")],
+    snapshot: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Backup to restore. [default: the newest]")
+    ] = None,
     revoke_tokens: Annotated[
-        bool, typer.Option("--revoke-tokens", help="Revoke all tokens in it; some were revoked since.")
+        bool,
+        typer.Option("--revoke-tokens", help="Revoke all tokens, because some may have been revoked after the backup."),
     ] = False,
     as_json: Json = False,
     data: Data = None,
 ) -> int:
-    """Restore a backup into an empty data folder and ledger.
+    """Restore a backup into an empty data directory.
 
-    The ledger is of SQLite or PostgreSQL, and all is checked. An interrupted restore is gone on with by the same
-    command; until it is finished nothing works on the folder.
+    Into an empty database, too: SQLite or PostgreSQL. Every file is verified. If it is interrupted, run it again: it
+    resumes. Until it is complete, no relume process uses the directory.
     """
     from relume_cli.backup.transfer_bar import transfer_bar
     from relume_cli.data_folder import open_settings, private_files
@@ -43,15 +46,15 @@ def restore(
         )
     print_snapshot(restored, [*restored.left_out, *damaged_files], as_json=as_json)
     for sentence in restored.left_out:
-        typer.echo(f"was left out: {sentence}", err=True)
+        typer.echo(f"not in the backup: {sentence}", err=True)
     for sentence in damaged_files:
-        typer.echo(f"left out: {sentence}", err=True)
+        typer.echo(f"not restored: {sentence}", err=True)
     _report_tokens(open_access(data), revoke_tokens)
     return 1 if damaged_files else 0
 
 
 def _report_tokens(access: AuthServices, revokes_tokens: bool) -> None:
-    """Say which tokens open something now: those that were revoked after the backup do again."""
+    """Print the valid tokens: those that were revoked after the backup are valid again."""
     now = time.time()
     for token in access.tokens.all():
         if not token.is_valid(now):

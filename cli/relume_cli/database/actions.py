@@ -1,4 +1,4 @@
-"""What commands that change the ledger share: it is open, and the audit hears of it. A server may run beside."""
+"""Open a data directory, and find its bakes. A server may run at the same time."""
 
 from __future__ import annotations
 
@@ -15,11 +15,9 @@ if TYPE_CHECKING:
     from relume_worker.service import BakeService
     from relume_worker.status import BakeStatus
 
-MIN_BAKE_ID_LENGTH = 8  # characters that the id of a bake may be cut to
-
 
 class OpenFolder(NamedTuple):
-    """A data folder: its settings, its bakes, which nothing here runs, and who may do what."""
+    """A data directory: settings, bake service (not started), and users with their rights."""
 
     settings: Settings
     service: BakeService
@@ -28,7 +26,7 @@ class OpenFolder(NamedTuple):
 
 @contextmanager
 def open_data_folder(data: Path | None) -> Iterator[OpenFolder]:
-    """Open a data folder that relume has used. Raises ParameterError where it has not."""
+    """Open a data directory that relume has used. Raises ParameterError if it has not."""
     from relume_cli.data_folder import check_used, open_bakes, open_settings
     from relume_server.auth.services import AuthServices
 
@@ -42,18 +40,18 @@ def open_data_folder(data: Path | None) -> Iterator[OpenFolder]:
 
 
 def find_bakes(service: BakeService, name: str) -> list[BakeStatus]:
-    """The bake of an id, or the start of one; else all of a scene, newest first. Raises NotFoundError.
+    """Return the bake of an id or the start of one, otherwise all bakes of a scene, newest first. Raises NotFoundError.
 
     Args:
-        service: where to look. name: what was typed.
+        service: of the data directory. name: as it was typed.
     """
-    from relume_cli.data_folder import find_scene
+    from relume_cli.data_folder import bakes_by_prefix, find_scene
 
-    matches = [bake for bake in service.bakes() if len(name) >= MIN_BAKE_ID_LENGTH and bake.id.startswith(name)]
+    matches = bakes_by_prefix(service, name)
     if len(matches) == 1:
         return matches
     if matches:
-        raise NotFoundError(f"{len(matches)} bakes begin with {name!r}; give more of the id")
+        raise NotFoundError(f"{len(matches)} bake ids begin with {name!r}; give more characters")
     scene = find_scene(service.ledger, name)
     bakes = service.bakes(scene.id)
     if not bakes:

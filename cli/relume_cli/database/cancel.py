@@ -1,4 +1,4 @@
-"""`relume cancel`: ends bakes that wait or run."""
+"""`relume cancel`: cancel queued and running bakes."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 def cancel(
     bakes: Annotated[
-        list[str], typer.Argument(metavar="BAKE…", help="Ids of bakes; or a scene: all of its that go on.")
+        list[str], typer.Argument(metavar="BAKE…", help="Ids of bakes, or a scene for all of its unfinished bakes.")
     ],
     as_json: Json = False,
     data: Data = None,
 ) -> int:
-    """Cancel bakes that wait or run, whoever runs them.
+    """Cancel queued and running bakes, on any machine.
 
-    What is done stays: the same relume bake goes on with it. Fails where a bake had ended already.
+    Finished tasks are saved: the same relume bake resumes. Fails if a bake had already ended.
     """
     from relume_cli.database.actions import find_bakes, open_data_folder
     from relume_cli.terminal.documents import bake_document
@@ -43,10 +43,10 @@ def cancel(
                     f"relume: bake {bake.id} is {data_folder.service.get(bake.id).state}; nothing to cancel", err=True
                 )
             else:
-                note(f"bake {bake.id} was cancelled already")
+                note(f"bake {bake.id} is already canceled")
     return 1 if has_failed else 0
 
 
 def _select_active(bakes: list[BakeStatus]) -> list[BakeStatus]:
-    """Those that go on; where none does, the newest, of which that is said."""
+    """The unfinished bakes; if there are none, the newest one."""
     return [bake for bake in bakes if not bake.final] or bakes[:1]

@@ -1,4 +1,4 @@
-"""`relume delete`: scenes, bakes, looks and environments that nobody needs any more."""
+"""`relume delete`: delete scenes, bakes, looks and environments."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Kind = Literal["scene", "bake", "look", "environment"]
 
 
 class Deletable(NamedTuple):
-    """One thing that is to be deleted: what names it, in words, and how."""
+    """Something to delete: its id, a label for questions, and the function that deletes it."""
 
     id: str
     label: str
@@ -26,16 +26,16 @@ class Deletable(NamedTuple):
 
 
 def delete(
-    kind: Annotated[Kind, typer.Argument(metavar="KIND", help="What it is; a scene goes with its bakes.")],
-    names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Ids or names, as relume list shows them.")],
-    yes: Annotated[bool, typer.Option("--yes", help="Do not ask.")] = False,
+    kind: Annotated[Kind, typer.Argument(metavar="KIND", help="What to delete; a scene is deleted with its bakes.")],
+    names: Annotated[list[str], typer.Argument(metavar="NAME…", help="Ids or names from relume list.")],
+    yes: Annotated[bool, typer.Option("--yes", help="Delete without asking.")] = False,
     as_json: Json = False,
     data: Data = None,
 ) -> None:
     """Delete scenes, bakes, looks or environments.
 
-    A server may go on; sessions that show a bake which is deleted are told, and end. Looks that name an environment
-    which is deleted are refused from then on.
+    A server need not stop: sessions that show a deleted bake end with a message. Looks that use a deleted environment
+    are no longer valid.
     """
     from relume_cli.database.actions import open_data_folder
     from relume_cli.tokens import audit_change
@@ -81,7 +81,7 @@ def _scene(data_folder: OpenFolder, name: str) -> Deletable:
 
 
 def _bake(data_folder: OpenFolder, name: str) -> Deletable:
-    """By its id alone: of the bakes of a scene none is meant more than another."""
+    """A bake by its id only: a scene may have several bakes."""
     from relume.core.errors import NotFoundError
     from relume_cli.database.actions import find_bakes
     from relume_cli.terminal.documents import recipe_text
@@ -102,7 +102,7 @@ def _look(data_folder: OpenFolder, name: str) -> Deletable:
     from relume_server.persistence.look_store import LookStore
 
     store = LookStore(data_folder.service.ledger.sessions)
-    look_name = pick("look", name, [(look.name, look.name) for look in store.list()], "looks are saved in the editor")
+    look_name = pick("look", name, [(look.name, look.name) for look in store.list()], "save looks in the editor")
     etag = store.get(look_name).etag
     return Deletable(look_name, f"look {look_name!r}", lambda: store.delete(look_name, etag))
 
@@ -114,7 +114,9 @@ def _environment(data_folder: OpenFolder, name: str) -> Deletable:
 
     folder = environments_path(data_folder.settings.data)
     candidates = [(record.id, record.name) for record in records(folder)]
-    environment_id = pick("imported environment", name.removeprefix(STORE.prefix), candidates, "built-in ones stay")
+    environment_id = pick(
+        "imported environment", name.removeprefix(STORE.prefix), candidates, "built-in environments cannot be deleted"
+    )
 
     def remove() -> None:
         STORE.remove(folder, environment_id)

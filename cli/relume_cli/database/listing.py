@@ -1,4 +1,4 @@
-"""`relume list`: what there is to be named on the command line, in looks and in REST calls."""
+"""`relume list`: list scenes, bakes, looks and assets."""
 
 from __future__ import annotations
 
@@ -18,34 +18,34 @@ if TYPE_CHECKING:
 
 Kind = Literal["scenes", "bakes", "looks", "environments", "materials", "images", "renders", "built-ins"]
 Row = tuple[dict[str, Any], str]
-"""A thing as JSON, and as a line that begins with what names it."""
+"""An entry as JSON, and as a line that begins with its name or id."""
 
 
 def list_items(
     kind: Annotated[Kind, typer.Argument(metavar="KIND", help="What to list.", show_default=True)] = "scenes",
-    scene: Annotated[str | None, typer.Option("--scene", metavar="SCENE", help="Bakes: of this scene alone.")] = None,
+    scene: Annotated[str | None, typer.Option("--scene", metavar="SCENE", help="Only bakes of this scene.")] = None,
     state: Annotated[
-        str | None, typer.Option("--state", metavar="STATE", help="Bakes and renders: in this state alone.")
+        str | None, typer.Option("--state", metavar="STATE", help="Only bakes or renders in this state.")
     ] = None,
     as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """List scenes, bakes, looks and all else that has a name.
+    """List scenes, bakes, looks, and assets.
 
-    The newest comes first; what names a thing stands in front of its line.
+    Newest first. Each line begins with the id or name that other commands accept.
     """
     from relume.core.errors import ParameterError
     from relume_cli.database.actions import open_data_folder
 
     if scene is not None and kind != "bakes":
-        raise ParameterError("--scene", scene, f"none with {kind}: bakes alone are of a scene")
+        raise ParameterError("--scene", scene, f"none: only bakes have a scene, not {kind}")
     if state is not None and kind not in ("bakes", "renders"):
-        raise ParameterError("--state", state, f"none with {kind}: bakes and renders alone have one")
+        raise ParameterError("--state", state, f"none: only bakes and renders have a state, not {kind}")
     if kind == "built-ins":
         rows = _built_ins()
     elif kind == "bakes":
-        with open_data_folder(data) as there:
-            rows = list(_bakes(there, scene, state))
+        with open_data_folder(data) as data_folder:
+            rows = list(_bakes(data_folder, scene, state))
     else:
         with open_data_folder(data) as data_folder:
             rows = [row for row in LISTS[kind](data_folder) if state in (None, row[0].get("state"))]
@@ -131,7 +131,7 @@ def _images(data_folder: OpenFolder) -> Iterator[Row]:
 
 
 def _renders(data_folder: OpenFolder) -> Iterator[Row]:
-    """As the ledger has them; how far a server is within a frame it alone knows."""
+    """Renders as in the database; only the server knows the progress within a frame."""
     from sqlalchemy import select
 
     from relume_server.persistence.tables import RenderRow

@@ -1,4 +1,4 @@
-"""`relume db draft`: begins a revision, for developers who change relume's tables."""
+"""`relume db draft`: write a new revision, for developers who change relume's tables."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import typer
 
 
 def db_draft(
-    message: Annotated[str, typer.Argument(metavar="MESSAGE", help="What the revision does, in a few words.")],
+    message: Annotated[str, typer.Argument(metavar="MESSAGE", help="Short description of the revision.")],
 ) -> None:
     """For developers: write the next revision of the tables.
 
-    It brings the newest one to the tables of the code; look it through.
+    It changes the newest revision into the tables of the code. Review it.
     """
-    import relume_server.auth.tables  # the server's, beside the worker's
+    import relume_server.auth.tables  # registers the server's tables
     import relume_server.persistence.tables  # noqa: F401
     from relume_worker.database import open_database
     from relume_worker.database.models import Base

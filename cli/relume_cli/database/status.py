@@ -1,4 +1,4 @@
-"""`relume status`: how far a bake is, or all that goes on."""
+"""`relume status`: progress of one bake, or of all running work."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from relume.core.errors import bytes_text
 from relume_cli.options import Data
-from relume_cli.terminal.printing import Json, print_result, size_text
+from relume_cli.terminal.printing import Json, print_result
 
 if TYPE_CHECKING:
     from relume_cli.database.actions import OpenFolder
@@ -17,12 +18,13 @@ if TYPE_CHECKING:
 
 def status(
     bake: Annotated[
-        str | None, typer.Argument(metavar="[BAKE]", help="Id of a bake, or a scene, whose newest is meant; else all.")
+        str | None,
+        typer.Argument(metavar="[BAKE]", help="Id of a bake, or a scene for its newest bake. [default: all]"),
     ] = None,
     as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """Show how far a bake is, or all that goes on."""
+    """Show the progress of one bake, or of all running work."""
     from relume_cli.database.actions import find_bakes, open_data_folder
     from relume_cli.terminal.documents import bake_document
 
@@ -39,9 +41,9 @@ def _line(bake: BakeStatus) -> str:
     from relume_cli.terminal.documents import recipe_text
 
     details = {
-        "ready": size_text(bake.bytes),
+        "ready": bytes_text(bake.bytes),
         "failed": bake.problem or "",
-        "cancelled": "the same command goes on with it",
+        "cancelled": "the same relume bake resumes it",
     }
     state = details.get(bake.state) or detail(bake)
     return f"{bake.id}  {bake.state}  {bake.progress:.0%}  {state}  {recipe_text(bake.recipe)}"
@@ -66,7 +68,7 @@ def _print_all(data_folder: OpenFolder, *, as_json: bool) -> None:
         "active": [bake_document(bake, data_folder.service) for bake in active],
     }
     lines = [
-        f"relume {document['version']}, {document['data']}, {size_text(document['free_bytes'])} free",
+        f"relume {document['version']}, {document['data']}, {bytes_text(document['free_bytes'])} free",
         f"{document['scenes']} scenes",
         *(_count_text(kind, document[kind]) for kind in ("bakes", "renders")),
         *map(_line, active),
@@ -85,6 +87,6 @@ def _renders_by_state(data_folder: OpenFolder) -> dict[str, int]:
 
 
 def _count_text(kind: str, by_state: dict[str, int]) -> str:
-    """As in "3 bakes (2 ready, 1 failed)"."""
+    """Return text such as "3 bakes (2 ready, 1 failed)"."""
     states = ", ".join(f"{num} {state}" for state, num in sorted(by_state.items()))
     return f"{sum(by_state.values())} {kind}" + (f" ({states})" if states else "")

@@ -1,4 +1,4 @@
-"""`relume db upgrade`: brings the database to the schema of this relume."""
+"""`relume db upgrade`: upgrade the database to the schema of this version."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from relume_cli.terminal.printing import Json, print_result
 
 
 def db_upgrade(as_json: Json = False, data: Data = None) -> None:
-    """Upgrade the database for this relume; make a backup before.
+    """Upgrade the database to this version; back up first.
 
-    Older versions of relume can no longer use it. Servers apply additive revisions by themselves; this applies the
-    others.
+    Older versions of relume cannot use it afterwards. Servers apply additive revisions by themselves; this command
+    applies the others.
     """
     from relume_cli.data_folder import open_settings
     from relume_worker.database.connect import connect

@@ -1,4 +1,4 @@
-"""`relume material export`: writes a look's material as a MERL file."""
+"""`relume material export`: write a material of a look as a MERL file."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from relume_cli.terminal.printing import Json, print_result
 
 def material_export(
     look: Annotated[Path, typer.Argument(metavar="LOOK.json", help="Look document; may be partial.")],
-    material: Annotated[str, typer.Argument(metavar="MATERIAL", help="Name of a material that the look names.")],
-    output: Annotated[Path, typer.Option(metavar="FILE.binary", help="Where to write it.")],
+    material: Annotated[str, typer.Argument(metavar="MATERIAL", help="Name of a material in the look.")],
+    output: Annotated[Path, typer.Option(metavar="FILE.binary", help="File to write.")],
     as_json: Json = False,
     data: Data = None,
 ) -> None:
     """Write an edited material as a MERL file.
 
-    For other renderers; any isotropic terms will do.
+    For other renderers. All terms must be isotropic.
     """
     from relume.assets.measured.merl import write_merl
     from relume.brdf.merl_export import sample_terms
@@ -35,7 +35,7 @@ def material_export(
     materials = read_look(look).get("materials")
     material_look = materials.get(material) if isinstance(materials, dict) else None
     if not isinstance(material_look, dict) or "terms" not in material_look:
-        raise ParameterError("MATERIAL", material, "the name of a material whose terms stand in the look")
+        raise ParameterError("MATERIAL", material, "a material whose terms are in the look")
     document = complete({"materials": {material: material_look}}, default_look([Material(material, ())]))
     write_merl(output, sample_terms(document["materials"][material]["terms"]))
     print_result({"path": str(output), "material": material}, str(output), as_json=as_json)

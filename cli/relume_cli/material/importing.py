@@ -1,4 +1,4 @@
-"""`relume material import`: keeps a measured material, or a BTF."""
+"""`relume material import`: import a measured material or a BTF."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ def material_import(
         Path,
         typer.Argument(
             metavar="FILE.binary|FILE.zip|FILE.btf",
-            help="Isotropic BRDF in the MERL layout, images by light and view (UBO2003), or a container (UBO2014).",
+            help="Isotropic MERL BRDF, UBO2003 BTF images in a ZIP, or UBO2014 BTF.",
         ),
     ],
-    name: Annotated[str | None, typer.Option(help="What to call it; else the file's name.")] = None,
-    error: Annotated[float, typer.Option(help="Of a BTF: relative RMS that compression may miss.")] = 0.05,
+    name: Annotated[str | None, typer.Option(help="Name of the material. [default: file name]")] = None,
+    error: Annotated[float, typer.Option(help="BTF: relative RMS error allowed in compression.")] = 0.05,
     as_json: Json = False,
     data: Data = None,
 ) -> None:
     """Import a measured material; print its name in looks.
 
-    Beside it stand its terms, and how well it is kept.
+    Prints its terms and its compression error as well.
     """
     from relume.assets.asset_store import check_name
     from relume.assets.measured.measured_store import store_material
@@ -44,7 +44,7 @@ def material_import(
     record = store_material(materials_path(folder), file, asset_name)
     model_errors = (("measured_lv + measured_hd", record.lobes_error), ("measured_hf", record.homomorphic_error))
     lines = [
-        f"  {model}: curves alone err by {', '.join(f'{channel_error:.1%}' for channel_error in errors)} (red, green, "
+        f"  {model}: error of the curves {', '.join(f'{channel_error:.1%}' for channel_error in errors)} (red, green, "
         f"blue)"
         for model, errors in model_errors
     ]
@@ -58,7 +58,6 @@ def _import_btf(folder: Path, file: Path, name: str, bound: float, *, as_json: b
     from relume_worker.paths import btfs_path
 
     record = until_interrupted(
-        file.name,
-        lambda progress, is_canceled: import_btf(btfs_path(folder), file, name, bound, progress, is_canceled),
+        file.name, lambda progress, is_canceled: import_btf(btfs_path(folder), file, name, bound, progress, is_canceled)
     )
     print_btf(record, as_json=as_json)

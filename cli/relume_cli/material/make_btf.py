@@ -1,4 +1,4 @@
-"""`relume material make-btf`: makes a synthetic BTF."""
+"""`relume material make-btf`: render a synthetic BTF."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ def material_make_btf(
         str,
         typer.Argument(
             metavar="weave|pebbles|corduroy|FILE",
-            help="Small geometry to render; a .glb, .obj or .ply file holds one period of yours, seen from above (+Y).",
+            help="Geometry to render; a .glb, .obj or .ply file contains one period, +Y up.",
         ),
     ],
     size: Annotated[int, typer.Option(help="Texels along each side.")] = 128,
-    grid: Annotated[int, typer.Option(help="Places along each side of a texel that are looked at.")] = 3,
-    error: Annotated[float, typer.Option(help="Relative RMS that compression may miss.")] = 0.05,
+    grid: Annotated[int, typer.Option(help="Samples along each side of a texel.")] = 3,
+    error: Annotated[float, typer.Option(help="Relative RMS error allowed in compression.")] = 0.05,
     period: Annotated[
         float | None,
-        typer.Option(help="Of a file: side of the square that repeats along x and z, metres; else the box about it."),
+        typer.Option(help="File: side of the square that repeats along x and z, in meters. [default: bounding box]"),
     ] = None,
-    name: Annotated[str | None, typer.Option(help="What to call it.")] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the material.")] = None,
     as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """Render a small geometry from all sides, as a material.
+    """Render a small geometry as a BTF.
 
-    From 81 sides in light from 81 sides; nothing is measured. What was rendered when it is interrupted is still there
-    when it is begun again.
+    From 81 view directions under 81 light directions; nothing is measured. If it is interrupted, run it again: it
+    resumes.
     """
     from relume.assets.asset_store import check_name
     from relume.synthetic_btf.synthesize import GEOMETRIES, MESH, SyntheticBtf, synthesize_btf

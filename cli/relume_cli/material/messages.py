@@ -1,4 +1,4 @@
-"""What commands say of a material that they have kept."""
+"""Results of commands that import materials."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
 
 def print_material(record: BtfRecord | MaterialRecord, lines: list[str], *, as_json: bool) -> None:
-    """Print its name in looks, its terms, and how well it is kept.
+    """Print a material's name in looks, its terms, and its compression error.
 
     Args:
-        record: of the material. lines: that say how well. as_json: whether JSON was asked for.
+        record: of the material. lines: with its error. as_json: whether JSON was asked for.
     """
     terms = record.terms()
     document = {"id": record.id, "data": record.data, "name": record.name, "terms": terms}
@@ -25,6 +25,6 @@ def print_material(record: BtfRecord | MaterialRecord, lines: list[str], *, as_j
 
 
 def print_btf(record: BtfRecord, *, as_json: bool) -> None:
-    """Print a BTF's name in looks, its terms, and how well it is kept."""
+    """Print a BTF's name in looks, its terms, and its compression error."""
     summary = f"  {record.clusters} clusters × {record.components} components, 1:{record.ratio:.0f}, "
     print_material(record, [f"{summary}{record.error[-1]:.1%} relative RMS"], as_json=as_json)

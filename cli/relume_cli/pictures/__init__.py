@@ -1,1 +1,1 @@
-"""Images written by commands: which looks, where to, how."""
+"""Images written by commands: looks, files, formats."""

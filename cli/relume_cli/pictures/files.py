@@ -1,11 +1,11 @@
-"""The files of pictures that commands make."""
+"""Files of rendered images."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from relume.core.errors import ParameterError
+from relume.core.errors import ParameterError, PlanError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -16,7 +16,7 @@ FORMATS = (".exr", ".png", ".webp")
 
 
 class ExrOptions(NamedTuple):
-    """Options of EXR alone: layers (`relume.output.exr.layers`), precision, and linear color space."""
+    """Options for EXR only: layers (`relume.output.exr.layers`), precision, and linear color space."""
 
     layering: Layering = False
     precision: Literal["half", "float"] = "half"
@@ -26,9 +26,9 @@ class ExrOptions(NamedTuple):
 def exr_options(
     output: Path, *, layers: bool, light_groups: bool, full_float: bool, color_space: str | None
 ) -> ExrOptions:
-    """The options of EXR. Raises ParameterError where another file is written, or two exclude each other."""
+    """Collect the EXR options. Raises ParameterError for other formats, and for options that exclude each other."""
     if layers and light_groups:
-        raise ParameterError("--layers", "with --light-groups", "one of the two: each are the whole picture")
+        raise PlanError("--layers and --light-groups exclude each other; give one")
     if (layers or light_groups or full_float or color_space) and output.suffix.lower() != ".exr":
         allowed = "a file name that ends in .exr, for --layers, --light-groups, --float, --color-space"
         raise ParameterError("--output", str(output), allowed)
@@ -36,7 +36,7 @@ def exr_options(
 
 
 def check_output(path: Path) -> None:
-    """Raise ParameterError before hours of work where the picture could not be written."""
+    """Raise ParameterError before hours of work if the image cannot be written."""
     if path.suffix.lower() not in FORMATS:
         raise ParameterError("--output", str(path), f"a file name that ends in {', '.join(FORMATS)}")
     if not path.parent.is_dir():
@@ -44,7 +44,7 @@ def check_output(path: Path) -> None:
 
 
 def check_display_view(path: Path, look: Any) -> None:
-    """Raise ParameterError before hours of work where a look has a view that no config here has."""
+    """Raise ParameterError before hours of work if a look has a view that is not in the OpenColorIO config."""
     from relume.image_io.ocio.active_config import require_config
     from relume.image_io.ocio.view import OcioView
 
@@ -53,7 +53,7 @@ def check_display_view(path: Path, look: Any) -> None:
 
 
 def save(path: Path, image: NDArray[Any], look: Any) -> None:
-    """Write linear radiance, (H, W, 3); formats for the screen are shown as the look's display says."""
+    """Write linear radiance, (H, W, 3); display formats apply exposure and tone mapping of the look."""
     from relume.image_io.write_image import write_image
 
     write_image(path, image, look.display.exposure, look.display.tone_map)

@@ -1,4 +1,4 @@
-"""The looks that a batch renders: files, folders of them, stdin, and saved ones."""
+"""Looks of a batch: files, folders, stdin, and saved looks."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Looks = Annotated[
     typer.Option(
         "--look",
         metavar="LOOK",
-        help="Look document: a file, a folder of them, - for stdin, or the name of a saved look; several times for "
+        help="Look document: a file, a folder of them, - for stdin, or the name of a saved look. Repeat for "
         "several. May be partial.",
     ),
 ]
@@ -30,19 +30,19 @@ MAX_LOOKS = 1000
 
 
 class NamedLook(NamedTuple):
-    """A look document, perhaps partial, and what it is called."""
+    """A look document, perhaps partial, with its name."""
 
     name: str
     document: dict[str, Any]
 
 
 def read_looks(arguments: Sequence[str], look_store: LookStore) -> list[NamedLook]:
-    """All looks that are meant, in the order in which they were given; the scene's own where none was.
+    """Read all looks in the given order; without arguments, the scene's default look.
 
     Args:
-        arguments: as on the command line. look_store: looks by name.
+        arguments: as on the command line. look_store: saved looks.
     Raises:
-        ParameterError: one cannot be read, or is no look. NotFoundError: there is none of that name.
+        ParameterError: a look cannot be read, or is invalid. NotFoundError: no saved look has this name.
     """
     looks = [look for argument in arguments for look in _resolve_argument(argument, look_store)] or [
         NamedLook("default", {})
@@ -71,7 +71,7 @@ def _from_file(path: Path) -> NamedLook:
 
 
 def _from_stdin() -> list[NamedLook]:
-    """One object is a look, a list has several."""
+    """Looks from stdin: an object is one look, a list has several."""
     document = read_json("--look", None)
     if not isinstance(document, list):
         return [_make_named_look("stdin", document, STDIN)]
@@ -82,7 +82,7 @@ def _from_stdin() -> list[NamedLook]:
 
 def _make_named_look(name: str, document: object, source: str) -> NamedLook:
     if not isinstance(document, dict):
-        raise ParameterError("--look", source, "a JSON object, as GET /api/looks/NAME answers")
+        raise ParameterError("--look", source, "a JSON object, as GET /api/looks/NAME returns")
     return NamedLook(name, document)
 
 
@@ -92,4 +92,6 @@ def _by_name(argument: str, look_store: LookStore) -> NamedLook:
     if name in names:
         return _make_named_look(name, json.loads(look_store.get(name).document), name)
     saved_names = ", ".join(repr(look_name) for look_name in names[:10]) or "none yet"
-    raise NotFoundError(f"--look is {argument[:80]!r}: no file, no folder and no saved look; saved are: {saved_names}")
+    raise NotFoundError(
+        f"--look is {argument[:80]!r}, which is no file, folder or saved look; saved looks: {saved_names}"
+    )

@@ -1,4 +1,4 @@
-"""What `relume render` is to write, checked before hours of work."""
+"""Plan the files of `relume render`, and check them before hours of work."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TurntableSubject = Literal["camera", "object", "environment"]
 
 
 class TurntablePlan(NamedTuple):
-    """A turntable: frames once around, what rotates, and frames a second of a video."""
+    """A turntable: frames per revolution, what rotates, and frames per second of a video."""
 
     frames: int
     subject: TurntableSubject = "camera"
@@ -28,10 +28,10 @@ class TurntablePlan(NamedTuple):
 
 
 class PlannedFile(NamedTuple):
-    """One file, or folder of frames.
+    """One image file, or folder of frames.
 
     Attributes:
-        look: what it is called. document: as it was given, perhaps partial. path: of the file or folder.
+        look: name. document: as given, perhaps partial. path: of the file or folder.
     """
 
     look: str
@@ -40,13 +40,13 @@ class PlannedFile(NamedTuple):
 
 
 def make_turntable_plan(frames: int | None, subject: TurntableSubject | None, fps: int | None) -> TurntablePlan | None:
-    """The turntable that is asked for. Raises ParameterError where there is none, and something is asked of it."""
+    """Make the turntable plan. Raises ParameterError if an option needs a turntable and there is none."""
     from relume_server.schemas.renders import MAX_FRAMES
 
     if frames is None:
         for option, value in (("--rotate", subject), ("--fps", fps)):
             if value is not None:
-                raise ParameterError(option, value, "--turntable N with it")
+                raise ParameterError(option, value, "it with --turntable N")
         return None
     if not 1 <= frames <= MAX_FRAMES:
         raise ParameterError("--turntable", frames, f"1 to {MAX_FRAMES:,} frames")
@@ -54,45 +54,46 @@ def make_turntable_plan(frames: int | None, subject: TurntableSubject | None, fp
 
 
 def check_target(output: Path, turntable_plan: TurntablePlan | None, *, resumes: bool) -> None:
-    """Raise ParameterError where what is asked for could not be written there."""
+    """Raise ParameterError if the output cannot be written."""
     suffix = output.suffix.lower()
     if turntable_plan is None:
         if suffix == VIDEO:
-            raise ParameterError("--output", str(output), "a picture's name; a video needs --turntable N")
+            raise ParameterError("--output", str(output), "the name of an image; a video needs --turntable N")
         check_output(output)
         return
     if suffix in NO_FOLDERS:
         raise ParameterError("--output", str(output), f"a folder for the numbered frames, or a name ending in {VIDEO}")
     if not output.parent.is_dir():
-        raise ParameterError("--output", str(output), "something in a folder that exists")
+        raise ParameterError("--output", str(output), "a path in a folder that exists")
     if suffix == VIDEO:
         from relume_server.io.video import check_encoder
 
         check_encoder()
     elif output.exists() and not output.is_dir():
-        raise ParameterError("--output", str(output), "a folder, which the numbered frames go into")
+        raise ParameterError("--output", str(output), "a folder for the numbered frames")
     if not resumes and any(frames_folder(output).glob("*.png")):
-        raise ParameterError("--output", str(output), "an empty folder; --resume goes on with what is there")
+        raise ParameterError("--output", str(output), "an empty folder, or --resume to keep its frames")
 
 
 def frames_folder(output: Path) -> Path:
-    """Where the frames of a turntable lie; those of a video beside it, until it is made."""
+    """Folder of a turntable's frames; for a video it is next to it, and deleted when the video is complete."""
     return output.with_name(output.name + ".frames") if output.suffix.lower() == VIDEO else output
 
 
 def plan_files(looks: Sequence[NamedLook], output: Path, turntable_plan: TurntablePlan | None) -> list[PlannedFile]:
-    """Which look goes where.
+    """Assign a file to each look.
 
     Args:
-        looks: all of them. output: as it was given; {look} in it stands for the name of each.
-        turntable_plan: a turntable, which is of one look.
+        looks: all looks. output: as given; {look} stands for the name of each. turntable_plan: needs exactly one look.
     Raises:
         ParameterError: several looks would be written to one file.
     """
     if len(looks) > 1 and turntable_plan is not None:
-        raise ParameterError("--look", f"{len(looks)} looks", "one with --turntable")
+        raise ParameterError("--look", f"{len(looks)} looks", "one look with --turntable")
     if len(looks) > 1 and LOOK not in output.name:
-        raise ParameterError("--output", str(output), f"a file name with {LOOK} in it, for the {len(looks)} looks")
+        raise ParameterError(
+            "--output", str(output), f"a file name with {LOOK} in it, because there are {len(looks)} looks"
+        )
     planned_files = [PlannedFile(look.name, look.document, _output_path(look.name, output)) for look in looks]
     for number, planned_file in enumerate(planned_files):
         if planned_file.path in (earlier.path for earlier in planned_files[:number]):
@@ -103,7 +104,7 @@ def plan_files(looks: Sequence[NamedLook], output: Path, turntable_plan: Turntab
 
 
 def complete_plan(planned_file: PlannedFile, default: dict[str, Any]) -> Look:
-    """The complete look of a file. Raises ParameterError naming the look."""
+    """Return the complete look of a file. Raises ParameterError with the name of the look."""
     from relume_cli.data_folder import complete_look
 
     look = complete_look(planned_file.document, default, f"look {planned_file.look!r}")

@@ -1,4 +1,4 @@
-"""Paints pictures of an opened bake, and turntables: numbered frames of a scene, or of its light, from all sides."""
+"""Render images and turntables of a bake."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class RenderSource(NamedTuple):
-    """What is rendered: a bake of a scene, opened, one of its views, and what makes exact pictures of moved eyes."""
+    """A bake of a scene, opened, one of its views, and for a free camera the builder of exact static views."""
 
     scene: SceneRecord
     bake: BakeStatus
@@ -38,11 +38,11 @@ class RenderSource(NamedTuple):
 def write_picture(
     source: RenderSource, look: Look, path: Path, exr: ExrOptions, report: Callable[[float], None]
 ) -> None:
-    """Write the exact picture of a look.
+    """Render the exact image of a look, and write it.
 
     Args:
-        source: a bake. look: complete. path: of the file. exr: used where it is one.
-        report: called with the share done.
+        source: a bake. look: complete. path: of the file. exr: options for EXR files.
+        report: called with the fraction done.
     """
     from relume.output.render_image import render_image
 
@@ -69,8 +69,8 @@ def _write_exr(source: RenderSource, look: Look, path: Path, exr: ExrOptions, re
     origin = Provenance(source.scene.id, source.scene.name, source.bake.id)
     export_exr(
         path,
-        lambda shown, told: render_image(
-            source.transfer, source.view, shown, progress=told, static_views=source.static_views
+        lambda layer_look, layer_progress: render_image(
+            source.transfer, source.view, layer_look, progress=layer_progress, static_views=source.static_views
         ),
         look,
         layers,
@@ -84,11 +84,11 @@ def _write_exr(source: RenderSource, look: Look, path: Path, exr: ExrOptions, re
 def write_turntable(
     source: RenderSource, planned_file: PlannedFile, turntable_plan: TurntablePlan, report: ReportProgress
 ) -> None:
-    """Write 0000.png, 0001.png, … into a folder, but for those that are there; or a video of them.
+    """Write the missing frames 0000.png, 0001.png, … into a folder, or a video of them.
 
     Args:
-        source: an opened bake, whose eyes move where the way needs it. planned_file: a look, and where it goes.
-        turntable_plan: how. report: called with the share done, in frames too.
+        source: an opened bake; a free-camera one if the camera or the object rotates. planned_file: a look and its
+            path. turntable_plan: frames and subject. report: called with the fraction done, within frames as well.
     """
     from relume.output.render_image import render_image
     from relume_server.batch.frame_sequence import look_at_frame
@@ -118,7 +118,7 @@ def write_turntable(
             )
             save(file, frame(camera, frame_look, report_frame), frame_look)
     if planned_file.path.suffix.lower() == VIDEO:
-        report(1.0, "making the video")
+        report(1.0, "encoding the video")
         write_video(folder, turntable_plan.fps, planned_file.path, lambda: False)
         shutil.rmtree(folder)
 
@@ -126,12 +126,12 @@ def write_turntable(
 def check_turntable(
     source: RenderSource, planned_file: PlannedFile, turntable_plan: TurntablePlan
 ) -> tuple[Animation, Sequence[Camera | None]]:
-    """What the frames show, and from where.
+    """Return the animation, and the camera of each frame (None: the baked one).
 
     Args:
-        source: an opened bake. planned_file: a look, and where it goes. turntable_plan: how.
+        source: an opened bake. planned_file: a look and its path. turntable_plan: frames and subject.
     Raises:
-        ParameterError: the bake cannot follow.
+        ParameterError: the bake does not support it.
     """
     from relume_server.batch.frame_sequence import check_animation
     from relume_server.schemas.renders import Animation, Turntable

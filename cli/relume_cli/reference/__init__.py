@@ -1,1 +1,1 @@
-"""`relume reference`: brute force from the command line."""
+"""`relume reference`: brute-force reference images."""

@@ -1,4 +1,4 @@
-"""Brute force from the command line: what is traced, pass by pass, and what it says of a bake's frame."""
+"""Trace the reference pass by pass, and measure the error of a bake's frame."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _AGAINST = {"all": "all light paths", "method": "the light paths of its method"}
 
 @dataclass(frozen=True)
 class ComparisonSubject:
-    """What is traced.
+    """A view of a scene with a look, and optionally a frame to compare.
 
     Attributes:
-        scene, view, look, size: as of `relume.reference.render_reference`.
-        has_indirect: whether the method whose paths are told apart has light between surfaces.
-        frame: that is compared, (height, width, 3); None where none is.
+        scene, view, look, size: as for `relume.reference.render_reference`.
+        has_indirect: whether the method has indirect illumination.
+        frame: linear radiance to compare, (height, width, 3); None: no comparison.
     """
 
     scene: Scene
@@ -40,7 +40,7 @@ class ComparisonSubject:
 
 @dataclass(frozen=True)
 class ReferencePasses:
-    """Passes of brute force by whose paths they are, "all" or "method"; and what is left out, in sentences."""
+    """Reference estimates by path set, "all" or "method", and sentences on omitted and unsupported light paths."""
 
     estimates: dict[str, Estimate]
     omitted_paths: tuple[str, ...]
@@ -51,11 +51,11 @@ def find_reference_subject(
     data: Path | None, name: str, look: Path | None, view: str | None, camera: Path | None, size: str | None,
     method: str | None, *, needs_bake: bool,
 ) -> ComparisonSubject:  # fmt: skip
-    """A scene as it is asked for. Raises NotFoundError, ParameterError, OSError.
+    """Find the scene, view and look that the command line names. Raises NotFoundError, ParameterError, OSError.
 
     Args:
         data, name, look, view, camera, size, method: as given on the command line.
-        needs_bake: the method is that of the scene's finest bake, where none is given.
+        needs_bake: without a method, take that of the scene's finest bake.
     """
     from relume.core.errors import NotFoundError
     from relume.look import default_look
@@ -80,7 +80,7 @@ def find_reference_subject(
 
 
 def find_bake_comparison(data: Path | None, name: str, look: Path | None, view: str | None) -> ComparisonSubject:
-    """The finest bake of a scene, and its frame of a look. Raises NotFoundError, ParameterError, OSError.
+    """Open the finest bake of a scene, and render its frame. Raises NotFoundError, ParameterError, OSError.
 
     Args:
         data, name, look, view: as given on the command line.
@@ -115,12 +115,12 @@ def find_bake_comparison(data: Path | None, name: str, look: Path | None, view: 
 def compare_passes(
     subject: ComparisonSubject, spp: int, paths: str, progress: Callable[[float], object]
 ) -> ReferencePasses:
-    """Trace a subject: in one pass, or where a frame is compared in as many as tell noise from error.
+    """Trace a subject in one pass; for a comparison in several, which separate noise from error.
 
     Args:
-        subject: what is traced. spp: samples a pixel, in all passes together.
-        paths: "all" or "method"; where a frame is compared both are traced.
-        progress: called with the share done.
+        subject: view and look. spp: samples per pixel, in all passes together.
+        paths: "all" or "method"; a comparison traces both.
+        progress: called with the fraction done.
     """
     from relume.reference import render_reference
     from relume.reference.comparison import Estimate
@@ -140,11 +140,11 @@ def compare_passes(
 
 
 def report_lines(subject: ComparisonSubject, passes: ReferencePasses, paths: str) -> Iterator[str]:
-    """What was traced, what is left out, and how far the frame is from it, a line each.
+    """Errors of the frame and omitted light paths, one line each.
 
     Args:
-        subject: with the frame, where one is compared. passes: passes of it.
-        paths: whose are asked for, where none is.
+        subject: with the frame to compare, if any. passes: its reference passes.
+        paths: path set to report without a comparison.
     """
     from relume.reference.comparison import compare
 
@@ -152,16 +152,16 @@ def report_lines(subject: ComparisonSubject, passes: ReferencePasses, paths: str
         for name, estimate in passes.estimates.items():
             yield f"against {_AGAINST[name]}: {_error_text(compare(subject.frame, estimate)[0])}"
     if subject.frame is not None or paths == "method":
-        yield from (f"left out by the method: {sentence}" for sentence in passes.omitted_paths)
-    yield from (f"left out by brute force, too: {sentence}" for sentence in passes.unsupported_paths)
+        yield from (f"not simulated by the method: {sentence}" for sentence in passes.omitted_paths)
+    yield from (f"not in the reference either: {sentence}" for sentence in passes.unsupported_paths)
 
 
 def document(subject: ComparisonSubject, passes: ReferencePasses, paths: str) -> dict[str, Any]:
-    """What `report_lines` says as JSON, by the names that REST has in a comparison.
+    """Return the report as JSON, with the field names of a comparison in REST.
 
     Args:
-        subject: with the frame, where one is compared. passes: passes of it.
-        paths: whose are asked for, where none is.
+        subject: with the frame to compare, if any. passes: its reference passes.
+        paths: path set to report without a comparison.
     """
     from dataclasses import asdict
 
@@ -181,14 +181,14 @@ def document(subject: ComparisonSubject, passes: ReferencePasses, paths: str) ->
 
 
 def _error_text(comparison: Comparison) -> str:
-    noise = f"noise of brute force {percent(comparison.noise)}"
+    noise = f"noise of the reference {percent(comparison.noise)}"
     if comparison.error is None or comparison.standard_error is None:
-        return f"no error beyond the noise, below {percent(comparison.error_upper_bound)} (relative RMSE); {noise}"
-    return f"errs by {percent(comparison.error, comparison.standard_error)} (relative RMSE); {noise}"
+        return f"no error above the noise, below {percent(comparison.error_upper_bound)} (relative RMSE); {noise}"
+    return f"error {percent(comparison.error, comparison.standard_error)} (relative RMSE); {noise}"
 
 
 def percent(fraction: float, error: float | None = None) -> str:
-    """A share, with as many digits as its standard error lets it have.
+    """Format a fraction in percent, with the digits that its standard error justifies.
 
     Args:
         fraction: of one. error: its standard error; None: two digits.
@@ -204,7 +204,7 @@ def percent(fraction: float, error: float | None = None) -> str:
 
 @contextmanager
 def _service(data: Path | None) -> Iterator[BakeService]:
-    """The bake service of a data folder, while it is needed."""
+    """Open the bake service of a data directory, and close it afterwards."""
     from relume_cli.data_folder import open_bakes, open_settings
 
     service = open_bakes(open_settings(data))

@@ -1,4 +1,4 @@
-"""`relume reference`: brute-force reference images, and comparisons with them."""
+"""`relume reference`: render reference images, and compare bakes with them."""
 
 from __future__ import annotations
 
@@ -13,30 +13,29 @@ from relume_cli.terminal.printing import Json, note, print_result
 
 def reference(
     scene: SceneName,
-    output: Annotated[Path, typer.Option(metavar="FILE.exr|.png|.webp", help="Where to write the picture.")],
+    output: Annotated[Path, typer.Option(metavar="FILE.exr|.png|.webp", help="Image file to write.")],
     spp: Annotated[int, typer.Option(metavar="N", min=1, max=1 << 20, help="Samples per pixel.")],
     look: LookFile = None,
     view: View = None,
-    camera: Annotated[Path | None, typer.Option(metavar="FILE.json", help="View from here instead.")] = None,
+    camera: Annotated[Path | None, typer.Option(metavar="FILE.json", help="Camera instead of a view.")] = None,
     size: Size = None,
     paths: Annotated[
-        Literal["all", "method"],
-        typer.Option(help="All light paths, or those of the method that the scene is baked with."),
+        Literal["all", "method"], typer.Option(help="All light paths, or only those that the bake's method simulates.")
     ] = "all",
     method: Annotated[
-        Literal["direct", "gather", "probes"] | None, typer.Option(help="Light paths of this method, baked or not.")
+        Literal["direct", "gather", "probes"] | None, typer.Option(help="Only light paths that this method simulates.")
     ] = None,
     compare: Annotated[
-        bool, typer.Option("--compare", help="Say how far the scene's finest bake is from it, by both kinds of paths.")
+        bool, typer.Option("--compare", help="Measure the error of the scene's finest bake, by both kinds of paths.")
     ] = False,
     as_json: Json = False,
     data: Data = None,
 ) -> None:
-    """Render by brute force, and compare a bake with it.
+    """Render a reference image, and compare a bake with it.
 
-    Every texel of the light counts, visibility is traced, and so are paths between surfaces; nothing is baked.
+    Brute force: all texels of the environment, traced visibility and indirect light; nothing is baked.
     """
-    from relume.core.errors import ParameterError
+    from relume.core.errors import PlanError
     from relume_cli.pictures.files import check_display_view, check_output, save
     from relume_cli.reference.passes import (
         compare_passes,
@@ -49,7 +48,7 @@ def reference(
 
     check_output(output)
     if compare and (camera, size, method) != (None, None, None):
-        raise ParameterError("--compare", "with --camera, --size or --method", "none of these: a bake has its own")
+        raise PlanError("--compare excludes --camera, --size and --method; leave them out: the bake has its own")
     if compare:
         subject = find_bake_comparison(data, scene, look, view)
     else:

@@ -1,4 +1,4 @@
-"""Scenes and bakes as JSON: the fields of the bodies that REST answers with, by the same names."""
+"""Scenes and bakes as JSON, with the field names of REST."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from relume_cli.terminal.printing import iso_time, size_text
+from relume.core.errors import bytes_text
+from relume_cli.terminal.printing import iso_time
 from relume_worker.status import FREE_CAMERA_METHODS
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def scene_document(record: SceneRecord, bakes: Sequence[BakeStatus]) -> dict[str, Any]:
-    """A scene, with the ids of its bakes."""
+    """Scene as JSON, with the ids of its bakes."""
     return {
         "id": record.id,
         "name": record.name,
@@ -33,7 +34,7 @@ def scene_document(record: SceneRecord, bakes: Sequence[BakeStatus]) -> dict[str
 
 
 def bake_document(status: BakeStatus, service: BakeService) -> dict[str, Any]:
-    """A bake at this moment."""
+    """Current state of a bake as JSON."""
     since_s = None if status.phase_since is None else max(0.0, round(time.time() - status.phase_since, 1))
     return {
         "id": status.id,
@@ -57,7 +58,7 @@ def bake_document(status: BakeStatus, service: BakeService) -> dict[str, Any]:
 
 
 def recipe_document(recipe: Recipe) -> dict[str, Any]:
-    """What is baked."""
+    """Recipe as JSON."""
     return {
         "method": recipe.method,
         "views": list(recipe.views),
@@ -72,7 +73,7 @@ def recipe_document(recipe: Recipe) -> dict[str, Any]:
 
 
 def plan_document(plan: Plan, service: BakeService) -> dict[str, Any]:
-    """What it costs."""
+    """Cost of a bake as JSON."""
     return {
         "view_samples": plan.num_view_samples,
         "rays": plan.num_rays,
@@ -83,16 +84,16 @@ def plan_document(plan: Plan, service: BakeService) -> dict[str, Any]:
 
 
 def recipe_text(recipe: Recipe) -> str:
-    """A recipe in a few words."""
+    """Recipe in a few words."""
     width, height = recipe.size
     return f"{recipe.method}, {width}×{height}, {recipe.num_lights:,} lights, views {', '.join(recipe.views)}"
 
 
 def plan_lines(plan: Plan, service: BakeService) -> list[str]:
-    """A plan for people."""
+    """Cost of a bake as lines of text."""
     seconds = service.estimate_seconds(plan)
     return [
         f"  {plan.num_view_samples:,} view samples, {plan.num_rays / 1e6:,.1f} M rays",
-        f"  at most {size_text(plan.store_bytes)} on the disk, {size_text(plan.peak_bytes)} of memory",
-        "  time unknown: nothing was baked here yet" if seconds is None else f"  about {seconds:,.0f} s",
+        f"  at most {bytes_text(plan.store_bytes)} of disk, {bytes_text(plan.peak_bytes)} of memory",
+        "  time unknown: no bake has finished here yet" if seconds is None else f"  about {seconds:,.0f} s",
     ]

@@ -1,4 +1,4 @@
-"""How far long work is: a bar at a terminal; where there is none, a line now and then; nothing with --quiet."""
+"""Progress of long work: a bar in a terminal, otherwise a line now and then; nothing with --quiet."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ import typer
 from relume_cli.terminal.printing import is_quiet
 
 LINE_STEP, MAX_INTERVAL_S, MIN_INTERVAL_S = 0.1, 30.0, 2.0
-"""A line for each tenth that is done, and each half minute; none sooner than two seconds after the one before."""
+"""A line for each tenth and each half minute, at least two seconds apart."""
 
 
 class ReportProgress(Protocol):
-    """Takes the share that is done, 0 to 1, and what is being done, in words."""
+    """Reports the fraction done, 0 to 1, and the current step as text."""
 
     def __call__(self, share: float, detail: str = "") -> None: ...
 
 
 def report_part(report: ReportProgress, index: int, total: int, detail: str) -> Callable[[float], None]:
-    """Whom to tell of one part of work.
+    """Return a callback that reports one part of a larger work.
 
     Args:
-        report: of all of it. index, total: which part of how many. detail: what the part is, in words.
+        report: of the whole work. index, total: of the part. detail: text for the part.
     """
     return lambda share: report((index + share) / total, detail)
 
 
 class ProgressLines:
-    """Progress where nobody looks at a terminal: in the log of a night's job."""
+    """Progress as lines, for logs."""
 
     def __init__(self, label: str, write: Callable[[str], object], clock: Callable[[], float] = time.monotonic) -> None:
         """
@@ -43,9 +43,9 @@ class ProgressLines:
         self._last_s, self._step = clock(), 0
 
     def __call__(self, share: float, detail: str = "") -> None:
-        """Say how far it is, where that is due."""
+        """Write a line if one is due."""
         since_s, step = self._clock() - self._last_s, math.floor(share / LINE_STEP + 1e-9)
-        self._step = min(self._step, step)  # work may begin anew
+        self._step = min(self._step, step)  # the work may restart
         if since_s < MIN_INTERVAL_S or (step == self._step and since_s < MAX_INTERVAL_S):
             return
         self._write(f"{self._label}: {share:.0%}" + (f", {detail}" if detail else ""))
@@ -55,7 +55,7 @@ class ProgressLines:
 
 @contextmanager
 def progress(label: str) -> Iterator[ReportProgress]:
-    """Show progress on stderr; yields whom to tell of it."""
+    """Show progress on stderr; yield the function that reports it."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 

@@ -1,1 +1,1 @@
-"""REST routes, one resource a file."""
+"""REST routes, one resource per module."""

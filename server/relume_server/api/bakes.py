@@ -1,4 +1,4 @@
-"""/api/bakes: plan, queue, follow and cancel bakes; the material ids of a baked view."""
+"""/api/bakes: plan, queue, follow and cancel bakes; material ids of a baked view."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ EVENT_POLL_S = 0.5
 
 @router.post("", status_code=202, responses={200: {"model": DryRunBody}, 202: {"model": BakeBody}})
 def submit_bake(request: BakeRequest, services: ServicesDep, caller: CallerDep) -> JSONResponse:
-    """Queue a bake, or with `dry_run` only say what it would cost; the same recipe twice is the same bake."""
+    """Queue a bake, or with `dry_run` return its cost; the same recipe is the same bake."""
     recipe = _recipe(request, services)
     if request.dry_run:
         plan = services.bakes.plan(request.scene, recipe)
@@ -59,8 +59,7 @@ def submit_bake(request: BakeRequest, services: ServicesDep, caller: CallerDep) 
 
 
 def _check_quotas(scene: str, recipe: Recipe, caller: Caller, services: Services) -> None:
-    """Whether somebody may queue one more; what is here or under way takes nothing. Raises QuotaError,
-    NearlyFullError."""
+    """Check that a caller may queue a bake; existing and running ones are free. Raises QuotaError, NearlyFullError."""
     with suppress(NotFoundError):
         if services.bakes.get(bake_id(scene, recipe)).state in ("queued", "running", "ready"):
             return
@@ -79,7 +78,7 @@ def list_bakes(
     state: Annotated[BakeState | None, Query()] = None,
     user: Annotated[str | None, Query(max_length=80)] = None,
 ) -> list[BakeBody]:
-    """Bakes, newest first, those of a scene, a state or a user."""
+    """List bakes, newest first, filtered by scene, state or user."""
     statuses = [
         status
         for status in services.bakes.bakes(scene)
@@ -91,7 +90,7 @@ def list_bakes(
 
 @router.get("/{bake}")
 def get_bake(bake: Id, services: ServicesDep) -> BakeBody:
-    """State, progress, rate and time left."""
+    """State, progress, rate and remaining time of a bake."""
     return bake_body(services.bakes.get(bake), services)
 
 
@@ -102,26 +101,26 @@ def get_bake(bake: Id, services: ServicesDep) -> BakeBody:
     responses={200: {"content": {"text/event-stream": {"schema": {"type": "string"}}}}},
 )
 async def bake_events(bake: Id, services: ServicesDep, caller: CallerDep) -> EventSourceResponse:
-    """Every change as a server-sent event `bake` with the same body as GET; ends with the bake, or with the token."""
+    """Stream changes as server-sent events `bake` with the body of GET; ends with the bake, or with the token."""
     await run_in_threadpool(services.bakes.get, bake)
     return _Events(bake, services, caller)
 
 
 class _Events(EventSourceResponse):
-    """A stream that is counted until it has ended, however it ends."""
+    """Event stream that counts against the caller's quota until it ends."""
 
     def __init__(self, bake: str, services: Services, caller: Caller) -> None:
         super().__init__(_events(bake, services, caller), headers={"Cache-Control": "no-store"})
         self._counted = services.access.quotas.stream(caller)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send it, as `EventSourceResponse` does. Raises QuotaError before anything is sent."""
+        """Send the stream, as `EventSourceResponse` does. Raises QuotaError before anything is sent."""
         with self._counted:
             await super().__call__(scope, receive, send)
 
 
 async def _events(bake: str, services: Services, caller: Caller) -> AsyncIterator[ServerSentEvent]:
-    """For as long as the caller may stay; whom a proxy named comes by it again after a while."""
+    """Yield changes while the caller is authorized; a caller named by a proxy is checked again after a while."""
     last_status: BakeStatus | None = None
     until_s = time.monotonic() + (PROXY_REVALIDATION_S if caller.auth_method == "proxy" else math.inf)
     while (
@@ -143,24 +142,24 @@ async def _events(bake: str, services: Services, caller: Caller) -> AsyncIterato
 
 @router.delete("/{bake}", status_code=204)
 def cancel_bake(bake: Id, services: ServicesDep, delete_files: bool = False) -> Response:
-    """Cancel; what was finished is kept for a resume. With `delete_files` the bake is deleted, finished or not."""
+    """Cancel a bake; finished tasks stay for a resume. With `delete_files` the bake is deleted, finished or not."""
     if delete_files:
         services.bakes.delete(bake)
         services.access.quotas.disown("bake", bake)
     elif not services.bakes.cancel(bake) and (state := services.bakes.get(bake).state) != "cancelled":
-        raise NotReadyError(f"the bake is {state}, there is nothing to cancel; ?delete_files=true deletes it")
+        raise NotReadyError(f"the bake is {state}; nothing to cancel (?delete_files=true deletes it)")
     return Response(status_code=204)
 
 
 @router.get("/{bake}/views/{view}/materials.png", response_class=PngResponse, name="get_material_ids")
 async def material_ids(bake: Id, view: Annotated[str, Path(max_length=256)], services: ServicesDep) -> Response:
-    """16-bit grey PNG: which material each pixel shows, in the scene's order; 65535 is background."""
+    """16-bit gray PNG with the material of each pixel, as index into the scene's materials; 65535 is background."""
     await run_in_threadpool(require_ready_bake, services, bake)
     async with services.transfers.acquire(bake, services.bakes.store_path(bake)) as transfer:
         if view not in transfer.views:
-            raise NotFoundError(f"this bake has no view {view[:80]!r}; it has {', '.join(transfer.views)[:400]}")
+            raise NotFoundError(f"this bake has no view {view[:80]!r}; its views are {', '.join(transfer.views)[:400]}")
         if transfer.camera_mode is CameraMode.FREE:
-            raise NotFoundError(f"the eye of view {view[:80]!r} moves; ask what a pixel shows by a probe")
+            raise NotFoundError(f"view {view[:80]!r} has a free camera; read its pixels in a session")
         fixed_view = cast("FixedViewTransfer", transfer).views[view]
         key, media_type = (bake, view, "materials"), PngResponse.media_type
         return await services.answers.stream(key, lambda: png_bytes(fixed_view.material_ids()), media_type, FOREVER)
@@ -168,7 +167,7 @@ async def material_ids(bake: Id, view: Annotated[str, Path(max_length=256)], ser
 
 @router.get("/{bake}/environment.png", response_class=PngResponse, name="get_own_environment")
 async def scene_environment(bake: Id, services: ServicesDep) -> PngResponse:
-    """The light that the scene came with, as small as those of /api/environments."""
+    """The environment that was baked, as a thumbnail like those of /api/environments."""
     await run_in_threadpool(require_ready_bake, services, bake)
     async with services.transfers.acquire(bake, services.bakes.store_path(bake)) as transfer:
         png = await services.pictures.run(("environment", bake), lambda: thumbnail(transfer.environment_radiance(None)))
@@ -176,7 +175,7 @@ async def scene_environment(bake: Id, services: ServicesDep) -> PngResponse:
 
 
 def require_ready_bake(services: Services, bake: str) -> BakeStatus:
-    """A bake that can be opened. Raises NotFoundError, NotReadyError."""
+    """Return a bake that can be opened. Raises NotFoundError, NotReadyError."""
     status = services.bakes.get(bake)
     if status.state != "ready":
         raise NotReadyError(f"the bake is {status.state}; wait until it is ready")
@@ -184,7 +183,7 @@ def require_ready_bake(services: Services, bake: str) -> BakeStatus:
 
 
 def _recipe(request: BakeRequest, services: Services) -> Recipe:
-    """What is baked: the preset, what the request names beside it, every view of the file where none is named."""
+    """Make the recipe: the preset, overridden by the request; by default all views of the file."""
     ledger = services.bakes.ledger
     requested_views = [
         view if isinstance(view, str) else make_custom_camera(view.name, view.to_world, view.yfov)
@@ -200,7 +199,7 @@ def _recipe(request: BakeRequest, services: Services) -> Recipe:
 
 
 def bake_body(status: BakeStatus, services: Services) -> BakeBody:
-    """A bake as the API shows it."""
+    """Make the body of a bake."""
     seconds = None if status.phase_since is None else max(0.0, round(time.time() - status.phase_since, 1))
     plan = _plan(status.plan, services)
     more = {"plan": plan, "phase_seconds": seconds, "created": format_timestamp(status.created), "user": status.client}

@@ -1,4 +1,4 @@
-"""/api/scenes/{id}/cameras: cameras that people place in a scene; bakes take them by name."""
+"""/api/scenes/{id}/cameras: cameras that users place in a scene; bakes refer to them by name."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ CameraName = Annotated[str, Path(min_length=1, max_length=MAX_NAME)]
 
 @router.get("", name="list_cameras")
 def get_cameras(scene: Id, services: ServicesDep, page: PageDep) -> list[CameraEntry]:
-    """The cameras that came with the scene, then those that were placed, by name."""
+    """List the cameras of the file, then the placed ones, by name."""
     return page.in_order(_entries(scene, services))
 
 
 @router.get("/{name}")
 def get_camera(scene: Id, name: CameraName, services: ServicesDep) -> CameraEntry:
-    """One camera."""
+    """Return one camera."""
     for entry in _entries(scene, services):
         if entry.name == name:
             return entry
@@ -40,14 +40,14 @@ def get_camera(scene: Id, name: CameraName, services: ServicesDep) -> CameraEntr
 
 @router.put("/{name}", status_code=204, responses={201: {"description": "Created"}, 204: {"description": "Replaced"}})
 def put_camera(scene: Id, name: CameraName, frame: CameraFrame, services: ServicesDep) -> Response:
-    """Keep a camera under a name: 201 where it is new. Bakes of an earlier one stay what they are."""
+    """Store a camera under a name: 201 if it is new. Bakes of its previous version are unchanged."""
     is_new = store_camera(services.bakes.ledger, scene, make_custom_camera(name, frame.to_world, frame.yfov))
     return Response(status_code=201 if is_new else 204)
 
 
 @router.delete("/{name}", status_code=204, name="delete_camera")
 def delete_placed_camera(scene: Id, name: CameraName, services: ServicesDep) -> Response:
-    """Forget a camera that was placed; bakes of it stay."""
+    """Delete a placed camera; its bakes are unchanged."""
     delete_camera(services.bakes.ledger, scene, name)
     return Response(status_code=204)
 

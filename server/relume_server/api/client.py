@@ -1,4 +1,4 @@
-"""Serves the built editor: hashed assets for ever, the page always fresh, the page for every route of the editor."""
+"""Serve the built editor: hashed assets are cached forever, the page never; unknown paths get the page."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ from starlette.websockets import WebSocketClose
 
 FOR_EVER = "public, max-age=31536000, immutable"
 NOT_BUILT = """<!doctype html><html lang="en"><meta charset="utf-8"><title>relume</title>
-<p>The server runs; the editor is not built yet. Build it and reload:</p>
+<p>The server is running, but the editor is not built. Build it and reload:</p>
 <pre>cd client_web &amp;&amp; npm ci &amp;&amp; npm run build</pre></html>"""
 
 
 class Client(StaticFiles):
-    """The editor's files under /; what is no file and has no suffix is a route of the editor."""
+    """Files of the editor under /; a path without suffix that is no file is a route of the editor."""
 
     def __init__(self, folder: Path) -> None:
         super().__init__(directory=folder, check_dir=False)
         self._index = folder / "index.html"
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """A WebSocket that no route takes is refused."""
+        """Refuse WebSockets of unknown addresses."""
         if scope["type"] == "websocket":
             await WebSocketClose(1008, "there is no such session")(scope, receive, send)
         else:
             await super().__call__(scope, receive, send)
 
     async def check_config(self) -> None:
-        """A missing folder is no error: it is said in the page."""
+        """Accept a missing folder: the page explains it."""
 
     async def get_response(self, path: str, scope: Scope) -> Response:
-        """A file, or the page."""
+        """Return a file, or the page."""
         if path == "api" or path.startswith("api/"):
             raise HTTPException(404, "there is no such call; see /api/openapi.json")
         if scope["method"] not in ("GET", "HEAD"):
-            raise HTTPException(405, "only GET here", {"Allow": "GET, HEAD"})
+            raise HTTPException(405, "only GET is allowed here", {"Allow": "GET, HEAD"})
         if not self._index.is_file():
             return HTMLResponse(NOT_BUILT, status_code=503, headers={"Cache-Control": "no-store"})
         try:

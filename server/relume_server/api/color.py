@@ -1,4 +1,4 @@
-"""/api/color: displays, views and colour spaces of the server's OpenColorIO config; views as tables for shaders."""
+"""/api/color: displays, views and color spaces of the server's OpenColorIO config; views as lookup tables."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class LutResponse(Response):
 
 @router.get("")
 def describe_color() -> ColorBody:
-    """What looks and renders may name of the config."""
+    """Displays, views and color spaces of the config."""
     config = get_config()
     if config is None:
         return ColorBody(id=None, name=None, working=None, displays=[], default=None, spaces=[])
@@ -45,10 +45,10 @@ def describe_color() -> ColorBody:
 
 @router.get("/{config}/lut", response_class=LutResponse)
 async def get_lut(config: Id, display: ViewName, view: ViewName, services: ServicesDep) -> Response:
-    """A view as a table of 65 x 65 x 65 x 3 numbers of 16 bits (docs/api.md)."""
+    """Lookup table of a view: 65 x 65 x 65 x 3 numbers of 16 bits (docs/api.md)."""
     ocio_config = get_config()
     if ocio_config is None or ocio_config.id != config:
-        raise NotFoundError("the server has another colour config now; ask /api/color again")
+        raise NotFoundError("the server's color config has changed; read /api/color again")
 
     def read_table() -> NDArray[np.uint16]:
         return ocio_config.table(OcioView(display, view)).astype("<u2")

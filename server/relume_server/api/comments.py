@@ -1,4 +1,4 @@
-"""/api/scenes/{id}/comments: words pinned to pixels. Rooms of the scene are told of each change."""
+"""/api/scenes/{id}/comments: comments pinned to pixels. Rooms of the scene are notified of changes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ CommentId = Annotated[Id, Path()]
 
 @router.get("")
 def list_comments(scene: Id, services: ServicesDep, page: PageDep, resolved: bool | None = None) -> list[CommentBody]:
-    """Of a scene, oldest first; those that are resolved, or that are not."""
+    """List comments of a scene, oldest first, filtered by `resolved`."""
     get_scene(services.bakes.ledger, scene)
     comments = [each for each in services.comments.list(scene) if resolved in (None, each.resolved is not None)]
     return [_body(scene, comment) for comment in page.cut(comments, lambda each: (each.created, each.id))]
@@ -39,7 +39,7 @@ def list_comments(scene: Id, services: ServicesDep, page: PageDep, resolved: boo
 async def add_comment(
     scene: Id, request: CommentRequest, services: ServicesDep, caller: CallerDep, response: Response
 ) -> CommentBody:
-    """Pin words to a pixel."""
+    """Add a comment."""
     comment = await run_in_threadpool(_add, services, scene, request, caller)
     services.live.rooms.notify_comment(scene)
     response.headers["Location"] = f"/api/scenes/{scene}/comments/{comment.id}"
@@ -54,7 +54,7 @@ def _add(services: Services, scene: str, request: CommentRequest, caller: Caller
     if request.view not in status.recipe.views:
         raise ParameterError("/view", request.view, "one of " + ", ".join(status.recipe.views)[:400])
     if request.x >= request.size[0] or request.y >= request.size[1]:
-        raise ParameterError("/x", [request.x, request.y], "a pixel of a picture of that size")
+        raise ParameterError("/x", [request.x, request.y], "a pixel inside size")
     if request.camera is not None:
         make_custom_camera("camera", request.camera.to_world, request.camera.yfov)
     picture = None if request.picture is None else small_picture(request.picture)
@@ -67,7 +67,7 @@ def _add(services: Services, scene: str, request: CommentRequest, caller: Caller
 async def resolve_comment(
     scene: Id, comment: CommentId, change: CommentChange, services: ServicesDep, caller: CallerDep
 ) -> Response:
-    """Settle a comment, or open it again."""
+    """Resolve or reopen a comment."""
     resolver = (caller.person or "somebody") if change.resolved else None
     await run_in_threadpool(services.comments.resolve, scene, comment, resolver)
     services.live.rooms.notify_comment(scene)
@@ -76,7 +76,7 @@ async def resolve_comment(
 
 @router.delete("/{comment}", status_code=204)
 async def delete_comment(scene: Id, comment: CommentId, services: ServicesDep) -> Response:
-    """Forget a comment."""
+    """Delete a comment."""
     await run_in_threadpool(services.comments.delete, scene, comment)
     services.live.rooms.notify_comment(scene)
     return Response(status_code=204)
@@ -89,7 +89,7 @@ async def delete_comment(scene: Id, comment: CommentId, services: ServicesDep) -
     name="get_comment_picture",
 )
 def get_picture(scene: Id, comment: CommentId, services: ServicesDep) -> Response:
-    """The picture of the moment, at most 320 pixels a side."""
+    """Snapshot of a comment, at most 320 pixels a side."""
     return Response(services.comments.picture(scene, comment), media_type="image/webp", headers=A_DAY)
 
 

@@ -1,4 +1,4 @@
-"""/api/comparisons: a frame against brute force, pass by pass."""
+"""/api/comparisons: compare a frame with the reference, pass by pass."""
 
 from __future__ import annotations
 
@@ -28,11 +28,13 @@ router = APIRouter(prefix="/api/comparisons", tags=["comparisons"])
 Picture = Literal["error", "reference", "method-error", "method-reference"]
 
 
-@router.post("", status_code=202, responses={200: {"model": ComparisonPlanBody, "description": "A dry run's answer"}})
+@router.post(
+    "", status_code=202, responses={200: {"model": ComparisonPlanBody, "description": "Response to a dry run"}}
+)
 async def submit_comparison(
     request: ComparisonRequest, services: ServicesDep, caller: CallerDep, response: Response
 ) -> ComparisonBody | ComparisonPlanBody:
-    """Queue a comparison, or say how long it would take; the look is checked first."""
+    """Queue a comparison, or with `dry_run` return its duration; the look is validated first."""
     await run_in_threadpool(require_ready_bake, services, request.bake)
     async with services.transfers.acquire(request.bake, services.bakes.store_path(request.bake)) as transfer:
         await run_in_threadpool(_check, request, transfer)
@@ -53,7 +55,7 @@ def _check(request: ComparisonRequest, transfer: OpenBake) -> None:
         comparison_camera(request, transfer)
         check_picture_size(request.size)
     elif request.camera is not None or request.size is not None:
-        allowed = "none for this bake, whose eye does not move: it is compared as it was baked"
+        allowed = "none, because this bake has fixed cameras"
         raise ParameterError("camera" if request.size is None else "size", "given", allowed)
     check_look(request.look, transfer, "/look")
     check_display(request.look, "/look")
@@ -67,27 +69,27 @@ def list_comparisons(
     bake: Annotated[Id | None, Query()] = None,
     user: Annotated[UserName | None, Query()] = None,
 ) -> list[ComparisonBody]:
-    """Comparisons, newest first, those of a state, a bake or a user; 100 where no `limit` is given."""
+    """List comparisons, newest first, filtered by state, bake or user; 100 without a `limit`."""
     job_filter = JobFilter(state, user, bake)
     return [_body(job, services) for job in list_jobs(services.comparisons, job_filter, page)]
 
 
 @router.get("/{comparison}")
 def get_comparison(comparison: Id, services: ServicesDep) -> ComparisonBody:
-    """State, progress, and what was found so far."""
+    """State, progress and errors so far."""
     return _body(services.comparisons.get(comparison), services)
 
 
 @router.delete("/{comparison}", status_code=204)
 def stop_comparison(comparison: Id, services: ServicesDep, delete_files: bool = False) -> Response:
-    """Stop a comparison; what was found so far is kept, unless `delete_files` is true."""
+    """Stop a comparison; its results are saved, unless `delete_files` is true."""
     (services.comparisons.delete if delete_files else services.comparisons.stop)(comparison)
     return Response(status_code=204)
 
 
 @router.post("/{comparison}/resume", status_code=202)
 def resume_comparison(comparison: Id, services: ServicesDep) -> ComparisonBody:
-    """Go on with a comparison that was stopped or has failed, after its last finished pass."""
+    """Resume a stopped or failed comparison after its last finished pass."""
     services.comparisons.resume(comparison)
     return _body(services.comparisons.get(comparison), services)
 
@@ -101,14 +103,15 @@ def resume_comparison(comparison: Id, services: ServicesDep) -> ComparisonBody:
 def get_picture(
     comparison: Id, name: Picture, services: ServicesDep, passes: Annotated[int | None, Query(ge=0)] = None
 ) -> Download:
-    """Where the frame differs, or the brute force so far, by the paths that were asked for or by those that the bake's
-    method follows. Brute force from the first pass on, where the frame differs from the second. `passes` only makes the
-    address change when the picture does."""
+    """Difference image, or the reference so far, for the requested light paths or those of the bake's method. The
+    reference is available from the first pass, the difference from the second. `passes` only makes the URL change with
+    the image.
+    """
     job = services.comparisons.get(comparison)
     path = services.comparisons.picture_path(comparison, name)
     if not path.exists():
-        needed = "one pass is" if name.endswith("reference") else "two passes are"
-        raise NotReadyError(f"{needed} needed, {job.completed} are done; wait a little")
+        needed = "1 pass is" if name.endswith("reference") else "2 passes are"
+        raise NotReadyError(f"{needed} needed, {job.completed} done; try again later")
     return Download(path, media_type="image/png", headers={"Cache-Control": "no-store"})
 
 

@@ -1,4 +1,4 @@
-"""/api/example-scenes: the scenes made by code, and taking one of them."""
+"""/api/example-scenes: list and import built-in scenes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ExampleName = Annotated[str, Path(max_length=256)]
 
 @router.get("", name="list_example_scenes")
 def list_examples(page: PageDep) -> list[ExampleSceneBody]:
-    """All of them, in the order in which they are shown."""
+    """List all built-in scenes, in display order."""
     return [
         ExampleSceneBody(name=name, label=each.label, description=each.description, size=each.size, method=each.method)
         for name, each in page.in_order(BUILT_IN.items())
@@ -31,9 +31,9 @@ def list_examples(page: PageDep) -> list[ExampleSceneBody]:
 
 @router.post("/{name}", status_code=201, name="import_example_scene")
 async def import_example(name: ExampleName, services: ServicesDep, caller: CallerDep, response: Response) -> SceneBody:
-    """Make it and register it like an imported one; a second time it is the same scene."""
+    """Import a built-in scene; repeating the call returns the same scene."""
     if name not in BUILT_IN:
-        raise NotFoundError(f"there is no built-in scene {name[:80]!r}; there are {', '.join(BUILT_IN)}")
+        raise NotFoundError(f"there is no built-in scene {name[:80]!r}; choose from {', '.join(BUILT_IN)}")
     request = ImportRequest.create(services.settings, "built_in", None, name)
     async with services.intake.reserving(caller.name, 0) as reservation:
         identity = await services.intake.import_file(reservation, lambda folder: request)

@@ -1,4 +1,4 @@
-"""/livez: the process runs. /readyz: it can serve. /metrics: figures for Prometheus."""
+"""/livez: the process runs. /readyz: it can serve. /metrics: Prometheus metrics."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ router = APIRouter(tags=["health"])
 
 @router.get("/livez")
 async def livez() -> dict[str, str]:
-    """The process answers."""
+    """The process responds."""
     return {"status": "alive"}
 
 
 @router.get("/readyz")
 def readyz(services: ServicesDep) -> dict[str, str]:
-    """The database can be read, the data directory has room, and the server is not being stopped."""
+    """The database is readable, the data directory has space, and the server is not draining."""
     services.drain.check()
     with services.bakes.ledger.sessions() as session:
         session.execute(select(BakeRow.id).limit(1))
@@ -31,5 +31,5 @@ def readyz(services: ServicesDep) -> dict[str, str]:
 
 @router.get("/metrics", response_class=PlainTextResponse)
 def metrics(services: ServicesDep) -> PlainTextResponse:
-    """Prometheus text."""
+    """Metrics in the Prometheus text format."""
     return PlainTextResponse(generate_latest(services.metrics.registry), headers={"Content-Type": CONTENT_TYPE_LATEST})

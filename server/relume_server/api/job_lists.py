@@ -1,4 +1,4 @@
-"""What routes of renders, comparisons and BTFs in the making have in common."""
+"""Helpers shared by the routes of renders, comparisons and BTF jobs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def list_jobs(
     *,
     newest_first: bool = True,
 ) -> list[Job[Request]]:
-    """A part of a queue's list. most: how long it is at most where nobody says that."""
+    """Return a page of a queue's jobs. default_limit: number without a `limit`."""
 
     def key(job: Job[Request]) -> Key:
         return newest(job.created, job.id) if newest_first else (job.created, job.id)
@@ -38,6 +38,6 @@ def list_jobs(
 
 
 def format_timestamps(job: Job[Request]) -> dict[str, str | None]:
-    """When it was asked for, begun and ended, as bodies say it."""
+    """Format the times of a job for its body."""
     times = {"created": job.created, "started": job.started, "ended": job.ended}
     return {name: None if at is None else format_timestamp(at) for name, at in times.items()}

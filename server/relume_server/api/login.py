@@ -1,4 +1,4 @@
-"""/api/me, /api/login, /api/logout: who calls. /api/audit: what was changed, for admins."""
+"""/api/me, /api/login, /api/logout: the caller. /api/audit: changes, for admins."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ COOKIE_SECONDS = 30 * 86_400
 
 @router.get("/me", name="get_me")
 async def me(caller: CallerDep, services: ServicesDep, response: Response) -> MeBody:
-    """Who calls, and what they may do."""
+    """The caller, with name and role."""
     response.headers["Cache-Control"] = "no-store"
     settings, role = services.settings, caller.role.label
     return MeBody(
@@ -35,7 +35,7 @@ async def me(caller: CallerDep, services: ServicesDep, response: Response) -> Me
 
 @router.post("/login", status_code=204)
 async def login(credentials: LoginRequest, request: Request, services: ServicesDep, caller: CallerDep) -> Response:
-    """Keep a token in a cookie that no script of a page can read, and no other site can send."""
+    """Store a token in a cookie that no script can read, and no other site can send."""
     access = services.access
     token_caller = await access.identity.by_token(credentials.token, caller.address, access.tokens)
     await access.record(_line(token_caller or caller, 401 if token_caller is None else 204))
@@ -55,7 +55,7 @@ def _line(caller: Caller, status: int) -> Change:
 
 @router.post("/logout", status_code=204)
 async def logout() -> Response:
-    """Forget the cookie; the token stays what it is."""
+    """Delete the cookie; the token stays valid."""
     response = Response(status_code=204)
     response.delete_cookie(COOKIE, path="/", httponly=True, samesite="strict")
     return response
@@ -68,7 +68,7 @@ def list_audit(
     before: Annotated[int | None, Query(ge=1, le=2**53)] = None,
     who: Annotated[str | None, Query(max_length=80)] = None,
 ) -> list[AuditEntry]:
-    """Changes, newest first; older ones by the `number` of the last as `before`."""
+    """List changes, newest first; pass the `number` of the last one as `before` for older ones."""
     return [
         AuditEntry(**{**vars(entry), "at": format_timestamp(entry.at)})
         for entry in services.access.audit.list(limit, before, who)

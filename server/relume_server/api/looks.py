@@ -1,4 +1,4 @@
-"""/api/looks: saved looks. A change names the version it changes (If-Match); a new one may say If-None-Match: *."""
+"""/api/looks: saved looks. A change names its version (If-Match); a new look may send If-None-Match: *."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ LOOK_BODY = {"requestBody": {"required": True, "content": LOOK_CONTENT}}
 
 @router.get("")
 def list_looks(services: ServicesDep, page: PageDep) -> list[LookEntry]:
-    """Names and versions, newest first."""
+    """List names and versions, newest first."""
     return [_entry(look) for look in page.cut(services.looks.list(), lambda look: newest(look.modified, look.name))]
 
 
 @router.get("/{name}", responses={200: {"content": LOOK_CONTENT}})
 def get_look(name: str, services: ServicesDep) -> Response:
-    """One look, with its version as ETag."""
+    """Return a look, with its version as ETag."""
     look = services.looks.get(check_name(name))
     return Response(look.document, headers=_headers(look), media_type="application/json")
 
@@ -51,9 +51,9 @@ async def put_look(
     if_none_match: Etags = None,
     created: AwareDatetime | None = None,
 ) -> Response:
-    """Save a look: 201 where it is new, 204 where it replaces the version that If-Match names.
+    """Save a look: 201 if it is new, 204 if it replaces the version in If-Match.
 
-    `created` is for one that is renamed, or comes back: it stands where it stood.
+    `created` keeps the position in lists of a look that is renamed or restored.
     """
     if if_none_match not in (None, "*"):
         raise ParameterError("If-None-Match", if_none_match, "* or nothing")
@@ -67,7 +67,7 @@ async def put_look(
 
 @router.put("/{name}/thumbnail", status_code=204, name="put_look_thumbnail")
 def put_thumbnail(name: str, request: ThumbnailRequest, services: ServicesDep, if_match: Etags = None) -> Response:
-    """Store a picture of the version that If-Match names; another version has none."""
+    """Store a thumbnail of the version in If-Match; later versions have none."""
     services.looks.put_thumbnail(check_name(name), small_picture(request.picture), if_match)
     return Response(status_code=204)
 
@@ -81,14 +81,14 @@ def put_thumbnail(name: str, request: ThumbnailRequest, services: ServicesDep, i
 def get_thumbnail(
     name: str, services: ServicesDep, version: Annotated[str | None, Query(max_length=64)] = None
 ) -> Response:
-    """The picture of a look as it is, at most 320 pixels a side; `version` makes the address change when it does."""
+    """Thumbnail of the current version, at most 320 pixels a side; `version` only makes the URL change with it."""
     picture = services.looks.thumbnail(check_name(name))
     return Response(picture, media_type="image/webp", headers={"Cache-Control": "no-cache"})
 
 
 @router.delete("/{name}", status_code=204)
 def delete_look(name: str, services: ServicesDep, if_match: Etags = None) -> Response:
-    """Delete the version that If-Match names."""
+    """Delete the version in If-Match."""
     services.looks.delete(check_name(name), if_match)
     return Response(status_code=204)
 

@@ -1,4 +1,4 @@
-"""/api/models: every BRDF term, its parameters and curves; sliders are built from it. How moving views send terms."""
+"""/api/models: BRDF models with parameters and curves, from which sliders are built; quantities computed from terms."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ router = APIRouter(prefix="/api/models", tags=["models"])
 
 @router.get("")
 def list_models(page: PageDep) -> list[ModelBody]:
-    """Every BRDF term."""
+    """List all BRDF models."""
     terms = page.in_order(registry.describe())
     return [ModelBody(**term, specular_below=specular_threshold(term["model"])) for term in terms]
 
 
 @router.post("/zernike-fit")
 async def get_zernike_fit(request: TermsRequest) -> list[ZernikeFitBody]:
-    """How terms are sent in views whose eye moves: the Zernike factorization of each (Mahajan 2008)."""
+    """Factorize terms for free cameras in the Zernike basis (Mahajan 2008)."""
     return await run_in_threadpool(_zernike_fit, _complete(request))
 
 
 @router.post("/albedo")
 async def get_albedo(request: TermsRequest) -> AlbedoBody:
-    """What share of the light that meets a material of these terms it sends back: no more than all, in the world."""
+    """Albedo of a material with these terms; physically at most 1."""
     return await run_in_threadpool(_albedo, _complete(request))
 
 
@@ -50,6 +50,6 @@ def _albedo(terms: list[dict[str, Any]]) -> AlbedoBody:
 
 
 def _zernike_fit(terms: list[dict[str, Any]]) -> list[ZernikeFitBody]:
-    from relume.live.free_camera.basis.factorization_error import factorization_error  # loads compiled kernels
+    from relume.live.free_camera.basis.factorization_error import factorization_error  # imports compiled kernels
 
     return [ZernikeFitBody(**factorization_error(term)._asdict()) for term in terms]

@@ -1,5 +1,4 @@
-"""What all lists have in common: a part of one is asked for by `limit` and `after`, and what a call does not take in
-its query is refused."""
+"""Lists by `limit` and `after`, and rejection of unknown query parameters."""
 
 from __future__ import annotations
 
@@ -18,14 +17,14 @@ from relume.core.errors import ParameterError
 
 MAX_LISTED = 1_000
 MAX_LONG = 100
-"""Of lists that grow without end so many are answered where nobody says how many."""
+"""Default page size of lists that grow without bound."""
 _MAX_CURSOR = 1_000
 
-NameFilter = Annotated[str | None, Query(max_length=200, description="only those of this name")]
+NameFilter = Annotated[str | None, Query(max_length=200, description="only entries with this name")]
 
 
 class _Stored(Protocol):
-    """What every record of a library says."""
+    """Common fields of asset records."""
 
     @property
     def id(self) -> str: ...
@@ -38,38 +37,38 @@ class _Stored(Protocol):
 Entry = TypeVar("Entry")
 Stored = TypeVar("Stored", bound=_Stored)
 Key = tuple[float | str, ...]
-"""By which a list is sorted; no two entries have the same."""
+"""Sort key of a list; unique per entry."""
 
 
 class Page:
-    """Which part of a list is asked for; where the next one begins stands in the answer's header `Link`."""
+    """Requested page of a list; the header `Link` of the response has the address of the next page."""
 
     def __init__(
         self,
         request: Request,
         response: Response,
-        limit: Annotated[int | None, Query(ge=1, le=MAX_LISTED, description="at most so many")] = None,
+        limit: Annotated[int | None, Query(ge=1, le=MAX_LISTED, description="maximum number of entries")] = None,
         after: Annotated[
             str | None,
-            Query(max_length=_MAX_CURSOR, description="where it begins, as the header Link of the part before says"),
+            Query(max_length=_MAX_CURSOR, description="start of the page, from the header Link of the previous page"),
         ] = None,
     ) -> None:
         self._request, self._response, self.limit = request, response, limit
         self.after = None if after is None else _decode_cursor(after)
 
     def default_limit(self, limit: int) -> int:
-        """How many are asked for; so many where nobody says. With one more it shows whether there is a next part."""
+        """Requested number of entries, or the default. One entry more shows whether there is a next page."""
         self.limit = self.limit or limit
         return self.limit
 
     def cut(self, entries: Iterable[Entry], key: Callable[[Entry], Key]) -> list[Entry]:
-        """The entries that are asked for.
+        """Cut the page out of a list.
 
         Args:
-            entries: all of the list, or at least those that the part may have and the one after it.
-            key: of an entry; lower ones come first.
+            entries: the whole list, or at least the page and one more entry.
+            key: of an entry; lower keys come first.
         Raises:
-            ParameterError: `after` is of another list.
+            ParameterError: `after` belongs to another list.
         """
         ordered = sorted(entries, key=key)
         start = 0
@@ -82,11 +81,11 @@ class Page:
         return ordered[start:end]
 
     def in_order(self, entries: Iterable[Entry]) -> list[Entry]:
-        """The entries that are asked for of a list whose order never changes."""
+        """Cut the page out of a list with constant order."""
         return [entry for _, entry in self.cut(enumerate(entries), lambda numbered: (float(numbered[0]),))]
 
     def check(self, key: Key) -> None:
-        """Whether `after` is of a list with such keys. Raises ParameterError."""
+        """Check that `after` belongs to a list with such keys. Raises ParameterError."""
         if self.after is not None and [isinstance(value, str) for value in self.after] != [
             isinstance(value, str) for value in key
         ]:
@@ -119,29 +118,33 @@ def _refuse(name: str) -> float:
 
 
 def _no_cursor(cursor: str) -> ParameterError:
-    return ParameterError("query parameter after", cursor, "what the header Link of this list's part before says")
+    return ParameterError("query parameter after", cursor, "the value from the header Link of the previous page")
 
 
 def newest(created: float, identity: str) -> Key:
-    """The key of lists whose newest entries come first."""
+    """Sort key for newest first."""
     return -created, identity
 
 
 def records_page(records: Iterable[Stored], name: str | None, page: Page) -> list[Stored]:
-    """The part that is asked for of a library's list, newest first. name: of those that are listed; None: any."""
+    """Page of asset records, newest first. name: only records with this name; None: all."""
     named = [record for record in records if name in (None, record.name)]
     return page.cut(named, lambda record: newest(record.created, record.id))
 
 
 def check_query(request: Request) -> None:
-    """Whether a call takes all that its query says. Raises ParameterError.
+    """Check that a call knows all its query parameters. Raises ParameterError.
 
-    What is passed over in silence is an error that nobody sees: a filter that was misspelled lists everything.
+    Otherwise a misspelled filter would silently list everything.
     """
     allowed_names = _query_names(request.scope["route"])
     for name in request.query_params:
         if name not in allowed_names:
-            allowed = f"only {', '.join(allowed_names)}" if allowed_names else "none: this call takes no query"
+            allowed = (
+                f"only {', '.join(allowed_names)}"
+                if allowed_names
+                else "none, because this call has no query parameters"
+            )
             raise ParameterError(f"query parameter {name[:80]}", request.query_params[name], allowed)
 
 
@@ -149,7 +152,7 @@ _QUERY_NAMES: dict[Callable[..., Any], Sequence[str]] = {}
 
 
 def _query_names(route: APIRoute) -> Sequence[str]:
-    """Names of the parameters that a route's query may have."""
+    """Names of a route's query parameters."""
     if route.endpoint not in _QUERY_NAMES:
         _QUERY_NAMES[route.endpoint] = _names(route.dependant)
     return _QUERY_NAMES[route.endpoint]

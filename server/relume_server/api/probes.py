@@ -1,4 +1,4 @@
-"""/api/bakes/{id}/probes: what a browser keeps of a bake to draw its moving views itself; nothing of it changes."""
+"""/api/bakes/{id}/probes: immutable data of a bake with which a browser draws free-camera views itself."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from relume_server.services import ServicesDep
 router = APIRouter(prefix="/api/bakes", tags=["bakes"])
 
 
-Layout = Annotated[int | None, Query(description="only makes the address change when a release has other arrays")]
+Layout = Annotated[int | None, Query(description="only makes the URL change between releases with different arrays")]
 
 
 class ArrayResponse(Response):
@@ -32,7 +32,7 @@ class ArrayResponse(Response):
 
 @router.get("/{bake}/probes")
 async def describe_probes(bake: Id, services: ServicesDep, response: Response, layout: Layout = None) -> FreeCameraBody:
-    """Of a moving view: what its shaders are written from, and the names of the arrays that they keep."""
+    """Constants for the shaders of free-camera views, and the names of their arrays."""
     await run_in_threadpool(require_ready_bake, services, bake)
     async with services.transfers.acquire(bake, services.bakes.store_path(bake)) as transfer:
         constants, arrays = services.live.library.shader_arrays(_require_free_camera(transfer))
@@ -44,7 +44,7 @@ async def describe_probes(bake: Id, services: ServicesDep, response: Response, l
 async def get_probe_array(
     bake: Id, array: Annotated[str, Path(max_length=64)], services: ServicesDep, layout: Layout = None
 ) -> Response:
-    """One of them: so many texels of 1, 2 or 4 numbers (docs/api.md)."""
+    """One array: texels of 1, 2 or 4 numbers (docs/api.md)."""
     await run_in_threadpool(require_ready_bake, services, bake)
     async with services.transfers.acquire(bake, services.bakes.store_path(bake)) as transfer:
         _, arrays = services.live.library.shader_arrays(_require_free_camera(transfer))
@@ -54,11 +54,11 @@ async def get_probe_array(
 
 def _require_free_camera(transfer: OpenBake) -> OpenBake:
     if transfer.camera_mode is not CameraMode.FREE:
-        raise NotFoundError("the views of this bake are fixed; bake the scene by method probes to move the eye")
+        raise NotFoundError("this bake has fixed cameras; bake the scene with method probes for a free camera")
     return transfer
 
 
 def _read_array(arrays: Mapping[str, Callable[[], NDArray[Any]]], name: str) -> NDArray[Any]:
     if name not in arrays:
-        raise NotFoundError(f"there is no array {name[:40]!r}; there are {', '.join(arrays)}")
+        raise NotFoundError(f"there is no array {name[:40]!r}; choose from {', '.join(arrays)}")
     return arrays[name]()

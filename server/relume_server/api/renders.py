@@ -1,4 +1,4 @@
-"""/api/renders: exact pictures of many looks at once."""
+"""/api/renders: exact images of many looks."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ MEDIA_TYPES = {"mp4": "video/mp4", "exr": "image/x-exr", "png": "image/png", "we
 async def submit_render(
     request: RenderRequest, services: ServicesDep, caller: CallerDep, response: Response
 ) -> RenderBody:
-    """Queue a batch; every look is checked first."""
+    """Queue a batch; all looks are validated first."""
     await run_in_threadpool(require_ready_bake, services, request.bake)
     async with services.transfers.acquire(request.bake, services.bakes.store_path(request.bake)) as transfer:
         max_bytes = await run_in_threadpool(_check, request, transfer)
@@ -65,7 +65,7 @@ async def submit_render(
 
 
 def _queue(request: RenderRequest, max_bytes: int, caller: Caller, services: Services) -> str:
-    """Queue a batch that takes at most so many bytes of whoever asks. Raises QuotaError, BusyError."""
+    """Queue a batch that counts at most so many bytes for the caller. Raises QuotaError, BusyError."""
     quotas = services.access.quotas
     with quotas.deciding:
         quotas.check_bytes(caller.name, max_bytes)
@@ -76,9 +76,9 @@ def _queue(request: RenderRequest, max_bytes: int, caller: Caller, services: Ser
 
 @router.post("/looks")
 async def frame_looks(request: LooksRequest, services: ServicesDep) -> LooksBody:
-    """What each frame of a batch with these keyframes shows, and from where: an editor plays what will be rendered."""
+    """Look and camera of each frame of an animation, so that an editor plays exactly what will be rendered."""
     if request.num_frames > MAX_LISTED_FRAMES:
-        raise ParameterError("frames", request.num_frames, f"at most {MAX_LISTED_FRAMES} to be looked at")
+        raise ParameterError("frames", request.num_frames, f"at most {MAX_LISTED_FRAMES} for this call")
     await run_in_threadpool(require_ready_bake, services, request.bake)
     async with services.transfers.acquire(request.bake, services.bakes.store_path(request.bake)) as transfer:
         return await run_in_threadpool(_frame_looks, request, transfer)
@@ -93,14 +93,14 @@ def _frame_looks(request: LooksRequest, transfer: OpenBake) -> LooksBody:
         documents.append(dict(look_document_at_frame(request, request.view, transfer, index)))
         num_chars += len(json.dumps(documents[-1]))
         if num_chars > MAX_LISTED_BYTES:
-            raise ParameterError("frames", request.num_frames, f"at most {index} of looks as large as these")
+            raise ParameterError("frames", request.num_frames, f"at most {index} with looks of this size")
     return LooksBody(looks=documents, cameras=cameras)
 
 
 def _path_cameras(request: LooksRequest, transfer: OpenBake) -> list[CameraFrame] | None:
-    """Where each frame is seen from; None where it was baked. Raises ParameterError where no eye can go there."""
+    """Camera of each frame; None for the baked camera. Raises ParameterError if the bake does not allow it."""
     if request.view is None:
-        raise ParameterError("view", None, "the view that the path is a way of")
+        raise ParameterError("view", None, "the view of the path")
     baked_view(request.view, transfer)
     cameras = [camera for camera in check_animation(request, request.view, transfer) if camera is not None]
     return [
@@ -110,27 +110,27 @@ def _path_cameras(request: LooksRequest, transfer: OpenBake) -> list[CameraFrame
 
 def _check_looks(request: Keyframes, transfer: OpenBake) -> None:
     if len(request.looks) > request.num_frames:
-        allowed = f"at most as many as frames, {request.num_frames}"
+        allowed = f"at most one per frame, {request.num_frames}"
         raise ParameterError("looks", f"{len(request.looks)} keyframes", allowed)
     for index, partial in enumerate(request.looks):
         check_look(partial, transfer, f"/looks/{index}")
 
 
 def baked_view(name: str, transfer: OpenBake) -> Any:
-    """A view of a bake that a body names. Raises ParameterError."""
+    """Return the view of a bake by name. Raises ParameterError."""
     if name not in transfer.views:
         raise ParameterError("view", name, "one of " + ", ".join(transfer.views)[:400])
     return transfer.views[name]
 
 
 def check_picture_size(size: tuple[int, int] | None) -> None:
-    """Whether pictures of a moving eye may be so large; None: as baked. Raises ParameterError."""
+    """Check the image size of a free camera; None: as baked. Raises ParameterError."""
     if size is not None and size[0] * size[1] > MAX_CAMERA_PIXELS:
-        raise ParameterError("size", list(size), f"at most {MAX_CAMERA_PIXELS} pixels in all")
+        raise ParameterError("size", list(size), f"at most {MAX_CAMERA_PIXELS} pixels in total")
 
 
 def check_look(partial: dict[str, Any], transfer: OpenBake, pointer: str) -> None:
-    """A look that stands at `pointer` of a body. Raises ParameterError."""
+    """Check a look at the JSON pointer `pointer`. Raises ParameterError."""
     try:
         looks.complete(partial, transfer.default_look)
     except ParameterError as error:
@@ -138,13 +138,13 @@ def check_look(partial: dict[str, Any], transfer: OpenBake, pointer: str) -> Non
 
 
 def check_display(partial: dict[str, Any], pointer: str) -> None:
-    """Whether pictures of a checked look, at `pointer` of a body, can be shown here. Raises ParameterError."""
+    """Check that this server can display images of a validated look at `pointer`. Raises ParameterError."""
     tone_map = partial.get("display", {}).get("tone_map")
     if not isinstance(tone_map, dict):
         return
     config = get_config()
     if config is None:
-        allowed = "one of relume's own: there is no OpenColorIO config here (RELUME_OCIO)"
+        allowed = "a built-in one, because this server has no OpenColorIO config (RELUME_OCIO)"
         raise ParameterError(f"{pointer}/display/tone_map", tone_map, allowed)
     try:
         config.check_view(OcioView(**tone_map))
@@ -153,23 +153,23 @@ def check_display(partial: dict[str, Any], pointer: str) -> None:
 
 
 def _check(request: RenderRequest, transfer: OpenBake) -> int:
-    """Raises ParameterError where something cannot be rendered.
+    """Raise ParameterError if something cannot be rendered.
 
     Returns:
-        What its files take at most, bytes.
+        Upper bound of the size of its files, bytes.
     """
     view = baked_view(request.view, transfer)
     if request.format != "exr" and request.layers:
-        raise ParameterError("layers", True, "false for this format; only EXR files have layers")
+        raise ParameterError("layers", True, "false, because only EXR files have layers")
     if request.format != "exr" and request.color_space is not None:
-        raise ParameterError("color_space", request.color_space, "null for this format, whose looks have a tone map")
+        raise ParameterError("color_space", request.color_space, "null, because only EXR files have a color space")
     find_space(request.color_space)
     if request.format == "mp4":
         check_encoder()
     if transfer.camera_mode is CameraMode.FREE:
         check_picture_size(request.size or (view.width, view.height))
     elif request.size is not None and (request.size[0] > view.width or request.size[1] > view.height):
-        allowed = f"at most {view.width}×{view.height}, the baked size; bake a larger one for more"
+        allowed = f"at most {view.width}×{view.height}, the baked size; bake a larger size for more"
         raise ParameterError("size", list(request.size), allowed)
     _check_looks(request, transfer)
     if request.format != "exr":
@@ -190,20 +190,20 @@ def list_renders(
     name: Annotated[Name | None, Query()] = None,
     user: Annotated[UserName | None, Query()] = None,
 ) -> list[RenderBody]:
-    """Batches, newest first, those of a state, a bake, a name or a user; 100 where no `limit` is given."""
+    """List batches, newest first, filtered by state, bake, name or user; 100 without a `limit`."""
     job_filter = JobFilter(state, user, bake, name)
     return [_body(job) for job in list_jobs(services.renders, job_filter, page)]
 
 
 @router.get("/{render}")
 def get_render(render: Id, services: ServicesDep) -> RenderBody:
-    """State and progress."""
+    """State and progress of a batch."""
     return _body(services.renders.get(render))
 
 
 @router.delete("/{render}", status_code=204)
 def delete_render(render: Id, services: ServicesDep) -> Response:
-    """Stop a batch and forget its pictures."""
+    """Stop a batch and delete its images."""
     services.renders.delete(render)
     services.access.quotas.disown("render", render)
     return Response(status_code=204)
@@ -211,7 +211,7 @@ def delete_render(render: Id, services: ServicesDep) -> Response:
 
 @router.post("/{render}/resume", status_code=202)
 def resume_render(render: Id, services: ServicesDep) -> RenderBody:
-    """Go on with a batch that has failed; pictures that are there stay."""
+    """Resume a failed batch; finished images are kept."""
     services.access.quotas.check_room()
     services.renders.resume(render)
     return _body(services.renders.get(render))
@@ -219,7 +219,7 @@ def resume_render(render: Id, services: ServicesDep) -> RenderBody:
 
 @router.post("/{render}/frames/{index}/retry", status_code=202)
 def retry_frame(render: Id, index: FrameIndex, services: ServicesDep) -> RenderBody:
-    """Paint one picture of a batch that is ready or has failed again, and what else is missing."""
+    """Render one image of a ready or failed batch again, and all missing ones."""
     services.access.quotas.check_room()
     services.renders.retry(_job_with_frame(render, index, services), index)
     return _body(services.renders.get(render))
@@ -228,7 +228,7 @@ def retry_frame(render: Id, index: FrameIndex, services: ServicesDep) -> RenderB
 def _job_with_frame(identity: str, index: int, services: Services) -> RenderJob:
     job = services.renders.get(identity)
     if index >= job.total:
-        raise NotFoundError(f"this batch has {job.total} frames, counted from 0")
+        raise NotFoundError(f"this batch has {job.total} frames, numbered from 0")
     return job
 
 
@@ -239,7 +239,7 @@ def _job_with_frame(identity: str, index: int, services: Services) -> RenderJob:
     responses=files("image/x-exr", "image/png", "image/webp"),
 )
 def get_frame(render: Id, index: FrameIndex, services: ServicesDep) -> Download:
-    """One finished picture, counted from 0."""
+    """One finished image, numbered from 0."""
     job = _job_with_frame(render, index, services)
     path = services.renders.frame_path(job, index)
     if not path.exists():
@@ -250,10 +250,10 @@ def get_frame(render: Id, index: FrameIndex, services: ServicesDep) -> Download:
 
 @router.get("/{render}/video.mp4", response_class=Download, name="get_video", responses=files("video/mp4"))
 def get_video(render: Id, services: ServicesDep) -> Download:
-    """All pictures as a video, where one was asked for, when it is finished."""
+    """The finished batch as a video, if one was requested."""
     job = services.renders.get(render)
     if job.request.format != "mp4":
-        raise NotFoundError(f"this batch has {job.request.format} pictures; ask for the format mp4")
+        raise NotFoundError(f"this batch has {job.request.format} images; submit one with format mp4")
     if job.state != "ready":
         raise NotReadyError(f"the batch is not finished; {_state(job)}")
     path = services.renders.video_path(job)
@@ -262,11 +262,11 @@ def get_video(render: Id, services: ServicesDep) -> Download:
 
 @router.get("/{render}/archive.zip", response_class=Download, name="get_archive", responses=files("application/zip"))
 def get_archive(render: Id, services: ServicesDep, partial: bool = False) -> Response:
-    """All pictures in one file, when all are finished; with `partial` those that are, before."""
+    """All finished images in a ZIP; with `partial` before the batch is finished."""
     job = services.renders.get(render)
     if job.state != "ready":
         if not partial:
-            raise NotReadyError(f"the batch is not finished; {_state(job)}; ?partial=true has what is there")
+            raise NotReadyError(f"the batch is not finished; {_state(job)}; ?partial=true returns the finished frames")
         return _partial_archive(job, services)
     path = services.renders.archive_path(job)
     return Download(path, media_type="application/zip", filename=services.renders.archive_name(job))
@@ -285,10 +285,10 @@ def _partial_archive(job: RenderJob, services: Services) -> Response:
 def _state(job: RenderJob) -> str:
     if job.state == "failed":
         return f"it failed: {job.problem}"
-    return f"it is {job.state}, wait a little"
+    return f"it is {job.state}, try again later"
 
 
 def _body(job: RenderJob) -> RenderBody:
     request = job.request
-    asked = {name: getattr(request, name) for name in ("bake", "view", "name", "format", "size")}
-    return RenderBody.from_object(job, **asked, **format_timestamps(job))
+    request_fields = {name: getattr(request, name) for name in ("bake", "view", "name", "format", "size")}
+    return RenderBody.from_object(job, **request_fields, **format_timestamps(job))

@@ -39,17 +39,22 @@ from relume_worker.status import BakeStatus
 from relume_worker.storage import fetch_if_missing
 
 router = APIRouter(prefix="/api/scenes", tags=["scenes"])
-_MATERIAL_DEFAULTS = {"shadow_catcher": False, "is_projected": False, "is_glass": False}  # which do not say it
-DEFAULT_ASPECT = 4 / 3  # of cameras that say only their height
+_MATERIAL_DEFAULTS = {
+    "shadow_catcher": False,
+    "is_projected": False,
+    "is_glass": False,
+}  # for records without these fields
+DEFAULT_ASPECT = 4 / 3  # of cameras with a vertical field of view only
 SceneFile = Annotated[
-    UploadFile, File(description="a .glb, .gltf, .obj or .ply file, or a .zip with one and the files it names")
+    UploadFile,
+    File(description="a .glb, .gltf, .obj or .ply file, or a .zip with one and the files that it references"),
 ]
 EnvironmentFile = Annotated[UploadFile | None, File(description="equirectangular environment map, .hdr or .exr")]
 SceneName = Annotated[str, Form(max_length=200)]
-Ground = Annotated[bool, Form(description="whether it is put on a ground, which catches its shadows")]
+Ground = Annotated[bool, Form(description="whether to add a ground plane that catches shadows")]
 Companions = Annotated[
     list[UploadFile],
-    File(description="the files that the scene names; their names and the scene's say the folders they lie in"),
+    File(description="files that the scene references; file names include the folders"),
 ]
 MAX_COMPANIONS, MAX_PATH = 900, 1_024
 
@@ -65,11 +70,11 @@ async def import_scene(
     companions: Companions = [],  # noqa: B006  (never changed)
     ground: Ground = False,
 ) -> SceneBody:
-    """Import a scene, in a process of its own; the body lists what was understood and a warning for what was not."""
+    """Import a scene in a separate process; the body has a summary, and a warning for each unsupported feature."""
     if not name.isprintable():
         raise ParameterError("name", name, "printable characters")
     if len(companions) > MAX_COMPANIONS or any(len(each.filename or "") > MAX_PATH for each in companions):
-        allowed = f"at most {MAX_COMPANIONS} files, their names of at most {MAX_PATH:,} characters"
+        allowed = f"at most {MAX_COMPANIONS} files with names of at most {MAX_PATH:,} characters"
         raise ParameterError("companions", f"{len(companions)} files", allowed)
     called = name.strip() or plain_stem(scene.filename) or "Scene"
 
@@ -92,7 +97,7 @@ async def import_scene(
 
 @router.post("/{scene}/ground", status_code=201)
 async def add_ground(scene: Id, services: ServicesDep, caller: CallerDep, response: Response) -> SceneBody:
-    """The same on a ground that catches shadows, as a new scene; this one stays as it is."""
+    """Add a ground plane that catches shadows, as a new scene; the original is unchanged."""
     record = await run_in_threadpool(get_scene, services.bakes.ledger, scene)
     folder = await run_in_threadpool(fetch_if_missing, scene_path(services.settings.data, scene))
     request = ImportRequest.create(services.settings, "grounded", folder, f"{record.name[:185]} on a ground")
@@ -106,7 +111,7 @@ async def add_ground(scene: Id, services: ServicesDep, caller: CallerDep, respon
 def list_scene_bodies(
     services: ServicesDep, page: PageDep, name: Annotated[str | None, Query(max_length=200)] = None
 ) -> list[SceneBody]:
-    """Scenes, newest first, or those of a name."""
+    """List scenes, newest first, filtered by name."""
     records = [record for record in list_scenes(services.bakes.ledger) if name in (None, record.name)]
     records = page.cut(records, lambda record: newest(record.created, record.id))
     bakes: dict[str, list[BakeStatus]] = defaultdict(list)
@@ -118,7 +123,7 @@ def list_scene_bodies(
 
 @router.get("/{scene}", name="get_scene")
 def get_scene_body(scene: Id, services: ServicesDep) -> SceneBody:
-    """One scene."""
+    """Return one scene."""
     placed = [camera.name for camera in list_cameras(services.bakes.ledger, scene)]
     return _body(get_scene(services.bakes.ledger, scene), services.bakes.bakes(scene), placed)
 
@@ -141,18 +146,17 @@ def remove_scene(scene: Id, services: ServicesDep) -> Response:
     responses=files("image/webp"),
 )
 async def get_thumbnail(scene: Id, services: ServicesDep, bake: Id | None = None) -> Download:
-    """The scene as a bake of it shows it, unedited; `bake` only makes the address change when it does."""
+    """Thumbnail of the unedited scene from a bake; `bake` only makes the URL change with the image."""
     statuses = await run_in_threadpool(services.bakes.bakes, scene)
     shown_bake = _thumbnail_bake([status for status in statuses if bake in (None, status.id)])
     if shown_bake is None:
-        raise NotFoundError("there is no picture of this scene; bake it first")
+        raise NotFoundError("there is no thumbnail of this scene; bake it first")
     path = await services.thumbnails.get_or_paint(shown_bake)
     return Download(path, media_type="image/webp", headers={"Cache-Control": "private, max-age=86400"})
 
 
 def _thumbnail_bake(bakes: Sequence[BakeStatus]) -> str | None:
-    """The bake that a scene's thumbnail shows: the coarsest of those that have its pixels, because it is painted
-    soonest; where none has, the finest."""
+    """Choose the bake for a thumbnail: the coarsest with enough pixels renders fastest; otherwise the finest."""
     ready_bakes = sorted((status for status in bakes if status.state == "ready"), key=lambda status: status.rank)
     large_bakes = [status for status in ready_bakes if status.recipe.size[0] >= MAX_WIDTH]
     return (large_bakes or ready_bakes[-1:])[0].id if ready_bakes else None

@@ -1,4 +1,4 @@
-"""The live session's WebSocket: who may open one, on which bake, and how many at once."""
+"""WebSocket of the live session: authorization, bake, and the limit of sessions."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ _PREFIX = re.compile(rf"[A-Za-z0-9_-]{{{ROOM_PREFIX}}}")
 
 @router.websocket("/api/bakes/{bake}/session")
 async def session(websocket: WebSocket, bake: str) -> None:
-    """A live session; foreign pages were refused before.
+    """Run a live session; foreign origins were rejected before.
 
-    A server that takes leave answers 503, and one whose room another has 404: a balancer then asks the next one, and
-    the client hears of nothing. All other refusals are said with a close code, so it accepts first.
+    A draining server answers 503, and one without the room 404, so that a load balancer tries the next server and the
+    client notices nothing. All other refusals are close codes, so the WebSocket is accepted first.
     """
     services: Services = websocket.app.state.services
     try:
@@ -59,8 +59,8 @@ async def session(websocket: WebSocket, bake: str) -> None:
 
 @asynccontextmanager
 async def _holding_room(services: Services, prefix: str) -> AsyncIterator[None]:
-    """With the rooms of that prefix, if any, on this server."""
-    if not _PREFIX.fullmatch(prefix):  # that is said once it is accepted
+    """Lease the rooms with that prefix, if any, for this server."""
+    if not _PREFIX.fullmatch(prefix):  # refused with a close code after accepting
         yield
         return
     async with services.live.room_lease.hold(prefix):
@@ -68,7 +68,7 @@ async def _holding_room(services: Services, prefix: str) -> AsyncIterator[None]:
 
 
 def _room_prefix(websocket: WebSocket) -> str:
-    """What the address says of a room: enough to find its server, not enough to open it."""
+    """Room prefix in the URL: enough to find the room's server, not enough to join."""
     return str(websocket.query_params.get("room_prefix", ""))
 
 
@@ -76,7 +76,7 @@ async def _accept(services: Services, websocket: WebSocket, bake: str) -> None:
     speaks_protocol = SUBPROTOCOL in websocket.scope["subprotocols"]
     try:
         await websocket.accept(subprotocol=SUBPROTOCOL if speaks_protocol else None)
-    except OSError:  # the client has left while it waited
+    except OSError:  # the client left while waiting
         return
     socket = ClientSocket(websocket, services.settings.ack_seconds)
     try:
@@ -106,7 +106,7 @@ async def _serve(services: Services, websocket: WebSocket, bake: str) -> None:
 
 
 def _look(services: Services, transfer: OpenBake, name: str | None, share_id: str | None) -> dict[str, Any] | None:
-    """The saved or shared look that a session is to begin with; who may only look sees those, too."""
+    """Return the saved or shared look that the session starts with; the role view may see these, too."""
     if name is not None:
         return complete(json.loads(services.looks.get(check_name(name)).document), transfer.default_look)
     if share_id is not None:

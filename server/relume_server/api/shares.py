@@ -1,4 +1,4 @@
-"""/api/shares: links that carry a look. What one shows is checked when it is made, and never changes."""
+"""/api/shares: share links. Their content is validated once, and never changes."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ router = APIRouter(prefix="/api/shares", tags=["shares"])
 ShareId = Annotated[str, Path(max_length=MAX_ID_LENGTH, pattern=r"^[a-z2-7]+$")]
 
 
-@router.post("", status_code=201, responses={200: {"model": ShareEntry, "description": "It was shared before"}})
+@router.post("", status_code=201, responses={200: {"model": ShareEntry, "description": "Shared before"}})
 async def create_share(request: ShareRequest, services: ServicesDep, response: Response) -> ShareEntry:
-    """Save what a link shows: 201, or 200 where the same was shared before."""
+    """Save the content of a share link: 201, or 200 if the same content was shared before."""
     status = await run_in_threadpool(require_ready_bake, services, request.bake)
     async with services.transfers.acquire(request.bake, services.bakes.store_path(request.bake)) as transfer:
         look = await run_in_threadpool(_complete, request, transfer)
@@ -40,7 +40,7 @@ async def create_share(request: ShareRequest, services: ServicesDep, response: R
 
 
 def _complete(request: ShareRequest, transfer: OpenBake) -> dict[str, Any]:
-    """The whole look, so that it stays what it is whatever defaults become."""
+    """Complete the look, so that later changes of defaults do not affect it."""
     for name in {request.view, *request.views, *request.cameras, *request.sizes}:
         baked_view(name, transfer)
     for name, frame in request.cameras.items():
@@ -55,7 +55,7 @@ def _complete(request: ShareRequest, transfer: OpenBake) -> dict[str, Any]:
 def list_shares(
     services: ServicesDep, page: PageDep, bake: Annotated[Id | None, Query()] = None
 ) -> list[ShareListEntry]:
-    """Links, newest first, or those of a bake."""
+    """List share links, newest first, filtered by bake."""
     links = services.shares.list("" if bake is None else f'"bake":"{bake}"')
     links = page.cut(links, lambda link: newest(link.created, link.id))
     return [
@@ -66,7 +66,7 @@ def list_shares(
 
 @router.get("/{share}")
 def get_share(share: ShareId, services: ServicesDep, response: Response) -> ShareBody:
-    """What a link shows, and what of it is not here any more."""
+    """Content of a share link, and its deleted parts."""
     record = services.shares.get(share)
     response.headers["Cache-Control"] = "no-cache"
     return ShareBody(
@@ -79,17 +79,17 @@ def get_share(share: ShareId, services: ServicesDep, response: Response) -> Shar
 
 @router.delete("/{share}", status_code=204)
 def delete_share(share: ShareId, services: ServicesDep) -> Response:
-    """Make room for others; the link opens nothing any more."""
+    """Delete a share link."""
     services.shares.delete(share)
     return Response(status_code=204)
 
 
 def _missing_assets(document: dict[str, Any], services: Services) -> list[str]:
-    """What a link names and the server has no more, one sentence each."""
+    """Deleted assets of a share link, one sentence each."""
     try:
         get_scene(services.bakes.ledger, document["scene"])
     except NotFoundError:
-        return ["The scene of this link was deleted; ask who sent it to import it again."]
+        return ["The scene of this link was deleted; ask its sender to import it again."]
     terms = [term for material in document["look"]["materials"].values() for term in material["terms"]]
     measured = sorted({term["data"] for term in terms if "data" in term})
     map_name = document["look"]["environment"]["map"]

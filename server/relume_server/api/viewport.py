@@ -1,4 +1,4 @@
-"""/api/scenes/{id}/viewport: the scene in plain colours from anywhere, to place cameras by before anything is baked."""
+"""/api/scenes/{id}/viewport: preview of a scene in plain colors, to place cameras before baking."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ JPEG_QUALITY = 85
 
 
 class JpegResponse(Response):
-    """An image; names its media type in the API's description."""
+    """JPEG image; names its media type in the OpenAPI description."""
 
     media_type = "image/jpeg"
 
 
 @router.get("")
 async def get_viewport(scene: Id, services: ServicesDep) -> ViewportBody:
-    """Where the scene is; reads it, which may take seconds."""
+    """Bounds of a scene; reads the scene, which may take seconds."""
     viewport = await _open_viewport(scene, services)
     framing = viewport.default_camera
     frame = CameraFrame(to_world=framing.to_world.ravel().tolist(), yfov=math.degrees(framing.yfov))
@@ -42,7 +42,7 @@ async def get_viewport(scene: Id, services: ServicesDep) -> ViewportBody:
 
 @router.post("", response_class=JpegResponse, name="draw_viewport")
 async def draw_viewport(scene: Id, view: ViewportRequest, services: ServicesDep) -> JpegResponse:
-    """What a camera would see, in plain colours."""
+    """Image of a camera in plain colors."""
     camera, viewport = _camera(view), await _open_viewport(scene, services)
 
     def encode_jpeg() -> bytes:
@@ -55,7 +55,7 @@ async def draw_viewport(scene: Id, view: ViewportRequest, services: ServicesDep)
 
 @router.post("/pick", name="pick_in_viewport")
 async def pick(scene: Id, pixel: ViewportPixel, services: ServicesDep) -> PickBody:
-    """What a position of that picture shows."""
+    """Surface point at a pixel of such an image."""
     camera, viewport = _camera(pixel), await _open_viewport(scene, services)
     position = await run_in_threadpool(viewport.point_at, camera, pixel.size, pixel.x, pixel.y)
     return PickBody(position=None if position is None else position.tolist())

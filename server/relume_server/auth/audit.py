@@ -1,6 +1,4 @@
-"""The audit: a line for each change, login and refusal, who and when, in the database. Lines are only added; the oldest
-go.
-"""
+"""The audit: a row per change, login and refusal, with user and time. Rows are only added; the oldest are deleted."""
 
 from __future__ import annotations
 
@@ -26,11 +24,11 @@ MAX_LISTED = 1_000
 
 @dataclass(frozen=True)
 class Change:
-    """What somebody has done.
+    """A change that a user made.
 
     Attributes:
-        who: name, or address where nobody logs in. role: that they had. address: where they are.
-        what: method and path, or in words. object: what was made, or what the path names. status: of the answer.
+        who: name, or address without login. role: of the user at that time. address: of the client.
+        what: method and path, or words. object: created, or named by the path. status: of the response.
         request: id of the request.
     """
 
@@ -44,23 +42,23 @@ class Change:
 
     @classmethod
     def by(cls, caller: Caller, action: str, target: str, status: int) -> Change:
-        """A change that a caller makes in the request at hand."""
+        """Make the change of a caller in the current request."""
         role, address = caller.role.label, caller.address[:64]
         return cls(caller.display_name[:80], role, address, action[:200], target[:500], status, REQUEST.get())
 
 
 @dataclass(frozen=True)
 class Entry(Change):
-    """A line; `number` counts up, `at` is in seconds since 1970."""
+    """A row; `number` counts up, `at` is in seconds since 1970."""
 
     number: int
     at: float
 
 
 class Audit:
-    """Lines of the audit, the newest `max_lines` of them; may be used from any thread.
+    """The newest `max_lines` rows of the audit. Thread-safe.
 
-    Of refusals a tenth as many, beside them: whoever tries to get in again and again pushes no change out.
+    Refusals are limited separately, to a tenth of it, so that repeated login attempts cannot displace changes.
     """
 
     def __init__(self, sessions: sessionmaker[Session], max_lines: int) -> None:
@@ -68,7 +66,7 @@ class Audit:
         self._until_trim = 0
 
     def add(self, change: Change) -> None:
-        """Write a line; where the database is away the log has it instead."""
+        """Add a row; if the database is unavailable, the log gets it instead."""
         try:
             with self._sessions.begin() as session:
                 session.add(AuditRow(at=time.time(), **asdict(change)))
@@ -77,13 +75,13 @@ class Audit:
                 self._until_trim = _TRIM_EVERY
                 self._trim()
         except DATABASE_ERRORS as error:
-            log.error("a line of the audit could not be kept (%s): %s", describe_error(error), change)
+            log.error("a row of the audit could not be stored (%s): %s", describe_error(error), change)
 
     def list(self, limit: int = 100, before: int | None = None, actor: str | None = None) -> Sequence[Entry]:
-        """Lines, newest first.
+        """List rows, newest first.
 
         Args:
-            limit: how many. before: only older ones than this number. actor: only of this name.
+            limit: maximum number. before: only rows with a smaller number. actor: only of this user.
         """
         query = select(AuditRow).order_by(AuditRow.number.desc()).limit(min(limit, MAX_LISTED))
         if before is not None:

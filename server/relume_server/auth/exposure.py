@@ -1,4 +1,4 @@
-"""Whether the settings let in whom somebody means to let in; asked once, before a server starts."""
+"""Check before startup that the settings do not let in more people than intended."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ if TYPE_CHECKING:
 
 
 def check_openness(settings: Settings) -> None:
-    """Raise OpennessError where a server would be open to more people than its settings sound like."""
+    """Raise OpennessError if a server would be open to more people than its settings suggest."""
     names_people = settings.user_header or settings.proxy_roles or "proxy_role" in settings.model_fields_set
     if names_people and not settings.login:
         raise OpennessError(
-            "RELUME_USER_HEADER, RELUME_PROXY_ROLE or RELUME_PROXY_ROLES is set, but nobody logs in, so that everybody "
-            "may do everything; set RELUME_LOGIN=true, or take those away"
+            "RELUME_USER_HEADER, RELUME_PROXY_ROLE or RELUME_PROXY_ROLES is set, but there is no login, so everyone "
+            "is admin; set RELUME_LOGIN=true, or remove these settings"
         )
     if names_people and not settings.user_header:
         raise OpennessError(
-            "RELUME_PROXY_ROLE or RELUME_PROXY_ROLES is set, but no header in which a proxy says who calls; set "
-            "RELUME_USER_HEADER=X-Forwarded-User, or take those away"
+            "RELUME_PROXY_ROLE or RELUME_PROXY_ROLES is set, but no header with the user's name; set "
+            "RELUME_USER_HEADER=X-Forwarded-User, or remove these settings"
         )
     if settings.user_header and not settings.trusted_proxies:
         raise OpennessError(
-            "RELUME_USER_HEADER is set, but no proxy whose word counts; name its address in RELUME_TRUSTED_PROXIES"
+            "RELUME_USER_HEADER is set, but no trusted proxy; add its address to RELUME_TRUSTED_PROXIES"
         )
     if "login" not in settings.model_fields_set and not _is_loopback(settings.host):
         raise OpennessError(
-            f"on {settings.host} whoever reaches this machine could read, import and delete everything; set "
-            "RELUME_LOGIN=true, or RELUME_LOGIN=false if that is what you want"
+            f"on {settings.host} anyone who reaches this machine could read, import and delete everything; set "
+            "RELUME_LOGIN=true, or RELUME_LOGIN=false if that is intended"
         )
 
 
 def _is_loopback(host: str) -> bool:
-    """Whether nobody outside reaches an address to listen on."""
+    """True if a listening address is not reachable from other machines."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:

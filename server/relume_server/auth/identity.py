@@ -1,4 +1,4 @@
-"""Who sends a request: a token in its header or cookie, or what a trusted proxy says; without a login, anyone."""
+"""Identify the caller: by a token in header or cookie, or by a trusted proxy; without login everyone is admin."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
 COOKIE = "relume_token"
 MAX_NAME = 80
-OPENS_NOTHING = "this token opens nothing: it is misspelt, has run out or was revoked; ask for another"
+OPENS_NOTHING = "this token is not valid: it is misspelled, expired or revoked; ask for a new one"
 UNKNOWN_PER_SECOND = 20.0
-"""How many tokens that are not known to be right are looked up for an address, where the settings do not say."""
+"""Token lookups per second for an address that has shown no valid token, without a setting."""
 
 
 class Identity:
-    """Tells who calls, as the settings say; on the event loop."""
+    """Identifies callers by the settings. Event loop only."""
 
     def __init__(self, settings: Settings) -> None:
         self._requires_login = settings.login
@@ -37,11 +37,11 @@ class Identity:
         self._unknown = TokenBuckets(rate, settings.requests_at_once, time.monotonic)
 
     async def caller(self, scope: Scope, tokens: TokenStore) -> Caller:
-        """Who calls. A token in the header goes before what a proxy says, and that before a cookie.
+        """Return the caller. A token in the header takes precedence over a proxy, and a proxy over a cookie.
 
         Raises:
-            LoginError: a token was sent in the header that opens nothing.
-            RateError: too many such were sent from there.
+            LoginError: the token in the header is not valid.
+            RateError: too many invalid tokens were sent from this address.
         """
         await self._proxies.resolve(_peer(scope))
         headers, address = Headers(scope=scope), self.address(scope)
@@ -62,21 +62,21 @@ class Identity:
         return Caller("", Role.ANYONE, address, "nobody")
 
     def address(self, scope: Scope) -> str:
-        """Of the client: who has connected, or where that is a trusted proxy whom it has added last."""
+        """Address of the client: the peer, or for a trusted proxy the last one it has forwarded."""
         return self._proxy_header(scope, "x-forwarded-for").split(",")[-1].strip()[:64] or _peer(scope)
 
     def is_secure(self, scope: Scope) -> bool:
-        """Whether the browser speaks TLS, to the server or to a trusted proxy."""
+        """True if the browser uses TLS, to the server or to a trusted proxy."""
         return "https" in (scope["scheme"], self._proxy_header(scope, "x-forwarded-proto").split(",")[-1].strip())
 
     async def by_token(self, text: str, address: str, tokens: TokenStore) -> Caller | None:
-        """Whose token a text is; asks the database, unless it has just done so.
+        """Return the caller of a token; asks the database, unless the result is cached.
 
-        Only so many guesses of an address are looked up: whoever may guess at will keeps the database busy for all. Who
-        has shown a right token before is not held up by others' guesses from there.
+        Lookups per address are limited, so that guessing tokens cannot keep the database busy. A client with a token
+        that was valid before is not delayed by guesses from its address.
 
         Raises:
-            RateError: enough have been looked up for now.
+            RateError: too many lookups.
         """
         is_guess, bucket = not tokens.is_cached(text), bucket_name(address)
         wait_s = self._unknown.take(bucket) if is_guess else 0.0
@@ -90,39 +90,38 @@ class Identity:
         return Caller(token.name, token.role, address, "token", token.id)
 
     def _by_proxy(self, headers: Headers, address: str) -> Caller | None:
-        """Whom the proxy names, where it may; a name that is none is nobody's."""
+        """Return the caller that the proxy names, if it may; None for an invalid name."""
         name = _as_utf8(_last(headers, self._header)).strip() if self._header else ""
         if not name or not name.isprintable() or len(PROXY + name) > MAX_NAME:
             return None
         return Caller(PROXY + name, ROLES[self._roles.get(name, self._role)], address, "proxy")
 
     def _proxy_header(self, scope: Scope, name: str) -> str:
-        """What a trusted proxy says in a header; empty where nobody is trusted."""
+        """Header of a trusted proxy; empty for any other peer."""
         return _last(Headers(scope=scope), name) if self._proxies.has(_peer(scope)) else ""
 
 
 def _peer(scope: Scope) -> str:
-    """Address of whoever has connected; empty where it has none."""
+    """Address of the peer; empty if it has none."""
     return scope["client"][0] if scope.get("client") else ""
 
 
 def _last(headers: Headers, name: str) -> str:
-    """The last line of a header, which the proxy has added where it adds lines; those before may be the client's."""
+    """Last line of a header, which the proxy has added; lines before may come from the client."""
     return (headers.getlist(name) or [""])[-1]
 
 
 def _as_utf8(value: str) -> str:
-    """A header's value, which is read as Latin-1: proxies write names in UTF-8, as settings have them."""
+    """Decode a header value as UTF-8, as proxies write names; ASGI reads it as Latin-1."""
     try:
         return value.encode("latin-1").decode()
-    except UnicodeDecodeError:  # it is Latin-1
+    except UnicodeDecodeError:  # not UTF-8
         return value
 
 
 def read_token_cookie(headers: Headers) -> str:
-    """The token in the cookie; empty where there is none.
+    """Token in the cookie; empty if there is none.
 
-    Read as browsers write them: `http.cookies` reads none beside one of another program on the host that is not as
-    RFC 6265 wants it.
+    Parsed like browsers write it: `http.cookies` finds nothing next to another program's cookie that violates RFC 6265.
     """
     return cookie_parser(headers.get("cookie", "")).get(COOKIE, "")

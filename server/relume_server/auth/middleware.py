@@ -1,7 +1,7 @@
-"""What every request passes before anything of it is read: who calls, how often, whether they may; and the audit.
+"""Middleware before any body is read: caller, rate limit, role; and the audit.
 
-Pure ASGI, and not a dependency of routes: FastAPI reads a body before it asks dependencies, so that whoever may not
-upload would have uploaded.
+Pure ASGI, not a dependency of routes: FastAPI reads the body before it calls dependencies, so the upload of an
+unauthorized client would already be here.
 """
 
 from __future__ import annotations
@@ -37,14 +37,15 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 _UNCHANGED = 200
-"""Calls that change something answer 201, 202 or 204; 200 says that they would, or that it was so before."""
+"""Status of a dry run, or of a call without effect; changes answer 201, 202 or 204."""
 
 
 class AuthMiddleware:
-    """The middleware between the guard, which knows no callers, and the routes.
+    """Middleware between the guard, which knows no callers, and the routes.
 
     Args:
-        access: asked for with each request, because it is opened after the app is made. clock: seconds.
+        app: of the routes. settings: of the server. access: called for each request, because it is opened after the app
+            is created. clock: monotonic seconds.
     """
 
     def __init__(
@@ -60,7 +61,7 @@ class AuthMiddleware:
         self._buckets = None if rate is None else TokenBuckets(rate, settings.requests_at_once, clock)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Refuse, or hand on with the caller in the scope."""
+        """Refuse the request, or forward it with the caller in its scope."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
@@ -75,7 +76,7 @@ class AuthMiddleware:
             return
         except DATABASE_ERRORS as error:
             if not is_unavailable(error):
-                log.error("who calls cannot be told (%s)", describe_error(error))
+                log.error("the caller cannot be identified (%s)", describe_error(error))
             await self._refuse(error, scope, receive, send)
             return
         if is_change(method, scope["path"]):
@@ -83,7 +84,7 @@ class AuthMiddleware:
         await self._app(scope, receive, send)
 
     async def _identify_caller(self, scope: Scope) -> Caller:
-        """Who calls, if not too often."""
+        """Identify the caller, and apply the rate limit."""
         access = self._access()
         try:
             caller = await access.identity.caller(scope, access.tokens)
@@ -95,7 +96,7 @@ class AuthMiddleware:
         return caller
 
     async def _audit_refusal(self, error: Exception, scope: Scope) -> None:
-        """A line of the audit about who is refused for what they are; a call without any token is no try to get in."""
+        """Add an audit row for a refused caller; a request without any token is not a login attempt."""
         caller: Caller | None = scope.get(KEY)
         is_try = Headers(scope=scope).get("authorization", "").lower().startswith("bearer ")
         if caller is not None and (isinstance(error, ForbiddenError) or (isinstance(error, LoginError) and is_try)):
@@ -106,7 +107,7 @@ class AuthMiddleware:
     def _count(self, name: str) -> None:
         wait_s = 0.0 if self._buckets is None else self._buckets.take(name)
         if wait_s > 0.0:
-            raise RateError(f"too many calls; wait {max(wait_s, 0.1):.1f} s, and make them less often", wait_s)
+            raise RateError(f"too many requests; wait {max(wait_s, 0.1):.1f} s, and make them less often", wait_s)
 
     def _required_role(self, method: str, path: str) -> Role:
         return Role.VIEW if self._viewers_comment and is_comment(method, path) else required_role(method, path)
@@ -116,20 +117,20 @@ class AuthMiddleware:
         if caller.role >= role:
             return
         if caller.role is Role.ANYONE:
-            raise LoginError("log in first: send a token as Authorization: Bearer, or open the editor and log in there")
+            raise LoginError("login required: send a token as Authorization: Bearer, or log in in the editor")
         raise ForbiddenError(
-            f"{caller.name} has the role {caller.role.label}, this needs {role.label}; ask an admin for a token with it"
+            f"{caller.name} has the role {caller.role.label}, this needs {role.label}; ask an admin for such a token"
         )
 
     def _with_audit(self, caller: Caller, scope: Scope, send: Send) -> Send:
-        """Writes a line when a change has been made, before its answer goes out."""
+        """Add an audit row for a change before its response is sent."""
 
         async def send_audited(message: Message) -> None:
             if message["type"] == "http.response.start":
                 headers = Headers(raw=message["headers"])
                 status, location = message["status"], headers.get("location", "")
                 is_new = "idempotency-replayed" not in headers
-                if is_new and _UNCHANGED < status < 300:  # what is sent to another address changes nothing yet
+                if is_new and _UNCHANGED < status < 300:  # a redirect has changed nothing yet
                     action = f"{scope['method']} {scope['path']}"
                     change = Change.by(caller, action, location or scope["path"], status)
                     await self._access().record(change)
@@ -139,7 +140,7 @@ class AuthMiddleware:
 
     @staticmethod
     async def _refuse(error: Exception, scope: Scope, receive: Receive, send: Send) -> None:
-        """An answer; a WebSocket is opened first, because browsers tell pages only of the codes that close one."""
+        """Send the refusal; a WebSocket is accepted first, because browsers show pages only its close code."""
         problem = make_problem(error)
         if scope["type"] == "http":
             await problem_response(problem, make_problem_headers(error))(scope, receive, send)
@@ -153,10 +154,12 @@ class AuthMiddleware:
 
 
 def _caller_bucket(caller: Caller) -> str:
-    """Who is counted: a user, by how they are known, else an address; a token may be called as an address is."""
+    """Rate-limit bucket of a caller: user and authentication method (a token may be named like an address), or
+    address.
+    """
     return f"{caller.auth_method} {caller.name}" if caller.name else f"address {bucket_name(caller.address)}"
 
 
 def _truncate_reason(text: str) -> str:
-    """As much as a closing word may have."""
+    """Truncate a WebSocket close reason to its maximum length."""
     return text.encode()[:123].decode(errors="ignore")

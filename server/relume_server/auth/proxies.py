@@ -1,4 +1,4 @@
-"""Proxies whose word on a request counts: by address, by network, or by a name of the network that stands for one."""
+"""Trusted proxies: by address, by network, or by host name."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import socket
 from collections.abc import Callable, Sequence
 
 RESOLVE_INTERVAL_S = 2.0
-"""How often a name is looked up at most, where a connection comes from an address that is not known."""
+"""Shortest interval between lookups of a name, if a connection comes from an unknown address."""
 
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 
 
 class Proxies:
-    """The trusted ones; on the event loop.
+    """The trusted proxies. Event loop only.
 
-    A proxy in a cluster has a name that stays and an address that does not, so names are looked up again whenever a
-    connection comes from elsewhere.
+    A proxy in a cluster has a constant name and a changing address, so names are resolved again if a connection comes
+    from an unknown address.
 
     Args:
-        texts: addresses, networks such as 10.0.0.0/8, or names. clock: seconds.
+        texts: addresses, networks such as 10.0.0.0/8, or names. clock: monotonic seconds.
     """
 
     def __init__(self, texts: Sequence[str], clock: Callable[[], float]) -> None:
@@ -30,7 +30,7 @@ class Proxies:
         self._clock, self._resolved_s = clock, -RESOLVE_INTERVAL_S
 
     async def resolve(self, peer: str) -> None:
-        """Have the names' addresses where a connection comes from one that is not known."""
+        """Resolve the names if a connection comes from an unknown address."""
         is_due = self._clock() - self._resolved_s >= RESOLVE_INTERVAL_S
         if not self._names or not is_due or self.has(peer):
             return
@@ -39,16 +39,16 @@ class Proxies:
         self._resolved_addresses = frozenset().union(*address_sets)
 
     def has(self, peer: str) -> bool:
-        """Whether a connection from an address is a trusted proxy's."""
+        """True if the peer is a trusted proxy."""
         try:
             address = ipaddress.ip_address(peer)
-        except ValueError:  # a socket file, or a test
+        except ValueError:  # a Unix socket, or a test
             return False
         return str(address) in self._resolved_addresses or any(address in network for network in self._networks)
 
 
 def parse_network(text: str) -> Network | None:
-    """The address or network that a text is; None: it is a name."""
+    """Parse an address or network; None for a name."""
     try:
         return ipaddress.ip_network(text, strict=False)
     except ValueError:
@@ -56,7 +56,7 @@ def parse_network(text: str) -> Network | None:
 
 
 async def _resolve_name(name: str) -> frozenset[str]:
-    """Of a name; none while it has none, as a proxy has that has not started."""
+    """Addresses of a name; none if it does not resolve, such as a proxy that has not started yet."""
     try:
         address_infos = await asyncio.get_running_loop().getaddrinfo(name, None, type=socket.SOCK_STREAM)
     except OSError:

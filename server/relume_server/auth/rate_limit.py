@@ -1,7 +1,7 @@
-"""Token buckets: so many calls a second on the mean, some more at once; of each caller, and of not too many callers.
+"""Token buckets: a mean rate of calls with bursts per caller, for a bounded number of callers.
 
-The libraries for this (slowapi, limits) keep their counts in a store of their own and wrap each route; this is twenty
-lines, and stands where all requests pass.
+The libraries for this (slowapi, limits) keep counts in a store of their own and wrap each route; this is twenty lines,
+and applies to all requests.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from collections.abc import Callable
 
 MAX_BUCKETS = 10_000
 IPV6_BITS = 64
-"""Of an address of IPv6, those that tell one customer from another: who has a network has all addresses in it."""
+"""Prefix length of an IPv6 network, which identifies a customer: its owner controls all addresses in it."""
 
 
 def bucket_name(address: str) -> str:
-    """Name of the bucket of an address: IPv6 counts by networks of /64."""
+    """Bucket name of an address: IPv6 by /64 network."""
     try:
         parsed = ipaddress.ip_address(address.partition("%")[0])
-    except ValueError:  # what a proxy said, a socket file, or a test
+    except ValueError:  # a name from a proxy, a Unix socket, or a test
         return address
     if parsed.version == 4:
         return str(parsed)
@@ -29,10 +29,10 @@ def bucket_name(address: str) -> str:
 
 
 class TokenBuckets:
-    """One bucket for each name; used from the event loop only.
+    """One bucket per name. Event loop only.
 
     Args:
-        per_second: calls on the mean. burst: calls at once, after a rest. clock: seconds.
+        per_second: mean rate. burst: calls at once after a pause. clock: monotonic seconds.
     """
 
     def __init__(self, per_second: float, burst: float, clock: Callable[[], float]) -> None:
@@ -40,11 +40,11 @@ class TokenBuckets:
         self._levels: OrderedDict[str, tuple[float, float]] = OrderedDict()
 
     def wait_s(self, name: str) -> float:
-        """Seconds until a call of this name may come; 0: now."""
+        """Seconds until the next call is allowed; 0: now."""
         return max(0.0, (1.0 - self.level(name)) / self._per_second)
 
     def take(self, name: str) -> float:
-        """Take one call; seconds to wait where there is none, which takes nothing."""
+        """Take one call; if there is none, take nothing and return the seconds to wait."""
         wait_s = self.wait_s(name)
         if wait_s == 0.0:
             self._levels[name] = self.level(name) - 1.0, self._clock()
@@ -54,10 +54,10 @@ class TokenBuckets:
         return wait_s
 
     def refund(self, name: str) -> None:
-        """What was taken last did not count after all."""
+        """Give back the last call taken."""
         self._levels[name] = min(self._burst, self.level(name) + 1.0), self._clock()
 
     def level(self, name: str) -> float:
-        """How many calls of this name may come at once."""
+        """Calls that are allowed at once."""
         level, at_s = self._levels.get(name, (self._burst, -math.inf))
         return min(self._burst, level + (self._clock() - at_s) * self._per_second)

@@ -1,4 +1,4 @@
-"""Bytes that count as somebody's while an upload is taken in and read."""
+"""Bytes that count as a user's while an upload is received and imported."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ if TYPE_CHECKING:
     from relume_server.auth.quotas import OwnedKind, Quotas
 
 RESERVATION_TTL_S = 3600
-"""How long what a killed server has reserved still counts."""
+"""Lifetime of a killed server's reservations."""
 MAX_CONCURRENT_IMPORTS = 2
-"""Among which the room that is left on the disk is shared."""
+"""Number of concurrent uploads that share the free disk space."""
 
 
 class Reservation:
-    """What one upload takes. It is a row beside those of things, written before anything is checked: whatever comes at
-    the same time, to another server too, counts it. Used by one thread at a time.
+    """Bytes of one upload, stored as a row before anything is checked, so that concurrent uploads, on other servers as
+    well, count it. Used by one thread at a time.
 
     Args:
-        quotas: of all. owner: whose it is.
+        quotas: of all users. owner: of the upload.
     """
 
     def __init__(self, quotas: Quotas, owner: str) -> None:
@@ -36,12 +36,12 @@ class Reservation:
         self.bytes = 0
 
     def reserve(self, num_bytes: int) -> None:
-        """Count so many bytes from now on.
+        """Reserve so many bytes.
 
         Raises:
-            QuotaError, NearlyFullError: there is no room for so many; what was held before is held on.
+            QuotaError, NearlyFullError: there is not enough space; the previous reservation stays.
         """
-        with self._quotas.deciding:  # of one server none is refused for another that is refused
+        with self._quotas.deciding:  # within one server a refused upload must not make another one fail
             before, self.bytes = self.bytes, num_bytes
             self._quotas.put_reserved(self.owner, self._row, num_bytes)
             try:
@@ -52,30 +52,30 @@ class Reservation:
                 raise
 
     def max_import_bytes(self) -> int:
-        """How large what is made of the upload may be, now."""
+        """Current maximum size of the imported result."""
         remaining_bytes, settings = self._quotas.remaining_bytes(self.owner), self._quotas.settings
         disk_bytes = (free_bytes(settings.data) - settings.min_free_bytes) // MAX_CONCURRENT_IMPORTS
         return max(0, disk_bytes if remaining_bytes is None else min(disk_bytes, remaining_bytes + self.bytes))
 
     def too_large_error(self, limit_bytes: int) -> QuotaError | NearlyFullError:
-        """The error of a file that unpacks to more than `max_import_bytes` said."""
+        """Return the error for a file that unpacks to more than `max_import_bytes`."""
         if self._quotas.remaining_bytes(self.owner) is None:
             return NearlyFullError(
-                f"the file unpacks to more than {bytes_text(limit_bytes)}, and the disk has no more room"
+                f"the file unpacks to more than {bytes_text(limit_bytes)}, and the disk has no more space"
             )
         return QuotaError(
-            f"the file unpacks to more than the {bytes_text(limit_bytes)} that you may still have; delete a scene, a "
+            f"the file unpacks to more than the {bytes_text(limit_bytes)} left in your quota; delete a scene, a "
             f"bake, a "
             "material or a render of yours first (RELUME_MAX_BYTES_PER_USER)"
         )
 
     def convert(self, kind: OwnedKind, object_id: str, num_bytes: int) -> None:
-        """What was reserved is a thing of so many bytes from now on, unless it is somebody's already."""
+        """Turn the reservation into an object of so many bytes, unless it has an owner already."""
         self._quotas.convert(("upload", self._row), (kind, object_id), num_bytes)
 
     @contextmanager
     def owner_assigned(self, kind: OwnedKind, object_id: str, num_bytes: int) -> Iterator[None]:
-        """What is queued inside is somebody's before anybody works on it; nobody's where that fails."""
+        """Assign the owner of an object before it is queued inside; undone if queuing fails."""
         self.convert(kind, object_id, num_bytes)
         try:
             yield
@@ -84,5 +84,5 @@ class Reservation:
             raise
 
     def release(self) -> None:
-        """Count nothing any more."""
+        """Delete the reservation."""
         self._quotas.drop_reserved(self._row)

@@ -1,4 +1,4 @@
-"""Roles, and whoever calls."""
+"""Roles and callers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from starlette.requests import HTTPConnection
 
 
 class Role(IntEnum):
-    """What somebody may do; who has one may do all that those below it may."""
+    """Role of a user; each includes those before it."""
 
     ANYONE = 0
     VIEW = 1
@@ -20,7 +20,7 @@ class Role(IntEnum):
 
     @property
     def label(self) -> str:
-        """As settings, commands and messages write it."""
+        """Name in settings, commands and messages."""
         return self.name.lower()
 
 
@@ -32,14 +32,14 @@ PROXY = "proxy:"
 
 @dataclass(frozen=True)
 class Caller:
-    """Whoever sent a request.
+    """The sender of a request.
 
     Attributes:
-        name: by which quotas, turns and the audit know them; empty where nobody logs in. Names that proxies say begin
-            with `PROXY`, which no token's name does: whom a proxy calls Ann is not who has Ann's token.
-        role: what they may do. address: where the request came from.
-        auth_method: how they are known: no login is asked for, they have not logged in, a token, a proxy.
-        token: id of the token. watches: they have come by a link that lets nobody edit.
+        name: for quotas, scheduling and audit; empty without login. Names from proxies begin with `PROXY`, which no
+            token's name does: a proxy's Ann is not the owner of Ann's token.
+        role: of the caller. address: of the client.
+        auth_method: no login required, not logged in, by token, or by proxy.
+        token: id of the token. watches: joined by a view-only link.
     """
 
     name: str
@@ -50,31 +50,31 @@ class Caller:
     watches: bool = False
 
     def watching(self) -> Caller:
-        """The same, who only looks."""
+        """This caller as view-only."""
         return replace(self, role=Role.VIEW, watches=True)
 
     @property
     def may_edit(self) -> bool:
-        """Whether they may change what others see."""
+        """True if the caller may change the look."""
         return self.role >= Role.EDIT
 
     @property
     def person(self) -> str:
-        """As other people read it in a room and beside a comment; empty where nobody logs in."""
+        """Display name in rooms and comments; empty without login."""
         return self.name.removeprefix(PROXY) if self.auth_method == "proxy" else self.name
 
     @property
     def display_name(self) -> str:
-        """As logs and the audit call them."""
+        """Name in logs and audit."""
         return self.name or self.address
 
 
 KEY = "relume.caller"
-"""Under which the gate leaves the caller in the scope of a request."""
+"""Key of the caller in the scope of a request."""
 
 
 def get_caller(connection: HTTPConnection) -> Caller:
-    """Who calls, for routes."""
+    """Return the caller, for routes."""
     caller: Caller = connection.scope[KEY]
     return caller
 

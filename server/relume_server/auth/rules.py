@@ -1,6 +1,6 @@
-"""The table of what each call needs; the gate asks it before anything of a request is read.
+"""Required role of each call, checked before the body is read.
 
-A call that is not listed is for admins alone, and `tests/access` fails for it: every route has its line here.
+A call that is not listed is for admins only, and `tests/access` fails: every route needs a row here.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from relume_server.errors import ForbiddenError
 ANYONE, VIEW, EDIT, ADMIN = Role
 
 SOCKET = "WEBSOCKET"
-"""Stands for a method where a live session is opened."""
+"""Method of opening a live session."""
 
 RULES: Mapping[str, Mapping[str, Role]] = {
     "/livez": {"GET": ANYONE},
@@ -99,9 +99,9 @@ RULES: Mapping[str, Mapping[str, Role]] = {
 MESSAGES: Mapping[str, Role] = {
     "open": VIEW,
     "edit": EDIT,
-    "edit_local": VIEW,  # an edit of nothing but ways of looking: exposure, light paths, what is shown alone
-    "prepare": VIEW,  # who may edit has the curve precomputed; who may not is told its values
-    "prepare_parameter": EDIT,  # of what is no curve: it only prepares edits
+    "edit_local": VIEW,  # edits of view settings only: exposure, light paths, solo
+    "prepare": VIEW,  # editors also trigger precomputing; viewers get the values only
+    "prepare_parameter": EDIT,  # a parameter: it only prepares edits
     "view": VIEW,
     "views": VIEW,
     "focus": VIEW,
@@ -115,7 +115,7 @@ MESSAGES: Mapping[str, Role] = {
     "presence": VIEW,
     "ping": VIEW,
 }
-"""What the messages of a live session need."""
+"""Required roles of session messages."""
 
 _COMPILED: tuple[tuple[re.Pattern[str], Mapping[str, Role]], ...] = tuple(
     (compile_path(path)[0], roles) for path, roles in RULES.items()
@@ -125,7 +125,7 @@ _COMMENTS = compile_path("/api/scenes/{scene}/comments")[0]
 
 
 def required_role(method: str, path: str) -> Role:
-    """What a call needs: the most that any line asks that fits it; of what is no call, nothing, the editor's files."""
+    """Required role of a call: the highest of all matching rows; none for files of the editor."""
     fitting = [roles[method] for pattern, roles in _COMPILED if method in roles and pattern.match(path)]
     if fitting:
         return max(fitting)
@@ -134,26 +134,23 @@ def required_role(method: str, path: str) -> Role:
 
 
 def methods_at(path: str) -> list[str]:
-    """What a path takes; routes of one path know each only their own method."""
+    """Methods of a path; routes know only their own method."""
     return sorted({method for pattern, roles in _COMPILED if pattern.match(path) for method in roles} - {SOCKET})
 
 
 def is_comment(method: str, path: str) -> bool:
-    """Whether a call writes a comment, which settings may let viewers do."""
+    """True if a call writes a comment, which settings may allow viewers."""
     return method == "POST" and _COMMENTS.match(path) is not None
 
 
 def is_change(method: str, path: str) -> bool:
-    """Whether a call changes something that others see: it is not safe, and needs more than to look."""
+    """True if a call changes shared state: an unsafe method that needs more than the role view."""
     return method not in ("GET", "HEAD", "OPTIONS", SOCKET) and required_role(method, path) >= EDIT
 
 
 def check_message(caller: Caller, kind: str) -> None:
-    """Raises ForbiddenError where a caller may not send messages of that kind."""
+    """Raise ForbiddenError if a caller may not send messages of this kind."""
     if caller.role < MESSAGES[kind] and caller.watches:
-        raise ForbiddenError("this link is for watching; ask who sent it for the one to work together")
+        raise ForbiddenError("this link is view-only; ask its sender for an edit link")
     if caller.role < MESSAGES[kind]:
-        raise ForbiddenError(
-            f"{caller.display_name} may look at this picture but not edit it; ask an admin for a token with the role "
-            f"edit"
-        )
+        raise ForbiddenError(f"{caller.display_name} has view-only access; ask an admin for a token with the role edit")

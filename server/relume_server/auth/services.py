@@ -1,4 +1,4 @@
-"""All that lives as long as the server and knows who may do what."""
+"""Tokens, quotas and audit of one database, for the lifetime of the server."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from relume_server.settings import Settings
 
 PROXY_REVALIDATION_S = 900.0
-"""Only the proxy knows whether somebody whom it named may still be here: after this time they come by it again."""
+"""Only the proxy knows whether its users are still authorized: after this time they must connect again."""
 
 
 class AuthServices:
-    """Tokens and who they are, quotas, and the audit, of one database."""
+    """Tokens and identities, quotas, and the audit of one database."""
 
     def __init__(self, sessions: sessionmaker[Session], settings: Settings) -> None:
         self.tokens, self.identity = TokenStore(sessions), Identity(settings)
@@ -32,21 +32,21 @@ class AuthServices:
         self.audit = Audit(sessions, settings.audit_lines)
 
     async def record(self, change: Change) -> None:
-        """Write a line of the audit, beside the event loop."""
+        """Add an audit row, in a thread."""
         await run_sync(self.audit.add, change)
 
     async def until_revoked(self, caller: Caller) -> None:
-        """Wait for as long as a caller may stay.
+        """Wait while a caller is authorized.
 
         Raises:
-            LoginError: the token has run out or was revoked.
+            LoginError: the token expired or was revoked.
         """
         while await self.may_stay(caller):
             await asyncio.sleep(TOKEN_CACHE_S)
-        raise LoginError("your token has run out or was revoked; log in with another one")
+        raise LoginError("your token expired or was revoked; log in with a new one")
 
     async def may_stay(self, caller: Caller) -> bool:
-        """Whether what a caller has open may go on; while the database is away it does."""
+        """True if the caller is still authorized; also while the database is unavailable."""
         try:
             return caller.token is None or await run_sync(self.tokens.is_valid, caller.token)
         except DATABASE_ERRORS:

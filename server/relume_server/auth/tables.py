@@ -1,4 +1,4 @@
-"""Tables of who may do what: tokens, what belongs to whom, and the audit."""
+"""Tables of tokens, ownership and audit."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from relume_worker.database.models import Base
 
 
 class TokenRow(Base):
-    """A token that was handed out. Times in seconds since 1970; of the secret only a hash is kept."""
+    """A token. Times in seconds since 1970; of the secret only a hash is stored."""
 
     __tablename__ = "tokens"
 
@@ -23,8 +23,7 @@ class TokenRow(Base):
 
 
 class OwnedRow(Base):
-    """What somebody has put here: an upload or a finished render of so many bytes, or a bake or a render that was
-    planned to take so many."""
+    """Ownership: an upload or finished render of so many bytes, or a bake or render planned to take so many."""
 
     __tablename__ = "owned"
 
@@ -35,7 +34,7 @@ class OwnedRow(Base):
 
 
 class AuditRow(Base):
-    """A change that somebody made; rows are only added, and the oldest go. See `relume_server.auth.audit`."""
+    """A change; rows are only added, and the oldest are deleted. See `relume_server.auth.audit`."""
 
     __tablename__ = "audit"
 

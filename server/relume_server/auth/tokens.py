@@ -1,6 +1,6 @@
-"""Tokens: made, listed, revoked, and told apart. `relume_<id>_<secret>`; the database keeps a hash of the secret.
+"""Tokens: create, list, revoke and check. `relume_<id>_<secret>`; the database stores a hash of the secret.
 
-The secret is 256 random bits, so that a plain hash is as good as a slow one, and a salt would protect nothing.
+The secret is 256 random bits, so a plain hash is as good as a slow one, and a salt would add nothing.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from relume_server.auth.tables import TokenRow
 
 MAX_TOKENS = 10_000
 MAX_UNKNOWN_IDS = 10_000
-"""Ids of which it is remembered that there is no such token."""
+"""Number of unknown ids that are cached."""
 TOKEN_CACHE_S = 2.0
-"""How long a token that was revoked elsewhere may still be taken."""
+"""Time for which a token that another process revoked may still be accepted."""
 _ID_DIGITS, _MAX_LENGTH = 12, 120
 
 
@@ -39,12 +39,12 @@ class Token:
     revoked: float | None
 
     def is_valid(self, now: float) -> bool:
-        """Whether it opens anything."""
+        """True if the token is neither expired nor revoked."""
         return self.revoked is None and (self.expires is None or now < self.expires)
 
 
 class TokenStore:
-    """Tokens in the database; may be used from any thread."""
+    """Tokens in the database. Thread-safe."""
 
     def __init__(self, sessions: sessionmaker[Session]) -> None:
         self._sessions = sessions
@@ -52,24 +52,26 @@ class TokenStore:
         self._unknown_ids: OrderedDict[str, float] = OrderedDict()
 
     def add(self, name: str, role: str, days: float | None = None) -> str:
-        """Hand out a token; the text is told this once.
+        """Create a token, and return its text, which is not stored.
 
         Raises:
-            ParameterError: there is no such role, the name is not one, or a valid token has it already.
+            ParameterError: unknown role, invalid name, or name of a valid token.
         """
         if role not in ROLES:
             raise ParameterError("role", role, ", ".join(ROLES))
         if not (name.isprintable() and name == name.strip() and 1 <= len(name) <= 80):
             raise ParameterError("name", name, "1 to 80 printable characters")
         if name.startswith(PROXY):
-            raise ParameterError("name", name, f"one that does not begin with {PROXY}, as names from proxies do")
+            raise ParameterError(
+                "name", name, f"a name that does not begin with {PROXY}, which is for names from proxies"
+            )
         if days is not None and not 0 < days <= 36_500:
             raise ParameterError("days", days, "more than 0, at most 36500")
         now, tokens = time.time(), self.all()
         if any(token.name == name and token.is_valid(now) for token in tokens):
-            raise ParameterError("name", name, "one that no valid token has; revoke that first")
+            raise ParameterError("name", name, "another name, or revoke the valid token of this name first")
         if len(tokens) >= MAX_TOKENS:
-            raise ParameterError("name", name, f"no more: {MAX_TOKENS:,} tokens were handed out")
+            raise ParameterError("name", name, f"none: the limit of {MAX_TOKENS:,} tokens is reached")
         identity, secret = secrets.token_hex(_ID_DIGITS // 2), secrets.token_urlsafe(32)
         expires = None if days is None else now + days * 86_400
         with self._sessions.begin() as session:
@@ -79,12 +81,12 @@ class TokenStore:
         return f"relume_{identity}_{secret}"
 
     def all(self) -> list[Token]:
-        """Every token that was handed out, oldest first."""
+        """All tokens, oldest first."""
         with self._sessions() as session:
             return [_token(row) for row in session.scalars(select(TokenRow).order_by(TokenRow.created))]
 
     def revoke(self, name: str) -> None:
-        """The valid token of that name, or of that id, opens nothing any more. Raises NotFoundError."""
+        """Revoke the valid token with this name or id. Raises NotFoundError."""
         now = time.time()
         matches = [token for token in self.all() if name in (token.name, token.id) and token.is_valid(now)]
         if not matches:
@@ -97,20 +99,20 @@ class TokenStore:
                 self._cached.pop(token.id, None)
 
     def authenticate(self, text: str) -> Token | None:
-        """The valid token that a text is; asks the database, unless it has just done so."""
+        """Return the valid token of a text; asks the database, unless the result is cached."""
         identity, secret = _split_token(text)
         cached = self._fetch(identity) if identity else None
         is_right = cached is not None and _is_secret(secret, cached[1])
         return cached[0] if cached is not None and is_right and cached[0].is_valid(time.time()) else None
 
     def is_cached(self, text: str) -> bool:
-        """Whether a text was a right token when it was looked up last, however long ago; asks no database."""
+        """True if a token was valid at its last lookup, however long ago; does not ask the database."""
         identity, secret = _split_token(text)
         cached = self._cached.get(identity)
         return cached is not None and _is_secret(secret, cached[2])
 
     def is_valid(self, identity: str) -> bool:
-        """Whether the token of that id still opens what it opened."""
+        """True if the token with this id is still valid."""
         cached = self._fetch(identity)
         return cached is not None and cached[0].is_valid(time.time())
 
@@ -132,7 +134,7 @@ class TokenStore:
 
 
 def _split_token(text: str) -> tuple[str, str]:
-    """Id and secret of a token; both empty where it is none."""
+    """Split a token into id and secret; both empty if it is malformed."""
     fields = text.split("_", 2)
     if len(text) > _MAX_LENGTH or len(fields) != 3 or fields[0] != "relume" or len(fields[1]) != _ID_DIGITS:
         return "", ""

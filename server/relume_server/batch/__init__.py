@@ -1,1 +1,1 @@
-"""Batch steps run one at a time in processes of their own that yield to sessions."""
+"""Batch steps, run in separate processes that yield to sessions."""

@@ -1,4 +1,4 @@
-"""What bakes show before anybody edits them: made ahead of the first who opens them, and small for lists."""
+"""First images of bakes: rendered in advance, and thumbnails for lists."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ MAX_WIDTH = 320
 def render_first(
     context: BatchContext, report: ProgressCallback, is_canceled: CancelCheck, *, bake: str
 ) -> Mapping[str, Any]:
-    """Shade the scene's own look in every view of a bake of fixed views; its images stay beside the store, where an
-    opened picture looks for them."""
+    """Shade the default look in every view of a fixed-camera bake; term images are stored next to the store."""
     transfer = context.transfer(bake)
     look, num_views = looks.validate(transfer.default_look, transfer.default_look), len(transfer.views)
     for done, view in enumerate(transfer.views):
@@ -34,13 +33,14 @@ def render_first(
 def paint_thumbnail(
     context: BatchContext, report: ProgressCallback, is_canceled: CancelCheck, *, bake: str, path: str
 ) -> Mapping[str, Any]:
-    """Paint the first view of a bake small.
+    """Render the thumbnail of a bake's first view.
 
     Args:
-        path: of the file, which appears whole; what is there already stays.
+        context: of the process. report, is_canceled: callbacks. bake: id.
+        path: of the file, which appears when it is complete; an existing one is kept.
     """
     file = Path(path)
-    if file.exists():  # somebody else asked at the same time
+    if file.exists():  # another request was faster
         return {}
     transfer = context.transfer(bake)
     view = next(iter(transfer.views.values()))

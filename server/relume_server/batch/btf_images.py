@@ -1,10 +1,10 @@
-"""Read the images of an uploaded BTF in a process of its own.
+"""Read the images of an uploaded BTF in a separate process.
 
-`python -m relume_server.batch.btf_images FILE FOLDER BYTES SECONDS`, started by `SandboxedViewArrays`, within the
-limits that imports have.
+`python -m relume_server.batch.btf_images FILE FOLDER BYTES SECONDS`, started by `SandboxedViewArrays`, with the limits
+of imports.
 
-It tells a line of JSON first: what directions there are, or what is wrong. Then for each view that is asked for, a line
-with its number, a line of JSON goes out and the values of `relume.assets.btf.compress.ViewArrays.get_view` after it.
+It first writes a line of JSON with the directions, or an error. Then for each line with a view's number, it writes a
+line of JSON followed by the values of `relume.assets.btf.compress.ViewArrays.get_view`.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ from relume.core.errors import MaterialError, RelumeError
 from relume_server.io.sandbox import confine, environment
 
 F32 = NDArray[np.float32]
-_MAX_FILE_BYTES = 64 << 20  # a picture that is read from a file of its own
-_STOPPED = "the BTF's images made their reader fail, or need more than {:.1f} GB or {} s each; make the file again"
+_MAX_FILE_BYTES = 64 << 20  # an image in a file of its own
+_STOPPED = "the BTF's images are damaged, or need more than {:.1f} GB or {} s each; export the file again"
 
 
 class SandboxedViewArrays:
     """Images of a file; implements `relume.assets.btf.compress.ViewArrays`.
 
     Args:
-        file: zip or container. max_bytes: of memory that reading may take. seconds: of processor, for one view.
+        file: ZIP or container. max_bytes: memory limit. seconds: of processor time per view.
     Raises:
         MaterialError: the file cannot be used.
     """
@@ -63,7 +63,7 @@ class SandboxedViewArrays:
         self.size = (int(header["size"][0]), int(header["size"][1]))
 
     def get_view(self, view: int) -> F32:
-        """Every texel's values from one direction. (lights, texels, 3) float32. Raises MaterialError."""
+        """Values of all texels from one view direction, (lights, texels, 3) float32. Raises MaterialError."""
         try:
             self._request_pipe.write(f"{view}\n".encode())
             self._request_pipe.flush()
@@ -91,21 +91,21 @@ class SandboxedViewArrays:
         """End the process."""
         self._process.kill()
         self._process.wait()
-        with suppress(BrokenPipeError):  # what nobody has read
+        with suppress(BrokenPipeError):  # unread output
             self._request_pipe.close()
         self._response_pipe.close()
         self._folder.cleanup()
 
 
 def main() -> NoReturn:
-    """The process itself."""
+    """Main function of the process."""
     file, folder, max_bytes, seconds = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_AS, (max_bytes, max_bytes))
     resource.setrlimit(resource.RLIMIT_FSIZE, (_MAX_FILE_BYTES, _MAX_FILE_BYTES))
     confine([file], folder)
     out = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever a library prints is no answer
+    os.dup2(2, 1)  # output of libraries must not mix with the answers
     try:
         _extend_cpu_limit(seconds)
         images = open_images(file)
@@ -123,7 +123,7 @@ def main() -> NoReturn:
 
 
 def _extend_cpu_limit(seconds: int) -> None:
-    """So much more processor time from now on."""
+    """Allow so much more processor time from now on."""
     used = resource.getrusage(resource.RUSAGE_SELF)
     resource.setrlimit(resource.RLIMIT_CPU, (int(used.ru_utime + used.ru_stime) + seconds, resource.RLIM_INFINITY))
 

@@ -1,4 +1,4 @@
-"""The step that makes a BTF, or goes on with it for a while: others have their turns meanwhile."""
+"""Step that makes a BTF, in time slices, so that other jobs can run in between."""
 
 from __future__ import annotations
 
@@ -21,9 +21,12 @@ from relume_server.schemas.btfs import BtfRequest
 from relume_server.settings import Settings
 from relume_worker.paths import btfs_path
 
-UPLOAD_FILE, RESULT_FILE = "images.zip", "found.json"  # a container or a mesh has the same name: the first bytes tell
+UPLOAD_FILE, RESULT_FILE = (
+    "images.zip",
+    "found.json",
+)  # a container or a mesh has the same name: checked by the first bytes
 _WORK_FOLDER, _PROGRESS_FILE = "making", "reached.txt"
-_GRID = 3  # places along each side of a texel
+_GRID = 3  # samples along each side of a texel
 SLICE_S = 30.0
 
 
@@ -35,12 +38,13 @@ def run_btf_slice(
     request: Mapping[str, Any],
     folder: str,
 ) -> Mapping[str, Any]:
-    """Render or read it, compress it, keep it; what was found when it was stopped is still there.
+    """Render or read a BTF, compress and store it; an interrupted step saves its results.
 
     Args:
-        request: the work's. folder: its files, what was sent among them.
+        context: of the process. report, is_canceled: callbacks.
+        request: body of the job. folder: its files, including uploads.
     Returns:
-        `is_done`: whether it is kept; else it is to be gone on with.
+        `is_done`: whether the BTF is stored; otherwise the step must run again.
     """
     btf_request, job_folder = BtfRequest.model_validate(request), Path(folder)
     time_slice = _TimeSlice(report, is_canceled, job_folder / _PROGRESS_FILE)
@@ -58,7 +62,7 @@ def run_btf_slice(
 
 def _make_record(request: BtfRequest, job_folder: Path, btfs_folder: Path, time_slice: _TimeSlice) -> BtfRecord:
     if request.geometry is None:
-        limits = Settings()  # of the environment, which is the server's
+        limits = Settings()  # of the server's process
         with closing(
             SandboxedViewArrays(job_folder / UPLOAD_FILE, limits.import_bytes, limits.import_seconds)
         ) as images:
@@ -79,11 +83,10 @@ def _make_record(request: BtfRequest, job_folder: Path, btfs_folder: Path, time_
 
 
 class _TimeSlice:
-    """Ends after a while, though not before something was found that no turn before it had.
+    """Ends after a while, but not before it has made progress beyond all earlier slices.
 
     Args:
-        report: called with the share done. is_canceled: asked now and then. path: file that says what turns have
-            reached.
+        report: called with the fraction done. is_canceled: polled. path: file with the progress of earlier slices.
     """
 
     def __init__(self, report: ProgressCallback, is_canceled: CancelCheck, path: Path) -> None:
@@ -93,15 +96,15 @@ class _TimeSlice:
         self._fraction = 0.0
 
     def report(self, fraction: float) -> None:
-        """So much is done, of all turns."""
+        """Report the fraction done, over all slices."""
         self._fraction = fraction
         self._report(fraction)
 
     def is_over(self) -> bool:
-        """Whether to stop: for now, or because it is not wanted any more."""
+        """True if the slice should stop: for now, or because the job is canceled."""
         return self._cancelled() or (self._fraction > self._previous_fraction and time.monotonic() > self._until_s)
 
     def report_result(self) -> None:
-        """Say what was reached."""
+        """Store the progress."""
         with atomic_write(self._path) as unfinished:
             unfinished.write_text(str(max(self._fraction, self._previous_fraction)))

@@ -1,4 +1,4 @@
-"""What steps work with: the library, and the bakes that were used last."""
+"""Context of steps: the library, and recently used bakes."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from relume_worker.paths import bake_path
 
 @dataclass
 class BatchContext:
-    """Of one process."""
+    """Context of one process."""
 
     data: Path
     library: Library
     _open_bakes: dict[str, OpenBake] = field(default_factory=dict, init=False)
 
     def transfer(self, bake: str) -> OpenBake:
-        """A bake, opened to be read; the last two stay open, of which each queue may need one. Raises StoreError."""
+        """Open a bake for reading; the last two stay open, because each queue may need one. Raises StoreError."""
         if bake not in self._open_bakes:
             for oldest in list(self._open_bakes)[: len(self._open_bakes) - 1]:
                 del self._open_bakes[oldest]

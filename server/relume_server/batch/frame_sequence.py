@@ -1,4 +1,4 @@
-"""What each frame of a batch shows: from where, and under which look; and from where a comparison sees its view."""
+"""Look and camera of each frame of a batch, and the camera of a comparison."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ if TYPE_CHECKING:
 
 
 def check_animation(request: Animation, view: str, transfer: OpenBake) -> Sequence[Camera | None]:
-    """Whether a bake can follow a batch, and where each frame is seen from; None where it was baked.
+    """Check that a bake supports a batch, and return the camera of each frame; None for the baked one.
 
     Raises:
-        ParameterError: what cannot be, and what can.
+        ParameterError: what is not supported, and what is.
     """
     path, num_frames = request.path, request.num_frames
     if path is not None and transfer.camera_mode is not CameraMode.FREE and not _has_fixed_camera(path):
-        allowed = "no path, or bake by method probes: this bake is seen from where it was baked alone"
+        allowed = "no path, or bake with method probes: this bake has fixed cameras"
         raise ParameterError("path", _path_text(path), allowed)
     if isinstance(path, Turntable) and request.frames not in (None, path.turntable):
-        raise ParameterError("frames", request.frames, f"{path.turntable}, as the turntable says, or nothing")
+        raise ParameterError("frames", request.frames, f"{path.turntable}, as in turntable, or leave it out")
     num_cameras = 0 if path is None or isinstance(path, Turntable) else len(path.cameras)
     if num_cameras > num_frames:
-        raise ParameterError("path/cameras", f"{num_cameras} keyframes", f"at most as many as frames, {num_frames}")
+        raise ParameterError("path/cameras", f"{num_cameras} keyframes", f"at most one per frame, {num_frames}")
     return cameras_of(request, view, transfer)
 
 
@@ -53,8 +53,8 @@ def _has_fixed_camera(path: Turntable | CameraPath) -> bool:
 
 
 def cameras_of(request: Animation, name: str, transfer: OpenBake) -> Sequence[Camera | None]:
-    """Where each frame is seen from; None where it was baked. Raises ParameterError for bad cameras."""
-    from relume.live.free_camera.camera_paths import (  # SciPy, which a process that describes its API does without
+    """Camera of each frame; None for the baked one. Raises ParameterError for invalid cameras."""
+    from relume.live.free_camera.camera_paths import (  # imports SciPy, which describing the API does not need
         interpolate_cameras,
         turntable,
     )
@@ -78,7 +78,7 @@ def _camera_of_frame(view: CameraView, frame: CameraFrame) -> Camera:
 
 
 def comparison_camera(request: ComparisonRequest, transfer: OpenBake) -> tuple[Camera, tuple[int, int]]:
-    """From where a comparison sees its view, and how large its pictures are. Raises ParameterError for bad cameras."""
+    """Camera and image size of a comparison. Raises ParameterError for invalid cameras."""
     view = transfer.views[request.view]
     camera = view.camera if request.camera is None else _camera_of_frame(view, request.camera)
     return camera, request.size or (view.width, view.height)
@@ -97,7 +97,7 @@ def _turntable_pivot(path: Turntable, view: FreeView, transfer: OpenBake) -> NDA
 
 
 def with_pivot(request: LooksRequest, transfer: OpenBake) -> LooksRequest:
-    """The same where an object turns, about a place that is found once rather than for each frame."""
+    """Fill in the pivot of a rotating object, so that it is not computed for each frame."""
     path = request.path
     if request.view is None or not isinstance(path, Turntable) or path.rotate != "object":
         return request
@@ -106,13 +106,13 @@ def with_pivot(request: LooksRequest, transfer: OpenBake) -> LooksRequest:
 
 
 def look_at_frame(request: Animation, view: str, transfer: OpenBake, index: int) -> Look:
-    """The look of a frame, validated: one of the batch's, or between two of them, under light that `path` may turn."""
+    """Validated look of a frame: a keyframe or interpolated, with the environment or object rotated by `path`."""
     default = transfer.default_look
     return looks.validate(look_document_at_frame(request, view, transfer, index), default)
 
 
 def look_document_at_frame(request: Animation, view: str | None, transfer: OpenBake, index: int) -> Mapping[str, Any]:
-    """The complete look of a frame, see `look_of`; `view` may be None where there is no path."""
+    """Complete look document of a frame, see `look_at_frame`; `view` may be None without a path."""
     document = _interpolated_document(request, transfer.default_look, index)
     if not isinstance(request.path, Turntable) or request.path.rotate == "camera":
         return document
@@ -124,10 +124,10 @@ def look_document_at_frame(request: Animation, view: str | None, transfer: OpenB
 
 
 def _interpolated_document(request: Keyframes, default: Mapping[str, Any], index: int) -> Mapping[str, Any]:
-    """Only those looks that a frame lies between are completed."""
+    """Interpolate the look document of a frame; only its two keyframes are completed."""
     if len(request.looks) == request.num_frames:
         return looks.complete(request.looks[index], default)
     position = index / max(1, request.num_frames - 1)
     first, second, weight = enclosing_keyframes(len(request.looks), position)
-    keys = dict.fromkeys((first, second))  # one of them where the frame is a keyframe
+    keys = dict.fromkeys((first, second))  # only one if the frame is a keyframe
     return interpolate_looks([looks.complete(request.looks[k], default) for k in keys], weight, request.interpolation)

@@ -1,4 +1,4 @@
-"""Frames of batch renders: painted one by one into files, and packed."""
+"""Frames of batch renders: rendered one by one into files, and packed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from relume_server.schemas.renders import RenderRequest
 if TYPE_CHECKING:
     from relume.scene.model import Camera
 
-_LAYERS = ".layers-*"  # folders beside a picture that is being written
+_LAYERS = ".layers-*"  # folders next to an image that is being written
 
 
 def paint_frame(
@@ -39,11 +39,12 @@ def paint_frame(
     path: str,
     scene_name: str,
 ) -> Mapping[str, Any]:
-    """Paint one picture of a batch.
+    """Render one image of a batch.
 
     Args:
-        request: the batch's body. index: of the picture. path: of its file, which appears whole.
-        scene_name: that people read in the file.
+        context: of the process. report, is_canceled: callbacks.
+        request: body of the batch. index: of the image. path: of its file, which appears when it is complete.
+        scene_name: stored in the file.
     """
     render_request, target = RenderRequest.model_validate(request), Path(path)
     _tidy(target.parent)
@@ -72,7 +73,7 @@ def paint_frame(
 
 
 def _tidy(folder: Path) -> None:
-    """Remove what a killed process left: of a batch one picture is painted at a time."""
+    """Remove files of a killed process: a batch renders one image at a time."""
     for stray in folder.glob(_LAYERS):
         shutil.rmtree(stray, ignore_errors=True)
     for unfinished in folder.glob(UNFINISHED):
@@ -111,8 +112,9 @@ def pack(
     """Pack a finished batch.
 
     Args:
-        frames: path of each picture, and what it is called in the archive. archive: file of all of them.
-        video: file of a video of them, or None. fps: its frames a second.
+        context: of the process. report, is_canceled: callbacks.
+        frames: path and archive name of each image. archive: file to write.
+        video: video file to write, or None. fps: its frames per second.
     """
     if video is not None:
         target = Path(video)

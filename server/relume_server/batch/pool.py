@@ -1,4 +1,4 @@
-"""The processes that do steps: started when they are needed, kept while they are, exchanged when they grew."""
+"""Pool of batch processes: started on demand, ended when idle, replaced when they grow."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from relume.core.errors import CancelledError, RelumeError
 from relume_server.batch.process import BatchProcess, ProcessExitedError
 from relume_server.batch.step import IsNeeded, ProgressCallback, Step
 
-MAX_STEPS = 500  # after so many a process is exchanged, whatever it holds
-_PROGRAM_BYTES = 1 << 30  # compiled kernels, an opened bake and Embree's trees: beside what is made from it
-_ASK_S = 0.1
+MAX_STEPS = 500  # steps after which a process is replaced, whatever its size
+_PROGRAM_BYTES = 1 << 30  # compiled kernels, an open bake and Embree's trees: besides cached results
+_POLL_S = 0.1
 _TRIES = 2
 
 
 class ProcessPool:
-    """Runs steps, so many at once; those that somebody waits for go before all others, else who came first."""
+    """Runs a limited number of steps at once: interactive ones first, otherwise first come, first served."""
 
     def __init__(
         self, data: Path, num_processes: int, num_bytes: int, num_threads: int, niceness: int, idle_s: float
     ) -> None:
         """
         Args:
-            data: the data directory. num_processes: at most.
-            num_bytes: that each may keep of what it makes. num_threads: of the kernels of each.
-            niceness: how much they yield to others, 0…19.
-            idle_s: how long a process that has nothing to do is kept.
+            data: data directory. num_processes: maximum.
+            num_bytes: cache of each process. num_threads: of the kernels in each.
+            niceness: of the processes, 0…19.
+            idle_s: lifetime of an idle process.
         """
         self._data, self._num_processes = data, num_processes
         self._limits, self._idle_s = (num_bytes, num_threads, niceness), idle_s
@@ -43,7 +43,7 @@ class ProcessPool:
         self._is_closed = False
 
     def run(self, step: Step, report: ProgressCallback, is_needed: IsNeeded) -> Mapping[str, Any]:
-        """See `RunStep`."""
+        """Run a step, see `RunStep`."""
         self._acquire_slot(step, is_needed)
         try:
             for _ in range(_TRIES):
@@ -56,12 +56,12 @@ class ProcessPool:
                 self._num_free_slots += 1
                 self._changed.notify_all()
         raise RelumeError(
-            f"the process that did the {step.kind} was killed twice, perhaps for want of memory; make the picture "
-            "smaller, or free memory and try again"
+            f"the process of the {step.kind} was killed twice, perhaps because memory ran out; give a "
+            "smaller size, or free memory and try again"
         )
 
     def release(self) -> None:
-        """End processes that have had nothing to do for a while."""
+        """End idle processes."""
         long_ago = time.monotonic() - self._idle_s
         with self._changed:
             idle = [process for process in self._free if process.idle_since_s < long_ago]
@@ -70,18 +70,18 @@ class ProcessPool:
             process.kill()
 
     def resident_bytes(self) -> int:
-        """What all processes hold."""
+        """Resident memory of all processes, in bytes."""
         with self._changed:
             processes = [*self._free, *self._busy]
         return sum(process.resident_bytes() for process in processes)
 
     def pids(self) -> list[int]:
-        """Of all processes."""
+        """Process ids."""
         with self._changed:
             return [process.pid for process in (*self._free, *self._busy)]
 
     def close(self) -> None:
-        """End all processes; a step that is under way fails."""
+        """End all processes; a running step fails."""
         with self._changed:
             self._is_closed = True
             processes, self._free = [*self._free, *self._busy], []
@@ -96,8 +96,8 @@ class ProcessPool:
             try:
                 while self._num_free_slots == 0 or ticket != min(self._waiting):
                     if self._is_closed or not is_needed():
-                        raise CancelledError(f"the {step.kind} was stopped before it began")
-                    self._changed.wait(_ASK_S)
+                        raise CancelledError(f"the {step.kind} was stopped before it started")
+                    self._changed.wait(_POLL_S)
                 self._num_free_slots -= 1
             finally:
                 self._waiting.remove(ticket)
@@ -113,19 +113,19 @@ class ProcessPool:
     def _acquire_process(self) -> BatchProcess:
         with self._changed:
             if self._is_closed:
-                raise CancelledError("the server closes")
+                raise CancelledError("the server is closing")
             while self._free:
                 process = self._free.pop()
                 if process.is_alive:
                     break
-                process.kill()  # what it leaves
+                process.kill()  # remaining time
             else:
                 process = BatchProcess(self._data, *self._limits)
             self._busy.add(process)
             return process
 
     def _return_process(self, process: BatchProcess) -> None:
-        """Keep it for the next step, or end it where it has grown."""
+        """Keep the process for the next step, or end it if it has grown."""
         num_bytes = process.resident_bytes()
         is_reusable = (
             process.is_alive and num_bytes <= self._limits[0] + _PROGRAM_BYTES and process.num_steps < MAX_STEPS

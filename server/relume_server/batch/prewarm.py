@@ -1,6 +1,6 @@
-"""Has what a new bake shows first made before anybody opens it: its own look, exactly, and its thumbnail.
+"""Render the first images of new bakes in advance: the default look, exactly, and the thumbnail.
 
-One server of a data directory does, the one that has the lock of a file in it: what is made lies there, for all.
+One server per data directory does it, the one with the lock of a file in it: the results are shared there.
 """
 
 from __future__ import annotations
@@ -26,52 +26,52 @@ from relume_worker.storage.locks import open_lock_file
 log = logging.getLogger(__name__)
 
 POLL_INTERVAL_S = 5.0
-MAX_BAKES_AT_START = 20  # an update makes all pictures old
+MAX_BAKES_AT_START = 20  # an update invalidates all images
 _LOCK = Path("bakes", "locks", "ahead")
 
 
 class Prewarmer:
-    """Looks for bakes that have become ready, in a thread of its own."""
+    """Finds bakes that have become ready, in a thread of its own."""
 
     def __init__(
         self, data: Path, ledger: Ledger, run: RunStep, thumbnails: Thumbnails, is_used: Callable[[str], bool]
     ) -> None:
         """
         Args:
-            data: the data directory. run: does steps.
-            is_used: whether somebody has a bake open, who makes its pictures already.
+            data: data directory. ledger: of bakes. run: runs steps. thumbnails: of bakes.
+            is_used: true if a bake is open, so that its images are rendered anyway.
         """
         self._data, self._ledger, self._run_step = data, ledger, run
         self._thumbnails, self._is_used = thumbnails, is_used
         self._closing = threading.Event()
-        self._outage = DatabaseError(log, "first pictures of new bakes cannot be made")
+        self._outage = DatabaseError(log, "first images of new bakes cannot be rendered")
         self._thread = threading.Thread(target=self._run, name="relume-ahead", daemon=True)
 
     def start(self) -> None:
-        """Begin to look."""
+        """Start the thread."""
         self._thread.start()
 
     def close(self) -> None:
-        """Stop looking; a step that is under way is not wanted any more."""
+        """Stop the thread; a running step is canceled."""
         self._closing.set()
         if self._thread.is_alive():
             self._thread.join()
 
     def _run(self) -> None:
         processed: set[str] = set()
-        while not self._closing.wait(POLL_INTERVAL_S):  # who waits for a bake opens it meanwhile
+        while not self._closing.wait(POLL_INTERVAL_S):  # a waiting user opens the bake meanwhile
             try:
                 with self._try_lock() as has_lock:
                     if has_lock:
                         self._run_once(processed)
                         self._outage.report_recovered()
-            except Exception as error:  # the database may be away for a while; the thread must outlive that
+            except Exception as error:  # the thread must survive an unavailable database
                 self._outage.report_failure(error)
 
     def _run_once(self, processed: set[str]) -> None:
-        """Make the pictures of bakes that were not known yet, the newest first; at first, of a few that have none."""
+        """Render images of new bakes, newest first; at startup, of a few that have none."""
         ready_bakes = self._ledger.ready_bakes()
-        processed.intersection_update(ready_bakes)  # one that was deleted may be baked again
+        processed.intersection_update(ready_bakes)  # a deleted one may be baked again
         new = [bake for bake in ready_bakes if bake not in processed]
         if not processed:
             processed.update(new[MAX_BAKES_AT_START:])
@@ -84,7 +84,7 @@ class Prewarmer:
                 self._prewarm(bake)
 
     def _needs_pictures(self, bake: str) -> bool:
-        """Whether a bake is here, and no picture of its own look by this code."""
+        """True if a bake is here without images of its default look by this code version."""
         store = bake_path(self._data, bake)
         with suppress(NotFoundError):
             is_fixed = self._ledger.bake(bake).recipe.method not in FREE_CAMERA_METHODS
@@ -98,17 +98,17 @@ class Prewarmer:
         if not is_needed():
             return
         try:
-            step = Step("first picture of a bake", values={"bake": bake})
+            step = Step("first image of a bake", values={"bake": bake})
             self._run_step(step, lambda share: None, is_needed)
             self._thumbnails.paint(bake, is_first=False)
-        except CancelledError:  # somebody opened it, or the server closes
+        except CancelledError:  # the bake was opened, or the server is closing
             pass
-        except (RelumeError, OSError) as error:  # whoever opens it is told; it may have been deleted meanwhile
-            log.info("the first picture of bake %s was not made ahead (%s)", bake, error)
+        except (RelumeError, OSError) as error:  # users who open it get the error; the bake may have been deleted
+            log.info("the first image of bake %s was not rendered in advance (%s)", bake, error)
 
     @contextmanager
     def _try_lock(self) -> Iterator[bool]:
-        """Whether it is for this process to look, for as long as the block runs."""
+        """Yield true if this process has the lock inside the block."""
         try:
             lock = open_lock_file(self._data / _LOCK, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:

@@ -1,4 +1,4 @@
-"""One process that does steps, seen from the server: started, asked, stopped, killed."""
+"""The server's side of one batch process: start, run steps, stop, kill."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ COMMAND = ["-m", "relume_server.batch.process_main"]
 
 
 class _NoRoomError(DiskFullError):
-    """A step found the disk full, and has said of what."""
+    """A step found the disk full; with its message."""
 
     def __init__(self, message: str) -> None:
         RelumeError.__init__(self, message)
@@ -37,28 +37,28 @@ _ERRORS_BY_KIND: Mapping[str, type[RelumeError]] = {
     "not-found": NotFoundError,
     "disk": _NoRoomError,
 }
-"""What a step may meet that is no failure of its process, by the last part of the problem's type."""
-_ASK_S = 0.1
-_STOP_S = 1.0  # a kernel may be at work for longer than anybody wants to wait
+"""Expected errors of a step, which do not end its process, by the last part of the problem's type."""
+_POLL_S = 0.1
+_STOP_S = 1.0  # a kernel may run for longer than anyone wants to wait
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 class ProcessExitedError(RelumeError):
-    """The process ended in the middle of a step."""
+    """The process ended during a step."""
 
 
 class BatchProcess:
-    """Does one step at a time; used by one thread at a time."""
+    """Runs one step at a time; used by one thread at a time."""
 
     def __init__(self, data: Path, num_bytes: int, num_threads: int, niceness: int) -> None:
         """
         Args:
-            data: the data directory. num_bytes: that it may keep of what it makes. num_threads: of its kernels.
-            niceness: how much it yields to others, 0…19.
+            data: data directory. num_bytes: cache of the process. num_threads: of its kernels.
+            niceness: of the process, 0…19.
         """
         numbers = map(str, (num_bytes, num_threads, niceness))
         command = [sys.executable, *COMMAND, str(data.resolve()), *numbers, *config_source()]
-        # a group of its own: Ctrl-C is the server's, and what it starts itself can be killed with it
+        # a process group of its own: Ctrl-C goes to the server only, and children can be killed together
         self._process = subprocess.Popen(  # noqa: S603
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, process_group=0,
             env=os.environ | dict.fromkeys(_THREAD_VARIABLES, "1"),
@@ -73,27 +73,27 @@ class BatchProcess:
 
     @property
     def pid(self) -> int:
-        """Of the process."""
+        """Process id."""
         return self._process.pid
 
     @property
     def is_alive(self) -> bool:
-        """Whether it can be asked; one that ends has closed its pipe some time before it is gone."""
+        """True if the process accepts steps; an exiting one closes its pipe before it is gone."""
         return not self._has_ended.is_set() and self._process.poll() is None
 
     def resident_bytes(self) -> int:
-        """All that it holds."""
+        """Resident memory in bytes."""
         return resident_bytes(self.pid) if self.is_alive else 0
 
     def do(self, step: Step, report: ProgressCallback, is_needed: IsNeeded) -> Mapping[str, Any]:
-        """See `RunStep`. Raises LostError where the process ended."""
+        """Run a step, see `RunStep`. Raises ProcessExitedError if the process ended."""
         self.num_steps += 1
         self._send(asdict(step))
         while is_needed():
             with suppress(queue.Empty):
-                message = self._messages.get(timeout=_ASK_S)
+                message = self._messages.get(timeout=_POLL_S)
                 if message is None:
-                    raise ProcessExitedError(f"the process that did the {step.kind} ended")
+                    raise ProcessExitedError(f"the process of the {step.kind} ended")
                 if "share" not in message:
                     return _answer(message)
                 report(message["share"])
@@ -101,7 +101,7 @@ class BatchProcess:
         raise CancelledError(f"the {step.kind} was stopped")
 
     def _stop(self) -> None:
-        """End the step in good time, with the process where need be."""
+        """Stop the step in time, if necessary by killing the process."""
         with suppress(ProcessExitedError):
             self._send("stop")
         until_s = time.monotonic() + _STOP_S
@@ -113,12 +113,12 @@ class BatchProcess:
         self.kill()
 
     def kill(self) -> None:
-        """End it now, and all that it started."""
+        """Kill the process and its children."""
         with suppress(ProcessLookupError):
             os.killpg(self.pid, signal.SIGKILL)
         self._process.wait()
         self._listener.join()
-        with suppress(OSError):  # what nobody has read
+        with suppress(OSError):  # unread output
             self._pipe.close()
 
     def _send(self, message: Any) -> None:
@@ -126,11 +126,11 @@ class BatchProcess:
             self._pipe.write(json.dumps(message) + "\n")
             self._pipe.flush()
         except OSError:
-            raise ProcessExitedError("the process ended before it was asked") from None
+            raise ProcessExitedError("the process ended before the step") from None
 
     def _listen(self) -> None:
         assert self._process.stdout is not None
-        with self._process.stdout as lines, suppress(ValueError):  # it was killed in the middle of a line
+        with self._process.stdout as lines, suppress(ValueError):  # killed while writing a line
             for line in lines:
                 self._messages.put(json.loads(line))
         self._has_ended.set()

@@ -1,11 +1,10 @@
-"""A process that runs steps.
+"""Main module of a process that runs steps.
 
 `python -m relume_server.batch.process_main DATA BYTES THREADS NICE [CONFIG [SPACE]]`, started by
-`relume_server.batch.process`; the last two as `relume.image_io.ocio.active_config` uses them.
+`relume_server.batch.process`; the last two as for `relume.image_io.ocio.active_config`.
 
-One line of JSON comes in for each step, `"stop"` for one that is not wanted any more; lines with `share`, and at last
-one with `answer`, `problem` or `cancelled` go out. It yields to everything else on the machine, and ends when nobody
-is left who could ask.
+Reads one line of JSON per step, or `"stop"` to cancel it; writes lines with `share`, and at last one with `answer`,
+`problem` or `cancelled`. It yields to everything else on the machine, and ends when the server is gone.
 """
 
 from __future__ import annotations
@@ -25,17 +24,17 @@ _REPORT_INTERVAL_S = 0.1
 
 
 def main() -> None:
-    """The process itself."""
+    """Main function of the process."""
     data, num_bytes, num_threads = Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3]
-    os.nice(int(sys.argv[4]))  # threads that start later inherit it
+    os.nice(int(sys.argv[4]))  # inherited by threads that start later
     out = os.fdopen(os.dup(1), "w", buffering=1)
-    os.dup2(2, 1)  # whatever a library prints is no answer
+    os.dup2(2, 1)  # output of libraries must not mix with the answers
     os.environ["RELUME_THREADS"] = num_threads
     step_queue: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
     stop = threading.Event()
     threading.Thread(target=_listen, args=(step_queue, stop), daemon=True).start()
 
-    # after the above, which is to hold for all threads that they start
+    # after the above, which must apply to all threads they start
     from relume.core.memory_usage import trim_heap
     from relume.image_io.ocio.active_config import using_config
     from relume_server.batch.context import BatchContext

@@ -1,10 +1,10 @@
-"""Passes of comparisons: the frame, then brute force pass by pass; sums and pictures are files.
+"""Passes of comparisons: the frame, then reference passes; sums and images are files.
 
-A comparison keeps in its folder the frame and the sums of its passes, so that whoever comes later goes on with the next
-pass, under other code with the first. Passes are added up twice, by all light paths and by those that the bake's method
-follows, where both are asked for. After each pass from the second on there are the figures and pictures of all passes
-so far: `error` and `reference` of the paths that were asked for, `method-error` and `method-reference` of the method's;
-before, `reference` pictures alone, for nothing tells their noise: at first small ones, which are soon there.
+A comparison stores its frame and the sums of its passes in its folder, so that it resumes with the next pass, or under
+other code with the first. Passes are summed twice, for all light paths and for those of the bake's method, if both are
+requested. From the second pass on there are errors and images: `error` and `reference` for the requested paths,
+`method-error` and `method-reference` for the method's; before that only `reference` images, because their noise is
+unknown: small ones first, which are ready soon.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ if TYPE_CHECKING:
 
 SPP = 64
 FIGURES = "figures.json"
-_FIRST_DOWNSCALE, _FIRST_SPP = 4, 16  # times as wide as the first pictures is the whole one
-_TIMING_DOWNSCALE = 8  # times as wide as its sample is a picture whose pace is not known
-_Estimates = dict[str, Estimate]  # by whose paths: "all", "method"
+_FIRST_DOWNSCALE, _FIRST_SPP = 4, 16  # the whole image has this multiple of the first images' width
+_TIMING_DOWNSCALE = 8  # the image has this multiple of the width of its timing sample
+_Estimates = dict[str, Estimate]  # by path set: "all", "method"
 
 
 def make_frame(
@@ -52,12 +52,13 @@ def make_frame(
     request: Mapping[str, Any],
     folder: str,
 ) -> Mapping[str, Any]:
-    """The frame that is compared, and a first brute force to look at, where they are not there.
+    """Render the frame to compare, and a first reference image, if they are missing.
 
     Args:
-        request: the comparison's body. folder: its files.
+        context: of the process. report, is_canceled: callbacks.
+        request: body of the comparison. folder: its files.
     Returns:
-        `passes`: how many there are of it.
+        `passes`: number of finished passes.
     """
     comparison, job_folder = ComparisonRequest.model_validate(request), Path(folder)
     frame_and_estimates = _load(job_folder)
@@ -88,7 +89,7 @@ def _write_first(
     frame: F32,
     is_canceled: CancelCheck,
 ) -> None:
-    """Write small pictures of brute force, of few samples: a pass may take minutes."""
+    """Write small reference images with few samples, because a pass may take minutes."""
     look, small = _look(request, transfer), _smaller(_FIRST_DOWNSCALE, frame.shape[1], frame.shape[0])
     reference = _render_pass(
         context, transfer, request, look, small, 0, lambda share: None, is_canceled, spp=_FIRST_SPP
@@ -106,16 +107,17 @@ def make_pass(
     request: Mapping[str, Any],
     folder: str,
 ) -> Mapping[str, Any]:
-    """One more pass.
+    """Add one pass.
 
     Args:
-        request: the comparison's body. folder: its files; `make_frame` was there before.
+        context: of the process. report, is_canceled: callbacks.
+        request: body of the comparison. folder: its files, from `make_frame`.
     Returns:
-        `passes`: how many there are now.
+        `passes`: number of finished passes.
     """
     comparison, job_folder = ComparisonRequest.model_validate(request), Path(folder)
     frame_and_estimates = _load(job_folder)
-    if frame_and_estimates is None:  # somebody tidied up
+    if frame_and_estimates is None:  # the files were deleted
         raise FileNotFoundError(job_folder)
     frame, old_estimates = frame_and_estimates
     transfer = context.transfer(comparison.bake)
@@ -123,8 +125,8 @@ def make_pass(
     reference = _render_pass(
         context, transfer, comparison, look, size, old_estimates["method"].passes, report, is_canceled
     )
-    if is_canceled():  # brute force does not ask at its end, and the sums may be another server's now
-        raise CancelledError("the pass is not wanted any more")
+    if is_canceled():  # the reference does not poll at its end, and the sums may belong to another server by now
+        raise CancelledError("the pass was canceled")
     new_estimates = {paths: estimate.add(reference.pictures[paths]) for paths, estimate in old_estimates.items()}
     _save(job_folder, frame, new_estimates)
     _write_figures(job_folder, frame, new_estimates, comparison.paths, reference, look.display)
@@ -134,12 +136,12 @@ def make_pass(
 def time_pass(
     context: BatchContext, report: ProgressCallback, is_canceled: CancelCheck, *, request: Mapping[str, Any]
 ) -> Mapping[str, Any]:
-    """How long a pass takes, by one of a small picture.
+    """Measure the time of a pass with a small image.
 
     Args:
-        request: the comparison's body.
+        context: of the process. report, is_canceled: callbacks. request: body of the comparison.
     Returns:
-        `seconds` of a pass.
+        `seconds` per pass.
     """
     comparison = ComparisonRequest.model_validate(request)
     transfer = context.transfer(comparison.bake)
@@ -148,7 +150,7 @@ def time_pass(
     scale = width * height / (size[0] * size[1])
     return {
         "seconds": estimate_seconds(
-            lambda told: _render_pass(context, transfer, comparison, look, size, 0, told, is_canceled), scale
+            lambda progress: _render_pass(context, transfer, comparison, look, size, 0, progress, is_canceled), scale
         )
     }
 
@@ -164,25 +166,21 @@ def _look(request: ComparisonRequest, transfer: OpenBake) -> Any:
 
 def _render_pass(
     context: BatchContext, transfer: OpenBake, request: ComparisonRequest, look: Any, size: tuple[int, int],
-    index: int, report: Any,
-    is_canceled: Any, spp: int = SPP,
+    index: int, report: Any, is_canceled: Any, spp: int = SPP,
 ) -> ReferenceImage:  # fmt: skip
     return context.library.reference(
         scene_path(context.data, transfer.scene_id), comparison_camera(request, transfer)[0], look, size, spp, report,
-        is_canceled,
-        index, reflects=EditAxis.BOUNCES in transfer.axes, is_whole=request.paths == "all",
+        is_canceled, index, reflects=EditAxis.BOUNCES in transfer.axes, is_whole=request.paths == "all",
     )  # fmt: skip
 
 
 def _load(folder: Path) -> tuple[F32, _Estimates] | None:
-    """The frame and the passes of an earlier start."""
+    """Load the frame and the sums of earlier passes; None if they are missing or outdated."""
     path = folder / "passes.npz"
     if not path.exists():
         return None
     with np.load(path, allow_pickle=False) as archive:
-        if (
-            "code" not in archive or str(archive["code"]) != comparison_code()
-        ):  # passes of other code: they are made again
+        if "code" not in archive or str(archive["code"]) != comparison_code():  # by other code: start again
             return None
         sums = {name.removeprefix("sums_"): archive[name] for name in archive if name.startswith("sums_")}
         return archive["frame"], {
@@ -191,7 +189,7 @@ def _load(folder: Path) -> tuple[F32, _Estimates] | None:
 
 
 def _save(folder: Path, frame: F32, estimates: _Estimates) -> None:
-    """Before anything is said of them: whatever is lost after that is made again from them."""
+    """Save frame and sums before reporting them; what is lost later is derived from them again."""
     metadata = {"passes": np.array(estimates["method"].passes), "code": np.array(comparison_code())}
     sums = {f"sums_{paths}": estimate.sums for paths, estimate in estimates.items()}
     with atomic_write(folder / "passes.npz") as unfinished:
@@ -201,7 +199,7 @@ def _save(folder: Path, frame: F32, estimates: _Estimates) -> None:
 def _write_figures(
     folder: Path, frame: F32, estimates: _Estimates, requested_paths: str, reference: ReferenceImage, display: Any
 ) -> None:
-    """Say what the passes so far say of the frame."""
+    """Write errors and images of all passes so far."""
     figures: dict[str, Any] = {
         "omitted_paths": reference.omitted_paths,
         "unsupported_paths": reference.unsupported_paths,
@@ -220,7 +218,7 @@ def _write_figures(
 
 
 def _write_comparison(folder: Path, frame: F32, estimate: Estimate, is_method_only: bool, display: Any) -> Comparison:
-    """Write the pictures of a comparison. is_beside: it is not what was asked for."""
+    """Write the images of a comparison, and return it. is_method_only: for the light paths of the method."""
     comparison, differs = compare(frame, estimate)
     _write_reference(folder, estimate, is_method_only, display)
     with atomic_write(folder / f"{_prefix(is_method_only)}error.png") as unfinished:

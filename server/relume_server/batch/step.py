@@ -1,4 +1,4 @@
-"""One step of work that runs apart: small enough to be a line of JSON, and its files say what was done."""
+"""A step of batch work: small enough for a line of JSON; its results are files."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ IsNeeded = Callable[[], bool]
 
 @dataclass(frozen=True)
 class Step:
-    """What to do.
+    """A step to run.
 
     Attributes:
-        kind: a name in `relume_server.batch.step_registry.STEPS`.
-        is_first: somebody waits for it; it goes before what takes its time.
+        kind: key of `relume_server.batch.step_registry.STEPS`.
+        is_first: interactive; runs before long steps.
         values: arguments of the step; JSON.
-        claim: folder and owner of the job whose step it is, see `relume_server.batch.step_claim`; None: no job.
+        claim: folder and lease owner of its job, see `relume_server.batch.step_claim`; None: no job.
     """
 
     kind: str
@@ -31,21 +31,21 @@ class RunStep(Protocol):
     """Runs steps; blocks."""
 
     def __call__(self, step: Step, report: ProgressCallback, is_needed: IsNeeded) -> Mapping[str, Any]:
-        """Do one step.
+        """Run one step.
 
         Args:
-            step: is done once, or once more where a process ended under it.
-            report: called with the share done, 0…1. is_needed: asked a few times a second.
+            step: runs once, or twice if its process ended.
+            report: called with the fraction done, 0…1. is_needed: polled a few times per second.
         Returns:
-            What the step answers.
+            Result of the step.
         Raises:
-            CancelledError: it was not wanted any more. RelumeError: it failed; the sentence says why.
+            CancelledError: it was no longer needed. RelumeError: it failed, with the cause.
         """
         ...
 
 
 class Batches(Protocol):
-    """Where steps are done; see `relume_server.batch.pool`."""
+    """Runs steps in processes; see `relume_server.batch.pool`."""
 
     @property
     def run(self) -> RunStep: ...

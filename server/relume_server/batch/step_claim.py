@@ -1,7 +1,7 @@
-"""Whose step the files of a work are: the server that holds its lease writes it down beside them.
+"""Lease owner of a job's files, written next to them by the server.
 
-A process that was paused together with its server asks nobody before it goes on: it finds here that another server has
-the work.
+A process that was suspended together with its server does not ask before it continues: it finds here that another
+server has taken the job over.
 """
 
 from __future__ import annotations
@@ -17,23 +17,24 @@ _CHECK_INTERVAL_S = 0.1
 
 
 def claim(folder: Path, owner: str) -> None:
-    """Say that a work's files are changed by an owner of a lease alone from now on."""
+    """Mark a job's files as owned by a lease owner."""
     if not is_claimed_by(folder, owner):
         with atomic_write(folder / _NAME) as unfinished:
             unfinished.write_text(owner)
 
 
 def is_claimed_by(folder: Path, owner: str) -> bool:
-    """Whether nobody else has the files of a work, nor has deleted them."""
+    """True if the files of a job are neither deleted nor claimed by another owner."""
     try:
         return (folder / _NAME).read_text() == owner
     except OSError:
         return False
 
 
-def cancelled_or_taken_over(folder: Path, owner: str, is_canceled: Callable[[], bool]) -> Callable[[], bool]:
-    """Whether a step is to end: it is cancelled, or its files are somebody else's. Steps ask thousands of times a
-    second, the file is read ten times."""
+def canceled_or_taken_over(folder: Path, owner: str, is_canceled: Callable[[], bool]) -> Callable[[], bool]:
+    """Return a check whether to end a step: canceled, or claimed by another owner. Steps poll thousands of times per
+    second; the file is read ten times.
+    """
     next_s, is_over = 0.0, False
 
     def is_cancelled() -> bool:

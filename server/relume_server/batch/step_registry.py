@@ -1,4 +1,4 @@
-"""The list of steps that run apart. To add one: write its function and add a line here."""
+"""Registry of batch steps. To add one, write its function and add a line here."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from relume_server.batch.context import BatchContext
 from relume_server.batch.frames import pack, paint_frame
 from relume_server.batch.reference_passes import make_frame, make_pass, time_pass
 from relume_server.batch.step import Step
-from relume_server.batch.step_claim import cancelled_or_taken_over
+from relume_server.batch.step_claim import canceled_or_taken_over
 
 STEPS: Mapping[str, Callable[..., Mapping[str, Any]]] = {
     "BTF": btf_steps.run_btf_slice,
-    "first picture of a bake": bake_previews.render_first,
+    "first image of a bake": bake_previews.render_first,
     "thumbnail of a bake": bake_previews.paint_thumbnail,
     "frame of a batch": paint_frame,
-    "pack of a batch": pack,
+    "archive of a batch": pack,
     "frame of a comparison": make_frame,
     "pass of a comparison": make_pass,
     "time of a pass": time_pass,
@@ -28,18 +28,19 @@ STEPS: Mapping[str, Callable[..., Mapping[str, Any]]] = {
 
 
 def do_step(context: BatchContext, step: Step, report: ProgressCallback, is_canceled: CancelCheck) -> Mapping[str, Any]:
-    """Do one step in this process.
+    """Run one step in this process.
 
     Args:
-        context: what it works with.
-        step: of a kind that is listed.
-        report: called with the share done. is_canceled: asked now and then.
+        context: of the process.
+        step: of a registered kind.
+        report: called with the fraction done. is_canceled: polled.
     Raises:
-        CancelledError: `is_canceled` said so, or another server has taken the work over. And what the step raises.
+        CancelledError: `is_canceled` returned true, or another server has taken the job over. Also what the step
+            raises.
     """
     if step.claim is not None:
         folder, owner = step.claim
-        is_canceled = cancelled_or_taken_over(Path(folder), owner, is_canceled)
+        is_canceled = canceled_or_taken_over(Path(folder), owner, is_canceled)
         if is_canceled():
-            raise CancelledError("the work was taken over")
+            raise CancelledError("the job was taken over")
     return STEPS[step.kind](context, report, is_canceled, **step.values)

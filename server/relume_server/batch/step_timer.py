@@ -1,41 +1,41 @@
-"""How long work in equal steps takes: known from steps before, else judged by a sample of one."""
+"""Estimate the time of equal steps, from earlier steps or from a sample."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
 
-_ENOUGH = 0.02  # of a step: before, its share says little
-_EARLY = 0.25  # of a sample: until then much is made that is made once, such as kernels
+_ENOUGH = 0.02  # below this fraction of a step, its progress says little
+_EARLY = 0.25  # of a sample: until then much is one-time work, such as loading kernels
 
 
 class StepTimer:
-    """Times the steps of one work while it runs."""
+    """Times the steps of a running job."""
 
     def __init__(self, step_s: float | None) -> None:
         """
         Args:
-            step_s: seconds that a step has taken before; None where that is not known.
+            step_s: seconds per step of earlier jobs; None if unknown.
         """
         self._step_s, self._start_s, self.fraction = step_s, time.monotonic(), 0.0
 
     def start(self) -> None:
-        """The first step begins now: what was done before is done once."""
+        """Start the first step: preparation before it is one-time work."""
         self._start_s = time.monotonic()
 
     def report(self, fraction: float) -> None:
-        """So much of the step at hand is done, 0…1."""
+        """Record progress of the current step, 0…1."""
         self.fraction = fraction
 
     def next_step(self) -> float:
-        """The step at hand is done. Returns: how many seconds a step takes, later ones counting more."""
+        """Finish the current step. Returns: seconds per step, recent ones weighted more."""
         elapsed_s, previous_s = time.monotonic() - self._start_s, self._step_s
         self._step_s = elapsed_s if previous_s is None else 0.5 * (previous_s + elapsed_s)
         self._start_s, self.fraction = time.monotonic(), 0.0
         return self._step_s
 
     def seconds_left(self, steps: int) -> float | None:
-        """Until so many steps are done, that at hand included; None where nothing was measured yet."""
+        """Seconds for this many steps including the current one; None if nothing has been measured yet."""
         step_s = self._step_s
         if self.fraction > _ENOUGH:
             current_s = (time.monotonic() - self._start_s) / self.fraction
@@ -44,10 +44,10 @@ class StepTimer:
 
 
 def estimate_seconds(work: Callable[[Callable[[float], object]], object], scale: float) -> float:
-    """Seconds that work would take if all but its preparation were `scale` times as much.
+    """Estimate the seconds of work whose main part is `scale` times as large.
 
     Args:
-        work: does a small sample; called with whom to tell its progress.
+        work: does a small sample; called with a progress callback. scale: of the main part.
     """
     began = time.monotonic()
     early: list[tuple[float, float]] = []

@@ -1,4 +1,4 @@
-"""Small pictures of baked scenes, painted once by the same code and kept."""
+"""Thumbnails of bakes, rendered once per code version and stored."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from relume_server.batch.step import RunStep, Step
 from relume_server.runtime.single_flight import SingleFlight
 
 NUM_WAITING = 2
-"""Threads that wait for steps: others have to wait for their turn there anyway."""
+"""Threads that wait for steps; more would only wait for the processes."""
 
 
 class Thumbnails:
-    """Files in a folder, made where they are missing.
+    """Files in a folder, rendered if they are missing.
 
     Args:
-        run: does steps.
+        folder: of the files. run: runs steps.
     """
 
     def __init__(self, folder: Path, run: RunStep) -> None:
@@ -24,14 +24,14 @@ class Thumbnails:
         self._single_flight = SingleFlight(NUM_WAITING, "relume-thumbnail")
 
     def close(self) -> None:
-        """Paint no more; no step may be under way that is not ended."""
+        """Stop; no step may be running."""
         self._single_flight.close()
 
     async def get_or_paint(self, bake: str) -> Path:
-        """The file of a ready bake's thumbnail, painted where it is missing; somebody waits for it.
+        """Return the file of a ready bake's thumbnail; renders it if missing, with priority.
 
         Args:
-            bake: an id that the ledger knows.
+            bake: an existing id.
         """
         path = self.path(bake)
         if not path.exists():
@@ -39,14 +39,14 @@ class Thumbnails:
         return path
 
     def path(self, bake: str) -> Path:
-        """Where the thumbnail of a bake is, or will be."""
+        """File of a bake's thumbnail, existing or not."""
         return self._folder / f"{bake}-{image_code()}.webp"
 
     def paint(self, bake: str, *, is_first: bool) -> None:
-        """Paint the thumbnail of a ready bake. is_first: whether somebody waits. Raises what `RunStep` does."""
+        """Render the thumbnail of a ready bake. is_first: whether someone waits. Raises what `RunStep` raises."""
         path = self.path(bake)
         values = {"bake": bake, "path": str(path)}
         self._run(Step("thumbnail of a bake", is_first, values), lambda share: None, lambda: True)
-        for stale in self._folder.glob(f"{bake}-*.webp"):  # of other code
+        for stale in self._folder.glob(f"{bake}-*.webp"):  # of another code version
             if stale != path:
                 stale.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Frames on their way to one client: at most two unacknowledged, and how fast the link is by its acknowledgements."""
+"""Flow control of one client: at most two unacknowledged frames, and throughput measured from acknowledgments."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class _InFlightFrame:
 
 
 class FrameWindow:
-    """Counts what the client has not acknowledged. Times are of one monotonic clock, in seconds."""
+    """Frames that the client has not acknowledged. Times are monotonic, in seconds."""
 
     def __init__(self, ack_seconds: float) -> None:
         self._ack_seconds = ack_seconds
@@ -32,8 +32,9 @@ class FrameWindow:
         self._bytes_per_s: float | None = None
 
     def has_room(self, view: str, visible_views: VisibleViews) -> bool:
-        """Whether another frame of a view may be sent: one alone has all slots; of several, the focused one has a slot
-        of its own, and the others share the rest."""
+        """True if another frame of a view may be sent: a single view has all slots; of several, the focused one has a
+        slot of its own, and the others share the rest.
+        """
         if len(self._in_flight) >= MAX_FRAMES_IN_FLIGHT:
             return False
         if len(visible_views.names) == 1:
@@ -44,27 +45,27 @@ class FrameWindow:
 
     @property
     def num_in_flight(self) -> int:
-        """Frames that were sent and not acknowledged yet."""
+        """Number of unacknowledged frames."""
         return len(self._in_flight)
 
     @property
     def next_frame(self) -> int:
-        """Id of the frame to be sent next."""
+        """Id of the next frame."""
         return self._last_frame + 1
 
     def on_sent(self, view: str, num_bytes: int, now_s: float) -> None:
-        """A frame of a view goes out."""
+        """Record a frame that is sent."""
         self._last_frame += 1
         self._in_flight[self._last_frame] = _InFlightFrame(view, now_s, num_bytes)
 
     def on_acknowledged(self, frame: int, now_s: float) -> None:
-        """The client has this frame and so all before it.
+        """Record an acknowledgment of this frame and all before it.
 
         Raises:
             ProtocolError: the frame was never sent.
         """
         if frame > self._last_frame or frame < 1:
-            raise ProtocolError(f"frame {frame} was never sent; acknowledge frames that arrived", 1002)
+            raise ProtocolError(f"frame {frame} was never sent; acknowledge received frames only", 1002)
         in_flight = self._in_flight.get(frame)
         for earlier in [f for f in self._in_flight if f <= frame]:
             del self._in_flight[earlier]
@@ -73,7 +74,7 @@ class FrameWindow:
         self._last_ack_s = now_s
 
     def _measure(self, in_flight: _InFlightFrame, now_s: float) -> None:
-        """Throughput from bytes over the time beyond the quickest round trip; frames queue behind each other."""
+        """Throughput from bytes over the time beyond the fastest round trip; frames queue behind each other."""
         transfer_s = max(now_s - max(in_flight.sent_s, self._last_ack_s), 1e-4)
         self._round_trip_s = min(self._round_trip_s, now_s - in_flight.sent_s)
         if in_flight.num_bytes < MEASURED_BYTES:
@@ -82,17 +83,17 @@ class FrameWindow:
         self._bytes_per_s = rate if self._bytes_per_s is None else 0.7 * self._bytes_per_s + 0.3 * rate
 
     def is_slow_for(self, num_bytes: int, *, was_slow: bool) -> bool:
-        """Whether what brings so many bytes a frame would stutter on this link.
+        """True if frames of this size would stutter on this connection.
 
         Args:
-            num_bytes: of a frame. was_slow: for the frame before; it takes a quicker link to be quick again.
+            num_bytes: of a frame. was_slow: result for the previous frame, for hysteresis.
         """
         if self._bytes_per_s is None:
             return was_slow
         return num_bytes / self._bytes_per_s > (QUICK_S if was_slow else SLOW_S)
 
     def check(self, now_s: float) -> None:
-        """Raises ProtocolError where the client has left a frame unacknowledged for too long."""
+        """Raise ProtocolError if a frame is unacknowledged for too long."""
         if self._in_flight and now_s - next(iter(self._in_flight.values())).sent_s > self._ack_seconds:
             raise ProtocolError(
                 f"no frame was acknowledged for {self._ack_seconds:g} s; reload the page", CLOSE_NO_ACKNOWLEDGEMENT

@@ -1,4 +1,4 @@
-"""The look of a session: where its edits are applied, checked and counted."""
+"""Look of a session: applies, validates and counts its edits."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from relume_server.schemas.protocol import EditMessage
 
 
 class LookState:
-    """The newest accepted look, its revision, and which sources of light alone are shown (None: all)."""
+    """Newest accepted look, its revision, and solo lights (None: all)."""
 
     def __init__(
         self, default: dict[str, Any], document: dict[str, Any], revision: int, solo: frozenset[str] | None = None
@@ -23,19 +23,19 @@ class LookState:
         self._materials: dict[str, tuple[Any, MaterialLook]] = {}
 
     def target(self, shared: int = 0) -> Target:
-        """The look as something to show; `shared` as in `Target`."""
+        """Return the look as a target; `shared` is its `room_revision`."""
         return Target(
             self._read(self.document), self.document, self.revision, None, solo=self.solo, room_revision=shared
         )
 
     def apply(self, message: EditMessage, received_s: float) -> Target:
-        """Apply an edit that came at `received_s`, whole or not at all.
+        """Apply an edit received at `received_s`, completely or not at all.
 
         Raises:
-            EditError, ParameterError: the look stays as it was.
+            EditError, ParameterError: the look is unchanged.
         """
         if message.revision <= self.revision:
-            raise EditError(f"old revision: {message.revision} is not newer than {self.revision}; count on from there")
+            raise EditError(f"old revision: {message.revision} is not newer than {self.revision}; send a larger one")
         patch = [operation.model_dump(exclude_unset=True) for operation in message.patch]
         document = looks.apply_patch(self.document, patch, self.default)
         if message.active_control is not None:
@@ -50,7 +50,7 @@ class LookState:
         )
 
     def adopt(self, document: dict[str, Any], source: Target) -> Target:
-        """Show a document that somebody else's edit led to, as they see it; the revision stays."""
+        """Take over the document of another participant's edit; the revision is unchanged."""
         self.document = document
         look = self._read(document)
         return Target(
@@ -65,7 +65,7 @@ class LookState:
         )
 
     def reverted(self, document: dict[str, Any], previous: Target) -> Target:
-        """What would be shown if the look became this document, and what is alone as it was when `previous` was."""
+        """Target for this document with the solo lights of `previous`."""
         return Target(
             self._read(document),
             document,
@@ -76,11 +76,11 @@ class LookState:
         )
 
     def revert(self, previous: Target) -> None:
-        """Go back to the look that is shown; the revision stays, so that the client counts on."""
+        """Return to the displayed look; the revision stays, so that the client keeps counting."""
         self.document, self.solo = previous.document, previous.solo
 
     def _read(self, document: dict[str, Any]) -> Look:
-        """A complete document as a look; long curves of materials that did not change are not read again."""
+        """Parse a complete document; long curves of unchanged materials are reused."""
         previous, self._materials = self._materials, {}
         for name, section in document["materials"].items():
             before, material = previous.get(name, (None, None))

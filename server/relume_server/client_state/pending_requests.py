@@ -1,4 +1,4 @@
-"""What the client wants and has not got yet: one slot of each kind, the newest wins, so memory stays bounded."""
+"""Pending requests of the client: one slot per kind, the newest wins, so memory is bounded."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from relume_server.schemas.protocol import HighlightMessage, InspectMessage
 
 @dataclass
 class PendingRequests:
-    """Filled by the receiving side, emptied by the frame loop; both on the event loop.
+    """Filled by the receiver, emptied by the frame loop; both on the event loop.
 
     Attributes:
-        target: the newest look; it stays, each view is painted with it once.
-        space: width and height that the client has for the view that it shows alone; None: as much as it is large.
-        camera_states: newest eye of each view that has been given one; it stays.
-        regions: what is on the client's screen of each view, where it has said so: x, y, width, height in pixels.
-        renderer: who renders views whose camera moves.
-        prepare_curve, active_parameter: pointers of a curve that was opened, of a parameter whose slider is in hand.
+        target: newest look; kept, each view renders it once.
+        space: width and height of the client's area for a single view; None: unlimited.
+        camera_states: newest free camera of each view; kept.
+        regions: visible region of each view, if set: x, y, width, height in pixels.
+        renderer: who renders free-camera views while they move.
+        prepare_curve, active_parameter: pointers of the opened curve, and of the parameter that is dragged.
     """
 
     target: Target
@@ -37,21 +37,21 @@ class PendingRequests:
     changed: asyncio.Event = field(default_factory=asyncio.Event)
 
     def pop_prepare(self) -> str | None:
-        """Empty the touched curve's slot."""
+        """Take the pending curve."""
         taken, self.prepare_curve = self.prepare_curve, None
         return taken
 
     def pop_active(self) -> str | None:
-        """Empty the held parameter's slot."""
+        """Take the pending parameter."""
         taken, self.active_parameter = self.active_parameter, None
         return taken
 
     def pop_inspect(self) -> InspectMessage | None:
-        """Empty the probe's slot."""
+        """Take the pending pixel probe."""
         taken, self.inspect = self.inspect, None
         return taken
 
     def pop_highlight(self) -> HighlightMessage | None:
-        """Empty the brush's slot."""
+        """Take the pending highlight request."""
         taken, self.highlight = self.highlight, None
         return taken

@@ -1,4 +1,4 @@
-"""Pointers into a look: whether there is such a curve, or such a thing to take hold of."""
+"""Check pointers into a look: curves, and what active controls can change."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from relume.live.fixed_camera.edit_pointers import (
 
 
 def find_curve(pointer: str, document: Mapping[str, Any]) -> tuple[dict[str, Any], Curve]:
-    """The term that a curve pointer means, and the curve's declaration, whether it is drawn by hand or not.
+    """Return the term and the declaration of a curve, edited or generated.
 
     Raises:
-        ParameterError: there is no such curve in this look.
+        ParameterError: the look has no such curve.
     """
     curve_pointer = parse_curve(pointer)
     term = _term(curve_pointer, document)
     curves = {curve.name: curve for curve in TERMS[term["model"]].normalized(term).curves} if term else {}
     if term is None or curve_pointer.name not in curves:
-        raise ParameterError("curve", pointer, "a pointer like /materials/Teapot/terms/1/curves/theta_h of this look")
+        raise ParameterError("curve", pointer, "a curve of this look, such as /materials/Teapot/terms/1/curves/theta_h")
     return term, curves[curve_pointer.name]
 
 
 def check_parameter(pointer: str, document: Mapping[str, Any]) -> None:
-    """Raises ParameterError where this look has no such parameter, light or field of the environment."""
+    """Raise ParameterError if the look has no such parameter, light or field of the environment."""
     match parse_pointer(pointer):
         case ParameterPointer() as parameter:
             term = _term(parameter, document)
@@ -49,11 +49,13 @@ def check_parameter(pointer: str, document: Mapping[str, Any]) -> None:
         case CurvePointer():
             exists = False
     if not exists:
-        raise ParameterError("parameter", pointer, "like /materials/Teapot/terms/1/params/ior or /lights/Lamp, here")
+        raise ParameterError(
+            "parameter", pointer, "one of this look, such as /lights/Key or /materials/A/terms/0/params/ior"
+        )
 
 
 def check_active_pointer(pointer: str, document: Mapping[str, Any]) -> None:
-    """Raises ParameterError where this look has neither such a curve nor what `check_parameter` looks for."""
+    """Raise ParameterError if the look has neither such a curve nor such a parameter."""
     if isinstance(parse_pointer(pointer), CurvePointer):
         find_curve(pointer, document)
     else:
@@ -61,7 +63,7 @@ def check_active_pointer(pointer: str, document: Mapping[str, Any]) -> None:
 
 
 def _term(pointer: CurvePointer | ParameterPointer, document: Mapping[str, Any]) -> dict[str, Any] | None:
-    """The term that a pointer goes into, where there is one; of a catcher's terms no picture shows anything."""
+    """Term of a pointer, if there is one; a shadow catcher's terms are never visible."""
     material = document["materials"].get(pointer.material)
     terms: list[dict[str, Any]] = material["terms"] if material and not material.get("shadow_catcher") else []
     return terms[pointer.term] if pointer.term < len(terms) else None

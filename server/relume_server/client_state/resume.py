@@ -1,6 +1,6 @@
-"""What was seen in sessions that were lost, kept for a while under a token that only their client knows.
+"""State of lost sessions, kept for a while under a secret token of the client.
 
-A client often notices a broken connection long before the server does, so live sessions can be resumed as well.
+A client often notices a broken connection before the server does, so live sessions can be resumed as well.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ MAX_SAVED = 256
 
 @dataclass(frozen=True)
 class SavedSession:
-    """What a session comes back to."""
+    """State to resume."""
 
     bake: str
     document: dict[str, Any]
@@ -36,7 +36,7 @@ def _saved_session(bake: str, look: LookState, visible_views: VisibleViews, unti
 
 
 class ResumeStore:
-    """Bounded in number and time; the oldest go first. Used from the event loop only."""
+    """Bounded in number and time; the oldest are dropped first. Event loop only."""
 
     def __init__(self, resume_seconds: float) -> None:
         self._resume_seconds = resume_seconds
@@ -44,13 +44,13 @@ class ResumeStore:
         self._saved: OrderedDict[str, SavedSession] = OrderedDict()
 
     def open(self, bake: str, look: LookState, visible_views: VisibleViews) -> str:
-        """A session begins; returns its token, which cannot be guessed."""
+        """Register a new session; returns its secret token."""
         token = secrets.token_urlsafe(24)
         self._live[token] = bake, look, visible_views
         return token
 
     def close(self, token: str, now_s: float) -> None:
-        """A session ends: keep its look, unless it was resumed already."""
+        """End a session: keep its state, unless it was resumed already."""
         if token not in self._live:
             return
         self._saved[token] = _saved_session(*self._live.pop(token), now_s + self._resume_seconds)
@@ -58,7 +58,7 @@ class ResumeStore:
             self._saved.popitem(last=False)
 
     def take(self, token: str, bake: str, now_s: float) -> SavedSession | None:
-        """The session of that token on that bake, once; None where there is none (any more)."""
+        """Take the session of a token on a bake, once; None if there is none (any more)."""
         if token in self._live and self._live[token][0] == bake:
             return _saved_session(*self._live.pop(token), now_s)
         saved = self._saved.get(token)
@@ -68,6 +68,6 @@ class ResumeStore:
         return saved if saved.until_s >= now_s else None
 
     def looks(self, now_s: float) -> list[tuple[str, dict[str, Any]]]:
-        """The bake and the look of each session, open or lost and awaited; these documents are never written to."""
+        """Bake and look of each session, open or lost; do not modify the documents."""
         looks = [(bake, look.document) for bake, look, _ in self._live.values()]
         return looks + [(saved.bake, saved.document) for saved in self._saved.values() if saved.until_s >= now_s]

@@ -1,4 +1,4 @@
-"""The sending side of one client's WebSocket."""
+"""Sending to one client's WebSocket."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ CLOSE_SECONDS = 2.0
 
 
 class ClientSocket:
-    """Sends, and gives up on a client that does not read."""
+    """Sends messages; gives up on a client that does not read."""
 
     def __init__(self, websocket: WebSocket, send_timeout_s: float) -> None:
         self._websocket, self._send_timeout_s = websocket, send_timeout_s
 
     async def send(self, message: BaseModel) -> None:
-        """A text message."""
+        """Send a text message."""
         async with self._limit_send_time():
             await self._websocket.send_text(message.model_dump_json(by_alias=True))
 
     async def send_frame(self, frame: bytes) -> None:
-        """A binary message."""
+        """Send a binary message."""
         async with self._limit_send_time():
             await self._websocket.send_bytes(frame)
 
     async def refuse(self, error: Exception | Problem, revision: int | None = None) -> None:
-        """Say that a message was refused."""
+        """Send a problem for a rejected message."""
         problem = error if isinstance(error, Problem) else make_problem(error)
         await self.send(ProblemMessage(revision=revision, problem=problem))
 
     async def close(self, code: int, reason: str) -> None:
-        """End the session with a word, at most 123 bytes of it; a client that does not listen is left."""
+        """Close the session with a reason of at most 123 bytes; an unresponsive client is abandoned."""
         if self._websocket.application_state is WebSocketState.DISCONNECTED:
             return
         try:
@@ -46,13 +46,13 @@ class ClientSocket:
             return
 
     def _limit_send_time(self) -> _Backoff:
-        if self._websocket.application_state is WebSocketState.DISCONNECTED:  # another task has found that out
+        if self._websocket.application_state is WebSocketState.DISCONNECTED:  # another task has timed out already
             raise WebSocketDisconnect(1006)
         return _Backoff(self._send_timeout_s)
 
 
 class _Backoff:
-    """A timeout that ends in the session's own words."""
+    """A timeout that raises the session's own error."""
 
     def __init__(self, seconds: float) -> None:
         self._timeout, self._seconds = asyncio.timeout(seconds), seconds

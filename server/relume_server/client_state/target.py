@@ -1,4 +1,4 @@
-"""What a session is to show: a look, and since when it is wanted."""
+"""The look that a session shall show, and the time of its request."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Target:
-    """A look that shall be shown.
+    """A requested look.
 
     Attributes:
         look: validated. document: the same as JSON.
-        received_s: when the edit came in; None for a look that no edit asked for. applied_s: when it had been applied.
-        active_pointer: pointer to what the hand was on that made it, where the client said so.
-        solo: names of sources of light that alone are shown; None: all.
-        room_revision: how often a room's look had changed by then; 0 where nobody shares it.
+        received_s: time of the edit; None for a look without an edit. applied_s: time when it was applied.
+        active_pointer: pointer of the active control that made it, if the client sent it.
+        solo: names of the lights that are shown alone; None: all.
+        room_revision: number of changes of the room's look so far; 0 without a room.
     """
 
     look: Any
@@ -33,11 +33,11 @@ class Target:
 
 @dataclass(frozen=True)
 class CameraState:
-    """Where a moving view is to be seen from.
+    """Requested camera of a free-camera view.
 
     Attributes:
-        seq: that frames name. size: of their pictures, pixels. received_s: when it came in.
-        is_idle: an exact picture is to follow when nothing else is left to do.
+        seq: repeated in frames. size: of the image, pixels. received_s: time of the message.
+        is_idle: an exact image follows when nothing else is left to do.
     """
 
     seq: int

@@ -1,4 +1,4 @@
-"""Which views a client sees side by side, and which of them it works in."""
+"""Visible views of a client, and the focused one."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from relume.core.errors import ParameterError
 
 
 class VisibleViews:
-    """Set by the receiving side, followed by the frame loop; both on the event loop.
+    """Set by the receiver, read by the frame loop; both on the event loop.
 
     Attributes:
-        names: views in the client's order. focus: the one under the pointer, served first.
-        resend_names: views that the client has asked for since the frame loop looked, and has nothing of.
+        names: views in the client's order. focus: the view under the pointer, served first.
+        resend_names: views requested since the last turn of the frame loop, of which the client has nothing.
     """
 
     def __init__(self, names: Sequence[str], focus: str) -> None:
@@ -20,13 +20,13 @@ class VisibleViews:
         self.resend_names: set[str] = set()
 
     def show(self, names: Sequence[str]) -> None:
-        """Show these from now on; the focus stays where it is one of them."""
+        """Show these views from now on; the focus is kept if it is one of them."""
         self.names = tuple(dict.fromkeys(names))
         self.resend_names.update(self.names)
         self._clamp_focus()
 
     def hide(self, name: str) -> None:
-        """One of several cannot be shown."""
+        """Hide one of several views that cannot be shown."""
         self.names = tuple(view_name for view_name in self.names if view_name != name)
         self._clamp_focus()
 
@@ -35,15 +35,15 @@ class VisibleViews:
             self.focus = self.names[0]
 
     def set_focus(self, name: str) -> None:
-        """The pointer is in this view now.
+        """Set the focus.
 
         Raises:
-            ParameterError: it is not shown.
+            ParameterError: the view is not visible.
         """
         self.focus = self.check(name)
 
     def check(self, name: str) -> str:
-        """The name of a shown view. Raises ParameterError for any other."""
+        """Return the name of a visible view. Raises ParameterError for any other."""
         if name not in self.names:
             raise ParameterError("view", name, ", ".join(self.names)[:400] + ", which are shown")
         return name

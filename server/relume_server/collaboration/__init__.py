@@ -1,1 +1,1 @@
-"""Rooms: several people on one look, their membership, and the lease that names the room's server."""
+"""Rooms: several participants share one look; membership, and the lease of the room's server."""

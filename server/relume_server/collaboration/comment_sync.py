@@ -1,4 +1,4 @@
-"""Comments that other servers took: rooms are told of those, too, a moment later."""
+"""Notify rooms of comments that other servers stored."""
 
 from __future__ import annotations
 
@@ -14,33 +14,33 @@ log = logging.getLogger(__name__)
 
 POLL_INTERVAL_S = 2.0
 Marks = Mapping[str, object]
-"""By scene, what is another one whenever its comments are."""
+"""A value per scene that changes with its comments."""
 
 
 class CommentSync:
-    """Looks again and again, for as long as the server runs; the database is asked only while there are rooms.
+    """Polls while the server runs; the database is queried only while there are rooms.
 
     Args:
-        marks: of some scenes. threads: that they are asked for in; nothing slow may run there.
+        rooms: of this server. marks: of some scenes. threads: for the query; for short work only.
     """
 
     def __init__(self, rooms: Rooms, marks: Callable[[Collection[str]], Marks], threads: Executor) -> None:
         self._rooms, self._marks, self._threads = rooms, marks, threads
         self._last_marks: Marks = {}
-        self._outage = DatabaseError(log, "whether there are new comments cannot be told")
+        self._outage = DatabaseError(log, "new comments cannot be read")
 
     async def run(self) -> None:
-        """Look for ever."""
+        """Poll forever."""
         while True:
             await asyncio.sleep(POLL_INTERVAL_S)
             try:
                 await self.refresh()
                 self._outage.report_recovered()
-            except Exception as error:  # the database may be away for a while; the next look must come
+            except Exception as error:  # the task must survive an unavailable database
                 self._outage.report_failure(error)
 
     async def refresh(self) -> None:
-        """Tell the rooms of those scenes whose comments have changed since the last look."""
+        """Notify the rooms of scenes whose comments changed since the last poll."""
         scenes = self._rooms.scenes()
         ask = asyncio.get_running_loop().run_in_executor
         before, self._last_marks = self._last_marks, await ask(self._threads, self._marks, scenes) if scenes else {}

@@ -1,4 +1,4 @@
-"""How a session comes into a room, and the names that open one."""
+"""Joining a room: ids and tokens."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from relume_server.schemas.rooms import MAX_PERSON_NAME, ROOM_PREFIX
 
 @dataclass(frozen=True)
 class JoinRequest:
-    """What the first message of a session says of a room.
+    """Room in the first message of a session.
 
     Attributes:
-        room: its id; None for who has only what opens it to watch.
-        view_token: what opens it to watch; it follows from the id, and the id not from it.
-        participant_token: token of the place that somebody had. name: how they are called.
+        room: id; None for view-only clients.
+        view_token: opens the room view-only; derived from the id, which cannot be derived from it.
+        participant_token: of an earlier session. name: display name.
     """
 
     room: str | None
@@ -28,17 +28,17 @@ class JoinRequest:
 
     @property
     def prefix(self) -> str:
-        """What of it stands in the address."""
+        """Room prefix, which is in the URL."""
         return self.view_token[:ROOM_PREFIX]
 
 
 def parse_join_request(opening: OpenMessage, room_prefix: str) -> JoinRequest | None:
-    """The door that a message names; None where it names none.
+    """Parse the room of an `open` message; None if it has none.
 
     Args:
-        room_prefix: of the address.
+        opening: the message. room_prefix: in the URL.
     Raises:
-        ParameterError: the name is not printable, or the address is one of other rooms.
+        ParameterError: the name is not printable, or the URL has another prefix.
     """
     name = None if opening.name is None else check_person(opening.name)
     if opening.room is not None:
@@ -48,18 +48,18 @@ def parse_join_request(opening: OpenMessage, room_prefix: str) -> JoinRequest | 
     else:
         return None
     if room_prefix != join_request.prefix:
-        allowed = f"{join_request.prefix}, as the room's name begins"
+        allowed = f"{join_request.prefix}, the first characters of the room's id"
         raise ParameterError("room_prefix of the address", room_prefix[:80], allowed)
     return join_request
 
 
 def derive_view_token(room: str) -> str:
-    """What opens a room to watch: it begins as the room's name does, and the rest of the name nobody finds."""
+    """Derive the view token of a room: it has the same prefix, and does not reveal the rest of the id."""
     return room[:ROOM_PREFIX] + hashlib.sha256(b"relume watch " + room.encode()).hexdigest()[ROOM_PREFIX:32]
 
 
 def check_person(name: str) -> str:
-    """A name as others see it. Raises ParameterError unless it is printable and short."""
+    """Check a display name. Raises ParameterError unless it is printable and short."""
     name = unicodedata.normalize("NFC", name).strip()
     if not name.isprintable() or not 1 <= len(name) <= MAX_PERSON_NAME:
         raise ParameterError("name", name[:80], f"1 to {MAX_PERSON_NAME} printable characters")

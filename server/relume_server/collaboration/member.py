@@ -1,7 +1,7 @@
-"""One session in a room: its edits go to all others, theirs come to it.
+"""One session in a room: its edits go to all others, and theirs come to it.
 
-A client knows of its own edits by itself. It is told the difference between that look and the one that there is, which
-is found when it can be sent: however much others edit and however slowly a client reads, nothing piles up.
+A client knows its own edits. It is sent the difference between its look and the room's, computed when it can be sent:
+however many edits there are, and however slowly a client reads, nothing accumulates.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ from relume_server.schemas.rooms import (
 )
 
 SEND_INTERVAL_S = 1 / 60
-_UNKNOWN = math.nan  # as a value of a look it equals none, itself included
+_UNKNOWN = math.nan  # equals no value of a look, not even itself
 
 
 @dataclass(frozen=True)
 class RoomEntry:
-    """Where a session has come to.
+    """A joined room.
 
     Attributes:
-        document: complete look that it begins with. is_new: nobody was in the room.
+        document: complete look to start with. is_new: the room was empty.
     """
 
     room: Room
@@ -51,21 +51,21 @@ class RoomEntry:
 
 
 class RoomMember:
-    """Sits between a session and its room; on the event loop.
+    """Connects a session to its room. Event loop only.
 
     Args:
-        look, pending: where others' edits come to, and are asked to be shown. may_edit: more than ways of looking.
+        entry: of the room. look, pending: of the session, updated by others' edits. may_edit: more than view settings.
     Attributes:
-        changed: something is to be told to the client. has_comments: such as that there are comments.
+        changed: set when something is to be sent. has_comments: comments have changed.
     """
 
     def __init__(self, entry: RoomEntry, look: LookState, pending: PendingRequests, *, may_edit: bool) -> None:
         self._entry, self._room, self._participant, self._may_edit = entry, entry.room, entry.participant, may_edit
         self._look, self._pending = look, pending
         self.changed, self.has_comments = asyncio.Event(), False
-        self._client, self._client_revision = look.document, look.revision  # what the client takes the look for
+        self._client, self._client_revision = look.document, look.revision  # the look that the client has
         self._last_patch: Sequence[Operation] = ()
-        # the room's look without what this session edited since its pictures showed its edits, or will if they can
+        # the room's look without this session's edits that its images have not shown yet
         self._painted = self._painting = entry.room.document
         self._sent_people = entry.room.people()
         self._authors: set[int] = set()
@@ -76,7 +76,7 @@ class RoomMember:
         await self._room.is_lost.wait()
 
     def info(self) -> RoomInfo:
-        """What hello says of the room."""
+        """Room of the hello message."""
         return RoomInfo(
             id=self._entry.join_request.room,
             view_token=self._entry.join_request.view_token,
@@ -88,18 +88,18 @@ class RoomMember:
         )
 
     def accepted(self, target: Target, patch: Sequence[Operation]) -> Target:
-        """The session's own edit was accepted: all others follow, if it is more than another way of looking.
+        """Pass the session's accepted edit on to all others, unless it changes view settings only.
 
         Args:
-            patch: that made the look of `target`, as the client sent it.
+            target: after the edit. patch: of the edit, as sent by the client.
         Returns:
-            What is to be shown here, which says how often the room's look has changed.
+            The target to show here, with its `room_revision`.
         """
         self._client, self._last_patch = rebase(self._client, patch), patch
         return self._change(target)
 
     def _change(self, target: Target) -> Target:
-        """Make this the room's look, if this session may edit; else only the session shows it."""
+        """Set the room's look, if this session may edit; otherwise only the session shows it."""
         changes: Sequence[Operation] = ()
         if self._may_edit:
             changes = diff_looks(self._room.document, target.document, LOCAL_SECTIONS)
@@ -113,32 +113,32 @@ class RoomMember:
         return target
 
     def on_painting(self, target: Target) -> None:
-        """The session's pictures are about to be given this look: the room's, or an older one that they could show."""
+        """Record that the images are about to get this look: the room's, or an older one that they support."""
         is_newest = target.room_revision == self._room.num_changes
         self._painting = self._room.document if is_newest else self._painted
 
     def on_painted(self) -> None:
-        """They can show it: none of the edits in it will be taken back."""
+        """Record that the images support it: none of its edits will be reverted."""
         self._painted = self._painting
 
     def without_own_edits(self, displayed: Target) -> Target | None:
-        """The room's look without this session's edits since its pictures showed `displayed`; None if there are none.
+        """The room's look without this session's edits since its images showed `displayed`; None if there are none.
 
-        Raises RelumeError where that is no look.
+        Raises RelumeError if the result is not a valid look.
         """
         document = with_local_settings(self._painted if self._may_edit else self._room.document, displayed.document)
         has_own_edits = bool(diff_looks(document, self._look.document)) or self._look.solo != displayed.solo
         return self._look.reverted(document, displayed) if has_own_edits else None
 
     def reverted(self, target: Target) -> Target:
-        """The newest edit of this session was not possible: all, and its own client, go on with this look instead."""
+        """Replace the room's look because the newest edit of this session is not supported."""
         self._look.revert(target)
         unknown = [{"op": "add", "path": each["path"], "value": _UNKNOWN} for each in self._last_patch if each["path"]]
         self._client = rebase(self._client, unknown) if len(unknown) == len(self._last_patch) else {}
         return self._change(target)
 
     def on_remote_edit(self, target: Target, author: int, changes: Sequence[Operation]) -> None:
-        """Show what somebody else has made of the look by these changes."""
+        """Show the look that another participant made by these changes."""
         self._painted, self._painting = rebase(self._painted, changes), rebase(self._painting, changes)
         document = with_local_settings(target.document, self._look.document)
         self._pending.target = self._look.adopt(document, target)
@@ -150,7 +150,7 @@ class RoomMember:
         self.changed.set()
 
     def update_presence(self, message: PresenceMessage, caller_name: str) -> None:
-        """Take note of a name, where nobody logs in, and of the material in hand. Raises ParameterError."""
+        """Set the name, if there is no login, and the selected material. Raises ParameterError."""
         materials = self._room.document["materials"]
         if message.material is not None and message.material not in materials:
             raise ParameterError("material", message.material, "one of " + ", ".join(materials)[:400])
@@ -160,7 +160,7 @@ class RoomMember:
         self._room.notify_people()
 
     async def send_updates(self, socket: ClientSocket) -> None:
-        """Run as long as the session does."""
+        """Send updates while the session runs."""
         while True:
             await self.changed.wait()
             self.changed.clear()
@@ -176,7 +176,7 @@ class RoomMember:
             await asyncio.sleep(SEND_INTERVAL_S)
 
     def _room_update(self) -> RoomUpdate | None:
-        """What the look has become besides what the client did by itself; of that only how far it was accepted."""
+        """Changes of the look besides the client's own edits, and how far those were accepted."""
         document, revision = self._look.document, self._look.revision
         patch = diff_looks(self._client, document)
         authors, self._authors = sorted(self._authors), set()
@@ -187,6 +187,6 @@ class RoomMember:
         return RoomUpdate(revision=revision, room_revision=self._room.num_changes, patch=operations, edited_by=authors)
 
     def leave(self, *, is_for_good: bool) -> None:
-        """The session has ended; `is_for_good` where the client said so, else it may come back."""
+        """End the membership; `is_for_good` if the client left, otherwise it may reconnect."""
         self._room.members.remove(self)
         self._room.leave(self._participant, is_for_good=is_for_good)

@@ -1,4 +1,4 @@
-"""The place of somebody in a room. It outlives a lost connection, and two sessions of one editor share it."""
+"""Participant of a room, who stays for a while after a lost connection; sessions of one editor share a participant."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ COLORS = ("#6cb2ff", "#ffb454", "#8fd67a", "#e58ce0", "#5fd8d0", "#ff8f80", "#d9
 
 @dataclass
 class Participant:
-    """Who somebody is to the others.
+    """A person in a room.
 
     Attributes:
-        id: from 1 on, in the order of coming. num_sessions: that are open now.
-        name: that others read. owner: whose it is, as quotas name them; empty if nobody logs in.
-        removal: takes the place away in a while, where none is.
+        id: from 1 on, in joining order. num_sessions: open ones.
+        name: display name. owner: user for quotas; empty without login.
+        removal: timer that removes the participant when no session is open.
     """
 
     token: str
@@ -32,7 +32,7 @@ class Participant:
     removal: asyncio.TimerHandle | None = field(default=None, repr=False)
 
     def person(self) -> Person:
-        """As it is told."""
+        """Participant as in messages."""
         return Person(
             id=self.id,
             name=self.name,

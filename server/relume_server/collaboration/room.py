@@ -1,4 +1,4 @@
-"""A room: a look that several people share, and who they are. Used from the event loop only."""
+"""A room: a shared look and its participants. Event loop only."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from relume_server.errors import BusyError
 from relume_server.schemas.rooms import Person
 
 LOCAL_SECTIONS = ("display", "transport")
-"""Sections of a look that each has for themselves: they are ways of looking."""
+"""View settings: sections of a look that are not shared."""
 
 
 def is_local_setting(path: str) -> bool:
-    """Whether a pointer into a look is one of a way of looking."""
+    """True if a pointer into a look is a view setting."""
     return path.split("/")[1:2] in ([name] for name in LOCAL_SECTIONS)
 
 
 def with_local_settings(document: Mapping[str, Any], local_document: Mapping[str, Any]) -> dict[str, Any]:
-    """A room's look with somebody's own ways of looking."""
+    """The room's look with a participant's own view settings."""
     return {**document, **{name: local_document[name] for name in LOCAL_SECTIONS}}
 
 
 class Listener(Protocol):
-    """A session in a room, as the room knows it; see `relume_server.collaboration.member.RoomMember`."""
+    """A session in a room; see `relume_server.collaboration.member.RoomMember`."""
 
     changed: asyncio.Event
     has_comments: bool
@@ -42,8 +42,8 @@ class Room:
     """One shared look.
 
     Attributes:
-        document: the complete look, seen as whoever edited last sees it. num_changes: that it has seen.
-        members: sessions that are in it. is_lost: another server has it.
+        document: complete look, with the view settings of the last editor. num_changes: its revision.
+        members: sessions in the room. is_lost: another server has it.
     """
 
     def __init__(
@@ -57,11 +57,11 @@ class Room:
         self._num_joined = 0
 
     def people(self) -> list[Person]:
-        """Who has a place, in the order of coming."""
+        """Participants in joining order."""
         return [participant.person() for participant in self._participants.values()]
 
     def join(self, join_request: JoinRequest, caller: Caller) -> Participant:
-        """The place that a session comes back to, or a new one. Raises BusyError where there is none."""
+        """Return the participant that a session resumes, or a new one. Raises BusyError if the room is full."""
         participant = self._participants.get(join_request.participant_token or "")
         if participant is None or participant.owner != caller.name:
             participant = self._add_participant(join_request, caller)
@@ -75,7 +75,7 @@ class Room:
 
     def _add_participant(self, join_request: JoinRequest, caller: Caller) -> Participant:
         if len(self._participants) >= self._max_people:
-            raise BusyError(f"{self._max_people} people are in this room; one of them has to leave first")
+            raise BusyError(f"{self._max_people} people are in this room, its limit; wait until one leaves")
         self._num_joined += 1
         used_colors = {participant.color for participant in self._participants.values()}
         color = next((color for color in COLORS if color not in used_colors), COLORS[self._num_joined % len(COLORS)])
@@ -85,7 +85,7 @@ class Room:
         return participant
 
     def leave(self, participant: Participant, *, is_for_good: bool) -> None:
-        """A session of somebody has ended; their place is kept for a while, unless that was the last one for good."""
+        """End a session of a participant, who stays for a while unless the last one left for good."""
         participant.num_sessions -= 1
         if participant.num_sessions == 0 and is_for_good:
             self._remove_participant(participant)
@@ -102,18 +102,18 @@ class Room:
             self._on_empty(self)
 
     def notify_people(self) -> None:
-        """Something about who is here has changed."""
+        """Notify members of changed participants."""
         for member in self.members:
             member.changed.set()
 
     def notify_comments(self) -> None:
-        """Somebody has commented."""
+        """Notify members of changed comments."""
         for member in self.members:
             member.has_comments = True
             member.changed.set()
 
     def close(self) -> None:
-        """Forget whoever may still come back."""
+        """Cancel the timers of all participants."""
         for participant in self._participants.values():
             if participant.removal is not None:
                 participant.removal.cancel()

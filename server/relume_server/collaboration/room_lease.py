@@ -1,4 +1,4 @@
-"""Keeps a room on one server: whoever comes to another is refused there, for a balancer to try the next one."""
+"""Keep a room on one server: other servers refuse it, so that a load balancer tries the next one."""
 
 from __future__ import annotations
 
@@ -24,30 +24,30 @@ T = TypeVar("T")
 
 
 class RoomLease:
-    """Holds the leases of this server's rooms. Used from the event loop only.
+    """Holds the leases of this server's rooms. Event loop only.
 
     Args:
-        drain: when the server takes leave its rooms are anybody's.
-        threads: that leases are taken in; nothing slow may run there.
+        rooms: of this server. leases: in the database. drain: when the server drains, its rooms are free.
+        threads: for leases; for short work only.
     """
 
     def __init__(self, rooms: Rooms, leases: RoomLeases, drain: DrainState, threads: Executor) -> None:
         self._threads = threads
         self._rooms, self._leases, self._drain = rooms, leases, drain
         self._sessions, self._has_leases = Counter[str](), False
-        self._lock = asyncio.Lock()  # what is taken is not given up by a round that has not heard of it
-        self._outage = DatabaseError(log, "which server has a room cannot be told")
+        self._lock = asyncio.Lock()  # serializes taking with the renewal, which would give up an unknown lease
+        self._outage = DatabaseError(log, "the leases of rooms cannot be read")
 
     @asynccontextmanager
     async def hold(self, prefix: str) -> AsyncIterator[None]:
-        """For as long as a session is in a room whose name begins so, or tries to be.
+        """Hold the lease while a session is in a room with this prefix, or is joining.
 
-        Raises ElsewhereError where another server has these rooms.
+        Raises OtherServerError if another server has these rooms.
         """
         self._sessions[prefix] += 1
         try:
             if not await self._take(prefix):
-                raise OtherServerError("another server has this room; come to it by way of the balancer, or try again")
+                raise OtherServerError("another server has this room; connect through the load balancer, or try again")
             yield
         finally:
             self._sessions[prefix] -= 1
@@ -59,19 +59,19 @@ class RoomLease:
             self._has_leases = True
             try:
                 return await self._ask(self._leases.take, prefix)
-            except DATABASE_ERRORS as error:  # the next round tries again
+            except DATABASE_ERRORS as error:  # the next renewal retries
                 self._outage.report_failure(error)
                 return True
 
     async def run(self) -> None:
-        """Keep what there is until the server takes leave."""
+        """Renew the leases until the server drains."""
         while not self._drain.is_draining:
             with suppress(TimeoutError):
                 await asyncio.wait_for(self._drain.wait(), RENEW_INTERVAL_S)
             await self.refresh()
 
     async def refresh(self) -> None:
-        """Keep what there is, if anything; who is in a room that another server has meanwhile has to go there."""
+        """Renew the leases, if any; members of rooms that another server took over must go there."""
         async with self._lock:
             prefixes = set() if self._drain.is_draining else {*self._sessions, *self._rooms.prefixes()}
             if not prefixes and not self._has_leases:
@@ -80,7 +80,7 @@ class RoomLease:
                 lost = await self._ask(self._leases.renew, prefixes)
                 self._has_leases = bool(prefixes)
                 self._outage.report_recovered()
-            except Exception as error:  # the database may be away for a while; the next look must come
+            except Exception as error:  # the task must survive an unavailable database
                 self._outage.report_failure(error)
                 return
         for prefix in lost:
@@ -90,6 +90,6 @@ class RoomLease:
         return await asyncio.get_running_loop().run_in_executor(self._threads, question, argument)
 
     async def close(self) -> None:
-        """Give up all."""
-        with suppress(*DATABASE_ERRORS):  # then the leases run out
+        """Give up all leases."""
+        with suppress(*DATABASE_ERRORS):  # otherwise the leases expire
             await self._ask(self._leases.renew, ())

@@ -1,4 +1,4 @@
-"""All rooms of this process. They live as long as somebody has a place in them, and in memory alone."""
+"""All rooms of this process, in memory; a room exists while it has participants."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Key = tuple[str, str]
 
 
 class Rooms:
-    """Rooms by scene and by what opens them to watch. Used from the event loop only."""
+    """Rooms by scene and view token. Event loop only."""
 
     def __init__(self, max_rooms: int, max_people: int, away_seconds: float) -> None:
         self._max_rooms, self._max_people, self._away_seconds = max_rooms, max_people, away_seconds
@@ -32,22 +32,23 @@ class Rooms:
         *,
         has_local_settings: bool,
     ) -> RoomEntry:
-        """A session comes in; whoever may edit and finds nobody makes the room, with the look that they bring.
+        """Join a room; an editor creates it if it does not exist, with the look of the session.
 
         Args:
-            scene: id. initial_document: the complete look that the session would show by itself.
-            has_local_settings: its ways of looking are the person's own, of a session that was lost.
+            join_request: of the session. scene: id. caller: of the session.
+            initial_document: complete look of the session.
+            has_local_settings: keep the session's own view settings, from a lost session.
         Raises:
-            BusyError: there are as many rooms, or people in this one, as may be; or nobody has made it yet.
+            BusyError: too many rooms, or participants; or no editor has created the room yet.
         """
         key = scene, join_request.view_token
         room = self._rooms.get(key)
         is_new = room is None
         if room is None:
             if caller.role < Role.EDIT:
-                raise BusyError("nobody is in this room now; it opens when somebody comes who may edit in it")
+                raise BusyError("this room is empty; it opens when an editor joins")
             if len(self._rooms) >= self._max_rooms:
-                raise BusyError(f"{self._max_rooms} rooms are open; one of them has to be left first")
+                raise BusyError(f"{self._max_rooms} rooms are open, the limit; wait until one is closed")
             room = Room(dict(initial_document), self._max_people, self._away_seconds, partial(self._discard, key))
         participant = room.join(join_request, caller)
         self._rooms[key] = room
@@ -60,20 +61,20 @@ class Rooms:
         )
 
     def scenes(self) -> set[str]:
-        """Ids of the scenes that people work on together."""
+        """Ids of the scenes of all rooms."""
         return {scene for scene, _ in self._rooms}
 
     def prefixes(self) -> set[str]:
-        """What the names of the rooms begin with."""
+        """Prefixes of all rooms."""
         return {watch[:ROOM_PREFIX] for _, watch in self._rooms}
 
     def lose(self, prefix: str) -> None:
-        """Another server has the rooms of this prefix: who is in them hears of it, and nobody comes in any more."""
+        """Close the rooms of a prefix, which another server has; members are notified."""
         for key in [key for key in self._rooms if key[1].startswith(prefix)]:
             self._rooms.pop(key).is_lost.set()
 
     def notify_comment(self, scene: str) -> None:
-        """Tell everybody who works on a scene together that its comments have changed."""
+        """Notify all rooms of a scene that its comments have changed."""
         for (room_scene, _), room in self._rooms.items():
             if room_scene == scene:
                 room.notify_comments()
@@ -83,6 +84,6 @@ class Rooms:
             del self._rooms[key]
 
     def close(self) -> None:
-        """Forget all of them."""
+        """Close all rooms."""
         for room in self._rooms.values():
             room.close()

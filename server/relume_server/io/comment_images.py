@@ -1,4 +1,4 @@
-"""Pictures that clients send with comments: read as what they say they are, made small, and written anew."""
+"""Snapshots of comments: decoded, scaled down, and encoded again."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ _FORMATS = ("PNG", "JPEG", "WEBP")
 
 
 def small_picture(text: str) -> bytes:
-    """A picture as it is kept: WebP, at most `STORED_SIDE` pixels a side.
+    """Convert an image to a stored snapshot: WebP, at most `STORED_SIDE` pixels a side.
 
     Args:
-        text: PNG, JPEG or WebP in Base64, or as the data URL that a canvas gives.
+        text: PNG, JPEG or WebP in Base64, or as the data URL of a canvas.
     Raises:
-        ParameterError: it is no such picture, or larger than `MAX_SIDE`.
+        ParameterError: it is not such an image, or larger than `MAX_SIDE`.
     """
     try:
         data = base64.b64decode(text.partition("base64,")[2] or text, validate=True)
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
-                if max(image.size) > MAX_SIDE:  # the header says it; nothing has been decoded yet
+                if max(image.size) > MAX_SIDE:  # read from the header, before decoding
                     raise ParameterError("picture", list(image.size), f"at most {MAX_SIDE} pixels a side")
                 small = image.convert("RGB")
     except (binascii.Error, OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:

@@ -1,4 +1,4 @@
-"""Downloaded files: whole or in parts, and under names that every system takes."""
+"""Downloads: whole files or ranges, with portable names."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ _CLOSED_RANGE = re.compile(rb"(\d+)-(\d+)")
 
 
 class Download(FileResponse):
-    """A file, or the part of it that a client goes on with (RFC 9110, section 14.2).
+    """A file, or a range of it (RFC 9110, section 14.2).
 
-    A `Range` that is none, as one that ends before it begins, is passed over: the answer is the whole file.
+    An invalid `Range`, such as one that ends before it starts, is ignored: the response is the whole file.
     """
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer. Raises RangeError where the file has nothing of what is asked for."""
+        """Send the response. Raises RangeError if the range is outside the file."""
 
         async def send_unless_refused(message: Message) -> None:
             if message["type"] == "http.response.start" and message["status"] == 416:
@@ -43,37 +43,37 @@ class Download(FileResponse):
 
 
 class ZipStream(StreamingResponse):
-    """Files packed while they are sent: nothing of the archive is on the disk, and little of it in memory."""
+    """A ZIP that is packed while it is sent: nothing on the disk, little in memory."""
 
     media_type = "application/zip"
 
     def __init__(self, files: Sequence[tuple[Path, str]], name: str) -> None:
         """
         Args:
-            files: each with its name in the archive; one that is deleted meanwhile is left out.
-            name: of the archive where it is saved.
+            files: each with its name in the archive; files deleted meanwhile are skipped.
+            name: download name of the archive.
         """
         disposition = f"attachment; filename*=utf-8''{quote(name)}"
         super().__init__(_zip_chunks(files), headers={"Content-Disposition": disposition, "Cache-Control": "no-store"})
 
 
 class _ZipBuffer(io.RawIOBase):
-    """What was written and not taken yet."""
+    """Written bytes that have not been taken yet."""
 
     def __init__(self) -> None:
         self._chunks: list[bytes] = []
 
     def writable(self) -> bool:
-        """It is."""
+        """True."""
         return True
 
     def write(self, data: Any) -> int:
-        """Add some."""
+        """Append bytes."""
         self._chunks.append(bytes(data))
         return len(self._chunks[-1])
 
     def take(self) -> bytes:
-        """Take all."""
+        """Take all bytes."""
         taken, self._chunks = b"".join(self._chunks), []
         return taken
 
@@ -99,5 +99,5 @@ def _are_ranges(value: bytes) -> bool:
 
 
 def safe_stem(text: str) -> str:
-    """Letters and digits of any script, dots, dashes and underscores of a text; anything else becomes dashes."""
+    """Replace all characters except letters, digits, dots, dashes and underscores by dashes."""
     return re.sub(r"[^\w.-]+", "-", text)[:_LONGEST].strip(".-") or "picture"

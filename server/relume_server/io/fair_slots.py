@@ -1,4 +1,4 @@
-"""So many things at once, in turns between those who ask."""
+"""A limited number of slots, assigned fairly between clients."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from relume_worker.fair_share import FairShare, WaitingBake
 
 
 class Slots:
-    """Slots, each held by somebody for a while. Used from the event loop only.
+    """Slots for concurrent work. Event loop only.
 
     Args:
-        num_slots: how many there are. max_per_client: how many of them one client may hold.
-        weights: turns of some clients, see `relume_worker.fair_share.FairShare`.
+        num_slots: total. max_per_client: maximum of one client.
+        weights: of clients, see `relume_worker.fair_share.FairShare`.
     """
 
     def __init__(self, num_slots: int, max_per_client: int, weights: Mapping[str, float]) -> None:
@@ -27,7 +27,7 @@ class Slots:
 
     @asynccontextmanager
     async def acquire(self, client: str) -> AsyncIterator[None]:
-        """Wait for a slot, and hold it for as long as the block runs."""
+        """Wait for a slot, and hold it inside the block."""
         number = next(self._numbers)
         ticket, granted = WaitingBake(str(number), client, False, number), asyncio.get_running_loop().create_future()
         self._waiting[ticket] = granted
@@ -36,10 +36,12 @@ class Slots:
             await granted
             yield
         finally:
-            if self._waiting.pop(ticket, None) is None:  # it was handed out, be it to one who does not wait any more
+            if (
+                self._waiting.pop(ticket, None) is None
+            ):  # the slot was granted, perhaps after its client had stopped waiting
                 self._free += 1
                 self._num_held[client] -= 1
-                self._num_held += Counter()  # forgets those who have none
+                self._num_held += Counter()  # drop zero counts
                 self._grant_slots()
 
     def _grant_slots(self) -> None:

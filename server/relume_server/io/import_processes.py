@@ -1,4 +1,4 @@
-"""Imports files, each in a process of its own, forked from one that has loaded what that takes."""
+"""Run imports in separate processes, forked from one that has loaded the readers."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ from relume_server.io.importer_zygote import ImportExit
 from relume_server.io.sandbox import environment, missing_features
 
 log = logging.getLogger(__name__)
-START_S = 120.0  # that a busy machine may take to load what imports need
+START_S = 120.0  # time that loading may take on a busy machine
 _DAMAGED = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, signal.SIGILL)
 _ERRORS_BY_KEY: Mapping[str, Callable[[str], Exception]] = {
     "problem": SceneError,
     "material": MaterialError,
-    "full": lambda _: DiskFullError("what was imported"),
-    "large": lambda _: ImportTooLargeError("what was imported is larger than there is room for"),
+    "full": lambda _: DiskFullError("the imported data"),
+    "large": lambda _: ImportTooLargeError("the imported data is too large"),
     "failure": RelumeError,
 }
 _COMMAND = [sys.executable, "-m", "relume_server.io.importer_zygote"]
 
 
 class ImportTooLargeError(RelumeError):
-    """A file unpacks to more than it may take."""
+    """A file unpacks to more than the limit."""
 
 
 class Importers:
-    """Imports files, each in a process of its own, which has its limits from the first byte of the file on."""
+    """Runs imports, each in a process with limits from the first byte of the file on."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._parent: tuple[subprocess.Popen[bytes], socket.socket] | None = None
 
     def start(self) -> None:
-        """Have the process run that others are forked from, unless it does; the first import else waits for it."""
+        """Start the process that others are forked from, if needed; otherwise the first import waits for it."""
         with self._lock:
             self._ensure_running()
 
@@ -50,8 +50,8 @@ class Importers:
         """Import into the request's folder; returns the id. Blocks.
 
         Raises:
-            SceneError: the file cannot be used, or reading it took too much. DiskFullError: there is no room for it.
-            OutgrownError: it takes more than it may. RelumeError: a defect; it is logged.
+            SceneError: the file cannot be used, or exceeds a limit. DiskFullError: the disk is full.
+            ImportTooLargeError: the result is too large. RelumeError: an internal error, which is logged.
         """
         asker, child_socket = socket.socketpair()
         with asker:
@@ -60,7 +60,7 @@ class Importers:
             return _result(request, _request_import(asker, request))
 
     def close(self) -> None:
-        """End the process that others are forked from; they end with who asked."""
+        """End the process that others are forked from; running imports end when their connection closes."""
         with self._lock:
             parent, self._parent = self._parent, None
         if parent is not None:
@@ -70,7 +70,7 @@ class Importers:
             process.wait()
 
     def _ensure_running(self) -> socket.socket:
-        """Where it is asked; it is begun where it does not run."""
+        """Return its socket; start it if it is not running."""
         if self._parent is None or self._parent[0].poll() is not None:
             if self._parent is not None:
                 self._parent[1].close()
@@ -79,11 +79,11 @@ class Importers:
 
 
 def _start_process() -> tuple[subprocess.Popen[bytes], socket.socket]:
-    # No thread pools: what is forked would lack them, and each reserves address space, which counts against the limit.
+    # No thread pools: forks would lack them, and each reserves address space, which counts against the limit.
     environ = environment() | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     if missing_features():
         log.warning(
-            "this machine has no %s: what reads uploads has limits, and is not kept from other files or the network "
+            "this machine has no %s: imports have limits, but can access other files or the network "
             "(docs/operations.md)",
             " and no ".join(missing_features()),
         )
@@ -94,7 +94,7 @@ def _start_process() -> tuple[subprocess.Popen[bytes], socket.socket]:
 
 
 def _request_import(asker: socket.socket, request: ImportRequest) -> ImportExit:
-    """How the process ended that was forked for this."""
+    """Run an import in a forked process, and return its exit."""
     asker.settimeout(START_S + request.seconds)
     try:
         asker.sendall(json.dumps(asdict(request)).encode() + b"\n")
@@ -103,29 +103,29 @@ def _request_import(asker: socket.socket, request: ImportRequest) -> ImportExit:
     except TimeoutError:
         return ImportExit(0, "", "", is_late=True)
     except (OSError, ValueError):
-        return ImportExit(0, "", "it has gone before it could tell how it ended", is_late=False)
+        return ImportExit(0, "", "the connection closed before the result", is_late=False)
 
 
 def _result(request: ImportRequest, import_exit: ImportExit) -> str:
-    """The id; or raise what a process's end means."""
+    """Return the id, or raise the error of a process's exit."""
     if -import_exit.code in _DAMAGED:
         _log(import_exit)
-        raise SceneError("the file made its reader fail, it is damaged; export it again")
+        raise SceneError("the file is damaged: its reader crashed; export it again")
     answer = json.loads(import_exit.answer) if import_exit.answer else {}
     if "id" in answer:
         return str(answer["id"])
     for key, make_error in _ERRORS_BY_KEY.items():
         if key in answer:
-            if key not in ("problem", "material") and import_exit.output:  # it has no log of its own
+            if key not in ("problem", "material") and import_exit.output:  # that process has no log
                 _log(import_exit)
             raise make_error(answer[key])
     if import_exit.is_late or import_exit.code < 0:
         limits = f"{request.seconds} s or {request.max_bytes / 1e9:.1f} GB"
         raise SceneError(f"the import was stopped: it needs more than {limits}; simplify the file")
     _log(import_exit)
-    raise RelumeError("the import failed, and not because of the file; the server's log says why, report it")
+    raise RelumeError("the import failed, but not because of the file; see the server's log, and report it")
 
 
 def _log(import_exit: ImportExit) -> None:
     line = " ".join(import_exit.output.split())
-    log.error("the process of an import ended with %d and said: %s", import_exit.code, line or "nothing")
+    log.error("an import process ended with code %d: %s", import_exit.code, line or "nothing")

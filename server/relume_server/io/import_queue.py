@@ -1,4 +1,4 @@
-"""Takes in what imports make: read in a process of its own, measured, counted as somebody's, put in its place."""
+"""Queue imports: run in a separate process, measure, count for the user, move into place."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ _STORES: Mapping[str, tuple[AssetStore, Callable[[Path], Path], OwnedKind]] = {
 
 
 class Intake:
-    """What routes give files to.
+    """Imports for routes.
 
     Attributes:
-        importers: read files.
+        importers: run the processes.
     """
 
     def __init__(self, settings: Settings, ledger: Ledger, quotas: Quotas, importers: Importers) -> None:
@@ -57,7 +57,7 @@ class Intake:
 
     @asynccontextmanager
     async def reserving(self, owner: str, num_bytes: int) -> AsyncIterator[Reservation]:
-        """Room for something that is made and not sent. Raises QuotaError, NearlyFullError."""
+        """Reserve space for something that is made, not uploaded. Raises QuotaError, NearlyFullError."""
         reservation = Reservation(self._quotas, owner)
         try:
             await run_in_threadpool(reservation.reserve, num_bytes)
@@ -66,19 +66,19 @@ class Intake:
             await run_in_threadpool(reservation.release)
 
     async def run_in_slot(self, client: str, work: Callable[[], T]) -> T:
-        """Do something in a thread when it is somebody's turn to import."""
+        """Run work in a thread when the client gets an import slot."""
         async with self._slots.acquire(client):
             return await run_in_threadpool(work)
 
     async def import_file(self, reservation: Reservation, make_request: Callable[[Path], ImportRequest]) -> str:
-        """Import a file, and return the id under which it is kept; whose it is, is counted.
+        """Import a file, assign it to its owner, and return its id.
 
         Args:
-            reservation: what it may take. make_request: lays files into an empty folder, in a thread, and says what
-                they are.
+            reservation: of the upload. make_request: writes files into an empty folder, in a thread, and describes
+                them.
         Raises:
-            QuotaError, NearlyFullError: what it unpacks to is too much; nothing of it is kept.
-            And what `Importers.run` raises.
+            QuotaError, NearlyFullError: the unpacked result is too large; nothing is stored.
+            Also what `Importers.run` raises.
         """
         return await self.run_in_slot(reservation.owner, lambda: self._import_file(reservation, make_request))
 
@@ -90,7 +90,7 @@ class Intake:
         return identity
 
     def read(self, reservation: Reservation, request: ImportRequest, folder: Path) -> str:
-        """Have a file of a folder read, within what it may take; what is made of it is there, too."""
+        """Run an import within the reservation; its result is in the folder, too."""
         max_bytes, output_folder = reservation.max_import_bytes(), folder / _OUTPUT_FOLDER
         output_folder.mkdir()
         try:
@@ -104,7 +104,7 @@ class Intake:
         if store is not None:
             target = store[1](self._settings.data) / store[0].path(into, identity).name
         num_bytes = _checked_bytes(into / identity)
-        if not target.exists():  # else it takes nothing more
+        if not target.exists():  # otherwise it takes no additional space
             reservation.reserve(num_bytes)
         if store is None:
             self._register_scene(into, identity, target)
@@ -113,7 +113,7 @@ class Intake:
         reservation.convert(store[2] if store else "scene", identity, num_bytes)
 
     def _register_scene(self, into: Path, identity: str, target: Path) -> None:
-        """Put a scene in its place; one that is here and damaged is whole again."""
+        """Move a scene into place; an existing damaged one is replaced."""
         with (into / SUMMARY).open("rb") as file:
             summary = json.loads(file.read(MAX_SUMMARY_BYTES))
         is_new = not target.exists()
@@ -123,17 +123,17 @@ class Intake:
         try:
             insert_scene(self._settings.data, self._ledger, identity, summary)
         except Exception:
-            if is_new:  # nobody would find it
+            if is_new:  # otherwise unreachable
                 shutil.rmtree(target, ignore_errors=True)
             raise
 
 
 def _checked_bytes(folder: Path) -> int:
-    """What the files in a folder take that another process has written. Raises RelumeError where one is no file."""
+    """Size of the files that another process has written. Raises RelumeError for anything but regular files."""
     num_bytes = 0
     for path in folder.rglob("*"):
         status = path.lstat()
         if not stat.S_ISREG(status.st_mode) and not stat.S_ISDIR(status.st_mode):
-            raise RelumeError("the import wrote what is no file; report the file that was sent")
+            raise RelumeError("the import wrote something other than a regular file; report the uploaded file")
         num_bytes += status.st_size
     return num_bytes

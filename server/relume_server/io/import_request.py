@@ -1,8 +1,8 @@
-"""Reads an uploaded file, writes what it is into a folder, and says its id or why it failed.
+"""Read an uploaded file, write the result into a folder, and return its id or an error.
 
-That is done in a process of its own, with limits, which has neither the database nor other files: a hostile file can
-end that process, not the server. `relume_server.io.importer_zygote` makes it, `relume_server.io.import_processes` asks
-for it, and `relume_server.io.import_queue` takes over what it has made.
+Runs in a separate process with limits, without access to the database or other files: a hostile file can end that
+process, not the server. `relume_server.io.importer_zygote` creates it, `relume_server.io.import_processes` requests it,
+and `relume_server.io.import_queue` moves the result into place.
 """
 
 from __future__ import annotations
@@ -21,31 +21,31 @@ from typing import TYPE_CHECKING, Literal
 from relume.core.errors import DiskFullError, MaterialError, RelumeError, is_disk_full
 from relume.core.filesystem import UNFINISHED
 
-if TYPE_CHECKING:  # the import process itself has no use for them, or not at once
+if TYPE_CHECKING:  # not needed by the import process, or not at once
     from relume.scene.model import Scene
     from relume_server.settings import Settings
 
 _OUT_OF_MEMORY_MESSAGES = (os.strerror(errno.ENOMEM), "can't start new thread")
 UPLOAD_PREFIX = "upload-"
 SUMMARY = "summary.json"
-"""What lists show of a scene, beside its folder."""
+"""File with the summary of a scene, next to its folder."""
 ImportKind = Literal["scene", "environment", "built_in", "grounded", "image", "material", "tile"]
 
 
 @dataclass(frozen=True)
 class ImportRequest:
-    """What to import.
+    """An import.
 
     Attributes:
-        into: an empty folder, which what is made is written to, and nothing else.
-        kind, file: what it is, and its path; empty for a built-in scene; of a scene to be "grounded" the folder that it
-            is kept in. A "tile", which a BTF is made of, is looked at alone, and has no id.
+        into: empty folder for the result; nothing else is written.
+        kind, file: kind and path; no path for a built-in scene; for a scene to be "grounded" its folder. A "tile" for a
+            BTF is validated only, and has no id.
         environment: path of a scene's environment map, or None.
-        name: what people will call it; of a built-in scene, which one it is.
-        scene: the name that a scene's or a material's file had, folders included.
-        companions: paths of the files that came with a scene, by theirs.
-        ground: whether a scene is put on one. period: side of what repeats, metres, where it is known.
-        seconds: of processor and wall. max_bytes: of address space. max_file_bytes: of each file that is written.
+        name: display name; of a built-in scene its key.
+        scene: file name of a scene or a material, with folders.
+        companions: paths of a scene's companion files, by name.
+        ground: whether to add a ground plane. period: side of one period, meters, if known.
+        seconds: limit of processor and wall time. max_bytes: of address space. max_file_bytes: of each written file.
     """
 
     into: str
@@ -72,7 +72,7 @@ class ImportRequest:
         scene: str = "",
         companions: Mapping[str, Path] | None = None,
     ) -> ImportRequest:
-        """A request within a server's limits; where to, and how large, is known when it has its turn."""
+        """Create a request with a server's limits; `into` and `max_file_bytes` are set when it gets its slot."""
         return cls(
             into="",
             kind=kind,
@@ -88,13 +88,13 @@ class ImportRequest:
 
     @property
     def input_files(self) -> list[Path]:
-        """The files that it is about."""
+        """Input files."""
         paths = [self.file, self.environment or "", *self.companions.values()]
         return [Path(path) for path in paths if path]
 
 
 def remove_strays(data: Path, older_than_s: float) -> None:
-    """Delete uploads, and what was being deleted, that a killed server left; younger ones may be another server's."""
+    """Delete uploads and files to be deleted that a killed server left; younger ones may belong to another server."""
     for folder in [*data.glob(f"{UPLOAD_PREFIX}*"), *data.glob(f"*/{UNFINISHED}/")]:
         with suppress(OSError):
             if time.time() - folder.stat().st_mtime > older_than_s:
@@ -102,11 +102,11 @@ def remove_strays(data: Path, older_than_s: float) -> None:
 
 
 def run_import(request: ImportRequest) -> dict[str, str]:
-    """What the process says: {"id": id}, or what failed.
+    """Run the import, and return {"id": id} or an error.
 
-    That is {"problem": sentence} of the file, {"material": sentence} of that of a material, {"full": sentence} of the
-    disk, {"large": sentence} where a file that it writes became larger than it may be, and {"failure": sentence} of all
-    else that is known. What nobody foresaw passes.
+    Errors: {"problem": sentence} of the file, {"material": sentence} of a material's file, {"full": sentence} if the
+    disk is full, {"large": sentence} if a written file exceeds its limit, and {"failure": sentence} for all other known
+    errors. Unexpected exceptions propagate.
     """
     try:
         return {"id": _import(request)}
@@ -129,13 +129,13 @@ def run_import(request: ImportRequest) -> dict[str, str]:
 
 
 def _is_too_large(error: BaseException | None) -> bool:
-    """Whether the limit of the files that it writes was met; NumPy says of a short write only how much was missing."""
+    """True if the file size limit was exceeded; NumPy reports short writes only by the missing amount."""
     is_short = isinstance(error, OSError) and error.errno is None and "requested and" in str(error)
     return is_short or (isinstance(error, OSError) and error.errno == errno.EFBIG)
 
 
 def _is_out_of_memory(error: Exception) -> bool:
-    """Whether the limit of address space was met: the system's calls say so in their own words."""
+    """True if the address space limit was exceeded; system calls report it in their own way."""
     return isinstance(error, MemoryError) or any(message in str(error) for message in _OUT_OF_MEMORY_MESSAGES)
 
 
@@ -214,5 +214,5 @@ def _read_scene(request: ImportRequest) -> Scene:
 
     environment = None if request.environment is None else read_environment(request.environment, "Environment")
     uploaded_files = UploadedFiles({name: Path(path) for name, path in request.companions.items()}, request.scene)
-    # bytes: what lies beside the file on this disk is not its own
+    # bytes: files next to it on this disk are not part of the upload
     return import_scene(read_file(request.file), request.name, environment, uploaded_files)

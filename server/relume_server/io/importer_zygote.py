@@ -1,11 +1,11 @@
-"""The process that imports are forked from: it has loaded what they need, which takes seconds, before anybody asks.
+"""Process that imports are forked from: it loads the readers once, which takes seconds.
 
-`python -m relume_server.io.importer_zygote` has a socket as stdin, and each message there brings the end of another.
-For that a keeper is forked, which reads one `ImportRequest` from it as a line of JSON, forks the process that imports,
-with limits
-from the file's first byte on, and answers with one `End`. `relume_server.io.import_processes` starts it.
+`python -m relume_server.io.importer_zygote` has a socket as stdin; each message on it contains the end of another
+socket, for which a supervisor is forked. The supervisor reads one `ImportRequest` as a line of JSON, forks the import
+process, with limits from the file's first byte on, and answers with one `ImportExit`.
+`relume_server.io.import_processes` starts it.
 
-Forking is safe because this process has one thread: loading starts none, and what is forked ends without going back.
+Forking is safe because this process has one thread: loading starts none, and forked processes exit without returning.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ from relume_server.io.import_request import ImportRequest, run_import
 from relume_server.io.sandbox import confine
 
 MAX_ANSWER_BYTES, MAX_OUTPUT_BYTES = 64 * 1024, 2_000
-MIN_FILE_BYTES = 1 << 16  # what it says of its end is a file, too
-MAX_OPEN_FILES = 1_024  # files at once; a scene has at most 900 companions
+MIN_FILE_BYTES = 1 << 16  # its exit report is a file as well
+MAX_OPEN_FILES = 1_024  # open files; a scene has at most 900 companions
 
 
 @dataclass(frozen=True)
 class ImportExit:
-    """How a process that imported has ended.
+    """Exit of an import process.
 
     Attributes:
-        code: that it ended with, or minus the signal.
-        answer: what `run_import` said, as JSON; empty where it came to nothing.
-        output: the end of what it wrote to stderr.
-        is_late: whether it was ended for taking too long.
+        code: exit code, or minus the signal.
+        answer: result of `run_import` as JSON; empty if there was none.
+        output: end of its stderr.
+        is_late: whether it was killed for exceeding its time.
     """
 
     code: int
@@ -51,10 +51,10 @@ class ImportExit:
 
 
 def main() -> None:
-    """The process itself: until nobody is left who could ask."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to a whole terminal; the server ends this one
+    """Main loop, until the server closes the socket."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to the whole terminal; the server ends this process
     _load()
-    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # keepers are waited for by who asked
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # supervisors are waited for by the server
     asking = socket.socket(fileno=sys.stdin.fileno())
     while True:
         message, received_fds, *_ = socket.recv_fds(asking, 1, 1)
@@ -63,14 +63,14 @@ def main() -> None:
         with (
             socket.socket(fileno=received_fds[0]) as asker,
             suppress(OSError),
-        ):  # no room for one more: who asks is told none
+        ):  # too many processes: the server gets no answer
             if os.fork() == 0:
                 asking.close()
                 _supervise_import(asker)
 
 
 def _load() -> None:
-    """Load what imports need, readers of scenes as well, while nobody waits for it."""
+    """Load the readers in advance."""
     import relume.assets.environments.read_environment
     import relume.assets.measured.measured_store
     import relume.images.image_store
@@ -83,13 +83,13 @@ def _load() -> None:
 
 
 def _supervise_import(asker: socket.socket) -> NoReturn:
-    """Be the process that has one file imported, and tells who asked how that ended."""
+    """Supervise one import, and report its exit."""
     try:
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         with asker.makefile("rb") as lines:
             request = ImportRequest(**json.loads(lines.readline()))
         asker.sendall(json.dumps(asdict(_run_import(request, asker))).encode())
-    finally:  # never back into the loop that it was forked from; who asked sees an end
+    finally:  # never return into the loop of the parent; the server sees the connection close
         os._exit(0)
 
 
@@ -109,11 +109,11 @@ def _run_import(request: ImportRequest, asker: socket.socket) -> ImportExit:
 
 
 def _read_answer(reading: int, asker: socket.socket, seconds: float) -> bytes | None:
-    """What a process tells until it ends; None where it took too long, or who asked is gone."""
+    """Read the output of a process until it ends; None if it takes too long, or the server is gone."""
     answer, until_s = b"", time.monotonic() + seconds
     while (remaining_s := until_s - time.monotonic()) > 0:
         readable, *_ = select.select([reading, asker.fileno()], [], [], remaining_s)
-        if asker.fileno() in readable:  # nothing more is asked: it is closed
+        if asker.fileno() in readable:  # no more requests: closed
             return None
         if reading in readable:
             chunk = os.read(reading, MAX_ANSWER_BYTES)
@@ -124,7 +124,7 @@ def _read_answer(reading: int, asker: socket.socket, seconds: float) -> bytes | 
 
 
 def _import(request: ImportRequest, writing: int, output: BinaryIO) -> NoReturn:
-    """Be the process that imports."""
+    """Body of the import process."""
     os.dup2(output.fileno(), 1)
     os.dup2(output.fileno(), 2)
     try:
@@ -138,12 +138,12 @@ def _import(request: ImportRequest, writing: int, output: BinaryIO) -> NoReturn:
         answer = json.dumps(run_import(request)).encode()
         while answer:
             answer = answer[os.write(writing, answer) :]
-    except MemoryError:  # met where even a sentence takes too much
+    except MemoryError:  # raised when not even the message fits into memory
         os.kill(os.getpid(), signal.SIGKILL)
     except BaseException:
         traceback.print_exc()
         os._exit(1)
-    os._exit(0)  # nothing is to be taken apart: it is the other process's
+    os._exit(0)  # skip cleanup, which belongs to the parent process
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""PNG answers, and how long a browser may keep them."""
+"""PNG responses, and cache lifetimes."""
 
 from __future__ import annotations
 
@@ -9,6 +9,6 @@ FOREVER = {"Cache-Control": "private, max-age=31536000, immutable"}
 
 
 class PngResponse(Response):
-    """An image; names its media type in the API's description."""
+    """PNG image; names its media type in the OpenAPI description."""
 
     media_type = "image/png"

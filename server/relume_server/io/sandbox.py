@@ -1,8 +1,8 @@
-"""What a process that reads a stranger's file may do: read the program and its own files, write into one folder.
+"""Sandbox of processes that read uploaded files: read the program and the input, write into one folder.
 
-Landlock keeps it from all other files, and seccomp from sockets, other programs and other processes. Both hold for a
-process that nobody gave any right, in a container, too. Where a kernel lacks one of them the process goes on with the
-other, and `missing` says so.
+Landlock blocks all other files, and seccomp blocks sockets, other programs and other processes. Both work without
+privileges, in containers as well. If a kernel lacks one, the process runs with the other, and `missing_features`
+reports it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from relume.core.numba_cache import cache_folder, disable_kernel_saving
 
 _PACKAGES = ("relume", "relume_worker", "relume_server")
 _SYSTEM = ("/usr", "/lib", "/lib64", "/bin", "/etc/ld.so.cache", "/etc/localtime", "/dev/null", "/dev/urandom")
-# What no reader of a file needs: sockets, other programs, other processes, and ways around these rules.
+# System calls that readers do not need: sockets, other programs and processes, and ways around these rules.
 _REFUSED_CALLS = (
     "socket", "socketpair", "connect", "bind", "sendto", "sendmsg", "sendmmsg",
     "execve", "execveat", "ptrace", "process_vm_readv", "process_vm_writev", "pidfd_getfd", "pidfd_open",
@@ -29,16 +29,16 @@ _REFUSED_CALLS = (
 
 
 def confine(readable: Sequence[Path], writable_folder: Path) -> None:
-    """Give up what reading files does not need; for good, and for all that this process starts.
+    """Enter the sandbox, permanently and for all child processes.
 
     Args:
-        readable: files and folders that it may read. writable_folder: folder that it may write to, temporary files too.
+        readable: files and folders to read. writable_folder: folder to write to, also for temporary files.
     """
     tempfile.tempdir = str(writable_folder)
     disable_kernel_saving()
-    with suppress(OSError):  # if memory is short, this process goes first
+    with suppress(OSError):  # if memory is short, kill this process first
         Path("/proc/self/oom_score_adj").write_text("1000")
-    has_landlock, has_seccomp = _has_landlock(), _has_seccomp()  # what they look for cannot be found afterwards
+    has_landlock, has_seccomp = _has_landlock(), _has_seccomp()  # cannot be found inside the sandbox
     if has_landlock:
         _restrict_files(readable, writable_folder)
     if has_seccomp:
@@ -47,7 +47,7 @@ def confine(readable: Sequence[Path], writable_folder: Path) -> None:
 
 @cache
 def missing_features() -> tuple[str, ...]:
-    """What this machine cannot do of it, by name."""
+    """Sandbox features that this machine lacks, by name."""
     features = (("Landlock", _has_landlock()), ("seccomp", _has_seccomp()))
     return tuple(name for name, is_available in features if not is_available)
 
@@ -87,7 +87,7 @@ def _restrict_files(readable: Sequence[Path], writable_folder: Path) -> None:
     with Ruleset(scoped=Scope.ABSTRACT_UNIX_SOCKET | Scope.SIGNAL) as rules:
         for path in _program():
             rules.allow_path(path, (read | AccessFS.EXECUTE) if path.is_dir() else AccessFS.READ_FILE)
-        for path in filter(Path.exists, readable):  # what has gone meanwhile its reader misses in words
+        for path in filter(Path.exists, readable):  # a file deleted meanwhile is reported by its reader
             rules.allow_path(path, read if path.is_dir() else AccessFS.READ_FILE)
         rules.allow_path(writable_folder, write)
         rules.restrict()
@@ -95,7 +95,7 @@ def _restrict_files(readable: Sequence[Path], writable_folder: Path) -> None:
 
 @cache
 def _program() -> tuple[Path, ...]:
-    """Where the interpreter, the packages and the compiled kernels lie."""
+    """Folders of the interpreter, the packages and the compiled kernels."""
     roots = [Path(sys.prefix), Path(sys.base_prefix), *map(Path, _SYSTEM)]
     roots += [Path(entry) for entry in sys.path if Path(entry).name in ("site-packages", "dist-packages")]
     roots += [Path(sys.modules[name].__path__[0]) for name in _PACKAGES if name in sys.modules]
@@ -108,13 +108,13 @@ def _restrict_syscalls() -> None:
 
     rules = pyseccomp.SyscallFilter(pyseccomp.ALLOW)
     for name in _REFUSED_CALLS:
-        with suppress(OSError, ValueError):  # a call that this machine does not know
+        with suppress(OSError, ValueError):  # unknown on this machine
             rules.add_rule(pyseccomp.ERRNO(errno.EPERM), name)
     rules.load()
 
 
 def environment() -> dict[str, str]:
-    """What of this process's environment such a process is given: nothing that could be a password or a key."""
+    """Environment variables for such a process: none that could contain a password or key."""
     return {name: os.environ[name] for name in _ENVIRONMENT if name in os.environ}
 
 
@@ -123,4 +123,4 @@ _ENVIRONMENT = (
     "PYTHONPATH", "PYTHONHOME", "PYTHONDONTWRITEBYTECODE", "PYTHONUNBUFFERED", "PYTHONWARNINGS",
     "NUMBA_CACHE_DIR", "NUMBA_CPU_NAME",
 )  # fmt: skip
-"""Names of variables that say where the program lies and how it speaks."""
+"""Variables with paths of the program, and its language."""

@@ -1,6 +1,6 @@
-"""Large answers that many may ask for: written to a file once, from which they are read as far as a client takes them.
+"""Large responses for many clients: written to a file once, and read at the speed of each client.
 
-A slow client holds a piece of a file, not a copy of the answer.
+A slow client holds one chunk of a file, not a copy of the response.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Content = bytes | NDArray[Any]
 
 
 class _File:
-    """An answer in a file without a name, which goes with the last who reads it."""
+    """A response in an unnamed file, deleted with its last reader."""
 
     def __init__(self, folder: Path, content: Content) -> None:
         with np.ascontiguousarray(content).data if isinstance(content, np.ndarray) else memoryview(content) as data:
@@ -38,7 +38,7 @@ class _File:
                     written += self._file.write(flat[written:])
 
     async def chunks(self, threads: CapacityLimiter) -> AsyncIterator[bytes]:
-        """All of it, as fast as they are taken. threads: that read."""
+        """Yield the content. threads: limits concurrent reads."""
         offset = 0
         while offset < self.num_bytes:
             piece = await run_sync(os.pread, self._file.fileno(), PIECE_BYTES, offset, limiter=threads)
@@ -47,10 +47,10 @@ class _File:
 
 
 class Answers:
-    """Those of one server. Used from the event loop only.
+    """Large responses of one server. Event loop only.
 
     Args:
-        folder: on whose disk they lie.
+        folder: on the disk for the files.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -61,7 +61,7 @@ class Answers:
     async def stream(
         self, key: Hashable, make: Callable[[], Content], media_type: str, headers: Mapping[str, str]
     ) -> StreamingResponse:
-        """An answer that is the same for all who ask by the same key. make: makes it, in a thread; it may raise."""
+        """Stream the response for a key, shared by all requests. make: creates the content, in a thread; may raise."""
         file = self._files.get(key)
         if file is None:
             file = await self._single_flight.run(key, lambda: _File(self._folder, make()))
@@ -70,5 +70,5 @@ class Answers:
         return StreamingResponse(file.chunks(self._readers), media_type=media_type, headers={**headers, **length})
 
     def close(self) -> None:
-        """Make no more."""
+        """Create no more."""
         self._single_flight.close()

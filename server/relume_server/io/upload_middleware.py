@@ -1,6 +1,6 @@
-"""Where uploads come in: room for one is there before any of its body is read, and so many of one user at once.
+"""Uploads: space is reserved before the body is read, and uploads per user are limited.
 
-Pure ASGI, behind the gate, which knows who calls: FastAPI reads the whole body before a route is asked.
+Pure ASGI, behind authentication, which identifies the caller: FastAPI reads the whole body before it calls a route.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from relume_server.request_limits import UPLOADS
 MEASURED = "/api/materials/measured"
 UPLOADS_AT_ONCE, UPLOADS_EACH = 64, 8
 STEP_BYTES = 16 << 20
-"""Held at a time of a body that does not say how large it is."""
+"""Reserved at a time for a body without a Content-Length."""
 _RESERVATION_KEY = "relume.reservation"
 _Refusal = QuotaError | NearlyFullError
 
 
 class UploadMiddleware:
-    """The middleware behind the gate.
+    """Middleware for uploads.
 
     Args:
-        access: asked for with each upload, because it is opened after the app is made.
-        max_per_user: uploads of one user at once; more of them wait. weights: turns of some users.
+        app: to protect. access: called for each upload, because it is opened after the app is created.
+        max_per_user: concurrent uploads of one user; others wait. weights: of users in scheduling.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class UploadMiddleware:
         self._slots = Slots(UPLOADS_AT_ONCE, max_per_user, weights)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Hand on; an upload with what it may take, which is let go when it is answered."""
+        """Forward the request; for an upload with a reservation, which is released after the response."""
         if scope["type"] != "http" or scope["method"] != "POST" or scope["path"] not in (*UPLOADS, MEASURED):
             await self._app(scope, receive, send)
             return
@@ -54,12 +54,12 @@ class UploadMiddleware:
             try:
                 await _Upload(reservation, scope).forward(self._app, receive, send)
             finally:
-                with CancelScope(shield=True):  # whoever has gone takes nothing any more
+                with CancelScope(shield=True):  # the client is gone
                     await run_sync(reservation.release)
 
 
 class _Upload:
-    """One of them, as its body comes in."""
+    """One upload while its body is received."""
 
     def __init__(self, reservation: Reservation, scope: Scope) -> None:
         self._reservation, self._scope = reservation, scope
@@ -69,7 +69,7 @@ class _Upload:
         self._refusal: _Refusal | None = None
 
     async def forward(self, app: ASGIApp, receive: Receive, send: Send) -> None:
-        """Hand it on, unless there is no room for it; said on the way whatever the app makes of that."""
+        """Forward the upload, unless there is no space; an error on the way overrides the app's response."""
 
         async def counted() -> Message:
             message = await receive()
@@ -90,7 +90,7 @@ class _Upload:
             if self._refusal is None or self._is_started:
                 raise
         if self._refusal is not None and not self._is_started:
-            close = {"Connection": "close"}  # what is left of the body is not read
+            close = {"Connection": "close"}  # the rest of the body is not read
             await problem_response(make_problem(self._refusal), close)(self._scope, receive, send)
 
     async def _reserve(self, num_bytes: int) -> None:
@@ -107,4 +107,4 @@ def _get_reservation(request: Request) -> Reservation:
 
 
 ReservationDep = Annotated[Reservation, Depends(_get_reservation)]
-"""What an upload's route may let it take."""
+"""Reservation of an upload, for routes."""

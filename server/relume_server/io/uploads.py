@@ -1,4 +1,4 @@
-"""Uploaded files, kept under names of our own."""
+"""Uploaded files under server-chosen names."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ COPY_BYTES = 1 << 20
 
 
 def save_upload(upload: UploadFile, path: Path) -> Path:
-    """The upload as a file of our own name; its size was bounded while it streamed in."""
+    """Save an upload under `path`; its size was limited while it streamed in."""
     with path.open("wb") as file:
         shutil.copyfileobj(upload.file, file, COPY_BYTES)
     return path
 
 
 def upload_bytes(*uploads: UploadFile | None) -> int:
-    """Size of what was sent."""
+    """Total size of uploads, in bytes."""
     return sum(upload.size or 0 for upload in uploads if upload is not None)
 
 
 def plain_name(filename: str | None) -> str:
-    """The uploaded file's name without folders; empty where nothing printable is left."""
+    """File name of an upload without folders; empty if no printable characters are left."""
     return _printable(_base_name(filename))
 
 
 def plain_stem(filename: str | None) -> str:
-    """A name from the uploaded file's, without its suffix; empty where nothing printable is left."""
+    """File name of an upload without suffix; empty if no printable characters are left."""
     return _printable(_base_name(filename).rsplit(".", 1)[0])
 
 

@@ -1,4 +1,4 @@
-"""Videos of numbered frames, by the program ffmpeg, which must be installed where the server runs."""
+"""Videos from numbered frames, with the installed program ffmpeg."""
 
 from __future__ import annotations
 
@@ -10,31 +10,30 @@ from pathlib import Path
 from relume.core.errors import CancelledError, ParameterError, RelumeError
 from relume.core.filesystem import atomic_write
 
-_ASK_S = 0.2
-_MAX_OUTPUT_CHARS = 300  # characters of what the program says
+_POLL_S = 0.2
+_MAX_OUTPUT_CHARS = 300  # characters of the program's output
 
 
 def check_encoder() -> str:
-    """Path of the program. Raises ParameterError where there is none."""
+    """Path of ffmpeg. Raises ParameterError if it is not installed."""
     encoder_path = shutil.which("ffmpeg")
     if encoder_path is None:
-        raise ParameterError("format", "mp4", "exr, png or webp; for mp4 ffmpeg must be installed on the server")
+        raise ParameterError("format", "mp4", "exr, png or webp; mp4 needs ffmpeg on the server")
     return encoder_path
 
 
 def write_video(frames: Path, fps: int, target: Path, is_canceled: Callable[[], bool]) -> None:
-    """Encode 0000.png, 0001.png, … of a folder as H.264; the file appears whole or not at all.
+    """Encode 0000.png, 0001.png, … of a folder as H.264; the file appears when it is complete.
 
-    Its colours are those of Rec. 709 by that standard's matrix, with sRGB's curve, and the file says so: of a file that
-    does not, players guess by its size.
+    Colors are Rec. 709, with its matrix and the sRGB curve, and tagged: without tags players guess from the image size.
 
     Args:
-        frames: the folder. fps: frames a second. target: file that ends in .mp4.
-        is_canceled: asked now and then.
+        frames: folder. fps: frames per second. target: file that ends in .mp4.
+        is_canceled: polled.
     Raises:
-        ParameterError: there is no encoder. CancelledError: `is_canceled` said so. RelumeError: it failed.
+        ParameterError: there is no encoder. CancelledError: `is_canceled` returned true. RelumeError: encoding failed.
     """
-    pad_filter = "pad=ceil(iw/2)*2:ceil(ih/2)*2"  # its colours are halved both ways
+    pad_filter = "pad=ceil(iw/2)*2:ceil(ih/2)*2"  # colors are subsampled in both directions
     matrix_filter = "scale=out_color_matrix=bt709:out_range=tv"
     with atomic_write(target) as unfinished:
         command = [
@@ -44,25 +43,25 @@ def write_video(frames: Path, fps: int, target: Path, is_canceled: Callable[[], 
             "-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "iec61966-2-1", "-color_range", "tv",
             "-movflags", "+faststart", "-f", "mp4", str(unfinished),
         ]  # fmt: skip
-        # nothing of it is a user's but a number
+        # no user input but a number
         with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:  # noqa: S603
             while True:
                 try:
-                    _, output = process.communicate(timeout=_ASK_S)
+                    _, output = process.communicate(timeout=_POLL_S)
                     break
                 except subprocess.TimeoutExpired:
                     if is_canceled():
                         process.kill()
-                        raise CancelledError("the video was cancelled") from None
+                        raise CancelledError("the video was canceled") from None
         if process.returncode != 0:
             raise RelumeError(f"ffmpeg could not make the video: {_failure_reason(process.returncode, output)}")
 
 
 def _failure_reason(code: int, output: str) -> str:
-    """What a program says of its failure, or what becomes of it where it says nothing."""
+    """Describe the failure of a program by its output, or by its exit code."""
     if code < 0:
-        return f"it was ended by signal {-code}, perhaps for want of memory; free some, then ask again"
+        return f"it was killed by signal {-code}, perhaps because memory ran out; free some, then try again"
     return (
         output.strip()[-_MAX_OUTPUT_CHARS:]
-        or f"it ended with {code} and said nothing; look into the disk's room, then ask again"
+        or f"it ended with {code} without output; check the free disk space, then try again"
     )

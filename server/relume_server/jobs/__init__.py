@@ -1,1 +1,1 @@
-"""Jobs that take minutes and outlive the server: renders, comparisons, BTF compression."""
+"""Jobs that take minutes and survive restarts: renders, comparisons, BTFs."""

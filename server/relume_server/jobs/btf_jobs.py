@@ -1,4 +1,4 @@
-"""BTFs that are made or imported: rendered from a small geometry, or compressed from images that were sent."""
+"""BTF jobs: render a BTF from a small geometry, or compress one from uploaded images."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ BtfJob = Job[BtfRequest]
 
 
 class BtfQueue(JobQueue[BtfRequest]):
-    """BTFs in the database, what is found so far in `data`/btf-jobs/<id>/; all of one is a step, done in turns."""
+    """BTF jobs in the database, with files in `data`/btf-jobs/<id>/; one step per job, which can be interrupted."""
 
     row, noun, request_type = BtfRow, "BTF", BtfRequest
     resumable = ("stopped",)
@@ -39,48 +39,48 @@ class BtfQueue(JobQueue[BtfRequest]):
     ) -> None:
         """
         Args:
-            sessions: of the database. data: directory of what is made.
-            run: does the steps. quota: how much may wait.
-            report_ready: called with the id of a work that is done, that of the BTF, and how many bytes it takes.
-            report_failed: called with the id of a work that has failed; nothing of it takes bytes any more.
+            sessions: of the database. data: data directory.
+            run: runs steps. quota: limits of the queue.
+            report_ready: called with the ids of a finished job and of its BTF, and its size in bytes.
+            report_failed: called with the id of a failed job; it takes no more space.
         """
         super().__init__(sessions, data / "btf-jobs", run, quota)
         self._btfs, self._report_ready, self._report_failed = btfs_path(data), report_ready, report_failed
 
     def steps(self, request: BtfRequest) -> int:
-        """One, which keeps what it has found when it is stopped."""
+        """One step, which saves partial results when it is interrupted."""
         return 1
 
     def step_s(self, request: BtfRequest) -> float | None:
-        """Two of them have little in common."""
+        """None: BTFs have little in common."""
         return None
 
     def is_first(self, request: BtfRequest) -> bool:
-        """Images are compressed in a tenth of the time that rendering them takes."""
+        """Compression first: it takes a tenth of the time of rendering."""
         return request.geometry is None
 
     def material(self, identity: str) -> str | None:
-        """Id of the BTF that a work has made; None where it is not ready."""
+        """Id of the BTF that a job has made; None if it is not ready."""
         path = self.folder / identity / RESULT_FILE
         return str(json.loads(path.read_text())["material"]) if path.exists() else None
 
     def step(self, job: BtfJob, timer: StepTimer) -> int:
-        """Make it, or go on with it for a while."""
+        """Start or resume the job, for a while."""
         folder = self.folder / job.id
         self.record_progress(job.id, 0)
         values = {"request": job.request.model_dump(mode="json"), "folder": str(folder)}
         if not self.run_in_process(job, "BTF", values, timer.report)["is_done"]:
             return 0
-        self.record_progress(job.id, 0)  # the lease may be lost since
+        self.record_progress(job.id, 0)  # the lease may be lost by now
         if (material := self.material(job.id)) is not None:
             self._report_ready(job.id, material, folder_bytes(self._btfs / material))
         return 1
 
     def on_ready(self, job: BtfJob) -> None:
-        """Let go what was sent: the material is there."""
+        """Delete the uploads: the BTF is stored."""
         (self.folder / job.id / UPLOAD_FILE).unlink(missing_ok=True)
 
     def on_failed(self, job: BtfJob) -> None:
-        """Let go what was sent: nobody can go on with it."""
+        """Delete the uploads: the job cannot be resumed."""
         shutil.rmtree(self.folder / job.id, ignore_errors=True)
         self._report_failed(job.id)

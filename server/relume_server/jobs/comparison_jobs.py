@@ -1,4 +1,4 @@
-"""How true a bake's frame is: passes of brute force, one after another, and what they say of the frame so far."""
+"""Comparisons: reference passes, one after another, and the error of a bake's frame so far."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from relume_server.persistence.tables import ComparisonRow
 from relume_server.schemas.base import Body
 from relume_server.schemas.bodies import ComparisonFigures, ComparisonRequest
 
-ANSWER_S = 1.5  # who asks how long it takes wants to know at once
-DEFAULT_PIXEL_S = 5e-4  # of a pass, before any was measured: of the built-in scenes, by one core
+ANSWER_S = 1.5  # estimates must answer quickly
+DEFAULT_PIXEL_S = 5e-4  # of one pass on one core, before any measurement: from the built-in scenes
 ComparisonJob = Job[ComparisonRequest]
 _Kind = tuple[str, str, tuple[int, int] | None, str]
 
 
 class Figures(Body):
-    """What a comparison has found; fields as of `ComparisonBody`."""
+    """Results of a comparison; fields as in `ComparisonBody`."""
 
     omitted_paths: Annotated[list[str], Field(default_factory=list)]
     unsupported_paths: Annotated[list[str], Field(default_factory=list)]
@@ -36,22 +36,22 @@ class Figures(Body):
 
 
 class DurationEstimate(NamedTuple):
-    """How long something will take. is_measured: judged by passes of the same view, not of others."""
+    """Estimated duration. is_measured: from passes of the same view."""
 
     seconds: float
     is_measured: bool
 
 
 class ComparisonQueue(JobQueue[ComparisonRequest]):
-    """Comparisons in the database, what they found in `data`/comparisons/<id>/; a step is a pass."""
+    """Comparisons in the database, with files in `data`/comparisons/<id>/; a step is one pass."""
 
     row, noun, request_type = ComparisonRow, "comparison", ComparisonRequest
 
     def __init__(self, sessions: sessionmaker[Session], data: Path, run: RunStep, quota: Quota) -> None:
         """
         Args:
-            sessions: of the database. data: directory of scenes, bakes and what is found.
-            run: does the steps. quota: how much may wait.
+            sessions: of the database. data: data directory.
+            run: runs steps. quota: limits of the queue.
         """
         super().__init__(sessions, data / "comparisons", run, quota)
         self._pass_s: dict[_Kind, float] = {}
@@ -60,25 +60,25 @@ class ComparisonQueue(JobQueue[ComparisonRequest]):
         self._sample: Future[None] | None = None
 
     def steps(self, request: ComparisonRequest) -> int:
-        """The passes."""
+        """Number of passes."""
         return request.passes
 
     def step_s(self, request: ComparisonRequest) -> float | None:
-        """As passes of this view took before."""
+        """Mean time of earlier passes of this view."""
         return self._pass_s.get(_kind(request))
 
     def is_first(self, request: ComparisonRequest) -> bool:
-        """All of them take their time."""
+        """False: all comparisons take long."""
         return False
 
     def estimate_duration(self, request: ComparisonRequest, num_pixels: int) -> DurationEstimate:
-        """What a comparison will take, told within `ANSWER_S` seconds.
+        """Estimate the duration of a comparison, within `ANSWER_S` seconds.
 
-        As passes of this view took before, or as a small picture takes now; until that is done, and where another view
-        is being tried out, as passes of other views took.
+        From earlier passes of this view, or from a small image that is rendered now; until that is done, and while
+        another view is measured, from passes of other views.
 
         Args:
-            num_pixels: of the picture that is compared.
+            request: the comparison. num_pixels: of the image.
         """
         key = _kind(request)
         if key not in self._pass_s:
@@ -89,7 +89,7 @@ class ComparisonQueue(JobQueue[ComparisonRequest]):
         return DurationEstimate(request.passes * pass_s, is_measured=key in self._pass_s)
 
     def _await_sample(self, key: _Kind, request: ComparisonRequest) -> None:
-        """Have a small picture made where none is being made, and wait for it a little. Raises what making it did."""
+        """Start rendering a small image unless one is in progress, and wait a little for it. Raises its exceptions."""
 
         def sample() -> None:
             step = Step("time of a pass", is_first=True, values={"request": request.model_dump(mode="json")})
@@ -103,24 +103,25 @@ class ComparisonQueue(JobQueue[ComparisonRequest]):
             pending.result(ANSWER_S)
 
     def close(self) -> None:
-        """See `JobQueue`."""
+        """Stop the queue, see `JobQueue`."""
         super().close()
         self._sampler.shutdown()
 
     def picture_path(self, identity: str, name: str) -> Path:
-        """File of a picture, there or not: "error" or "reference" of the paths that were asked for, "method-error" or
-        "method-reference" of those that the method follows."""
+        """Image file, existing or not: "error" or "reference" for the requested paths, "method-error" or
+        "method-reference" for the paths of the bake's method.
+        """
         if self.get(identity).request.paths == "method":
             name = name.removeprefix("method-")
         return self.folder / identity / f"{name}.png"
 
     def figures(self, identity: str) -> Figures:
-        """What the passes so far say of the frame."""
+        """Errors of the frame from the passes so far."""
         path = self.folder / identity / FIGURES
         return Figures.model_validate_json(path.read_text()) if path.exists() else Figures.model_validate({})
 
     def step(self, job: ComparisonJob, timer: StepTimer) -> int:
-        """Make the frame where it is missing, and a pass."""
+        """Render the frame if it is missing, and one pass."""
         request = job.request
         values: dict[str, Any] = {"request": request.model_dump(mode="json"), "folder": str(self.folder / job.id)}
         self.record_progress(job.id, job.completed)
@@ -135,5 +136,5 @@ class ComparisonQueue(JobQueue[ComparisonRequest]):
 
 
 def _kind(request: ComparisonRequest) -> _Kind:
-    """Passes of one kind take about as long as each other, wherever an eye is that moves."""
+    """Key of comparisons whose passes take about the same time, for any position of a free camera."""
     return request.bake, request.view, request.size, request.paths

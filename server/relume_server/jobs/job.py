@@ -1,4 +1,4 @@
-"""One long work as everybody outside of the queue sees it, and how much of it there may be."""
+"""State of a job, and the limits of a queue."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Request = TypeVar("Request", bound=BaseModel)
 
 @dataclass(frozen=True)
 class Quota:
-    """How much work of one kind may wait or run: of all clients together, and of each; and whose turns are how many.
+    """Limits of queued and running jobs of one kind, in total and per client, and the clients' weights.
 
     Attributes:
         weights: see `relume_worker.fair_share.FairShare`.
@@ -30,14 +30,14 @@ class Quota:
 
 @dataclass(frozen=True)
 class Job(Generic[Request]):
-    """One row at one moment.
+    """State of one row.
 
     Attributes:
-        request: the body of the call that asked for it. user: who called; "" where nobody logs in.
-        completed, total: steps. progress: 0…1; what is done of the step at hand counts too.
-        seconds_left: None where the work does not run, or nothing was measured yet.
-        problem: why it failed, one sentence.
-        created, started, ended: seconds since 1970; None: not yet, or an older relume has not written it down.
+        request: body of the call. user: caller; "" without login.
+        completed, total: steps. progress: 0…1, including part of the current step.
+        seconds_left: None if the job is not running, or nothing has been measured yet.
+        problem: cause of the failure, one sentence.
+        created, started, ended: seconds since 1970; None: not yet, or the row is of an older version.
     """
 
     id: str
@@ -56,7 +56,7 @@ class Job(Generic[Request]):
 
 @dataclass(frozen=True)
 class JobFilter:
-    """Which works a list shows; None: any. bake, name: of their requests."""
+    """Filter of a list of jobs; None: any. bake, name: of their requests."""
 
     state: str | None = None
     user: str | None = None
@@ -65,5 +65,5 @@ class JobFilter:
 
 
 def new_id() -> str:
-    """A name for a work."""
+    """Create an id for a job."""
     return secrets.token_hex(8)

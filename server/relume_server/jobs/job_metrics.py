@@ -1,4 +1,4 @@
-"""How much long work waits and runs, of each kind."""
+"""Number of queued and running jobs by kind."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _STATES = ("queued", "running")
 
 
 def count_jobs(sessions: sessionmaker[Session]) -> Mapping[tuple[str, str], int]:
-    """Rows by kind and state, "queued" or "running"."""
+    """Count rows by kind and state, "queued" or "running"."""
     counts = {(kind, state): 0 for kind in _ROWS for state in _STATES}
     with sessions() as session:
         for kind, row in _ROWS.items():

@@ -1,12 +1,12 @@
-"""The one queue of long work: rows of a table, and one thread that has them done step by step, in fair turns.
+"""Job queue: rows of a table, and one thread that runs them step by step with fair scheduling.
 
-A row is queued, running, ready, failed or stopped. Several servers may share the rows and the folder of their files:
-who does a step holds the row's lease meanwhile. What a killed server left is gone on with by another, or at the next
-start; the work itself must keep on disk what it has done.
+A row is queued, running, ready, failed or stopped. Several servers may share the rows and the files: the one that runs
+a step has the row's lease meanwhile. Another server, or the next start, resumes the jobs of a killed server; jobs must
+save their finished steps on disk.
 
-Libraries for this (Celery, Dramatiq, RQ, Huey) run functions in processes of their own behind a broker. Here the row is
-what REST answers, stops, resumes and forgets, clients have their turns between the steps of one work, a step yields to
-every hand that drags, and a server needs nothing beside its database.
+Libraries for this (Celery, Dramatiq, RQ, Huey) run functions in separate processes behind a broker. Here the row is the
+REST resource, clients are scheduled between the steps of one job, a step yields to every active control, and a server
+needs nothing but its database.
 """
 
 from __future__ import annotations
@@ -44,26 +44,25 @@ _CHECK_INTERVAL_S = 0.1
 
 
 class JobQueue(ABC, Generic[Request]):
-    """Work of one kind; its files lie in `folder`/<id>/.
+    """Jobs of one kind; their files are in `folder`/<id>/.
 
-    A kind says which table its rows are in, what people call one of them, what a request is, how many steps it takes,
-    which go first, and how a step is done.
+    A subclass defines the table, the noun for messages, the request, the number of steps, the priority, and a step.
 
-    Only who holds the lease of a row changes its state, its files and its quota. A server that was paused for longer
-    than the lease finds that out by its next statement on the row, and drops what it was doing.
+    Only the owner of a row's lease changes its state, its files and its quota. A server that was suspended for longer
+    than the lease notices at its next statement on the row, and drops its work.
     """
 
     row: ClassVar[type[JobRow]]
     noun: ClassVar[str]
     request_type: type[Request]
     resumable: ClassVar[Sequence[str]] = ("stopped", "failed")
-    """States from which it can go on: its files are still there."""
+    """States from which a job can be resumed: its files are still there."""
 
     def __init__(self, sessions: sessionmaker[Session], folder: Path, run: RunStep, quota: Quota) -> None:
         """
         Args:
-            sessions: of the database. folder: made where it is missing.
-            run: does a step, apart from this process. quota: how much may wait.
+            sessions: of the database. folder: created if missing.
+            run: runs a step in another process. quota: limits of the queue.
         """
         self._sessions, self.folder, self.run, self._quota = sessions, folder, run, quota
         self._owner = new_owner()
@@ -75,49 +74,49 @@ class JobQueue(ABC, Generic[Request]):
 
     @abstractmethod
     def steps(self, request: Request) -> int:
-        """How many steps a request takes, at least one."""
+        """Number of steps of a request, at least one."""
 
     @abstractmethod
     def step_s(self, request: Request) -> float | None:
-        """Seconds that a step of such a request has taken before; None where that is not known."""
+        """Seconds per step of earlier requests like this; None if unknown."""
 
     @abstractmethod
     def is_first(self, request: Request) -> bool:
-        """Whether it is so small that it goes before all others."""
+        """True for small requests, which go first."""
 
     @abstractmethod
     def step(self, job: Job[Request], timer: StepTimer) -> int:
-        """Do what comes next; calls `note` before, and tells `timer`.
+        """Run the next step; call `note` first, and report to `timer`.
 
         Returns:
-            How many steps are done now; as many as there are: all is.
+            The number of finished steps; the total if the job is finished.
         Raises:
-            CancelledError: it is not wanted any more.
+            CancelledError: the job is no longer wanted.
         """
 
     def on_failed(self, job: Job[Request]) -> None:
-        """Called when the row says so, of whoever held the lease: most kinds keep what they have."""
+        """Called after the row has failed, by the owner of the lease; by default files are kept."""
 
     def on_ready(self, job: Job[Request]) -> None:
-        """Called when the row says so, of whoever held the lease: most kinds keep what they have."""
+        """Called after the row is ready, by the owner of the lease; by default files are kept."""
 
     def run_in_process(
         self, job: Job[Request], kind: str, values: Mapping[str, Any], report: Callable[[float], object]
     ) -> Mapping[str, Any]:
-        """Have a step of work done in another process, for as long as it is wanted.
+        """Run a step in another process, while the job is wanted.
 
         Args:
-            job: whose step it is. kind, values: of the step. report: called with the share done.
+            job: of the step. kind, values: of the step. report: called with the fraction done.
         """
         step = Step(kind, self.is_first(job.request), values, (str(self.folder / job.id), self._owner))
         return self.run(step, report, lambda: self.is_needed(job.id))
 
     def start(self) -> None:
-        """Go on with what was left."""
+        """Start the thread, which resumes unfinished jobs."""
         self._thread.start()
 
     def close(self) -> None:
-        """Finish the step at hand and stop; the rest is for the next start."""
+        """Finish the current step and stop; the rest is resumed at the next start."""
         self._closing.set()
         self._wake.set()
         self._thread.join(timeout=30)
@@ -129,16 +128,16 @@ class JobQueue(ABC, Generic[Request]):
         prepare: Callable[[Path], object] | None = None,
         identity: str | None = None,
     ) -> str:
-        """Queue a request that was checked.
+        """Queue a validated request.
 
         Args:
-            request: what is asked for. client: who asks; clients have their turns one after another.
-            prepare: puts what the work needs into its folder, quickly.
-            identity: from `new_id`, where somebody has to know it before the work may begin.
+            request: body of the call. client: caller; clients are scheduled fairly.
+            prepare: writes the job's inputs into its folder; quick.
+            identity: from `new_id`, if the caller needs the id before the job can start.
         Returns:
-            The id of the work.
+            The id of the job.
         Raises:
-            BusyError, QuotaError: enough waits or runs already, of all or of this client.
+            BusyError, QuotaError: the limit of all jobs, or of this client, is reached.
         """
         identity, row = identity or new_id(), self.row
         with self._sessions.begin() as session:
@@ -155,18 +154,18 @@ class JobQueue(ABC, Generic[Request]):
         return identity
 
     def _check_quota(self, session: Session, client: str) -> None:
-        """Whether one more of a client may wait. Raises BusyError, QuotaError."""
+        """Check that a client may queue one more job. Raises BusyError, QuotaError."""
         quota = self._quota
         clients = session.scalars(select(self.row.client).where(self.row.state.in_(ACTIVE))).all()
         if len(clients) >= quota.max_total:
-            text = f"as many {self.noun}s wait or run as may, {quota.max_total}; try again when some are done"
+            text = f"the limit of {quota.max_total} unfinished {self.noun}s is reached; try again later"
             raise BusyError(f"{text} (RELUME_MAX_QUEUED)")
         if sum((queued_client or "") == client for queued_client in clients) >= quota.max_per_client:
-            text = f"as many {self.noun}s of yours wait or run as may, {quota.max_per_client}; wait, or stop one"
+            text = f"you have reached the limit of {quota.max_per_client} unfinished {self.noun}s; wait, or stop one"
             raise QuotaError(f"{text} (RELUME_MAX_QUEUED_PER_USER)")
 
     def get(self, identity: str) -> Job[Request]:
-        """A row. Raises NotFoundError."""
+        """Return a job. Raises NotFoundError."""
         with self._sessions() as session:
             row = session.get(self.row, identity)
         if row is None:
@@ -184,11 +183,12 @@ class JobQueue(ABC, Generic[Request]):
     def page(
         self, job_filter: JobFilter, limit: int, after: tuple[float, str] | None = None, *, newest_first: bool = True
     ) -> list[Job[Request]]:
-        """Rows, newest first or last.
+        """List jobs, newest first or last.
 
         Args:
-            job_filter: are listed. limit: at most so many.
-            after: time of creation and id of the row after which the list begins; None: with the first.
+            job_filter: of the list. limit: maximum number.
+            after: time of creation and id of the row before the page; None: start with the first.
+            newest_first: order.
         """
         row = self.row
         query = _filtered(select(row), row, job_filter).limit(limit)
@@ -200,14 +200,14 @@ class JobQueue(ABC, Generic[Request]):
             return [self._job(each) for each in session.scalars(query.order_by(created, row.id))]
 
     def referencing(self, text: str) -> list[str]:
-        """Ids of work that waits or goes on whose request holds a text, oldest first."""
+        """Ids of queued and running jobs whose request contains a text, oldest first."""
         row = self.row
         query = select(row.id).where(row.state.in_(ACTIVE), row.request.contains(text, autoescape=True))
         with self._sessions() as session:
             return list(session.scalars(query.order_by(row.created)))
 
     def delete(self, identity: str) -> None:
-        """Stop the work and forget its files. Raises NotFoundError."""
+        """Stop a job and delete its files. Raises NotFoundError."""
         self.get(identity)
         with self._sessions.begin() as session:
             if (row := session.get(self.row, identity)) is not None:
@@ -215,26 +215,26 @@ class JobQueue(ABC, Generic[Request]):
         shutil.rmtree(self.folder / identity, ignore_errors=True)
 
     def stop(self, identity: str) -> None:
-        """End work that waits or goes on; its files stay, `resume` goes on with them. Raises NotFoundError."""
+        """Stop a queued or running job; its files stay for `resume`. Raises NotFoundError."""
         self.get(identity)
         self._update(identity, ACTIVE, state="stopped", ended=time.time())
 
     def resume(self, identity: str) -> None:
-        """Queue what was stopped or has failed again; what waits or runs stays as it is.
+        """Queue a stopped or failed job again; no effect on a queued or running one.
 
         Raises:
-            NotFoundError. NotReadyError: it is ready, or its files are gone. BusyError, QuotaError: as `submit`.
+            NotFoundError. NotReadyError: it is ready, or its files are deleted. BusyError, QuotaError: as `submit`.
         """
         job = self.get(identity)
         if job.state not in ACTIVE:
             self.requeue(job, self.resumable)
 
     def requeue(self, job: Job[Request], states: Sequence[str], prepare: Callable[[], object] = lambda: None) -> None:
-        """Queue a work that is in one of some states again.
+        """Queue a job in one of some states again.
 
         Args:
-            job: as it was found. states: from which it may be queued.
-            prepare: called before anybody can begin with it.
+            job: as read. states: from which it may be queued.
+            prepare: called before it can start.
         Raises:
             NotReadyError: it is in another state. BusyError, QuotaError: as `submit`.
         """
@@ -251,22 +251,21 @@ class JobQueue(ABC, Generic[Request]):
         self._wake.set()
 
     def record_progress(self, identity: str, done: int) -> None:
-        """Record progress. Raises CancelledError where the work was stopped, its row deleted, or the server closes."""
+        """Record progress. Raises CancelledError if the job was stopped or deleted, or the server is closing."""
         if not self._update_leased(identity, state="running", done=done) or self.is_closing:
             raise CancelledError(f"the {self.noun} was stopped")
 
     @property
     def is_closing(self) -> bool:
-        """Whether the work at hand should stop."""
+        """True if the current step should stop."""
         return self._closing.is_set()
 
     def is_needed(self, identity: str) -> bool:
-        """Whether nobody had stopped the work, deleted its row or taken it over some moments ago, and the server goes
-        on."""
+        """True unless the job was stopped, deleted or taken over a moment ago, or the server is closing."""
         if self.is_closing:
             return False
         if self._needed_until[0] == identity and time.monotonic() < self._needed_until[1]:
-            return True  # work asks thousands of times a second
+            return True  # steps ask thousands of times per second
         with self._sessions() as session:
             row = session.get(self.row, identity)
             is_active = row is not None and row.state in ACTIVE and row.owner == self._owner
@@ -274,7 +273,7 @@ class JobQueue(ABC, Generic[Request]):
         return is_active
 
     def _update_leased(self, identity: str, **values: Any) -> bool:
-        """Change a row that is under way, and whose lease is here. False where it is not any more."""
+        """Change a running row whose lease is here. False if it is not any more."""
         return self._update(identity, ACTIVE, self.row.owner == self._owner, **values)
 
     def _update(self, identity: str, states: Sequence[str], *conditions: Any, **values: Any) -> bool:
@@ -289,16 +288,16 @@ class JobQueue(ABC, Generic[Request]):
                 identity = self._next()
                 self._outage.report_recovered()
                 if identity is not None:
-                    with suppress(NotFoundError):  # somebody has deleted it since
+                    with suppress(NotFoundError):  # deleted in the meantime
                         self._do(self.get(identity))
                     continue
-            except Exception as error:  # the database may be away for a while; the thread must outlive that
+            except Exception as error:  # the thread must survive an unavailable database
                 self._outage.report_failure(error)
             self._wake.wait(timeout=_POLL_INTERVAL_S)
             self._wake.clear()
 
     def _next(self) -> str | None:
-        """Take the lease of the row whose turn it is, of those that nobody works on; None where there is none."""
+        """Take the lease of the next row without a live owner; None if there is none."""
         row = self.row
         columns = row.id, row.client, row.is_first, row.created, row.owner, row.heartbeat  # requests may be large
         query = select(*columns, epoch_s().label("now")).where(row.state.in_(ACTIVE))
@@ -331,7 +330,7 @@ class JobQueue(ABC, Generic[Request]):
         self._update(identity, STATES, self.row.owner == owner, heartbeat=epoch_s())
 
     def _do(self, job: Job[Request]) -> None:
-        """A step of one row; every failure ends in it as a sentence."""
+        """Run a step of one row; every error ends up in the row as a sentence."""
         folder = self.folder / job.id
         timer = self._timers.setdefault(job.id, StepTimer(self.step_s(job.request)))
         timer.start()
@@ -343,7 +342,7 @@ class JobQueue(ABC, Generic[Request]):
             self._record_step(job, done)
         except CancelledError:  # closing, stopped, deleted, or taken over
             pass
-        except OperationalError:  # the database is away: the step is done again, and finds what is on the disk
+        except OperationalError:  # the database is unavailable: the step runs again, and finds its results on the disk
             raise
         except Exception as error:
             if not isinstance(error, RelumeError | OSError):
@@ -358,7 +357,7 @@ class JobQueue(ABC, Generic[Request]):
             log_lost_lease(self.noun, job.id)
 
     def _record_step(self, job: Job[Request], done: int) -> None:
-        """A step has ended; so many are done now."""
+        """Record a finished step; `done` steps are finished."""
         if done < job.total:
             self._update_leased(job.id, done=done)
         elif self._update_leased(job.id, done=done, state="ready", ended=time.time()):
@@ -378,7 +377,7 @@ def _num_changed(session: Session, statement: Any) -> int:
 
 
 def _filtered(query: Select[Any], row: type[JobRow], job_filter: JobFilter) -> Select[Any]:
-    """A query of the rows that a list shows; requests are JSON without blanks."""
+    """Filter a query of rows; requests are JSON without spaces."""
     if job_filter.state is not None:
         query = query.where(row.state == job_filter.state)
     if job_filter.user is not None:

@@ -1,4 +1,4 @@
-"""Batch renders: one frame after another; what is on disk is not painted again after a restart."""
+"""Batch renders, frame by frame; finished frames are not rendered again after a restart."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from relume_server.schemas.renders import RenderRequest
 
 RenderJob = Job[RenderRequest]
 HEAD_BYTES = 1 << 16
-"""More than a picture's file has besides its pixels."""
+"""Upper bound of an image file's size without pixels."""
 
 
 class RenderQueue(JobQueue[RenderRequest]):
-    """Batches in the database, pictures in `data`/renders/<id>/; a step is a picture."""
+    """Batches in the database, with images in `data`/renders/<id>/; a step is one image."""
 
     row, noun, request_type = RenderRow, "render", RenderRequest
 
@@ -37,59 +37,59 @@ class RenderQueue(JobQueue[RenderRequest]):
     ) -> None:
         """
         Args:
-            sessions: of the database. data: directory of bakes and pictures.
-            run: does the steps. quota: how much may wait. scene_name: of a bake's id.
-            report_bytes: told the id of a finished render, and what its files take, bytes.
+            sessions: of the database. data: data directory.
+            run: runs steps. quota: limits of the queue. scene_name: of a bake's id.
+            report_bytes: called with the id of a finished render, and the size of its files in bytes.
         """
         super().__init__(sessions, data / "renders", run, quota)
         self._scene_name, self._report_bytes = scene_name, report_bytes
 
     def steps(self, request: RenderRequest) -> int:
-        """One for each frame."""
+        """One step per frame."""
         return request.num_frames
 
     def step_s(self, request: RenderRequest) -> float | None:
-        """Pictures of two batches have little in common."""
+        """None: images of different batches have little in common."""
         return None
 
     def frame_path(self, job: RenderJob, index: int) -> Path:
-        """File of one picture, there or not."""
+        """File of one image, existing or not."""
         return self.folder / job.id / f"{index:04d}.{job.request.picture_format}"
 
     def download_name(self, job: RenderJob, index: int) -> str:
-        """What the file of one picture is called where it is saved."""
+        """Download name of one image."""
         number = f"-{index:04d}" if job.total > 1 else ""
         return f"{_stem(job)}{number}.{job.request.picture_format}"
 
     def archive_name(self, job: RenderJob) -> str:
-        """What the file of all pictures is called where it is saved."""
+        """Download name of the archive."""
         return f"{_stem(job)}.zip"
 
     def video_name(self, job: RenderJob) -> str:
-        """What the video is called where it is saved."""
+        """Download name of the video."""
         return f"{_stem(job)}.mp4"
 
     def video_path(self, job: RenderJob) -> Path:
-        """The finished batch as a video, where one was asked for."""
+        """File of the video."""
         return self.folder / job.id / "video.mp4"
 
     def archive_path(self, job: RenderJob) -> Path:
-        """The finished batch in one file."""
+        """File of the archive."""
         return self.folder / job.id / "archive.zip"
 
     def is_first(self, request: RenderRequest) -> bool:
-        """A single picture does not wait behind animations."""
+        """True for single images, which do not wait for animations."""
         return request.num_frames == 1
 
     def missing(self, job: RenderJob) -> list[int]:
-        """Which pictures are not painted yet."""
+        """Indices of the missing images."""
         return [index for index in range(job.total) if not self.frame_path(job, index).exists()]
 
     def retry(self, job: RenderJob, index: int) -> None:
-        """Paint one picture again, and pack all anew.
+        """Render one image again, and pack all images again.
 
         Raises:
-            NotReadyError: the batch waits or runs. BusyError, QuotaError: as `submit`.
+            NotReadyError: the batch is queued or running. BusyError, QuotaError: as `submit`.
         """
 
         def remove_files() -> None:
@@ -99,7 +99,7 @@ class RenderQueue(JobQueue[RenderRequest]):
         self.requeue(job, ("ready", "failed"), remove_files)
 
     def step(self, job: RenderJob, timer: StepTimer) -> int:
-        """Paint the first picture that is missing, or pack them."""
+        """Render the first missing image, or pack all."""
         missing = self.missing(job)
         done = job.total - len(missing)
         self.record_progress(job.id, min(done, job.total - 1))
@@ -116,17 +116,17 @@ class RenderQueue(JobQueue[RenderRequest]):
         frames = [(str(self.frame_path(job, k)), self.download_name(job, k)) for k in range(job.total)]
         video = str(self.video_path(job)) if job.request.format == "mp4" else None
         values = {"frames": frames, "archive": str(self.archive_path(job)), "video": video, "fps": job.request.fps}
-        self.run_in_process(job, "pack of a batch", values, lambda share: None)
-        self.record_progress(job.id, job.total - 1)  # the lease may be lost since
+        self.run_in_process(job, "archive of a batch", values, lambda share: None)
+        self.record_progress(job.id, job.total - 1)  # the lease may be lost by now
         self._report_bytes(job.id, folder_bytes(self.folder / job.id))
         return job.total
 
 
 def planned_bytes(request: RenderRequest, size: tuple[int, int], num_layers: int) -> int:
-    """What the files of a render take at most: its pictures uncompressed, and all of them again, packed.
+    """Upper bound of the size of a render's files: uncompressed images, and all of them again in the archive.
 
     Args:
-        request: what is asked for. size: of a picture, pixels. num_layers: of a picture, itself among them.
+        request: the batch. size: of an image, pixels. num_layers: per image, including the image itself.
     """
     channel_bytes = 1 if request.format != "exr" else 2 if request.precision == "half" else 4
     picture_bytes = size[0] * size[1] * 3 * channel_bytes * num_layers

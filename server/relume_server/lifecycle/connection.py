@@ -1,6 +1,6 @@
-"""uvicorn's HTTP, with bounds on what a connection may send and how long it may take before its request is whole.
+"""uvicorn's HTTP with limits on request size and time.
 
-uvicorn has no such bounds for its fast parser, and for its slow one of bytes alone.
+uvicorn has no such limits for its fast parser, and only a size limit for its slow one.
 """
 
 from __future__ import annotations
@@ -25,11 +25,10 @@ _LARGE_HEAD = b"HTTP/1.1 431 Request Header Fields Too Large\r\n" + _CLOSE
 
 
 class Connection(HttpToolsProtocol):
-    """A connection whose requests are bounded: the head in bytes and seconds, the body in how slowly it may come.
+    """A connection with limits: size and time of the head, minimum rate of the body.
 
-    A head may be longer by what one read brings, 256 KiB. A body may take `BODY_SECONDS`, and a second
-    more for each `MIN_BODY_BYTES_PER_SECOND` that have come. While the app does not take what has come, the client is
-    not at fault.
+    A head may exceed its limit by one read, 256 KiB. A body may take `BODY_SECONDS`, plus one second for each
+    `MIN_BODY_BYTES_PER_SECOND` received. Time in which the app does not read is not counted.
     """
 
     def __init__(self, *args: Any, **more: Any) -> None:
@@ -38,7 +37,7 @@ class Connection(HttpToolsProtocol):
         self._deadline: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """See `asyncio.Protocol`; one too many is told so and closed."""
+        """See `asyncio.Protocol`; a connection above the limit gets an error and is closed."""
         super().connection_made(transport)
         if len(self.connections) > MAX_CONNECTIONS:
             self._end(_BUSY)
@@ -51,7 +50,7 @@ class Connection(HttpToolsProtocol):
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """See `asyncio.Protocol`; a head that grows beyond its bound is refused."""
+        """See `asyncio.Protocol`; a head above the limit is refused."""
         if self.transport.is_closing():
             return
         if self._is_in_head:
@@ -61,44 +60,44 @@ class Connection(HttpToolsProtocol):
             self._end(_LARGE_HEAD)
 
     def on_message_begin(self) -> None:
-        """The parser has the first byte of a request."""
+        """The parser has received the first byte of a request."""
         self._num_header_bytes = 0
         if self._deadline is None:
             self._expect(HEAD_SECONDS)
         super().on_message_begin()
 
     def on_header(self, name: bytes, value: bytes) -> None:
-        """The parser has a header. Raises ValueError, which uvicorn answers with 400: there are too many."""
+        """The parser has received a header. Raises ValueError (uvicorn answers 400) if there are too many."""
         self._num_header_bytes += len(name) + len(value)
         if self._num_header_bytes > MAX_HEAD_BYTES or len(self.headers) >= MAX_HEADERS:
             raise ValueError("too many headers")
         super().on_header(name, value)
 
     def on_headers_complete(self) -> None:
-        """The parser has a whole head."""
+        """The parser has received a whole head."""
         self._is_in_head = False
         self._num_body_bytes = 0
         self._expect(BODY_SECONDS)
         super().on_headers_complete()
 
     def on_body(self, body: bytes) -> None:
-        """The parser has some of a body."""
+        """The parser has received part of a body."""
         self._num_body_bytes += len(body)
         super().on_body(body)
 
     def on_message_complete(self) -> None:
-        """The parser has a whole request."""
+        """The parser has received a whole request."""
         self._is_in_head, self._num_head_bytes = True, 0
         self._expect_nothing()
         super().on_message_complete()
 
     def handle_websocket_upgrade(self) -> None:
-        """Another protocol goes on with the connection."""
+        """Hand the connection over to the WebSocket protocol."""
         self._expect_nothing()
         super().handle_websocket_upgrade()
 
     def _expect(self, seconds: float) -> None:
-        """Look whether what is awaited has come after so many seconds."""
+        """Check in so many seconds that the expected data has been received."""
         self._expect_nothing()
         self._deadline = self.loop.call_later(seconds, self._late)
 
@@ -108,12 +107,12 @@ class Connection(HttpToolsProtocol):
             self._deadline = None
 
     def _late(self) -> None:
-        """A deadline has passed: give a body as long as its bytes are worth, else end."""
+        """Handle a missed deadline: extend it for a body by the bytes received, otherwise close."""
         self._deadline = None
         is_answering = self.cycle is not None and not self.cycle.response_complete
         if self.transport.is_closing():
             return
-        if self.flow.read_paused or (self._is_in_head and is_answering):  # the client may have to wait for the app
+        if self.flow.read_paused or (self._is_in_head and is_answering):  # the app may not be reading
             self._expect(BODY_SECONDS)
         elif self._is_in_head:
             self._end(_LATE)
@@ -124,7 +123,7 @@ class Connection(HttpToolsProtocol):
             self._end(_LATE)
 
     def _end(self, answer: bytes) -> None:
-        """Close, with an answer where none has begun."""
+        """Close, with a response if none has started."""
         has_started = self.cycle is not None and self.cycle.response_started
         if self._is_in_head or not has_started:
             self.transport.write(answer)

@@ -1,4 +1,4 @@
-"""Whether the server is taking leave; sessions wait to hear of it."""
+"""Drain state of the server, which sessions wait for."""
 
 from __future__ import annotations
 
@@ -6,29 +6,29 @@ import asyncio
 
 from relume_server.errors import DrainingError
 
-DRAIN_MESSAGE = "the server is being stopped or exchanged; it is back in a while, and nothing is lost"
+DRAIN_MESSAGE = "the server is restarting; it will be back soon, and nothing is lost"
 
 
 class DrainState:
-    """Begun once, on the event loop."""
+    """Started once, on the event loop."""
 
     def __init__(self) -> None:
         self._started = asyncio.Event()
 
     @property
     def is_draining(self) -> bool:
-        """Whether it has begun."""
+        """True after `start`."""
         return self._started.is_set()
 
     def start(self) -> None:
-        """Begin."""
+        """Start draining."""
         self._started.set()
 
     async def wait(self) -> None:
-        """Wait until it has begun."""
+        """Wait until draining starts."""
         await self._started.wait()
 
     def check(self) -> None:
-        """Raises LeavingError where it has begun: nothing that lasts is to be begun any more."""
+        """Raise DrainingError if the server is draining: no sessions or streams may start."""
         if self.is_draining:
             raise DrainingError(DRAIN_MESSAGE)

@@ -1,4 +1,4 @@
-"""uvicorn, with a drain before its end: SIGTERM lets sessions go first, and the process ends within a bound."""
+"""uvicorn with draining: SIGTERM lets sessions move first, and the process ends within a time limit."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class ServerProcess(uvicorn.Server):
     """Runs the app until it is stopped: by SIGTERM after its sessions have left, by SIGINT or a second SIGTERM at once.
 
     Args:
-        drain: what sessions and /readyz hear of. num_sessions: that are open.
-        drain_seconds: how long they may take to leave. stop_seconds: how long all else may take after that.
-        on_started: called once requests are answered. end: ends this process, whatever it does.
+        config: of uvicorn. drain: state for sessions and /readyz. num_sessions: open ones.
+        drain_seconds: time limit for sessions to leave. stop_seconds: time limit for everything else afterwards.
+        on_started: called once requests are answered. end: ends this process unconditionally.
     """
 
     def __init__(
@@ -52,30 +52,30 @@ class ServerProcess(uvicorn.Server):
         try:
             super().run(sockets)
         finally:
-            self._timer.cancel()  # whoever ran it may go on
+            self._timer.cancel()  # the caller may continue
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Open what the app needs, then listen."""
+        """Open the app's services, then listen."""
         await super().startup(sockets)
         if self.started:
             self._on_started()
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """A signal has come: the first SIGTERM is seen to by `on_tick`, on the event loop."""
+        """Handle a signal; the first SIGTERM is left to `on_tick`, on the event loop."""
         if sig == signal.SIGTERM and self._signal is None and self.started:
             self._signal = sig
         else:
             super().handle_exit(sig, frame)
 
     async def on_tick(self, counter: int) -> bool:
-        """Every tenth of a second: take leave where that is asked for, and end when all have left.
+        """Run every 0.1 s: start draining if requested, and end when all sessions have left.
 
-        What does not stop in time after that is left: the ledger knows what is finished.
+        Work that does not stop in time is abandoned: the database knows the finished tasks.
         """
         if self._signal is not None and not self.should_exit:
             if self._until_s is None:
                 self._until_s = time.monotonic() + self._drain_seconds
-                log.warning("stopping: %d sessions are told to leave", self._num_sessions())
+                log.warning("stopping: draining %d sessions", self._num_sessions())
                 self._drain.start()
             if self._num_sessions() == 0 or time.monotonic() > self._until_s:
                 super().handle_exit(self._signal, None)
@@ -85,6 +85,6 @@ class ServerProcess(uvicorn.Server):
         return should_exit
 
     def _give_up(self) -> None:
-        text = "not stopped after %g s; ending all the same, what was under way goes on at the next start"
+        text = "not stopped after %g s; exiting anyway, unfinished work resumes at the next start"
         log.error(text, self._stop_seconds)
         self._end(1)

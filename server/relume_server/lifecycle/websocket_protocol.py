@@ -1,4 +1,4 @@
-"""uvicorn's WebSockets, that answer whatever asks for one."""
+"""uvicorn's WebSockets, with a response to malformed requests."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ _NO_REQUEST = b"HTTP/1.1 400 Bad Request\r\nConnection: close\r\nContent-Length:
 
 
 class Socket(WebSocketsSansIOProtocol):
-    """A WebSocket whose request, where it cannot be read, is refused.
+    """A WebSocket that refuses unreadable requests.
 
-    Of a line beyond 8 KiB, as the cookies of a login may be, or more than 128 headers, `websockets` makes a refusal
-    that uvicorn never sends: who asked waited for ever, and held a connection.
+    For a line above 8 KiB, such as a login's cookies, or more than 128 headers, `websockets` creates a refusal that
+    uvicorn never sends: the client would wait forever, and hold a connection.
     """
 
     def data_received(self, data: bytes) -> None:
-        """Bytes have come; see `asyncio.Protocol`."""
+        """See `asyncio.Protocol`."""
         super().data_received(data)
         if self.conn.handshake_exc is None or self.handshake_initiated:
             return

@@ -1,4 +1,4 @@
-"""Comments: words that somebody pinned to a pixel of a scene's picture, with a small picture of that moment."""
+"""Comments: text that a user pinned to a pixel of a view, with a small snapshot."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MAX_COMMENTS, MAX_PER_SCENE, MAX_BYTES = 10_000, 500, 256 * 1024**2
 
 @dataclass(frozen=True)
 class Comment:
-    """One of them, without its picture; times in seconds since 1970. `pin`: as it was sent."""
+    """A comment without its snapshot; times in seconds since 1970. `pin`: as it was sent."""
 
     id: str
     pin: dict[str, Any]
@@ -35,10 +35,10 @@ class Comment:
 
 
 def check_text(text: str) -> str:
-    """Words as they are stored. Raises ParameterError where nothing can be read, or something in them is no text."""
+    """Normalize the text of a comment. Raises ParameterError if it is blank, or has control characters."""
     text = unicodedata.normalize("NFC", text).strip()
     if not text or any(unicodedata.category(each) in ("Cc", "Cs") and each not in "\n\t" for each in text):
-        raise ParameterError("text", text[:80], "words, in any number of lines, without control characters")
+        raise ParameterError("text", text[:80], "text, in any number of lines, without control characters")
     return text
 
 
@@ -49,13 +49,13 @@ class CommentStore:
         self._sessions = sessions
 
     def list(self, scene: str) -> list[Comment]:
-        """Of a scene, oldest first."""
+        """List the comments of a scene, oldest first."""
         with self._sessions() as session:
             query = select(CommentRow).where(CommentRow.scene == scene)
             return [_comment(row) for row in session.scalars(query.order_by(CommentRow.created, CommentRow.id))]
 
     def marks(self, scenes: Collection[str]) -> dict[str, tuple[object, ...]]:
-        """Of each of these scenes, what is another one whenever its comments are."""
+        """Return for each scene a value that changes with its comments."""
         row = CommentRow
         query = (
             select(row.scene, func.count(), func.count(row.resolved), func.max(row.created), func.max(row.resolved))
@@ -68,12 +68,12 @@ class CommentStore:
         return marks
 
     def add(self, scene: str, pin: Mapping[str, Any], text: str, author: str, picture: bytes | None) -> Comment:
-        """Keep one.
+        """Add a comment.
 
         Args:
-            scene: id. pin: where it is, as JSON. text: checked. author: who says it. picture: WebP of the moment.
+            scene: id. pin: position, as JSON. text: checked. author: name. picture: snapshot, WebP.
         Raises:
-            BusyError: there are as many as may be.
+            BusyError: the limit is reached.
         """
         pin_json = json.dumps(dict(pin), allow_nan=False)
         num_bytes = len(pin_json.encode()) + len(text.encode()) + len(picture or b"")
@@ -95,26 +95,26 @@ class CommentStore:
             return _comment(row)
 
     def resolve(self, scene: str, comment: str, resolver: str | None) -> None:
-        """Settle one, by somebody, or with None open it again. Raises NotFoundError."""
+        """Resolve a comment, or with None reopen it. Raises NotFoundError."""
         with self._sessions.begin() as session:
             row = _row(session, scene, comment)
             row.resolved, row.resolved_by = (None, None) if resolver is None else (time.time(), resolver)
 
     def picture(self, scene: str, comment: str) -> bytes:
-        """The picture of its moment, WebP. Raises NotFoundError."""
+        """Snapshot of a comment, WebP. Raises NotFoundError."""
         with self._sessions() as session:
             picture = _row(session, scene, comment).picture
         if picture is None:
-            raise NotFoundError("this comment has no picture")
+            raise NotFoundError("this comment has no snapshot")
         return picture
 
     def delete(self, scene: str, comment: str) -> None:
-        """Forget one. Raises NotFoundError."""
+        """Delete a comment. Raises NotFoundError."""
         with self._sessions.begin() as session:
             session.delete(_row(session, scene, comment))
 
     def delete_scene(self, scene: str) -> None:
-        """Forget all of a scene that is gone."""
+        """Delete all comments of a deleted scene."""
         with self._sessions.begin() as session:
             session.execute(delete(CommentRow).where(CommentRow.scene == scene))
 
@@ -125,13 +125,13 @@ def _check_room(session: Session, scene: str, num_bytes: int) -> None:
     if (session.scalar(scene_query) or 0) >= MAX_PER_SCENE:
         raise BusyError(f"a scene has at most {MAX_PER_SCENE} comments; delete some first")
     if totals[0] >= MAX_COMMENTS or totals[1] + num_bytes > MAX_BYTES:
-        raise BusyError("no more comments can be kept; delete some first")
+        raise BusyError("the limit of stored comments is reached; delete some first")
 
 
 def _row(session: Session, scene: str, comment: str) -> CommentRow:
     row = session.get(CommentRow, comment)
     if row is None or row.scene != scene:
-        raise NotFoundError(f"there is no comment {comment[:40]}; somebody may have deleted it")
+        raise NotFoundError(f"there is no comment {comment[:40]}; it may have been deleted")
     return row
 
 

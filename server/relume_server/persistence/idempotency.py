@@ -1,6 +1,6 @@
-"""Answers to calls that made something, by the key that a client gave each: the same call again is answered so again.
+"""Responses to calls with an idempotency key, which are replayed if the same call comes again.
 
-Bounded: so many answers of each client and of all, each of so many bytes, for a day.
+Bounded: number per client and in total, size of each, and one day.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from relume_worker.lease import may_run, new_owner
 
 RETENTION_S = 86_400.0
 ABANDONED_S = 3_600.0
-"""A call whose server says nothing of it for so long is not answered any more."""
+"""A call that its server does not confirm for so long is not answered any more."""
 MAX_EACH, MAX_ALL = 200, 10_000
 MAX_BODY_BYTES = 64 * 1024
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What was answered; `body` is None where it was too large."""
+    """A response; `body` is None if it was too large."""
 
     status: int
     location: str | None
@@ -35,23 +35,23 @@ class Answer:
 
 @dataclass(frozen=True)
 class EarlierCall:
-    """What is known of an earlier call of the same key; `answer` is None while it is still made."""
+    """An earlier call with the same key; `answer` is None while it is running."""
 
     digest: str
     answer: Answer | None
 
 
 class IdempotencyStore:
-    """Calls and their answers; may be used from any thread."""
+    """Calls and their responses. Thread-safe."""
 
     def __init__(self, sessions: sessionmaker[Session]) -> None:
         self._sessions, self._owner = sessions, new_owner()
 
     def claim(self, client: str, key: str, digest: str) -> EarlierCall | None:
-        """Take a key for a call, or say what is known of the call that had it before.
+        """Claim a key for a call, or return the earlier call.
 
         Args:
-            client: who calls. key: as they call it. digest: of all that was sent.
+            client: caller. key: of the caller. digest: of the whole request.
         """
         self._tidy(client)
         while True:
@@ -60,7 +60,7 @@ class IdempotencyStore:
             if existing is None:
                 if self._add(client, key, digest):
                     return None
-                continue  # the same call came at the same time
+                continue  # claimed at the same time
             row, now = existing
             if row.status is not None:
                 answer = Answer(row.status, row.location, row.media_type, row.body)
@@ -70,14 +70,14 @@ class IdempotencyStore:
             self._delete(_is(client, key), IdempotencyRow.owner == row.owner, IdempotencyRow.status.is_(None))
 
     def end(self, client: str, key: str, answer: Answer) -> None:
-        """Keep the answer of a call that was begun here."""
+        """Store the response of a call that this server ran."""
         is_small = answer.body is not None and len(answer.body) <= MAX_BODY_BYTES
         values = {**vars(answer), "body": answer.body if is_small else None}
         with self._sessions.begin() as session:
             session.execute(update(IdempotencyRow).where(_is(client, key), self._has_own_claim).values(values))
 
     def drop(self, client: str, key: str) -> None:
-        """Forget a call that was begun here and has made nothing: it may be tried again."""
+        """Delete a call that this server began and that had no effect: it may be retried."""
         self._delete(_is(client, key), self._has_own_claim)
 
     @property
@@ -98,7 +98,7 @@ class IdempotencyStore:
             return cast("CursorResult[Any]", session.execute(delete(IdempotencyRow).where(*conditions))).rowcount
 
     def _tidy(self, client: str) -> None:
-        """Forget what is old, and the oldest of what is too much."""
+        """Delete old entries, and the oldest ones above the limits."""
         row, excess = IdempotencyRow, []
         with self._sessions() as session:
             for condition, limit in ((row.client == client, MAX_EACH), (row.key != "", MAX_ALL)):

@@ -1,4 +1,4 @@
-"""Which server has the rooms of a name: a lease in the ledger, so that of several servers one has them."""
+"""Leases of rooms: for each room prefix, one server has the rooms."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from relume_worker.database.clock import epoch_s
 from relume_worker.lease import may_run, new_owner
 
 ROOM_LEASE_S = 3.0
-"""How long a room waits when its server has died: three rounds of `relume_server.collaboration.room_lease`."""
+"""Time after which a dead server's rooms are free: three rounds of `relume_server.collaboration.room_lease`."""
 
 _STALE_S = 3600.0
-"""What a server that died has left is deleted after so long, if nobody wants it."""
+"""Time after which a dead server's unused leases are deleted."""
 
 
 class RoomLeases:
-    """The leases of one server; may be used from any thread. One is of all rooms whose names begin alike."""
+    """Leases of one server, one per room prefix. Thread-safe."""
 
     def __init__(self, sessions: sessionmaker[Session]) -> None:
         self._sessions, self._owner = sessions, new_owner()
 
     def take(self, prefix: str) -> bool:
-        """Take or renew one. False where another server that is alive has it."""
+        """Take or renew a lease. False if another live server has it."""
         row = RoomRow
         query = select(row.owner, row.heartbeat, epoch_s().label("now")).where(row.prefix == prefix)
         with self._sessions() as session:
@@ -39,19 +39,19 @@ class RoomLeases:
             return False
         unchanged = row.prefix == prefix, row.owner == lease.owner, row.heartbeat == lease.heartbeat
         statement = update(row).where(*unchanged).values(owner=self._owner, heartbeat=epoch_s())
-        with self._sessions.begin() as session:  # of two servers that come upon a dead one's lease one changes the row
+        with self._sessions.begin() as session:  # if two servers find a dead one's lease, only one changes the row
             return cast("CursorResult[Any]", session.execute(statement)).rowcount > 0
 
     def _add(self, prefix: str) -> bool:
         try:
             with self._sessions.begin() as session:
                 session.add(RoomRow(prefix=prefix, owner=self._owner, heartbeat=epoch_s()))
-        except IntegrityError:  # another server has added it in this moment
+        except IntegrityError:  # another server added it at the same time
             return False
         return True
 
     def renew(self, prefixes: Collection[str]) -> set[str]:
-        """Renew these and give up all others. Returns those of them that another server has."""
+        """Renew these leases and give up all others. Returns those that another server has."""
         row, is_owned = RoomRow, RoomRow.owner == self._owner
         is_dropped, is_old = and_(is_owned, row.prefix.not_in(prefixes)), row.heartbeat < epoch_s() - _STALE_S
         with self._sessions.begin() as session:

@@ -1,4 +1,4 @@
-"""Saved looks: named JSON documents in the database, changed only by who knows the version they change."""
+"""Saved looks: named JSON documents in the database; a change must name the current version."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sqlalchemy import CursorResult, delete, func, select, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, sessionmaker
 
-from relume.core.errors import NotFoundError, ParameterError
+from relume.core.errors import NotFoundError, ParameterError, bytes_text
 from relume.look import Look
 from relume_server.errors import BusyError, PreconditionFailedError, PreconditionRequiredError, TooLargeError
 from relume_server.persistence.tables import LookRow
@@ -26,12 +26,12 @@ SECTIONS = tuple(Look.model_fields)
 
 @dataclass(frozen=True)
 class SavedLook:
-    """A look as it was saved; times in seconds since 1970.
+    """A saved look; times in seconds since 1970.
 
     Attributes:
-        document: JSON, its members in the order in which they came.
+        document: JSON, with the members in the given order.
         etag: quoted, as in the header.
-        has_thumbnail: whether there is a picture of this version.
+        has_thumbnail: true if there is a thumbnail of this version.
     """
 
     name: str
@@ -43,13 +43,13 @@ class SavedLook:
 
     @property
     def num_bytes(self) -> int:
-        """Of the document, which is ASCII."""
+        """Size of the document, which is ASCII."""
         return len(self.document)
 
 
 @dataclass(frozen=True)
 class ListedLook:
-    """What a list says of a look; `num_bytes` of its document."""
+    """A look in a list; `num_bytes` of its document."""
 
     name: str
     etag: str
@@ -60,7 +60,7 @@ class ListedLook:
 
 
 def check_name(name: str) -> str:
-    """The name as it is stored. Raises ParameterError unless it is 1 to 80 printable characters."""
+    """Normalize a name. Raises ParameterError unless it is 1 to 80 printable characters."""
     name = unicodedata.normalize("NFC", name)
     is_plain = name.isprintable() and name == name.strip() and not set("/\\") & set(name) and name not in (".", "..")
     if not is_plain or not 1 <= len(name) <= 80:
@@ -69,22 +69,22 @@ def check_name(name: str) -> str:
 
 
 def parse_document(body: bytes) -> str:
-    """A look document as compact JSON, in its own order: lights are listed in it.
+    """Parse a look document into compact JSON with its own order, which lists of lights need.
 
     Raises TooLargeError, ParameterError.
     """
     if len(body) > MAX_LOOK_BYTES:
-        raise TooLargeError(f"a look has at most {MAX_LOOK_BYTES:,} bytes; simplify its curves")
+        raise TooLargeError(f"a look has at most {bytes_text(MAX_LOOK_BYTES)}; simplify its curves")
     try:
         document: Any = json.loads(body, parse_constant=_refuse_constant)
         text = json.dumps(document, separators=(",", ":"), allow_nan=False)
     except (ValueError, RecursionError):
-        raise ParameterError("look", "not JSON", "a look document as JSON, every number finite") from None
+        raise ParameterError("look", "not JSON", "a look document as JSON with finite numbers") from None
     if not isinstance(document, dict):
         raise ParameterError("look", document, "an object with some of " + ", ".join(SECTIONS))
     for section, value in document.items():
         if section not in SECTIONS:
-            raise ParameterError(f"/{section[:80]}", value, "nothing of that name: a look has " + ", ".join(SECTIONS))
+            raise ParameterError(f"/{section[:80]}", value, "a known name: a look has " + ", ".join(SECTIONS))
         if not isinstance(value, dict):
             raise ParameterError(f"/{section}", value, "an object")
     return text
@@ -101,7 +101,7 @@ class LookStore:
         self._sessions = sessions
 
     def list(self) -> Sequence[ListedLook]:
-        """All of them, newest first, without their documents: these may take gigabytes."""
+        """All looks, newest first, without their documents, which may take gigabytes."""
         has_thumbnail = func.coalesce(LookRow.thumbnail_of == LookRow.etag, False)
         created = func.coalesce(LookRow.created, LookRow.modified)
         num_bytes = func.length(LookRow.document)
@@ -111,7 +111,7 @@ class LookStore:
             return [ListedLook(*row) for row in rows]
 
     def get(self, name: str) -> SavedLook:
-        """One look. Raises NotFoundError."""
+        """Return a look. Raises NotFoundError."""
         with self._sessions() as session:
             row = session.get(LookRow, name)
         if row is None:
@@ -119,7 +119,7 @@ class LookStore:
         return _saved(row)
 
     def referencing(self, text: str) -> tuple[str, ...]:
-        """Names of looks whose documents hold a text, sorted; of wildcards none are known."""
+        """Names of looks whose documents contain a text, sorted; the text has no wildcards."""
         with self._sessions() as session:
             query = select(LookRow.name).where(LookRow.document.contains(text, autoescape=True))
             return tuple(sorted(session.scalars(query)))
@@ -132,15 +132,15 @@ class LookStore:
         if_none_match: str | None,
         created: float | None = None,
     ) -> tuple[SavedLook, bool]:
-        """Save a look; whether it is new.
+        """Save a look; return it, and true if it is new.
 
         Args:
-            name, document: checked. if_match, if_none_match: as the headers say.
-            created: its place among the others where it is new, as of one that had another name; None: now.
+            name, document: checked. if_match, if_none_match: the headers.
+            created: time of a new look, for example of a renamed one; None: now.
         Raises:
-            ParameterError: that is no time that has been.
-            PreconditionRequiredError: it exists and the caller does not say which version it replaces.
-            PreconditionFailedError: it is not at that version.
+            ParameterError: `created` is in the future, or before 1970.
+            PreconditionRequiredError: the look exists and the caller does not name the version to replace.
+            PreconditionFailedError: the look has another version.
         """
         etag = '"' + hashlib.sha256(document.encode()).hexdigest()[:32] + '"'
         now = time.time()
@@ -158,7 +158,7 @@ class LookStore:
         return saved, False
 
     def thumbnail(self, name: str) -> bytes:
-        """The picture of a look as it is, WebP. Raises NotFoundError."""
+        """Thumbnail of the current version, WebP. Raises NotFoundError."""
         with self._sessions() as session:
             row = session.get(LookRow, name)
             if row is None or row.thumbnail is None or row.thumbnail_of != row.etag:
@@ -166,13 +166,13 @@ class LookStore:
             return row.thumbnail
 
     def put_thumbnail(self, name: str, picture: bytes, if_match: str | None) -> None:
-        """Store a picture of a version of a look, WebP. Raises as `put` does where it is at another."""
+        """Store a thumbnail of a version, WebP. Raises as `put` if the look has another version."""
         if if_match is None:
             raise PreconditionRequiredError("send If-Match with the version of the look that the thumbnail shows")
         self._change(name, if_match, update(LookRow).values(thumbnail=picture, thumbnail_of=LookRow.etag))
 
     def delete(self, name: str, if_match: str | None) -> None:
-        """Delete a look. Raises as `put` does."""
+        """Delete a look. Raises as `put`."""
         if if_match is None:
             self.get(name)
             raise PreconditionRequiredError("send If-Match with the version of the look that you delete")
@@ -182,7 +182,7 @@ class LookStore:
         try:
             with self._sessions.begin() as session:
                 if (session.scalar(select(func.count()).select_from(LookRow)) or 0) >= MAX_LOOKS:
-                    raise BusyError(f"{MAX_LOOKS:,} looks are saved; delete some first")
+                    raise BusyError(f"the limit of {MAX_LOOKS:,} saved looks is reached; delete some first")
                 row = LookRow(name=saved.name, document=saved.document, etag=saved.etag)
                 row.modified, row.created = saved.modified, saved.created
                 session.add(row)
@@ -191,7 +191,7 @@ class LookStore:
         return True
 
     def _change(self, name: str, if_match: str, statement: Any) -> None:
-        """Update or delete the row if it is still at one of those versions, in one statement."""
+        """Update or delete the row if it still has one of those versions, in one statement."""
         statement = statement.where(LookRow.name == name)
         etags = [etag.strip() for etag in if_match.split(",")]
         if etags != ["*"]:
@@ -200,7 +200,7 @@ class LookStore:
             result = cast("CursorResult[Any]", session.execute(statement))
             num_changed = result.rowcount
         if num_changed == 0:
-            raise PreconditionFailedError(f"look {name!r} was changed or deleted in the meantime; read it again")
+            raise PreconditionFailedError(f"look {name!r} has been changed or deleted since; read it again")
 
 
 def _saved(row: LookRow) -> SavedLook:

@@ -1,7 +1,7 @@
-"""What links carry: a look of a bake as somebody saw it, saved once and never changed.
+"""Share links: a look of a bake with views and cameras, saved once and never changed.
 
-The id is the beginning of a hash of the content: the same picture shared twice is the same link. Its order is part of
-it, for lights are listed in the order in which they were added.
+The id is the beginning of a hash of the content: sharing the same content twice gives the same link. The order of
+members counts, because lights are listed in the order in which they were added.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from sqlalchemy import func, select
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, sessionmaker
 
-from relume.core.errors import NotFoundError, ParameterError
+from relume.core.errors import NotFoundError, ParameterError, bytes_text
 from relume_server.errors import BusyError, TooLargeError
 from relume_server.persistence.tables import ShareRow
 
@@ -29,7 +29,7 @@ ID_LENGTH, MAX_ID_LENGTH = 10, 32
 
 @dataclass(frozen=True)
 class Share:
-    """One link's content; `document` as it was saved, `created` in seconds since 1970."""
+    """Content of a link; `document` as saved, `created` in seconds since 1970."""
 
     id: str
     document: dict[str, Any]
@@ -38,7 +38,7 @@ class Share:
 
 @dataclass(frozen=True)
 class ListedShare:
-    """What a list says of a link: its content has so many bytes."""
+    """A link in a list, with the size of its content."""
 
     id: str
     created: float
@@ -52,10 +52,10 @@ class ShareStore:
         self._sessions = sessions
 
     def put(self, document: Mapping[str, Any]) -> tuple[str, bool]:
-        """Save a content that was checked; its id, and whether it is new.
+        """Save validated content; return its id, and true if it is new.
 
         Raises:
-            TooLargeError, BusyError: it, or all of them together, would be too large. ParameterError: not finite.
+            TooLargeError, BusyError: this content, or all together, would be too large. ParameterError: not finite.
         """
         text = _as_json(document)
         name = base64.b32encode(hashlib.sha256(text.encode()).digest()).decode().lower()
@@ -65,31 +65,31 @@ class ShareStore:
                 return identity, True
             if self._text(identity) == text:
                 return identity, False
-        raise BusyError("no name is left for this link; change the look a little and share it again")
+        raise BusyError("no id is available for this link; change the look slightly and share it again")
 
     def get(self, identity: str) -> Share:
-        """A link's content. Raises NotFoundError."""
+        """Content of a link. Raises NotFoundError."""
         with self._sessions() as session:
             row = session.get(ShareRow, identity)
         if row is None:
-            raise NotFoundError(f"there is no shared look {identity[:40]}; ask who sent the link to share it again")
+            raise NotFoundError(f"there is no shared look {identity[:40]}; ask the sender to share it again")
         return Share(row.id, json.loads(row.document), row.created)
 
     def list(self, text: str = "") -> Sequence[ListedShare]:
-        """All links, or those whose contents hold a text."""
+        """All links, or those whose content contains a text."""
         query = select(ShareRow.id, ShareRow.created, ShareRow.bytes)
         with self._sessions() as session:
             rows = session.execute(query.where(ShareRow.document.contains(text, autoescape=True)))
             return [ListedShare(*row) for row in rows]
 
     def referencing(self, text: str) -> tuple[str, ...]:
-        """Ids of links whose contents hold a text, sorted; of wildcards none are known."""
+        """Ids of links whose content contains a text, sorted; the text has no wildcards."""
         with self._sessions() as session:
             query = select(ShareRow.id).where(ShareRow.document.contains(text, autoescape=True))
             return tuple(sorted(session.scalars(query)))
 
     def delete(self, identity: str) -> None:
-        """Make room: the link opens nothing any more. Raises NotFoundError."""
+        """Delete a link. Raises NotFoundError."""
         self.get(identity)
         with self._sessions.begin() as session:
             if (row := session.get(ShareRow, identity)) is not None:
@@ -100,7 +100,7 @@ class ShareStore:
             return session.scalar(select(ShareRow.document).where(ShareRow.id == identity))
 
     def _insert(self, identity: str, text: str) -> bool:
-        """Save under an id; False where it is taken."""
+        """Save under an id; false if the id is taken."""
         num_bytes = len(text.encode())
         try:
             with self._sessions.begin() as session:
@@ -108,9 +108,9 @@ class ShareStore:
                     return False
                 totals = session.execute(select(func.count(), func.coalesce(func.sum(ShareRow.bytes), 0))).one()
                 if totals[0] >= MAX_SHARES or totals[1] + num_bytes > MAX_BYTES:
-                    raise BusyError("no more links can be kept; delete some with DELETE /api/shares/{id}")
+                    raise BusyError("the limit of share links is reached; delete some with DELETE /api/shares/{id}")
                 session.add(ShareRow(id=identity, document=text, bytes=num_bytes, created=time.time()))
-        except IntegrityError:  # somebody else was faster
+        except IntegrityError:  # another server was faster
             return False
         return True
 
@@ -119,7 +119,7 @@ def _as_json(document: Mapping[str, Any]) -> str:
     try:
         text = json.dumps(document, separators=(",", ":"), allow_nan=False)
     except (ValueError, RecursionError):
-        raise ParameterError("/look", "not a number", "a look whose every number is finite") from None
+        raise ParameterError("/look", "not a number", "a look with finite numbers") from None
     if len(text.encode()) > MAX_SHARE_BYTES:
-        raise TooLargeError(f"a shared look has at most {MAX_SHARE_BYTES:,} bytes; simplify its curves")
+        raise TooLargeError(f"a shared look has at most {bytes_text(MAX_SHARE_BYTES)}; simplify its curves")
     return text

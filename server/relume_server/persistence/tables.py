@@ -1,4 +1,4 @@
-"""Tables that belong to the server, in the same database as the ledger's."""
+"""Tables of the server, in the same database as the worker's."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ class LookRow(Base):
     """A saved look.
 
     Attributes:
-        created, modified: seconds since 1970; the first is None in rows of a relume that did not write it down.
-        thumbnail: WebP. thumbnail_of: the version that it shows; None where there is none.
+        created, modified: seconds since 1970; `created` is None in rows of older versions.
+        thumbnail: WebP. thumbnail_of: its version; None if there is none.
     """
 
     __tablename__ = "looks"
@@ -28,7 +28,7 @@ class LookRow(Base):
 
 
 class ShareRow(Base):
-    """What a link carries; never changed. `document` is JSON of so many bytes, `created` in seconds since 1970."""
+    """Content of a share link; never changed. `document` is JSON of so many bytes, `created` in seconds since 1970."""
 
     __tablename__ = "shares"
 
@@ -39,11 +39,11 @@ class ShareRow(Base):
 
 
 class JobRow(Base):
-    """A long work of the server, see `relume_server.jobs.queue`. `request` is the body as JSON.
+    """A job, see `relume_server.jobs.queue`. `request` is the body as JSON.
 
-    `client` asked for it and `is_first` says that it goes before others; rows of an older relume have neither. Whoever
-    does a step of it holds the lease: `owner`, renewed by `heartbeat` (seconds since 1970 by the database's clock).
-    `started` and `ended` are seconds since 1970; None: not yet, or in a row of an older relume.
+    `client` submitted it, and `is_first` gives it priority; null in rows of older versions. The process of its current
+    step has the lease: `owner`, renewed by `heartbeat` (seconds since 1970 by the database's clock). `started` and
+    `ended` are seconds since 1970; None: not yet, or in a row of an older version.
     """
 
     __abstract__ = True
@@ -69,36 +69,36 @@ class RenderRow(JobRow):
 
 
 class BtfRow(JobRow):
-    """A BTF that is made or imported, in one step."""
+    """A BTF to make or import, in one step."""
 
     __tablename__ = "btfs"
 
 
 class ComparisonRow(JobRow):
-    """A comparison with brute force; `done` passes are finished."""
+    """A comparison with the reference; `done` passes are finished."""
 
     __tablename__ = "truths"
 
 
 class RoomRow(Base):
-    """Which server has the rooms of a name, see `relume_server.persistence.leases`; gone when nobody is in them.
+    """Lease of rooms, see `relume_server.persistence.leases`; deleted when they are empty.
 
     Attributes:
-        prefix: what their names begin with. owner, heartbeat: as of a work's lease.
+        prefix: of their ids. owner, heartbeat: as for the lease of a job.
     """
 
     __tablename__ = "rooms"
 
-    prefix: Mapped[str] = mapped_column("watch", primary_key=True)  # it held the whole name once
+    prefix: Mapped[str] = mapped_column("watch", primary_key=True)  # formerly the whole id
     owner: Mapped[str]
     heartbeat: Mapped[float]
 
 
 class CommentRow(Base):
-    """Words pinned to a pixel, see `relume_server.persistence.comment_store`.
+    """A comment, see `relume_server.persistence.comment_store`.
 
     Attributes:
-        pin: JSON: bake, view, x, y, size, camera. picture: WebP. num_bytes: of all that.
+        pin: JSON: bake, view, x, y, size, camera. picture: WebP. num_bytes: of all of it.
         created, resolved: seconds since 1970; None: open.
     """
 
@@ -118,13 +118,12 @@ class CommentRow(Base):
 
 
 class IdempotencyRow(Base):
-    """A call that made something, and its answer, see `relume_server.persistence.idempotency`.
+    """A call with an idempotency key and its response, see `relume_server.persistence.idempotency`.
 
     Attributes:
-        client, key: whose call it is, and how they call it. digest: of all that was sent.
-        owner: the process that answers it; see `relume_worker.lease`. created: seconds since 1970 by the database's
-            clock.
-        status: of the answer; None: there is none yet. location, media_type, body: of the answer.
+        client, key: caller, and the caller's key. digest: of the whole request.
+        owner: the process that runs it; see `relume_worker.lease`. created: seconds since 1970 by the database's clock.
+        status: of the response; None: not yet. location, media_type, body: of the response.
     """
 
     __tablename__ = "idempotency"

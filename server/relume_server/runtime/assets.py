@@ -1,4 +1,4 @@
-"""All that looks may name besides what is built in: which stores there are, and where each lies in the data."""
+"""Asset stores of the data directory."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from relume_worker.paths import btfs_path, environments_path, images_path, mater
 
 
 def list_asset_stores(data_dir: Path) -> list[tuple[AssetStore, Path]]:
-    """Every store with its folder."""
+    """All asset stores with their folders."""
     return [
         (MATERIALS, materials_path(data_dir)),
         (BTFS, btfs_path(data_dir)),
@@ -26,7 +26,7 @@ def list_asset_stores(data_dir: Path) -> list[tuple[AssetStore, Path]]:
 
 @contextmanager
 def using_asset_stores(data_dir: Path) -> Iterator[None]:
-    """Looks find what is in this data directory for as long as the block runs."""
+    """Let looks find the assets of a data directory inside the block."""
     with ExitStack() as stack:
         for store, folder in list_asset_stores(data_dir):
             stack.enter_context(store.with_search_folder(folder))

@@ -1,4 +1,4 @@
-"""Opened bakes, shared by all sessions and renders: each store is opened once and kept while somebody uses it."""
+"""Open bakes, shared by all sessions and renders: each store is opened once, and stays open while it is in use."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class _Entry:
 
 
 class TransferPool:
-    """Opens by bake id; a few that nobody uses stay open for a while, most recently used first.
+    """Opens bakes by id; a few unused ones stay open for a while, most recently used first.
 
-    Used from the event loop only.
+    Event loop only.
     """
 
     def __init__(
@@ -37,16 +37,17 @@ class TransferPool:
     ) -> None:
         """
         Args:
-            idle_s: how long a bake that nobody uses is kept. clock: seconds.
+            open_transfer: opens a store. executor: for opening.
+            idle_s: time for which an unused bake stays open. clock: monotonic seconds.
         """
         self._open_transfer, self._executor = open_transfer, executor
         self._idle_s, self._clock = idle_s, clock
         self._entries: OrderedDict[str, _Entry] = OrderedDict()
-        self._last_used_s: dict[Path, float] = {}  # when somebody left it last
+        self._last_used_s: dict[Path, float] = {}  # when it was last released
 
     @asynccontextmanager
     async def acquire(self, bake: str, path: Path) -> AsyncIterator[OpenBake]:
-        """The transfer of a bake for as long as the block runs. Raises what opening raises (StoreError)."""
+        """Yield the transfer of a bake. Raises StoreError if it cannot be opened."""
         entry = self._entries.get(bake)
         if entry is None:
             opening = asyncio.get_running_loop().run_in_executor(self._executor, self._open_transfer, path)
@@ -56,7 +57,7 @@ class TransferPool:
             yield await asyncio.shield(entry.future)
         except BaseException:
             if entry.future.done() and (entry.future.cancelled() or entry.future.exception() is not None):
-                self._discard(bake, entry)  # the next one tries again
+                self._discard(bake, entry)  # the next caller retries
             raise
         finally:
             entry.num_users -= 1
@@ -65,20 +66,20 @@ class TransferPool:
 
     @property
     def open_bakes(self) -> list[OpenBake]:
-        """Those that are open now; may be asked from any thread."""
+        """Bakes that are open now. Thread-safe."""
         futures = [entry.future for entry in list(self._entries.values()) if entry.future.done()]
         return [future.result() for future in futures if not future.cancelled() and future.exception() is None]
 
     def is_used(self, bake: str) -> bool:
-        """Whether somebody uses a bake now; may be asked from any thread."""
+        """True if a bake is in use now. Thread-safe."""
         entry = self._entries.get(bake)
         return entry is not None and entry.num_users > 0
 
     def release(self) -> tuple[int, Collection[Path]]:
-        """Close bakes that nobody has used for a while.
+        """Close bakes that have been unused for a while.
 
         Returns:
-            How many were closed, and the stores that are in use or were until a while ago.
+            Number of closed bakes, and stores that are, or recently were, in use.
         """
         long_ago = self._clock() - self._idle_s
         self._last_used_s = {path: used_s for path, used_s in self._last_used_s.items() if used_s > long_ago}

@@ -1,4 +1,4 @@
-"""Lets go of what nobody uses: bakes that nobody looks at, their frozen caches, and memory that is free."""
+"""Evict unused data: open bakes, their precomputed results, and free memory of the allocator."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ INTERVAL_S = 10.0
 
 
 class CacheEvictor:
-    """Goes round every few seconds, for as long as the server runs.
+    """Runs every few seconds while the server runs.
 
     Args:
-        trim_cache: drops what the caches hold of all but these stores, down to their floor.
-        used_bytes: what the caches hold. release_processes: ends processes that have nothing to do.
+        transfers: open bakes. threads: for the work.
+        trim_cache: evicts the results of all other stores, down to the floor.
+        used_bytes: size of the caches. release_processes: ends idle processes.
     """
 
     def __init__(
@@ -37,16 +38,16 @@ class CacheEvictor:
         self._used_bytes = used_bytes
 
     async def run(self) -> None:
-        """Go round for ever."""
+        """Run forever."""
         while True:
             await asyncio.sleep(INTERVAL_S)
             try:
                 await self.run_once()
-            except Exception:  # whatever one round meets, the next must come
-                log.exception("what nobody uses could not be let go")
+            except Exception:  # one failed round must not end the next ones
+                log.exception("unused data could not be evicted")
 
     async def run_once(self) -> None:
-        """Let go of what has not been used for a while."""
+        """Evict data that has been unused for a while."""
         before = self._used_bytes()
         num_closed, used_stores = self._transfers.release()
         self._trim_cache(used_stores)

@@ -1,4 +1,4 @@
-"""Room on the disk."""
+"""Free disk space."""
 
 from __future__ import annotations
 
@@ -7,5 +7,5 @@ from pathlib import Path
 
 
 def free_bytes(folder: Path) -> int:
-    """Room on the disk of a folder."""
+    """Free space on the disk of a folder, in bytes."""
     return shutil.disk_usage(folder).free

@@ -1,4 +1,4 @@
-"""Where heavy work runs: quick steps of pictures in one pool, long ones (opening, freezing) in another."""
+"""Thread pools: one for short steps of images, one for long work (opening, precomputing)."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from relume.core.thread_pools import mark_background_thread, run_frame
 P = ParamSpec("P")
 T = TypeVar("T")
 NUM_QUERIES = 2
-NUM_LONG = 8  # more than cores: a view that is opened must not wait until others have frozen theirs
+NUM_LONG = 8  # more than cores: opening a view must not wait for others' precomputing
 
 
 class Threads:
-    """The pools of an app.
+    """Thread pools of the app.
 
     Attributes:
-        queries: for short questions to the database that must not wait for anything else: whose a room is, what is new.
-        short_slots: of sessions at the pool for quick steps, in the order in which they asked.
+        queries: for short database queries that must not wait: room leases, events.
+        short_slots: of sessions in the pool for short steps, first come, first served.
     """
 
     def __init__(self) -> None:
@@ -33,14 +33,14 @@ class Threads:
         self.queries = ThreadPoolExecutor(NUM_QUERIES, "relume-news")
 
     def close(self) -> None:
-        """Take no more work; what runs is finished."""
+        """Accept no more work; running work finishes."""
         self.short.shutdown(wait=True, cancel_futures=True)
         self.long.shutdown(wait=True, cancel_futures=True)
         self.queries.shutdown(wait=True, cancel_futures=True)
 
 
 class SerialExecutor:
-    """Runs work for one picture, and at the end waits for what still runs: a thread cannot be interrupted."""
+    """Runs the work of one image, and waits for it at the end, because a thread cannot be interrupted."""
 
     def __init__(self, threads: Threads) -> None:
         self._threads = threads
@@ -48,22 +48,22 @@ class SerialExecutor:
 
     @asynccontextmanager
     async def acquire_slot(self) -> AsyncIterator[None]:
-        """Wait for a thread for short steps. What is asked of it is best said inside: until then it grows old."""
+        """Wait for a thread for short steps. Read the inputs inside, because they change while waiting."""
         async with self._threads.short_slots:
             yield
 
     async def run_in_slot(self, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Run a short step inside `turn`."""
+        """Run a short step inside `acquire_slot`."""
         self._running = future = self._threads.short.submit(lambda: run_frame(work, *args, **kwargs))
         return await asyncio.wrap_future(future)
 
     async def run_short(self, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Wait for a turn, and run a short step."""
+        """Wait for a slot, and run a short step."""
         async with self.acquire_slot():
             return await self.run_in_slot(work, *args, **kwargs)
 
     def submit_long(self, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> asyncio.Future[T]:
-        """Start something that takes its time."""
+        """Start long work."""
         self._running = future = self._threads.long.submit(work, *args, **kwargs)
         return asyncio.wrap_future(future)
 

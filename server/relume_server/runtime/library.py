@@ -1,4 +1,4 @@
-"""The real library behind sessions: opened transfers, live pictures over one shared cache, exact renders."""
+"""Implementation of the sessions' library: open bakes, live images with one shared cache, exact renders."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 
 def open_library(cache_bytes: int, floor_bytes: int) -> Library:
-    """relume's own, with one memory for all sessions, renders and comparisons together.
+    """Create the library, with one cache for all sessions, renders and comparisons.
 
     Args:
-        cache_bytes: that it holds at most. floor_bytes: of them, of bakes that nobody uses.
+        cache_bytes: budget of the cache. floor_bytes: part of it for bakes that are not in use.
     """
-    # Imported here because they load compiled kernels, which a process that only describes the API can do without.
+    # Imported here because they load compiled kernels, which a process that only describes the API does not need.
     from relume.core.cache import Cache, use_for_assets
     from relume.core.source_hash import image_code
     from relume.live.fixed_camera.picture import Picture
@@ -57,7 +57,7 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
             return Picture(transfer, view, memory, is_watched=True)
 
         def make_static_view(*camera_args: Any, **options: Any) -> Any:
-            # in the job's thread: reading a scene takes its time
+            # in the job's thread, because reading a scene takes long
             return static_view_builder(transfer).make_static_view(*camera_args, **options)
 
         return ProgressivePicture(FreeCameraPicture(transfer, view, is_watched=True), make_static_view, memory)
@@ -66,7 +66,7 @@ def open_library(cache_bytes: int, floor_bytes: int) -> Library:
         static_views = static_view_builder(transfer) if exact and transfer.camera_mode is CameraMode.FREE else None
         return render_image(transfer, view, look, static_views=static_views, **options)
 
-    image_code()  # of what runs now: its files may be exchanged while it does
+    image_code()  # of the running version: its files may be replaced meanwhile
     memory = Cache(cache_bytes)
     use_for_assets(memory)
     return Library(

@@ -1,4 +1,4 @@
-"""What a session needs of the library: a transfer, a picture, and how to get them. Tests put stand-ins here."""
+"""Interfaces of transfers and images that sessions need; tests replace them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ F32 = NDArray[np.float32]
 
 
 class Progress(Protocol):
-    """What one step changed."""
+    """Result of one step."""
 
     @property
     def tiles(self) -> Sequence[Tile]: ...
@@ -33,24 +33,24 @@ class Progress(Protocol):
     def exact(self) -> bool: ...
     @property
     def fidelity(self) -> FidelityLabel:
-        """How near what is seen of it is to its look."""
+        """Fidelity of the visible region."""
         ...
 
     @property
     def complete(self) -> bool:
-        """Whether something of every term is shown."""
+        """True if every term is shown."""
         ...
 
     @property
     def changed(self) -> bool: ...
     @property
     def previous_error(self) -> float | None:
-        """How far the picture that an exact one replaces was from it, relative RMS, where its eye moved."""
+        """Error of the approximate image that an exact one replaces, relative RMS, after the camera stopped."""
         ...
 
 
 class Picture(Protocol):
-    """One live picture; used from one thread at a time."""
+    """A live image; used from one thread at a time."""
 
     def set_look(self, look: Any, *, active_pointer: str | None, solo: frozenset[str] | None) -> None: ...
     def check(self, look: Any) -> None: ...
@@ -67,26 +67,26 @@ class Picture(Protocol):
 
 
 class FixedPicture(Picture, Protocol):
-    """One from where it was baked."""
+    """A live image of a fixed camera."""
 
     def look_at(self, region: Tile | None) -> None:
-        """What is seen of it, and is to be exact first."""
+        """Set the visible region, which is computed first."""
         ...
 
 
 class FreeCameraPicture(Picture, Protocol):
-    """One whose eye moves."""
+    """A live image of a free camera."""
 
     renders_pixels: bool
 
     def set_camera(self, camera: Camera, size: tuple[int, int], *, is_idle: bool) -> None: ...
     def array_blocks(self) -> tuple[Mapping[str, ArrayBlock], ShaderConstants] | None:
-        """What a shader needs to draw it, None where it is a fixed picture now."""
+        """Shader inputs, None while the image is a static view."""
         ...
 
 
 class PlacementViewport(Protocol):
-    """A scene as cameras are placed in it; see `relume.output.open_viewport`."""
+    """Preview of a scene for placing cameras; see `relume.output.open_viewport`."""
 
     @property
     def default_camera(self) -> Camera: ...
@@ -100,25 +100,24 @@ class PlacementViewport(Protocol):
 
 @dataclass(frozen=True)
 class Library:
-    """How transfers are opened and pictures made; one per app.
+    """Opens transfers and makes images; one per app.
 
     Attributes:
         open_transfer: path of a published store -> transfer; heavy.
-        open_transient: the same for work that nobody watches: what it makes is the first to be forgotten.
-        make_picture: (transfer, view name) -> picture, its caches shared; heavy.
+        open_transient: the same for batch work: its results are evicted first.
+        make_picture: (transfer, view name) -> live image with shared caches; heavy.
         render: (transfer, view name, complete look) -> (H, W, 3 or 4) linear radiance in the baked size, with coverage
-            where the look's background is transparent; `progress`, `is_canceled`, `for_display` and `eye` as of
-            `render_image`; `exact`, where the eye moves: not as it looks meanwhile; heavy.
+            if the look's background is transparent; `progress`, `is_canceled`, `for_display` and `camera_and_size` as
+            for `render_image`; `exact`: for a free camera, instead of the approximate image; heavy.
         render_small: (transfer, view name, complete look, width) -> the same with fewer pixels, but at least `width`
-            columns where the bake has them.
-        reference: (folder of a scene, camera, complete look, size, spp, progress, cancelled, pass index,
-            reflects=whether surfaces light each other, is_whole=whether all light paths are asked for) -> pictures by
-            brute force, `relume.reference.ReferenceImage`; heavy.
-        open_viewport: folder of a scene -> what cameras are placed in it by; heavy where nobody has asked for a while.
-        shader_arrays: transfer of a moving view -> what its shaders are written from, and the arrays that they keep.
-        bytes_by_owner: what the memory of all that was made from bakes holds now: kind and bake -> bytes.
-        cache_used_bytes: all of it, and what is being made.
-        trim_cache: (stores) -> drops what they hold of all others, down to their floor.
+            columns if the bake has them.
+        reference: (folder of a scene, camera, complete look, size, spp, progress, canceled, pass index, reflects=has
+            indirect light, is_whole=all light paths requested) -> `relume.reference.ReferenceImage`; heavy.
+        open_viewport: folder of a scene -> preview for placing cameras; heavy unless used recently.
+        shader_arrays: free-camera transfer -> constants of its shaders, and their arrays.
+        bytes_by_owner: memory of all results computed from bakes: kind and bake -> bytes.
+        cache_used_bytes: all of it, including results being computed.
+        trim_cache: (stores) -> evicts the results of all other stores, down to their floor.
     """
 
     open_transfer: Callable[[Path], OpenBake]

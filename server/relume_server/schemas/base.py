@@ -1,4 +1,4 @@
-"""What all bodies of the REST calls have in common."""
+"""Base class of all REST bodies."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ JobState = Literal["queued", "running", "ready", "failed", "stopped"]
 
 
 class Body(BaseModel):
-    """The base of all bodies."""
+    """Base of all bodies."""
 
     model_config = ConfigDict(extra="forbid")
 
     @classmethod
     def from_object(cls, source: object, **more: Any) -> Self:
-        """A body whose fields are the attributes of `source` with the same names, and `more`."""
+        """Build a body from the attributes of `source` with the same names, and `more`."""
         values = {name: getattr(source, name) for name in cls.model_fields if name not in more}
         return cls(**values, **more)

@@ -1,4 +1,4 @@
-"""Bodies of the REST calls: what is accepted and what is answered."""
+"""Bodies of REST requests and responses."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ Preset = Literal["preview", "good", "final"]
 
 
 def format_timestamp(posix_s: float) -> str:
-    """A time as all bodies write it: ISO 8601, UTC."""
+    """Format a time as ISO 8601, UTC."""
     return datetime.fromtimestamp(posix_s, UTC).isoformat()
 
 
 class SceneView(Body):
-    """A camera; `aspect` is width ÷ height. `is_placed`: somebody placed it, it did not come with the scene."""
+    """A camera; `aspect` is width ÷ height. `is_placed`: placed by a user, not from the scene's file."""
 
     name: str
     aspect: float
@@ -34,11 +34,11 @@ class SceneView(Body):
 
 
 class SceneMaterial(Body):
-    """A material and its default terms, in look-document form.
+    """A material and its default terms, as in look documents.
 
-    `catcher`: it is the ground, which looks may show by its shadows alone. `is_projected`: most of its triangles
-    have no texture coordinates, and take a projection. `is_glass`: light passes it, as the scene's file says and no
-    look changes.
+    `catcher`: it is the ground, which looks may show as a shadow catcher. `is_projected`: most of its triangles have no
+    texture coordinates and use a projection. `is_glass`: it transmits light, as defined by the scene's file; looks
+    cannot change it.
     """
 
     name: str
@@ -49,15 +49,16 @@ class SceneMaterial(Body):
 
 
 class SceneVariant(Body):
-    """A look that came with the scene's file; partial, in look-document form."""
+    """A material variant of the scene's file, as a partial look document."""
 
     name: str
     look: dict[str, Any]
 
 
 class SceneWarning(Body):
-    """A warning of the import. `severity`: what `text` is about is missing or wrong in the picture ("unsupported"),
-    looks much the same ("approximated"), or does not change the picture ("ignored")."""
+    """An import warning. `severity`: the feature is missing or wrong in the image ("unsupported"), looks much the same
+    ("approximated"), or does not change the image ("ignored").
+    """
 
     text: str
     severity: Severity
@@ -66,7 +67,7 @@ class SceneWarning(Body):
 class SceneBody(Body):
     """A scene; `materials` in the order of the ids in `/views/{view}/materials.png`, `bakes` newest first.
 
-    `warnings`: the worst first.
+    `warnings`: most severe first.
     """
 
     id: str
@@ -83,7 +84,7 @@ class SceneBody(Body):
 
 
 class ExampleSceneBody(Body):
-    """A scene made by code; `size` and `method` of a bake show it well."""
+    """A built-in scene; `size` and `method` suit its bake."""
 
     name: str
     label: str
@@ -93,9 +94,9 @@ class ExampleSceneBody(Body):
 
 
 class MaterialBody(Body):
-    """A library material under one model: what stands in a look, and how a list shows it.
+    """A library material under one model, as terms for a look and as a list entry.
 
-    `id` is "table/material", `group` what it is made of, `model` that of its highlight, `swatch` its colour "#rrggbb".
+    `id` is "table/material", `group` its category, `model` that of its highlight, `swatch` its color "#rrggbb".
     """
 
     id: str
@@ -108,7 +109,7 @@ class MaterialBody(Body):
 
 
 class MapPoint(Body):
-    """A material in the plane of reflectance seen head-on and roughness; `id` is that of its library entry."""
+    """A material in the plane of reflectance at normal incidence and roughness; `id` is that of its library entry."""
 
     id: str
     f0: float
@@ -116,14 +117,14 @@ class MapPoint(Body):
 
 
 class MaterialMapBody(Body):
-    """Sun's navigation map; `triangles` are indices of points, counter-clockwise where x is f0 and y is log sigma."""
+    """Sun's navigation map; `triangles` are indices of points, counter-clockwise with x = f0 and y = log sigma."""
 
     points: list[MapPoint]
     triangles: list[tuple[int, int, int]]
 
 
 class MeasuredBody(Body):
-    """A measured material; looks name it by `data`, `terms` is how it begins.
+    """A measured material; looks refer to it by `data`, `terms` are its initial terms.
 
     `lobes_error` (measured_lv + measured_hd) and `homomorphic_error` (measured_hf): of the curves alone, per channel.
     """
@@ -139,10 +140,10 @@ class MeasuredBody(Body):
 
 
 class BtfBody(Body):
-    """A bidirectional texture; looks name it by `data`, `terms` is how it begins.
+    """A BTF; looks refer to it by `data`, `terms` are its initial terms.
 
-    `synthetic` says which geometry it was rendered from; null where it was measured. `error` is the relative RMS of the
-    compression by how many components are used, from none on; `ratio` what is saved by it.
+    `synthetic` describes the geometry that it was rendered from; null if it was measured. `error` is the relative RMS
+    of the compression by number of components, starting with none; `ratio` is the compression ratio.
     """
 
     id: str
@@ -161,9 +162,9 @@ class BtfBody(Body):
 
 
 class EnvironmentBody(Body):
-    """An environment that looks may name, by `map`, in place of the scene's own; `created` is null for a built-in one.
+    """An environment that looks can use instead of the scene's own, by `map`; `created` is null for built-in ones.
 
-    `warnings`: what was changed when its file was read.
+    `warnings`: changes made when its file was read.
     """
 
     id: str
@@ -175,15 +176,13 @@ class EnvironmentBody(Body):
 
 
 class BakeRequest(Body):
-    """What to bake. A preset gives size and lights; what is named beside it wins. `aspect`: width ÷ height of the
-    preset's picture, of as many pixels; beside a `size` it says nothing.
+    """A bake to queue. The preset gives size and lights; explicit fields override it. `aspect`: width ÷ height of the
+    image with as many pixels as the preset's; ignored with `size`.
 
-    `views`: names of the scene's cameras, or cameras, which become part of the recipe; all that came with the scene
-    where none are named. `probes`: surface probes of a free camera (method `probes`); refused for fixed views, which
-    have none.
-    `patches`: surface patches that indirect light is stored for; `gather_rays`: of a view sample or probe; by default
-    as many as fit the picture (methods `gather` and `probes`).
-    `relightable`: divide the light so that turning or exchanging the environment errs little.
+    `views`: names of the scene's cameras, or cameras, which become part of the recipe; default: all cameras of the
+    file. `probes`: surface probes of a free camera (method `probes`); refused for fixed cameras. `patches`: surface
+    patches of indirect light; `gather_rays`: per view sample or probe; by default both fit the image size (methods
+    `gather` and `probes`). `relightable`: tile the environment so that rotating or replacing it causes little error.
     """
 
     scene: Id
@@ -201,8 +200,9 @@ class BakeRequest(Body):
 
 
 class PlanBody(Body):
-    """What a bake will cost; upper bounds, but for `store_bytes`, on disk, as a little of it takes, rounded up; and
-    `seconds`: judged by finished bakes, null where there are none."""
+    """Cost of a bake. Upper bounds, except `store_bytes`, which is estimated from a sample and rounded up, and
+    `seconds`, which is estimated from finished bakes and null if there are none.
+    """
 
     view_samples: int
     rays: int
@@ -212,8 +212,9 @@ class PlanBody(Body):
 
 
 class RecipeBody(Body):
-    """What was asked for, complete; `cameras` are those of the `views` that somebody placed. `probes`: null for fixed
-    cameras. `patches`, `gather_rays`: null where the method chooses."""
+    """The complete recipe; `cameras` are those of placed or custom `views`. `probes`: null for fixed cameras.
+    `patches`, `gather_rays`: null if the method chooses.
+    """
 
     method: str
     views: list[str]
@@ -227,12 +228,11 @@ class RecipeBody(Body):
 
 
 class BakeBody(Body):
-    """A bake; `progress` 0…1, `problem` one sentence where it failed, or had to start again.
+    """A bake; `progress` 0…1, `problem` is a sentence if it failed or had to restart.
 
-    `phase`: what it does while it runs, and for how many seconds already. `queue_position`: bakes that a queued one
-    waits for.
-    `is_current`: whether the code that made it, which `code` names, is the server's own; others can be used, but might
-    come out otherwise if it were baked again. `user` asked for it first, `created` says when.
+    `phase`: current step, for `phase_seconds` already. `queue_position`: number of bakes before a queued one.
+    `is_current`: made by the server's own code version (`code`); older bakes can be used, but might differ if they were
+    baked again. `user`: who submitted it first, `created`: when.
     """
 
     id: str
@@ -255,7 +255,7 @@ class BakeBody(Body):
 
 
 class DryRunBody(Body):
-    """The answer to a dry run: nothing was queued."""
+    """Response to a dry run: nothing was queued."""
 
     id: str
     recipe: RecipeBody
@@ -263,8 +263,9 @@ class DryRunBody(Body):
 
 
 class LookEntry(Body):
-    """A saved look in the list of them. `created`: when it was saved first, which editors sort by. `thumbnail`: address
-    of the picture of this version, relative to the server, null where there is none."""
+    """A saved look in a list. `created`: when it was first saved, the sort key of editors. `thumbnail`: URL of this
+    version's image, relative to the server, null if there is none.
+    """
 
     name: str
     etag: str
@@ -275,24 +276,24 @@ class LookEntry(Body):
 
 
 class ThumbnailRequest(Body):
-    """A picture of a look: a PNG, JPEG or WebP in Base64, at most 1024 pixels a side; stored smaller."""
+    """A thumbnail of a look: a PNG, JPEG or WebP in Base64, at most 1024 pixels a side; stored smaller."""
 
     picture: Annotated[str, Field(max_length=MAX_PICTURE_TEXT)]
 
 
 class SharedPaths(Body):
-    """Light paths that are looked at; as a look's `transport`."""
+    """Visible light paths; as a look's `transport`."""
 
     show: PathFilter
     bounces: Annotated[int, Field(ge=0, le=MAX_BOUNCES)]
 
 
 class ShareRequest(Body):
-    """What a link shows: a look of a bake, the views beside each other and the one in hand.
+    """Content of a share link: a look of a bake, the views side by side, and the focused one.
 
-    `solo`, `solo_light`: a material, a source of light ("" is the environment) that is shown alone. `paths`: the light
-    paths that are looked at; null: those of the look. `cameras`: of views whose camera is free, by name;
-    `sizes`: of their pictures, pixels, where they are not as large as was baked.
+    `solo`, `solo_light`: the material or the light ("" is the environment) that is shown alone. `paths`: visible light
+    paths; null: those of the look. `cameras`: free cameras by view; `sizes`: image sizes in pixels by view, if not the
+    baked size.
     """
 
     bake: Id
@@ -307,21 +308,21 @@ class ShareRequest(Body):
 
 
 class ShareEntry(Body):
-    """A link that was made; `url` is relative to the server."""
+    """A new share link; `url` is relative to the server."""
 
     id: str
     url: str
 
 
 class ShareListEntry(ShareEntry):
-    """A link in the list of them; what it shows takes so many bytes."""
+    """A share link in a list, with the size of its content."""
 
     created: str
     bytes: int
 
 
 class ShareBody(ShareRequest):
-    """What a link shows; `missing`: what of it is not here any more, one sentence each."""
+    """Content of a share link; `missing`: one sentence for each deleted part of it."""
 
     id: str
     created: str
@@ -330,11 +331,10 @@ class ShareBody(ShareRequest):
 
 
 class ComparisonRequest(Body):
-    """Compare a look with brute force, in so many passes; figures come from the second on.
+    """Compare a look with the reference, in so many passes; errors are available from the second pass on.
 
-    `paths`: "all" that the scene has, and those that the bake's method follows beside them; or "method", these alone,
-    which is sooner done. Where the eye moves: `camera`, from where it is seen, and `size` of the picture; by default as
-    it was baked.
+    `paths`: "all" compares with all light paths of the scene, and with those of the bake's method; "method" only with
+    the latter, which is faster. For a free camera: `camera` and `size` of the image; by default as baked.
     """
 
     bake: Id
@@ -348,9 +348,10 @@ class ComparisonRequest(Body):
 
 
 class ComparisonPlanBody(Body):
-    """The answer to a dry run: nothing was queued. `seconds` that it will take, once it has its turn.
+    """Response to a dry run: nothing was queued. `seconds`: duration once it starts.
 
-    `is_measured`: false where nothing of this view was timed yet, and pictures of others tell; ask again in a moment.
+    `is_measured`: false while no pass of this view has been timed and the estimate is from other views; ask again
+    later.
     """
 
     passes: int
@@ -359,12 +360,11 @@ class ComparisonPlanBody(Body):
 
 
 class ComparisonFigures(Body):
-    """Each relative to the truth's root mean square over pixels and channels; see docs/accuracy.md.
+    """Errors, each relative to the RMS of the reference over pixels and channels; see docs/accuracy.md.
 
-    `rmse` of the difference, `noise` of the brute force, `error` of the frame with the noise taken off, and its
-    `standard_error`: null where that cannot be told from the noise, `error_upper_bound` is what it is below then.
-    `significant_pixel_fraction`: share of pixels whose difference the noise does not explain, at most a hundredth of
-    them by chance.
+    `rmse`: of the difference. `noise`: of the reference. `error`: of the frame, with the noise removed, and its
+    `standard_error`: null if below the noise; `error_upper_bound` is its upper bound then.
+    `significant_pixel_fraction`: fraction of pixels whose difference the noise does not explain, by chance at most 1 %.
     """
 
     rmse: float
@@ -376,12 +376,13 @@ class ComparisonFigures(Body):
 
 
 class ComparisonBody(Body):
-    """A comparison; `completed` of `total` passes are done. `seconds_left`: null where it does not run or nothing was
-    measured yet. `user` asked for it; `created`, `started` and `ended` are times; null: not yet.
+    """A comparison; `completed` of `total` passes are done. `seconds_left`: null if it is not running or nothing has
+    been measured yet. `user`: who requested it; `created`, `started` and `ended` are times; null: not yet.
 
-    `error_all_paths`: against all light paths, null where only the method's were asked for; `error_method_paths`:
-    against those that the method follows. `omitted_paths`: which paths the method leaves out of what the look shows;
-    `unsupported_paths`: which brute force leaves out, too. In sentences; both are empty before the first pass.
+    `error_all_paths`: against all light paths, null if only the method's were requested; `error_method_paths`: against
+    those of the method. `omitted_paths`: light paths of the look that the method does not simulate;
+    `unsupported_paths`: light paths that the reference does not simulate either. Sentences; both empty before the first
+    pass.
     """
 
     id: str

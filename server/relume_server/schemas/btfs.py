@@ -1,4 +1,4 @@
-"""Bodies of BTFs that are made or imported."""
+"""Bodies of BTF jobs."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from relume_server.schemas.base import Body, Id, JobState, Name
 Geometry = Literal["weave", "pebbles", "corduroy"]
 GeometrySource = Literal[Geometry, "mesh"]
 Texels = Annotated[int, Field(ge=8, le=256)]
-Period = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False, description="side of what repeats, metres")]
+Period = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False, description="side of one period, meters")]
 TEXELS = 128
-Bound = Annotated[float, Field(ge=1e-4, le=0.5, description="relative RMS that compression may miss")]
+Bound = Annotated[float, Field(ge=1e-4, le=0.5, description="relative RMS error allowed in compression")]
 BOUND = 0.05
 
 
 class SyntheticBtfRequest(Body):
-    """A BTF to be rendered from a small geometry, `size` texels wide; nothing of it is measured."""
+    """A synthetic BTF to render from a small geometry, `size` texels wide."""
 
     geometry: Geometry
     size: Texels = TEXELS
@@ -27,7 +27,7 @@ class SyntheticBtfRequest(Body):
 
 
 class BtfRequest(Body):
-    """A BTF to be made: rendered from `geometry`, which for `mesh` was sent, or of images that were sent."""
+    """A BTF to make: rendered from `geometry` (for `mesh` an uploaded file), or compressed from uploaded images."""
 
     name: Name
     error: Bound
@@ -37,8 +37,9 @@ class BtfRequest(Body):
 
 
 class BtfJobBody(Body):
-    """A BTF in the making. `material`: its id where it is ready. `geometry`: null where images were sent. `user` asked
-    for it; `created`, `started` and `ended` are times; null: not yet."""
+    """A BTF job. `material`: its id when ready. `geometry`: null for uploaded images. `user`: who requested it;
+    `created`, `started` and `ended` are times; null: not yet.
+    """
 
     id: Id
     name: str

@@ -1,4 +1,4 @@
-"""Bodies of the calls that place cameras."""
+"""Bodies of placed cameras."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ ViewportSide = Annotated[int, Field(ge=16, le=1024)]
 
 
 class CameraFrame(Body):
-    """Where a camera is and how wide it looks.
+    """Pose and field of view of a camera.
 
-    `to_world`: camera to world, 16 numbers by row, looking along -Z; scale is taken out. `yfov`: vertical, degrees.
+    `to_world`: camera to world, 16 numbers, row by row, looking along -Z; scale is removed. `yfov`: vertical, degrees.
     """
 
     to_world: Annotated[list[float], Field(min_length=16, max_length=16)]
@@ -22,19 +22,19 @@ class CameraFrame(Body):
 
 
 class CameraBody(CameraFrame):
-    """A camera that a person placed, by name."""
+    """A camera that a user placed, by name."""
 
     name: Name
 
 
 class CameraEntry(CameraBody):
-    """A camera of a scene; `is_placed`: somebody placed it, it did not come with the scene."""
+    """A camera of a scene; `is_placed`: placed by a user, not from the scene's file."""
 
     is_placed: bool
 
 
 class ViewportBody(Body):
-    """The bounds of a scene, metres, and a camera that sees all of it."""
+    """Bounds of a scene, meters, and a camera that sees all of it."""
 
     bounds_min: list[float]
     bounds_max: list[float]
@@ -42,19 +42,19 @@ class ViewportBody(Body):
 
 
 class ViewportRequest(CameraFrame):
-    """A camera, and how many pixels of its picture are wanted."""
+    """A camera, and the size of its image in pixels."""
 
     size: tuple[ViewportSide, ViewportSide]
 
 
 class ViewportPixel(ViewportRequest):
-    """A position in such a picture, pixels from the left and from the top."""
+    """A pixel of such an image, from the left and from the top."""
 
     x: Annotated[float, Field(ge=0, le=1024)]
     y: Annotated[float, Field(ge=0, le=1024)]
 
 
 class PickBody(Body):
-    """World space, metres; null where nothing is there."""
+    """Point and normal in world space, meters; null if nothing is there."""
 
     position: list[float] | None

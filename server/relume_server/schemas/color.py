@@ -1,4 +1,4 @@
-"""The body of /api/color: what of the server's OpenColorIO config looks and renders may name."""
+"""Body of /api/color: displays, views and color spaces of the server's OpenColorIO config."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ class DisplayBody(Body):
 
 
 class ViewBody(Body):
-    """A view of a display, as looks name it in `display.tone_map`."""
+    """A view of a display, as in a look's `display.tone_map`."""
 
     display: str
     view: str
 
 
 class ColorBody(Body):
-    """Without a config all of it is null or empty. `id` changes with the config; `default`: the view that the config
-    shows unasked; `working`: its name of linear Rec. 709; `spaces`: its linear colour spaces, in which EXR files may be
-    rendered."""
+    """OpenColorIO config of the server; all fields are null or empty without one. `id` changes with the config;
+    `default`: its default view; `working`: its name of linear Rec. 709; `spaces`: its linear color spaces, for EXR
+    files.
+    """
 
     id: str | None
     name: str | None

@@ -1,4 +1,4 @@
-"""Bodies of the calls about comments: words that people pin to a pixel of a picture."""
+"""Bodies of comments: text pinned to a pixel of a view."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ PixelCoordinate = Annotated[int, Field(ge=0, lt=16384)]
 
 
 class CommentRequest(Body):
-    """Pin words to a pixel.
+    """Pin a comment to a pixel.
 
-    `x`, `y`: of the picture of `view` as it was `size` large, from its upper left corner. `camera`: where a view was
-    seen from whose eye moves. `text`: plain. `author`: taken where nobody logs in. `picture`: of the moment, a PNG,
-    JPEG or WebP in Base64, at most 1024 pixels a side.
+    `x`, `y`: pixel of the image of `view` at `size`, from its upper left corner. `camera`: free camera of the view, if
+    any. `text`: plain. `author`: used if the server has no login. `picture`: snapshot, a PNG, JPEG or WebP in Base64,
+    at most 1024 pixels a side.
     """
 
     bake: Id
@@ -36,13 +36,13 @@ class CommentRequest(Body):
 
 
 class CommentChange(Body):
-    """Whether a comment is settled."""
+    """Resolve or reopen a comment."""
 
     resolved: bool
 
 
 class CommentBody(Body):
-    """A comment. `picture`: address of the picture of the moment, relative to the server, null where there is none."""
+    """A comment. `picture`: URL of the snapshot, relative to the server, null if there is none."""
 
     id: str
     bake: str

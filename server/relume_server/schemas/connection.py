@@ -1,4 +1,4 @@
-"""Messages about the connection of a live session itself."""
+"""Messages about the connection of a live session."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ Token = Annotated[str, Field(min_length=1, max_length=64)]
 
 
 class OpenMessage(Message):
-    """client → server: first message, and sent once. All of it may be left out; null is the same.
+    """client → server: first message, sent once. All fields are optional; null is the same as leaving them out.
 
-    `room`, or to watch only `view_token`, names the room in which others share the look; the address then has the first
-    eight characters of it as `room_prefix`. `participant_token`: this client's in that room. `name`: how to be
-    called, where nobody logs in. `share`, or `look`: the shared or saved look to begin with. `resume`: token of a
-    session that was lost."""
+    `room`, or `view_token` for a view-only link, is the id of the room to join; the URL then has its first eight
+    characters as `room_prefix`. `participant_token`: of this client in the room. `name`: display name if the server has
+    no login. `share`, or `look`: the shared or saved look to start with. `resume`: token of a lost session.
+    """
 
     type: Literal["open"]
     room: RoomName | None = None
@@ -31,20 +31,21 @@ class OpenMessage(Message):
 
 
 class PingMessage(Message):
-    """client → server: is anybody there? Answered by a `PongMessage` at once, whatever is being computed."""
+    """client → server: keep-alive. Answered by a `PongMessage` at once, whatever is being computed."""
 
     type: Literal["ping"]
 
 
 class PongMessage(Message):
-    """server → client: the answer to a `PingMessage`."""
+    """server → client: answer to a `PingMessage`."""
 
     type: Literal["pong"] = "pong"
 
 
 class DrainMessage(Message):
-    """server → client: the server is being stopped. Open the session again, there or on another server, within so many
-    seconds; until then it goes on. The look is the client's to bring, where the new server does not know the token."""
+    """server → client: the server is stopping. Open the session again, here or on another server, within so many
+    seconds; until then this one continues. Send the look if the new server does not know the resume token.
+    """
 
     type: Literal["server_draining"] = "server_draining"
     seconds: float

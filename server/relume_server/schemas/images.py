@@ -1,4 +1,4 @@
-"""Bodies of images that looks may name in the place of a material's own."""
+"""Bodies of images that replace a material's textures."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from relume_server.schemas.base import Body, Id, Name
 
 
 class ImageBody(Body):
-    """An image that looks may name in the place of a material's own: `texture` or `roughness_map` of its terms, its
+    """An image that looks can use instead of a material's own: as `texture` or `roughness_map` of its terms, or as its
     `normal_map`.
 
-    `size`: width and height. `warnings`: what was changed when its file was read. `roughness`: the mean of its green,
-    how rough a material is that has it as its map. `metalness`: of one that was made and not sent, the image that says
-    where it is metal; `base`: its base colour, an image, "diffuse" or "scene" of the scene's own textures, or null
-    where that is the same everywhere.
+    `size`: width and height. `warnings`: changes made when its file was read. `roughness`: mean of its green channel,
+    the roughness of a material that uses it as a map. For images made from a metallic map: `metalness` is the id of
+    that map; `base` is its base color: an image, "diffuse" or "scene" for the scene's own textures, or null if it is
+    constant.
     """
 
     id: str
@@ -33,7 +33,7 @@ class ImageBody(Body):
 
 
 class MetalnessRequest(Body):
-    """A material that an image of metalness is for: its `terms` as they are, and whose own textures these name."""
+    """A material to apply a metallic map to: its current `terms`, and the material whose textures they use."""
 
     scene: Id
     material: Name
@@ -41,6 +41,6 @@ class MetalnessRequest(Body):
 
 
 class MetalnessBody(Body):
-    """What its terms become: textures of what scatters light and of highlights, and their mean f0."""
+    """Terms that use the metallic map: textures of diffuse terms and highlights, and their mean f0."""
 
     terms: list[dict[str, Any]]

@@ -1,4 +1,4 @@
-"""Bodies of the calls about who calls, and what was changed."""
+"""Bodies of login, caller and audit."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ AnyRoleName = Literal["anyone", "view", "edit", "admin"]
 
 
 class LoginRequest(Body):
-    """The token that somebody was given."""
+    """An access token."""
 
     token: Annotated[str, Field(min_length=1, max_length=200)]
 
 
 class MeBody(Body):
-    """Who calls. `login`: whether people log in here; `auth_method`: how this one is known (`open`: nobody is asked).
-    `allow_viewer_comments`: whether those who only look may write comments."""
+    """The caller. `login`: whether this server has a login; `auth_method`: how the caller was identified (`open`: no
+    login). `allow_viewer_comments`: whether the role view may write comments.
+    """
 
     login: bool
     name: str
@@ -29,7 +30,7 @@ class MeBody(Body):
 
 
 class AuditEntry(Body):
-    """A change that somebody made; `at` in ISO 8601, `who` a name, or an address where nobody logs in."""
+    """A change; `at` in ISO 8601, `who` a name, or an address without login."""
 
     number: int
     at: str

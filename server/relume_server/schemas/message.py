@@ -1,4 +1,4 @@
-"""What all messages of a live session have in common."""
+"""Base class of all session messages."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ RoleName = Literal["view", "edit", "admin"]
 
 
 class Message(BaseModel):
-    """The base of all messages: immutable, nothing beyond what is declared."""
+    """Base of all messages: immutable, without undeclared fields."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

@@ -1,4 +1,4 @@
-"""Bodies that describe BRDF terms: what each model takes, and what stands behind a look's terms."""
+"""Bodies of BRDF models and of quantities computed from terms."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from relume_server.schemas.base import Body, Name
 
 
 class ParameterBody(Body):
-    """A number that generates curves; `scale` says how a slider moves.
+    """A numeric parameter that generates curves; `scale` is the scale of its slider.
 
-    One that `requires_new_operator` has one value for all channels; a change of it precomputes the operator anew.
-    Values are multiples of `step`, where it is given.
+    If `requires_new_operator`, it has one value for all channels, and a change precomputes the operator anew. Values
+    are multiples of `step`, if given.
     """
 
     name: str
@@ -30,7 +30,7 @@ class ParameterBody(Body):
 
 
 class CurveBody(Body):
-    """An editable factor of a term; a `view_dependent` one multiplies the finished pixel."""
+    """An editable curve of a term; a `view_dependent` one multiplies the shaded pixel."""
 
     name: str
     label: str
@@ -41,9 +41,10 @@ class CurveBody(Body):
 
 
 class ModelBody(Body):
-    """A BRDF term; `texture` is the channel it takes by default, `needs_data` whether it is measured, `width_parameter`
-    the one that maps of roughness scale, `width_power` the power of a roughness that it grows with, `specular_below`
-    where it makes a mirror, and `data_prefix` how the names of such data begin (see `data`)."""
+    """A BRDF model; `texture` is its default texture channel, `needs_data` whether it is measured, `width_parameter`
+    the parameter that roughness maps scale, `width_power` the power of roughness that it grows with, `specular_below`
+    the value below which it is a mirror, and `data_prefix` the prefix of its data names (see `data`).
+    """
 
     model: str
     label: str
@@ -60,21 +61,22 @@ class ModelBody(Body):
 
 
 class TermsRequest(Body):
-    """Terms as they stand in a look."""
+    """Terms, as in a look."""
 
     terms: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=MAX_TERMS)]
 
 
 class BallRequest(TermsRequest):
-    """Terms of a `material` of a scene, whose own images they may name."""
+    """Terms of a scene's `material`, which may use its textures."""
 
     material: Name
 
 
 class ZernikeFitBody(Body):
-    """How a term is sent in views whose eye moves: by so many `functions` of the incident light, with a `residual`
-    (cosine-weighted relative RMS); `required_functions`: how many would miss a twentieth, null where more than these;
-    `is_mirror`: as a blurred mirror instead."""
+    """Factorization of a term for free cameras: `functions` basis functions of the incident light, with a `residual`
+    (cosine-weighted relative RMS); `required_functions`: number with a residual of at most 5 %, null if more than
+    available; `is_mirror`: drawn as a blurred mirror instead.
+    """
 
     functions: int
     residual: float
@@ -83,8 +85,9 @@ class ZernikeFitBody(Body):
 
 
 class AlbedoBody(Body):
-    """What share of even light a material sends back, its textures white: the `mean` over all directions, and the
-    `max` in any channel, at `max_angle_degrees` from the normal."""
+    """Albedo of a material with white textures: `mean` over all view directions, and the `max` in any channel, at
+    `max_angle_degrees` from the normal.
+    """
 
     mean: list[float]
     max: float

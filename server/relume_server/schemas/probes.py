@@ -1,4 +1,4 @@
-"""The body of /api/bakes/{id}/probes: what the shaders of a moving view are written from."""
+"""Body of /api/bakes/{id}/probes: constants for the shaders of free-camera views."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from relume_server.schemas.base import Body
 
 
 class RecurrenceBody(Body):
-    """How the functions of the Zernike basis follow from each other; see `relume.math.zernike.Recurrence`."""
+    """Recurrence table of the Zernike basis; see `relume.math.zernike.Recurrence`."""
 
     order: list[int]
     norm: list[float]
@@ -18,9 +18,9 @@ class RecurrenceBody(Body):
 
 
 class LobeListsBody(Body):
-    """Lists of lights that lobes look for: `bins_per_side` of the map of directions, `max_listed` for each
-    bin, `lights_per_bright_light`; `min_width` is the least σ, radians, of so many `widths`, each √2 times the one
-    before."""
+    """Light lists for lobes: `bins_per_side` of the map of direction bins, `max_listed` lights per bin,
+    `lights_per_bright_light`; `min_width` is the smallest σ in radians of `widths` steps, each √2 times the one before.
+    """
 
     bins_per_side: int
     max_listed: int
@@ -30,9 +30,10 @@ class LobeListsBody(Body):
 
 
 class LobeShapesBody(Body):
-    """Sizes of tables of highlights, see `relume.live.free_camera.basis.lobe_shapes`.
+    """Sizes of the highlight tables, see `relume.live.free_camera.basis.lobe_shapes`.
 
-    Rings, half an octave each, from the float that has the bits `min_bits`; azimuths; widths of lights."""
+    Rings of half an octave, starting at the float with the bits `min_bits`; azimuths; light widths.
+    """
 
     elevation_rings: int
     azimuths: int
@@ -42,9 +43,10 @@ class LobeShapesBody(Body):
 
 class FreeCameraBody(Body):
     """Sizes of the tables: `num_basis` K functions, rows over θo, columns over φo. `gradient_basis` for mapped normals,
-    (3, K). `first_probes`: where those of each material begin, and one more at the end. `arrays` are the names of what
-    GET /api/bakes/{id}/probes/{array} gives. `has_alpha_test`: some surfaces are not everywhere, which the arrays do
-    not say: pictures of the server show it."""
+    (3, K). `first_probes`: index of the first probe of each material, and the total. `arrays` are the names for GET
+    /api/bakes/{id}/probes/{array}. `has_alpha_test`: some surfaces are alpha-tested, which the arrays do not contain;
+    only images of the server show it.
+    """
 
     num_basis: int
     table_rows: int

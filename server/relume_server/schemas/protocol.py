@@ -1,12 +1,11 @@
-"""Every message of a live session (subprotocol relume.v2), typed once; the editor's TypeScript is generated from here.
+"""Messages of a live session (subprotocol relume.v2); the editor's TypeScript types are generated from them.
 
 Text messages are JSON, at most `MAX_MESSAGE_BYTES`. A binary message is one frame: uint32 little-endian header length,
-JSON header (`FrameHeader`), payload. The payload holds the header's tiles one after another, row-major, top row first:
-"rgb9e5" 4 bytes a pixel, "f32" 12 bytes a pixel, "jpeg" one image of the whole picture, perhaps of fewer pixels, "r8"
-one byte a pixel (frames of kind "highlight": 0…255 stands for 0…1). Where the header says `alpha`, a byte for each
-pixel of the same tiles follows all that: how much it hides of what is put behind it, which its light has been
-multiplied by already. A frame of kind "scene_update" has no tiles: its payload is the arrays that `scene_update` names,
-little-endian, one after another.
+JSON header (`FrameHeader`), payload. The payload contains the tiles of the header in order, row-major, top row first:
+"rgb9e5" 4 bytes per pixel, "f32" 12 bytes per pixel, "jpeg" one image of the whole view, perhaps with fewer pixels,
+"r8" one byte per pixel (frames of kind "highlight": 0…255 stands for 0…1). With `alpha` in the header, one byte of
+coverage per pixel of the same tiles follows; the radiance is premultiplied. A frame of kind "scene_update" has no
+tiles: its payload is the arrays that `scene_update` names, little-endian, in order.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ MAX_MESSAGE_BYTES = 64 * 1024
 MAX_FRAMES_IN_FLIGHT = 2
 MAX_VISIBLE_VIEWS = 4
 MAX_CAMERA_PIXELS = 1920 * 1200
-# of GET /api/bakes/{id}/probes/…, kept for ever: clients name it, lest what an earlier release gave be taken for it
+# layout version of GET /api/bakes/{id}/probes/…, which is cached forever: clients name it in the URL
 PROBES_LAYOUT = 3
 
 Sources = Annotated[list[Name], Field(min_length=1, max_length=MAX_LIGHTS + 1)]
@@ -40,11 +39,11 @@ Coordinate = Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]
 
 
 class EditMessage(Message):
-    """client → server: change the look; `revision` must be newer than the last. `active_control` is what is being
-    dragged: a curve, or what `PrepareMessage` may name as `parameter`, in the look after the edit; null for all other
-    edits. `solo` names sources of light, local lights and "environment", that alone are shown from now on, without
-    being part of the look; null: all. Left out, it stays as it was. An edit that says `solo` may have an empty
-    patch."""
+    """client → server: change the look; `revision` must be newer than the last. `active_control` is the control that is
+    dragged: a curve, or a `parameter` as in `PrepareMessage`, in the look after the edit; null for all other edits.
+    `solo` lists the lights, local ones and "environment", that are shown alone from now on, without being part of the
+    look; null: all; left out: unchanged. An edit with `solo` may have an empty patch.
+    """
 
     type: Literal["edit"]
     revision: Revision
@@ -54,19 +53,20 @@ class EditMessage(Message):
 
     @property
     def changes_solo(self) -> bool:
-        """Whether it changes what is alone."""
+        """True if the edit sets `solo`."""
         return "solo" in self.model_fields_set
 
     @model_validator(mode="after")
     def _is_edit(self) -> EditMessage:
         if not self.patch and not self.changes_solo:
-            raise ValueError("an edit has a patch of one operation at least, or says what is solo")
+            raise ValueError("give at least one operation in patch, or solo")
         return self
 
 
 class ViewMessage(Message):
-    """client → server: show this view alone. `size` is the space that the client has, in pixels: JPEGs are scaled down
-    to fit into it, until views are shown otherwise; all other frames come in the baked size."""
+    """client → server: show this view alone. `size` is the client's area in pixels: JPEGs are scaled down to it until
+    the next such message; all other frames have the baked size.
+    """
 
     type: Literal["view"]
     name: Name
@@ -74,23 +74,24 @@ class ViewMessage(Message):
 
 
 class ViewsMessage(Message):
-    """client → server: show these views side by side; every edit changes all of them."""
+    """client → server: show these views side by side; edits apply to all."""
 
     type: Literal["views"]
     names: Annotated[list[Name], Field(min_length=1, max_length=MAX_VISIBLE_VIEWS)]
 
 
 class FocusMessage(Message):
-    """client → server: the pointer is in this view, one of those that are shown: its frames and freezes go first."""
+    """client → server: the pointer is in this visible view: its frames and operators have priority."""
 
     type: Literal["focus"]
     view: Name
 
 
 class RegionMessage(Message):
-    """client → server: of a view whose camera is "fixed" this region is on the screen: x, y, width, height in pixels of
-    its picture. It is exact before all else, frames of what is on its way bring its tiles alone, and `fidelity` is that
-    of what is in it. null: all of the picture, as it is before anything is said."""
+    """client → server: visible region of a view with a "fixed" camera: x, y, width, height in pixels of its image. It
+    is computed first, approximate frames contain only its tiles, and `fidelity` refers to it. null: the whole image,
+    the default.
+    """
 
     type: Literal["region"]
     view: Name
@@ -98,14 +99,14 @@ class RegionMessage(Message):
 
 
 class AckMessage(Message):
-    """client → server: this frame was received and shown."""
+    """client → server: this frame was received and displayed."""
 
     type: Literal["ack"]
     frame: Annotated[int, Field(ge=0, le=2**53)]
 
 
 class EncodingMessage(Message):
-    """client → server: how pictures are sent. "auto": HDR, JPEG while moving where the link is too slow for it."""
+    """client → server: encoding of images. "auto": HDR, but JPEG while moving if the connection is too slow for it."""
 
     type: Literal["encoding"]
     format: Literal["hdr", "jpeg", "auto"]
@@ -113,7 +114,7 @@ class EncodingMessage(Message):
 
 
 class InspectMessage(Message):
-    """client → server: what makes up this pixel? Of a shown view, the focused one by itself; see `InspectAnswer`."""
+    """client → server: read a pixel of a visible view, by default the focused one; see `InspectAnswer`."""
 
     type: Literal["inspect"]
     view: Name | None = None
@@ -122,8 +123,7 @@ class InspectMessage(Message):
 
 
 class HighlightMessage(Message):
-    """client → server: which pixels does this stretch of a curve light? Each shown view answers by a frame
-    "highlight"."""
+    """client → server: show the pixels that a curve's interval affects; each visible view answers "highlight"."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_by_name=True, validate_by_alias=True)
 
@@ -134,9 +134,9 @@ class HighlightMessage(Message):
 
 
 class PrepareMessage(Message):
-    """client → server: one of two: the user opened this `curve`: freeze it ahead and send its `CurveMessage` from now
-    on; or has in hand what moves this `parameter`, which may also be a light (/lights/NAME) or a field of the
-    environment: prepare for it, the open curve stays open."""
+    """client → server: announce an edit. Either of `curve`: precompute it and send its `CurveMessage` from now on; or
+    of `parameter`, also a light (/lights/NAME) or a field of the environment: prepare it; the open curve stays open.
+    """
 
     type: Literal["prepare"]
     curve: Pointer | None = None
@@ -145,15 +145,16 @@ class PrepareMessage(Message):
     @model_validator(mode="after")
     def _has_one_target(self) -> PrepareMessage:
         if (self.curve is None) == (self.parameter is None):
-            raise ValueError("a prepare message names either a curve or a parameter")
+            raise ValueError("give either curve or parameter")
         return self
 
 
 class CameraMessage(Message):
-    """client → server: see a view whose camera is "free" from here, in a picture of this size; the latest wins, and
-    frames name its `seq` as `camera_seq`. `to_world`, by row, and `yfov`: as in `CameraInfo`. `active_control`: as in
-    an edit; nothing is prepared for it. `refine`: "exact", an exact picture from there follows when the camera stops,
-    and edits go on in it; "none", none does."""
+    """client → server: move the "free" camera of a view, with this image size; the latest message counts, and frames
+    repeat its `seq` as `camera_seq`. `to_world`, row by row, and `yfov` as in `CameraInfo`. `active_control`: as in an
+    edit; nothing is prepared for it. `refine`: "exact": an exact image follows when the camera stops, and edits
+    continue in it; "none": none follows.
+    """
 
     type: Literal["camera"]
     view: Name
@@ -166,9 +167,10 @@ class CameraMessage(Message):
 
 
 class RendererMessage(Message):
-    """client → server: who renders views whose camera is "free" while they move. "client": from now on frames
-    of kind "scene_update" bring what a shader needs, beside what GET /api/bakes/{id}/probes gave once, each part again
-    where it has changed; no frame comes for a camera alone. Exact pictures come as ever."""
+    """client → server: who renders views with a "free" camera while they move. "client": from now on frames of kind
+    "scene_update" contain the shader inputs that GET /api/bakes/{id}/probes does not, each when it changes; moving the
+    camera sends no frame. Exact images are sent as before.
+    """
 
     type: Literal["renderer"]
     renderer: Literal["client", "server"]
@@ -196,7 +198,7 @@ CLIENT_MESSAGE: TypeAdapter[ClientMessage] = TypeAdapter(ClientMessage)
 
 
 class Problem(BaseModel):
-    """RFC 9457. `type` names the kind, `detail` says what happened and what to do."""
+    """RFC 9457 problem. `type` is the kind, `detail` says what happened and what to do."""
 
     model_config = ConfigDict(extra="allow", frozen=True)
 
@@ -207,15 +209,16 @@ class Problem(BaseModel):
 
 
 class CameraInfo(Message):
-    """Looks along its -Z. `to_world`: camera to world, 4 × 4 by row, rigid, metres. `yfov`: vertical, radians."""
+    """A camera that looks along its -Z. `to_world`: 4 × 4, row by row, rigid, meters. `yfov`: vertical, radians."""
 
     to_world: list[float]
     yfov: float
 
 
 class ViewInfo(Message):
-    """A view, its size in pixels and its camera; `camera_mode`: seen from where it was baked alone, or from anywhere.
-    Then `bounds` are the lowest and the highest corner of what there is to see, metres."""
+    """A view, its size in pixels and its camera; `camera_mode`: fixed at the baked camera, or free. For a free camera
+    `bounds` are the minimum and maximum corner of the scene, meters.
+    """
 
     name: str
     width: int
@@ -226,20 +229,19 @@ class ViewInfo(Message):
 
 
 class FreeCameraError(Message):
-    """How far pictures are from the exact ones while an eye moves, measured in the bake: relative RMS over the surfaces
-    that a few eyes see, in the scene's own look."""
+    """Error of free-camera images, measured in the bake: relative RMS over surfaces, in the scene's default look."""
 
     value: float
     standard_error: float
 
 
 class HelloMessage(Message):
-    """server → client: first message. `revision` and `solo` are the last ones of a resumed session, else 0 and null.
+    """server → client: first message. `revision` and `solo` are the last ones of a resumed session, otherwise 0 and
+    null.
 
-    `visible_views` are the views that frames come of, `focused_view` is one of them; `views` are all that were baked.
-    `method`: the light of the bake; `axes`: what can be changed in its pictures. `role`: who may only `view` sends no
-    edits. `room`: where others share the look, null for a session of one. `free_camera_error`: null where no camera is
-    free, and where it could not be measured.
+    `visible_views`: views whose frames are sent, `focused_view` one of them; `views`: all baked views. `method`: of the
+    bake; `axes`: what edits can change. `role`: with `view` no edits are accepted. `room`: the shared room, null if
+    there is none. `free_camera_error`: null without a free camera, and if it could not be measured.
     """
 
     type: Literal["hello"] = "hello"
@@ -263,9 +265,9 @@ class HelloMessage(Message):
 
 
 class StatusMessage(Message):
-    """server → client: something takes time; `progress` 0…1. A curve is precomputed for its edits (`label` names it),
-    or a term is shaded because the picture has no image of it yet; "ready": that has ended. What does not wait for it
-    goes on meanwhile."""
+    """server → client: something takes time; `progress` 0…1. A curve is precomputed for edits (`label` names it), or a
+    term is shaded for the first time; "ready" ends it. Other work continues meanwhile.
+    """
 
     type: Literal["status"] = "status"
     state: Literal["precomputing", "shading", "ready"]
@@ -275,7 +277,7 @@ class StatusMessage(Message):
 
 
 class ProblemMessage(Message):
-    """server → client: a message was refused; the look stays as it was."""
+    """server → client: a message was rejected; the look is unchanged."""
 
     type: Literal["problem"] = "problem"
     revision: int | None
@@ -283,9 +285,9 @@ class ProblemMessage(Message):
 
 
 class InspectAnswer(Message):
-    """server → client: one pixel; `bands` is each band's contribution of the active curve, per channel.
+    """server → client: one pixel; `bands` is the contribution of each band of the active curve, per channel.
 
-    `position` and `normal` are of the surface that covers most of it, world space; null for background.
+    `position` and `normal`: of the surface that covers most of the pixel, world space; null for background.
     """
 
     type: Literal["inspect"] = "inspect"
@@ -301,7 +303,7 @@ class InspectAnswer(Message):
 
 
 class CurveMessage(Message):
-    """server → client: the touched curve at this revision, band averages per channel, over 0…`max_degrees`."""
+    """server → client: the active curve at this revision, band averages per channel, over 0…`max_degrees`."""
 
     type: Literal["curve"] = "curve"
     curve: str
@@ -312,7 +314,7 @@ class CurveMessage(Message):
 
 
 class BakeMessage(Message):
-    """server → client: another bake of the same scene goes on or is ready; open a session on it and send the look."""
+    """server → client: another bake of the scene is running or ready; to use it, open a session and send the look."""
 
     type: Literal["bake"] = "bake"
     bake: str
@@ -339,7 +341,7 @@ ServerMessage = (
 
 
 class FrameTimes(Message):
-    """Milliseconds spent on a frame: edit waiting, updating the picture, encoding."""
+    """Milliseconds spent on a frame: waiting, updating the image, encoding."""
 
     wait: float
     update: float
@@ -347,7 +349,7 @@ class FrameTimes(Message):
 
 
 class ArrayInfo(Message):
-    """An array of a payload or of GET /api/bakes/{id}/probes: so many texels of 1, 2 or 4 numbers."""
+    """An array of a payload or of GET /api/bakes/{id}/probes: number of texels, each of 1, 2 or 4 numbers."""
 
     name: str
     dtype: Literal["float32", "float16", "uint32", "int32"]
@@ -355,11 +357,12 @@ class ArrayInfo(Message):
 
 
 class SceneUpdate(Message):
-    """What a shader needs for a look besides arrays. `gain`: of the picture; `environment_gain`, `background_gain`: of
-    the prefiltered environment that lobes look up, and of the background, per channel. `environment_rotation`: added to
-    u. `environment_mips`: first texel, height and width of each. `bright_lights`: of the environment, which lobes
-    evaluate separately: direction, radiance, spread. `shows_direct`: direct light is shown, and with it the background.
-    `arrays` are those of the payload; those that are not named are as they were."""
+    """Shader constants of a look, besides arrays. `gain`: of the image; `environment_gain`, `background_gain`: of the
+    prefiltered environment for lobes, and of the background, per channel. `environment_rotation`: added to u.
+    `environment_mips`: first texel, height and width of each. `bright_lights`: bright environment lights, which lobes
+    evaluate separately: direction, radiance, spread. `shows_direct`: direct light and the background are visible.
+    `arrays`: those in the payload; all others are unchanged.
+    """
 
     gain: tuple[float, float, float]
     environment_gain: tuple[float, float, float]
@@ -375,11 +378,12 @@ class SceneUpdate(Message):
 
 
 class FrameHeader(Message):
-    """Header of a binary frame. `room_revision`: of the last `RoomUpdate` whose look it shows. `camera_seq`:
-    of the camera that it shows, null before the first and of fixed views. `exact`: all that the client has of the
-    picture is; `fidelity`: of what is in its region. `complete`: something of every term is shown. `previous_error`: of
-    the first exact frame after the camera stopped, how far the approximate picture was from it, relative RMS.
-    `scene_update`: of kind "scene_update" alone."""
+    """Header of a binary frame. `room_revision`: of the last `RoomUpdate` that it shows. `camera_seq`: of the camera
+    that it shows, null before the first one and for fixed cameras. `exact`: the client's whole image is exact;
+    `fidelity`: of its visible region. `complete`: every term is shown. `previous_error`: of the first exact frame after
+    the camera stopped: error of the approximate image before it, relative RMS. `scene_update`: only for kind
+    "scene_update".
+    """
 
     frame: int
     revision: int

@@ -16,7 +16,7 @@ ImageFormat = Literal["exr", "png", "webp"]
 RenderFormat = Literal["exr", "png", "webp", "mp4"]
 MAX_LOOKS = 1000
 MAX_FRAMES = 3600
-MAX_LISTED_FRAMES = 600  # frames whose looks are told at once
+MAX_LISTED_FRAMES = 600  # frames per POST /api/renders/looks
 MAX_LISTED_BYTES = 16 << 20
 Frames = Annotated[int, Field(ge=1, le=MAX_FRAMES)]
 TurntableSubject = Literal["camera", "object", "environment"]
@@ -24,12 +24,12 @@ Metres = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 
 
 class Turntable(Body):
-    """Once around an upright line, in so many frames; `start_camera`: the first of them, by default where the view
-    begins.
+    """One revolution about a vertical axis, in so many frames; `start_camera`: of the first frame, by default the
+    view's.
 
-    `pivot`: a place on the line, metres; by default in the middle of the first picture, as deep as what it shows.
-    `rotate`: the `camera`; or, before a camera that stays, the `object`, under an environment and lights that stay,
-    too; or the `environment` alone, which needs no bake with a free camera.
+    `pivot`: a point on the axis, meters; by default the center of the first image, at the depth of its surface.
+    `rotate`: the `camera`; or the `object`, with fixed camera, environment and lights; or the `environment` alone,
+    which needs no free camera.
     """
 
     turntable: Frames
@@ -39,13 +39,13 @@ class Turntable(Body):
 
 
 class CameraPath(Body):
-    """From camera to camera, at even shares of the frames; one frame each where no number of frames is given."""
+    """Interpolate cameras, spaced evenly over the frames; one frame each if no number of frames is given."""
 
     cameras: Annotated[list[CameraFrame], Field(min_length=1, max_length=MAX_LOOKS)]
 
 
 def _path_kind(path: Any) -> str:
-    """Which way is meant, so that nobody is told what the other lacks."""
+    """Select the kind of path, so that errors mention only that kind."""
     is_round = isinstance(path, Turntable) or (isinstance(path, dict) and "turntable" in path)
     return "turntable" if is_round else "cameras"
 
@@ -57,9 +57,10 @@ Path = Annotated[
 
 
 class Keyframes(Body):
-    """Looks, perhaps partial, of a bake. With `frames` they are keyframes at even shares of so many, and what is
-    between goes from one to the next. `interpolation`: from parameter to parameter, or across the material map (GET
-    /api/materials/map) where both are of its kind."""
+    """Looks of a bake, perhaps partial. With `frames` they are keyframes, spaced evenly, and the looks between are
+    interpolated. `interpolation`: by parameters, or along the material map (GET /api/materials/map) if both materials
+    are of its model.
+    """
 
     bake: Id
     looks: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=MAX_LOOKS)]
@@ -68,18 +69,18 @@ class Keyframes(Body):
 
     @property
     def num_frames(self) -> int:
-        """How many pictures come of it."""
+        """Number of images."""
         return len(self.looks) if self.frames is None else self.frames
 
 
 class Animation(Keyframes):
-    """Keyframes that may be seen from elsewhere in each frame: `path`, which a bake whose eye moves can follow."""
+    """Keyframes with an optional camera `path`, which needs a bake with a free camera."""
 
     path: Path | None = None
 
     @property
     def num_frames(self) -> int:
-        """How many pictures come of it."""
+        """Number of images."""
         if isinstance(self.path, Turntable):
             return self.path.turntable
         if self.frames is not None:
@@ -88,29 +89,28 @@ class Animation(Keyframes):
 
 
 class LooksRequest(Animation):
-    """What each frame of an animation shows; `view`: of which `path` is a way."""
+    """Request the look of each frame of an animation; `view`: of the `path`."""
 
     view: Name | None = None
 
 
 class LooksBody(Body):
-    """The complete look of each frame, and from where it is seen; null where no `path` was given."""
+    """Complete look and camera of each frame; cameras are null without a `path`."""
 
     looks: list[dict[str, Any]]
     cameras: list[CameraFrame] | None
 
 
 class RenderRequest(Animation):
-    """A batch of exact pictures; looks may be partial.
+    """A batch of exact images; looks may be partial.
 
-    `size`: at most the baked one, which is the default; where the eye moves, any. `name`: what downloads are called; by
-    default the scene and the view. Of EXR alone: `layers` beside the picture, one for each light and each kind of light
-    path, or "light_groups", direct and reflected light of each light, together the picture; `precision` of the values;
-    and `color_space`, a linear one of the server's OpenColorIO config (GET /api/color), else linear Rec. 709.
+    `size`: at most the baked one, the default; any for a free camera. `name`: of downloads; default: scene and view.
+    Only for EXR: `layers`, true for one per light and per light path, or "light_groups" for direct and indirect light
+    of each light, which add up to the image; `precision` of the values; and `color_space`, a linear one of the server's
+    OpenColorIO config (GET /api/color), by default linear Rec. 709.
 
-    Of an animation: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video of them, `fps`
-    frames a second. `quality`: "interactive" renders frames of a free camera as they look while it moves, a hundred
-    times sooner.
+    For animations: `path` and `frames`, see POST /api/renders/looks. `format` "mp4" makes a video with `fps` frames per
+    second. `quality`: "interactive" renders a free camera as it looks while moving, about a hundred times faster.
     """
 
     view: Name
@@ -125,15 +125,15 @@ class RenderRequest(Animation):
 
     @property
     def picture_format(self) -> ImageFormat:
-        """Of a single frame."""
+        """Image format of a single frame."""
         return "png" if self.format == "mp4" else self.format
 
 
 class RenderBody(Body):
-    """A batch; `completed` of `total` frames are finished, `progress` 0…1 counts what is done of the next one too.
+    """A batch; `completed` of `total` frames are finished, `progress` 0…1 includes part of the current one.
 
-    `seconds_left`: null where it does not run or nothing was measured yet. `user` asked for it; "" where nobody logs
-    in. `created`, `started` and `ended` are times; null: not yet.
+    `seconds_left`: null if it is not running or nothing has been measured yet. `user`: who requested it; "" without
+    login. `created`, `started` and `ended` are times; null: not yet.
     """
 
     id: str

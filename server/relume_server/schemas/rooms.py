@@ -1,4 +1,4 @@
-"""Messages between people who work on one look: who is here, and what the look has become."""
+"""Messages of a room: participants and changes of the shared look."""
 
 from __future__ import annotations
 
@@ -11,14 +11,13 @@ from relume_server.schemas.message import Message, Name, Revision, RoleName
 MAX_PERSON_NAME = 40
 PersonName = Annotated[str, Field(min_length=1, max_length=MAX_PERSON_NAME)]
 ROOM_PREFIX = 8
-"""Characters of a room's name that stand in addresses, by which balancers choose a server; they open nothing."""
+"""Length of the room prefix in URLs, by which load balancers choose a server; it gives no access."""
 MIN_ROOM, MAX_ROOM = 24, 64
 RoomName = Annotated[str, Field(min_length=MIN_ROOM, max_length=MAX_ROOM, pattern=r"^[A-Za-z0-9_-]+$")]
 
 
 class PresenceMessage(Message):
-    """client → server: what others in the room see of this one: the name, where nobody logs in (left out: as it was),
-    and the selected material."""
+    """client → server: own name, if the server has no login (left out: unchanged), and selected material."""
 
     type: Literal["presence"]
     name: PersonName | None = None
@@ -26,7 +25,7 @@ class PresenceMessage(Message):
 
 
 class Person(Message):
-    """Somebody in a room. `id`: theirs as long as they are in it. `online`: false while their connection is lost."""
+    """A participant. `id`: constant while in the room. `online`: false while the connection is lost."""
 
     id: int
     name: str
@@ -37,9 +36,10 @@ class Person(Message):
 
 
 class RoomInfo(Message):
-    """The room of a session. `id` opens it to edit, null for who only watches; `view_token` opens it to watch.
-    `participant_token` comes back as the same person, `self_id` is their id. `is_new`: nobody was in it, so that it has
-    the look that this session brings. `default_look`: the scene's own look, as everything is that nobody has edited."""
+    """The room of a session. `id` opens it for editing, null for view-only participants; `view_token` opens it
+    view-only. `participant_token` rejoins as the same participant, `self_id` is its id. `is_new`: the room was empty,
+    so it has the look of this session. `default_look`: the scene's default look.
+    """
 
     id: str | None
     view_token: str
@@ -51,7 +51,7 @@ class RoomInfo(Message):
 
 
 class RoomMessage(Message):
-    """server → client: who is in the room now, of these oneself at `self_id`."""
+    """server → client: current participants; `self_id` is oneself."""
 
     type: Literal["room"] = "room"
     self_id: int
@@ -59,14 +59,13 @@ class RoomMessage(Message):
 
 
 class CommentsMessage(Message):
-    """server → client: somebody has written, settled or deleted a comment on the scene; read the list again."""
+    """server → client: a comment of the scene was added, resolved or deleted; read the list again."""
 
     type: Literal["comments"] = "comments"
 
 
 class SharedOperation(Message):
-    """One operation of what a shared look has become. A path may be there already where it says `add`, and gone where
-    it says `remove`."""
+    """One operation of a change of the shared look. A path may already exist for `add`, or be missing for `remove`."""
 
     op: Literal["replace", "add", "remove"]
     path: str
@@ -74,9 +73,10 @@ class SharedOperation(Message):
 
 
 class RoomUpdate(Message):
-    """server → client: what the room's look has become since the last such message, or `hello`, with this session's own
-    edits up to `revision` in it. The `patch` is empty where there were no others. `room_revision` counts its changes,
-    and frames say which they show. `edited_by`: ids of those who edited."""
+    """server → client: changes of the room's look since the last such message, or `hello`, including this session's own
+    edits up to `revision`. The `patch` is empty if there were no others. `room_revision` counts the changes, and frames
+    repeat it. `edited_by`: ids of the participants who edited.
+    """
 
     type: Literal["room_update"] = "room_update"
     revision: Revision

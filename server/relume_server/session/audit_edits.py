@@ -1,4 +1,4 @@
-"""What a session edits, for the audit: a line about every minute while edits come, and one when it ends."""
+"""Audit of a session's edits: one row per minute with edits, and one at its end."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from relume_server.auth.audit import Audit, Change
 from relume_server.auth.roles import Caller
 
 WRITE_INTERVAL_S = 60.0
-"""What a server that is killed had not written down yet is not in the audit."""
+"""Interval between rows; a killed server loses the edits since the last one."""
 
 _MAX_PATHS, _MAX_CHARS, _SWITCHING = 100, 160, 101
 
 
 class AuditWriter:
-    """Counts edits, and the places in the look that they change; used from the event loop.
+    """Counts edits and the pointers that they change. Event loop only.
 
     Args:
-        session_name: the session, as the audit names it.
+        audit: to write to. caller: of the session. session_name: in the audit.
     """
 
     def __init__(self, audit: Audit, caller: Caller, session_name: str) -> None:
@@ -28,21 +28,21 @@ class AuditWriter:
         self._num_edits, self._paths = 0, dict[str, None]()
 
     def add_edit(self, pointers: Iterable[str]) -> None:
-        """An edit was accepted that changes what these point at: of each the first two names count."""
+        """Count an accepted edit of these pointers; the first two names of each are kept."""
         self._num_edits += 1
         for pointer in pointers:
             if len(self._paths) < _MAX_PATHS:
-                path = "/".join(pointer.split("/")[:3])  # names of a file's materials may hold anything
+                path = "/".join(pointer.split("/")[:3])  # names of a file's materials may contain anything
                 self._paths["".join(each if each.isprintable() else "?" for each in path)] = None
 
     async def run(self) -> None:
-        """Write as long as the session runs."""
+        """Write rows while the session runs."""
         while True:
             await asyncio.sleep(WRITE_INTERVAL_S)
             await self.write()
 
     async def write(self) -> None:
-        """A line of what has come since the last one, if anything has; written even where this is cancelled."""
+        """Write a row for the edits since the last one, if any; also when canceled."""
         if not self._num_edits:
             return
         action = f"{self._num_edits} edits in a session{_format_paths(list(self._paths))}"
@@ -52,7 +52,7 @@ class AuditWriter:
 
 
 def _format_paths(paths: list[str]) -> str:
-    """As many of them as a line has room for."""
+    """As many pointers as fit into a row."""
     text = ""
     for k, path in enumerate(paths):
         if len(text) + len(path) > _MAX_CHARS:

@@ -1,4 +1,4 @@
-"""Who has come to a session, and with what."""
+"""Client and initial state of a session."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ from relume_server.collaboration.join import JoinRequest
 
 @dataclass(frozen=True)
 class JoinContext:
-    """What a client says when it opens a session.
+    """Contents of a client's `open` message.
 
     Attributes:
-        resume: token of a session that was lost. look: complete document that the session begins with; None: the
-            scene's own.
-        join_request: of the room that they come into; None: they are alone.
+        resume: token of a lost session. look: complete document to start with; None: the scene's default.
+        join_request: of the room to join; None: no room.
     """
 
     caller: Caller

@@ -1,4 +1,4 @@
-"""How fast the messages of one session are taken: nobody who sends as fast as they can is in the way of others."""
+"""Message rate limit of a session, which keeps the event loop free for others."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from relume_server.auth.rate_limit import TokenBuckets
 from relume_server.errors import CLOSE_POLICY
 
 MESSAGES_PER_SECOND, MESSAGE_BURST = 200.0, 400
-"""More than a hand makes that moves at each frame of a fast screen."""
+"""More than one message per frame of a fast display while dragging."""
 MAX_BUSY_S = 10.0
-"""Who sends more for so long is told to go."""
+"""Time above the limit after which a session is closed."""
 CPU_FRACTION, WORK_BURST_S = 0.15, 0.3
-"""Of the event loop's time for one session's messages: on the mean, and after a rest."""
+"""Fraction of the event loop's time for one session's messages: on average, and in a burst."""
 _MIN_SLEEP_S = 0.001
 
 
 class Pace:
-    """A bucket of messages, and one of the time that they take; used from the event loop only.
+    """Token buckets for messages, and for the time to process them. Event loop only.
 
     Args:
-        clock, work_clock: seconds, and those that this thread has worked. sleep: as `asyncio.sleep`.
+        clock, work_clock: seconds, wall and CPU time of this thread. sleep: as `asyncio.sleep`.
     """
 
     def __init__(
@@ -38,15 +38,15 @@ class Pace:
         self._last_calm_s = self._paused_s = clock()
 
     def start_message(self) -> None:
-        """A message has come: what is done until the next `pause` is done for it."""
+        """Start measuring the processing of a message, until the next `pause`."""
         self._started_s = self._work_clock()
 
     async def pause(self, *, is_due: bool) -> None:
-        """Before the next message: let others go on, and wait if there was too much.
+        """Let others run before the next message, and wait if there were too many.
 
         Args:
-            is_due: the message acknowledged a frame: it does not count, and allows one more. So the server itself says
-                how fast a program may edit that waits for frames.
+            is_due: the message acknowledged a frame: it is free, and allows one more. So a program that waits for
+                frames edits at the server's own rate.
         Raises:
             ProtocolError: there were too many for too long; carries the close code.
         """

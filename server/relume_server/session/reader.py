@@ -1,4 +1,4 @@
-"""Reads what comes over a session's WebSocket."""
+"""Read messages from a session's WebSocket."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from relume_server.schemas import protocol
 from relume_server.schemas.connection import OpenMessage
 
 OPEN_SECONDS = 10.0
-"""A client that has connected says within this time what it wants."""
+"""Time limit for a client's first message."""
 
 
 async def read_opening(websocket: WebSocket) -> OpenMessage:
-    """The first message of a session.
+    """Read the first message of a session.
 
     Raises:
         WebSocketDisconnect: the client is gone.
-        ProtocolError: none came in time, or another one; carries the close code.
+        ProtocolError: no message in time, or another one; carries the close code.
     """
     try:
         async with asyncio.timeout(OPEN_SECONDS):
@@ -37,7 +37,7 @@ async def read_opening(websocket: WebSocket) -> OpenMessage:
 
 
 def read_message(received: Any) -> protocol.ClientMessage | protocol.Problem:
-    """A message as ASGI received it, or why it is none.
+    """Parse a message of ASGI, or return the problem if it is invalid.
 
     Raises:
         WebSocketDisconnect: the client is gone.

@@ -1,4 +1,4 @@
-"""The receiving half of a session: reads messages, checks them, and notes what the client wants."""
+"""Receiving half of a session: reads and validates messages, and stores the client's requests."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MAX_BAD_MESSAGES = 50
 
 
 class MessageReceiver:
-    """Runs until the client goes or breaks the rules too often."""
+    """Runs until the client leaves, or breaks the protocol too often."""
 
     def __init__(self, websocket: WebSocket, state: SessionState) -> None:
         self._websocket, self._socket, self._pending, self._visible_views = (
@@ -43,7 +43,7 @@ class MessageReceiver:
         self._num_bad = 0
 
     async def run(self) -> None:
-        """Receive for ever.
+        """Receive forever.
 
         Raises:
             WebSocketDisconnect: the client is gone.
@@ -59,12 +59,12 @@ class MessageReceiver:
             await pace.pause(is_due=self._window.num_in_flight < num_in_flight)
 
     async def _answer(self, received: Any, received_s: float) -> None:
-        """Do what a message asks, or say why not."""
+        """Handle a message, or answer with a problem."""
         message = read_message(received)
         if isinstance(message, protocol.Problem):
             await self._refuse_malformed(message)
             return
-        if isinstance(message, PingMessage):  # from here, so that no frame is waited for
+        if isinstance(message, PingMessage):  # answered here, without waiting for a frame
             await self._socket.send(PongMessage())
             return
         try:
@@ -76,10 +76,10 @@ class MessageReceiver:
             self._pending.changed.set()
 
     async def _refuse_malformed(self, problem: protocol.Problem) -> None:
-        """A message that no client of ours sends: said each time, forgiven a number of times."""
+        """Answer an invalid message; a limited number is tolerated."""
         self._num_bad += 1
         if self._num_bad > MAX_BAD_MESSAGES:
-            raise ProtocolError("too many messages that cannot be understood; reload the page", CLOSE_POLICY)
+            raise ProtocolError("too many invalid messages; reload the page", CLOSE_POLICY)
         await self._socket.refuse(problem)
 
     def _dispatch(self, message: protocol.ClientMessage, received_s: float) -> None:
@@ -118,7 +118,7 @@ class MessageReceiver:
 
     def _update_presence(self, message: PresenceMessage) -> None:
         if self._member is None:
-            raise ProtocolError("nobody shares this session; open one with a room to work together", CLOSE_POLICY)
+            raise ProtocolError("this session has no room; open one with a room to share it", CLOSE_POLICY)
         self._member.update_presence(message, self._caller.person)
 
     def _prepare(self, message: protocol.PrepareMessage) -> None:
@@ -146,13 +146,13 @@ class MessageReceiver:
         self._metrics.edits.labels("applied").inc()
 
     def _set_camera(self, message: protocol.CameraMessage, received_s: float) -> None:
-        """Take note of an eye; a number that is not newer than the last says nothing."""
+        """Store a new camera; a `seq` that is not newer than the last is ignored."""
         if self._transfer.camera_mode is not CameraMode.FREE:
-            raise ParameterError("view", message.view, "a view whose camera is free; bake the scene by method probes")
+            raise ParameterError("view", message.view, "a view with a free camera; bake the scene with method probes")
         self._check_view(message.view)
         width, height = message.size
         if not (width >= 1 and height >= 1 and width * height <= protocol.MAX_CAMERA_PIXELS):
-            allowed = f"at least 1×1 pixels, at most {protocol.MAX_CAMERA_PIXELS} in all"
+            allowed = f"at least 1×1 pixels, at most {protocol.MAX_CAMERA_PIXELS} in total"
             raise ParameterError("size", list(message.size), allowed)
         camera = make_custom_camera("camera", message.to_world, math.degrees(message.yfov)).camera
         previous = self._pending.camera_states.get(message.view)
@@ -162,16 +162,18 @@ class MessageReceiver:
             )
 
     def _look_at(self, message: protocol.RegionMessage) -> None:
-        """Take note of what is on the screen of a view."""
+        """Store the visible region of a view."""
         self._check_view(message.view)
         if self._transfer.camera_mode is CameraMode.FREE:
-            raise ParameterError("view", message.view, "a view whose camera is fixed")
+            raise ParameterError("view", message.view, "a view with a fixed camera")
         if message.rect is None:
             self._pending.regions.pop(message.view, None)
             return
         (x, y, _, _), view = message.rect, self._transfer.views[message.view]
         if not (x < view.width and y < view.height):
-            raise ParameterError("rect", list(message.rect), f"some of the picture's {view.width}×{view.height} pixels")
+            raise ParameterError(
+                "rect", list(message.rect), f"a region of the image, {view.width}×{view.height} pixels"
+            )
         self._pending.regions[message.view] = message.rect
 
     def _check_view(self, name: str) -> None:
@@ -186,7 +188,7 @@ class MessageReceiver:
 
 
 def _permission_key(message: protocol.ClientMessage) -> str:
-    """What a message is to the table of roles."""
+    """Key of a message in the table of roles."""
     match message:
         case protocol.EditMessage(patch=patch, active_control=control) if all(
             is_local_setting(path)

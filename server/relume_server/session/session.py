@@ -1,4 +1,4 @@
-"""One live session from hello to the last word: puts the parts together and ends them together."""
+"""One live session, from hello to close: connects its parts and ends them together."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class SessionServices:
-    """What all sessions share."""
+    """Services shared by all sessions."""
 
     library: Library
     threads: Threads
@@ -70,7 +70,7 @@ class SessionServices:
 async def serve(
     services: SessionServices, websocket: WebSocket, bake: str, transfer: OpenBake, context: JoinContext
 ) -> None:
-    """Serve an accepted WebSocket until one side ends it; what the client had is kept for a resume."""
+    """Serve an accepted WebSocket until one side ends it; its state is kept for a resume."""
     saved = services.resumes.take(context.resume, bake, time.monotonic()) if context.resume else None
     initial_document = saved.document if saved else context.look or transfer.default_look
     room_entry = _enter_room(
@@ -104,7 +104,7 @@ async def serve(
             log.error("session of bake %s ends (%s)", bake, describe_error(error))
         await state.socket.close(find_close_code(error), make_problem(error).detail)
     except Exception as error:
-        log.exception("session of bake %s ends by a defect", bake)
+        log.exception("session of bake %s ends with an internal error", bake)
         await state.socket.close(find_close_code(error), make_problem(error).detail)
     finally:
         services.metrics.sessions.dec()
@@ -123,7 +123,7 @@ def _enter_room(
     *,
     has_local_settings: bool,
 ) -> RoomEntry | None:
-    """Into the room that was asked for; None where none was."""
+    """Join the requested room; None without a room."""
     if context.join_request is None:
         return None
     return services.rooms.enter(
@@ -133,10 +133,10 @@ def _enter_room(
 
 def _state(
     services: SessionServices, websocket: WebSocket, transfer: OpenBake, context: JoinContext,
-    saved: SavedSession | None,
-    document: dict[str, Any], room_entry: RoomEntry | None, audit_writer: AuditWriter | None,
+    saved: SavedSession | None, document: dict[str, Any], room_entry: RoomEntry | None,
+    audit_writer: AuditWriter | None,
 ) -> SessionState:  # fmt: skip
-    """What the halves of the session begin with: what was kept of a lost one, and this look."""
+    """Create the state of a session: from a lost session, or with this look."""
     default = transfer.default_look
     look = LookState(default, document, saved.revision, saved.solo) if saved else LookState(default, document, 0)
     first = next(iter(transfer.views))
@@ -153,7 +153,7 @@ def _state(
 def _audit_writer(audit: Audit, context: JoinContext, bake: str, session: str) -> AuditWriter | None:
     if not context.caller.may_edit:
         return None
-    # enough to know it by, not to open it
+    # identifies the room, without giving access
     room = "" if context.join_request is None else f", room {context.join_request.prefix}…"
     return AuditWriter(audit, context.caller, f"/api/bakes/{bake}/session, {session}{room}")
 
@@ -202,7 +202,7 @@ def _view_info(view: CameraView, transfer: OpenBake) -> ViewInfo:
 
 
 async def _run(services: SessionServices, websocket: WebSocket, bake: str, state: SessionState) -> None:
-    """Run all parts, and a watch on the token, until one of them ends; raise what ended it."""
+    """Run all parts, and a check of the token, until one of them ends; raise its exception."""
     tasks = [
         asyncio.create_task(MessageReceiver(websocket, state).run()),
         asyncio.create_task(FrameLoop(state, services.library, services.threads).run()),
@@ -226,22 +226,22 @@ async def _run(services: SessionServices, websocket: WebSocket, bake: str, state
 
 
 async def _send_drain(services: SessionServices, socket: ClientSocket) -> None:
-    """Tell the client when the server takes leave; it goes when it likes to."""
+    """Notify the client when the server drains; the client leaves when it is ready."""
     await services.drain.wait()
     await socket.send(DrainMessage(seconds=services.drain_seconds))
     await asyncio.Event().wait()
 
 
 async def _require_proxy_login(services: SessionServices, socket: ClientSocket) -> None:
-    """Have a client whom a proxy named come by it again. Raises LoginError if it does not go."""
+    """Ask a client that a proxy named to connect again. Raises LoginError if it does not leave."""
     await asyncio.sleep(PROXY_REVALIDATION_S)
     await socket.send(DrainMessage(seconds=services.drain_seconds))
     await asyncio.sleep(services.drain_seconds)
-    raise LoginError("the proxy that named you has to do so again; open the session again")
+    raise LoginError("the proxy's login must be renewed; open the session again")
 
 
 async def _redirect_to_room(services: SessionServices, member: RoomMember, socket: ClientSocket) -> None:
-    """Send the client after its room when another server has it. Raises ElsewhereError where it does not go."""
+    """Ask the client to follow its room when another server has it. Raises OtherServerError if it does not leave."""
     await member.wait_until_lost()
     await socket.send(DrainMessage(seconds=services.drain_seconds))
     await asyncio.sleep(services.drain_seconds)
@@ -249,7 +249,7 @@ async def _redirect_to_room(services: SessionServices, member: RoomMember, socke
 
 
 async def _end(tasks: Sequence[asyncio.Task[None]]) -> None:
-    """Cancel the tasks and see them end, even while being is_canceled: a thread may still use the picture."""
+    """Cancel the tasks and wait for them, even while being canceled: a thread may still use the image."""
     is_canceled: asyncio.CancelledError | None = None
     for task in tasks:
         task.cancel()
@@ -260,6 +260,6 @@ async def _end(tasks: Sequence[asyncio.Task[None]]) -> None:
             is_canceled = error
     for task in tasks:
         if not task.cancelled():
-            task.exception()  # one that lost the race to end the session is not told
+            task.exception()  # its error is not the one that ended the session
     if is_canceled is not None:
         raise is_canceled

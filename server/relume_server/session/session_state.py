@@ -1,4 +1,4 @@
-"""What the two halves of a session have in common."""
+"""State shared by the two halves of a session."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from relume_server.telemetry.traces import Traces
 
 @dataclass(frozen=True)
 class SessionState:
-    """The receiving half fills them, the sending half follows; all on the event loop.
+    """Written by the receiver, read by the frame loop; all on the event loop.
 
     Attributes:
-        traces: None where nobody wants any. caller: who is at the other end. member: the session in its room; None
-            where nobody shares it. audit_writer: for the audit; None of who may not edit: theirs are ways of looking.
+        traces: None if disabled. caller: the client. member: of the room; None without a room. audit_writer: None for
+            view-only clients, which change view settings only.
     """
 
     socket: ClientSocket

@@ -1,4 +1,4 @@
-"""The collector that traces go to, as the log tells of it. Importing this loads OpenTelemetry's SDK."""
+"""Log lines about the trace collector. Importing this loads OpenTelemetry's SDK."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ log = logging.getLogger(__name__)
 
 
 class TraceExporter(SpanExporter):
-    """What an exporter sends to: that it is away is one line of the log, and that it is back another.
+    """Wraps an exporter; logs one line when the collector is lost, and one when it is back.
 
-    OpenTelemetry's own writes four warnings for each batch, every five seconds; their first says why.
+    OpenTelemetry itself logs four warnings per batch, every five seconds; the first contains the cause.
     """
 
     def __init__(self, exporter: SpanExporter) -> None:
         """
         Args:
-            exporter: sends.
+            exporter: sends the spans.
         """
         self._exporter, self._messages = exporter, list[str]()
-        self._outage = Outage(log, "the collector of traces")
+        self._outage = Outage(log, "the trace collector")
         logging.getLogger(EXPORTER).addFilter(self._collect_message)
 
     def _collect_message(self, record: logging.LogRecord) -> bool:
@@ -36,22 +36,22 @@ class TraceExporter(SpanExporter):
         return False
 
     def export(self, spans: Sequence[ReadableSpan]) -> SpanExportResult:
-        """Send some; those that cannot be sent are lost."""
+        """Send spans; those that cannot be sent are dropped."""
         self._messages.clear()
         began_s = time.monotonic()
         result = self._exporter.export(spans)
         if result is SpanExportResult.SUCCESS:
             self._outage.report_recovered(began_s)
         else:
-            message = self._messages[0] if self._messages else "it takes none"
+            message = self._messages[0] if self._messages else "it accepts none"
             self._outage.report_failure(RelumeError(message), began_s)
         return result
 
     def shutdown(self) -> None:
-        """Send no more."""
+        """Shut the exporter down."""
         self._exporter.shutdown()
         logging.getLogger(EXPORTER).removeFilter(self._collect_message)
 
     def force_flush(self, timeout_millis: int = 30_000) -> bool:
-        """Nothing is kept here."""
+        """True: nothing is buffered here."""
         return True

@@ -1,4 +1,4 @@
-"""What the server counts and times, as Prometheus sees it; one registry per app."""
+"""Metrics for Prometheus; one registry per app."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ LATENCY_S = (0.001, 0.002, 0.004, 0.006, 0.008, 0.010, 0.015, 0.020, 0.033, 0.06
 
 
 class _CacheCollector(Collector):
-    """What is in the memory: kinds and bakes come and go."""
+    """Cache size by kind and bake, which change at run time."""
 
     def __init__(self, bytes_by_owner: Callable[[], Mapping[CacheOwner, int]]) -> None:
         self._bytes_by_owner = bytes_by_owner
 
     def collect(self) -> Iterator[GaugeMetricFamily]:
-        """One gauge."""
+        """Yield one gauge."""
         gauge = GaugeMetricFamily("relume_cache_bytes", "Bytes in the cache, by kind and bake", labels=["kind", "bake"])
         for owner, num_bytes in self._bytes_by_owner().items():
             gauge.add_metric(owner, num_bytes)
@@ -31,13 +31,13 @@ class _CacheCollector(Collector):
 
 
 class _JobCollector(Collector):
-    """How much long work waits and runs; nothing while the database is away."""
+    """Number of jobs by kind and state; none while the database is unavailable."""
 
     def __init__(self, count_jobs: Callable[[], Mapping[tuple[str, str], int]]) -> None:
         self._count_jobs = count_jobs
 
     def collect(self) -> Iterator[GaugeMetricFamily]:
-        """One gauge."""
+        """Yield one gauge."""
         gauge = GaugeMetricFamily("relume_jobs", "Jobs by kind and state", labels=["kind", "state"])
         with suppress(*DATABASE_ERRORS):
             for labels, count in self._count_jobs().items():
@@ -46,7 +46,7 @@ class _JobCollector(Collector):
 
 
 class Metrics:
-    """The figures by name, as Prometheus wants names: units are seconds and bytes, counters end in _total."""
+    """Metrics by name, with Prometheus' conventions: seconds and bytes, counters end in _total."""
 
     def __init__(self) -> None:
         self.registry = registry = CollectorRegistry()
@@ -57,23 +57,23 @@ class Metrics:
         self.bakes = Counter("relume_bakes", "Bakes submitted", registry=registry)
         self.requests = Counter("relume_http_requests", "HTTP requests", ["method", "status"], registry=registry)
         self.refused_sessions = Counter(
-            "relume_refused_sessions", "Sessions that were not opened", ["reason"], registry=registry
+            "relume_refused_sessions", "Sessions that were refused", ["reason"], registry=registry
         )
-        self.refused_sessions.labels("busy")  # an increase is one of what was there before
-        self.request_seconds = self._histogram("relume_http_request_seconds", "Request received to answer begun")
+        self.refused_sessions.labels("busy")  # create all labels now, so that `increase` sees the first event
+        self.request_seconds = self._histogram("relume_http_request_seconds", "Request received to response started")
         self._draining = Gauge(
-            "relume_draining", "Whether the server drains before it stops, 0 or 1", registry=registry
+            "relume_draining", "Drain state: 1 while the server is draining, otherwise 0", registry=registry
         )
         self._free = Gauge("relume_disk_free_bytes", "Free disk space of the data directory", registry=registry)
         self._least_free = Gauge(
-            "relume_disk_min_free_bytes", "Free disk space below which /readyz says no", registry=registry
+            "relume_disk_min_free_bytes", "Free disk space below which /readyz fails", registry=registry
         )
         self.edit_to_socket = self._histogram("relume_edit_to_socket_seconds", "Edit received to frame sent")
-        self.update = self._histogram("relume_frame_update_seconds", "Updating the picture")
+        self.update = self._histogram("relume_frame_update_seconds", "Updating the image")
         self.encode = self._histogram("relume_frame_encode_seconds", "Encoding a frame")
-        self.freeze = self._histogram("relume_freeze_seconds", "Freezing a curve")
+        self.freeze = self._histogram("relume_freeze_seconds", "Precomputing a curve")
         self._cache = Gauge(
-            "relume_frozen_cache_bytes", "Bytes in the cache of everything computed from bakes", registry=registry
+            "relume_frozen_cache_bytes", "Bytes in the cache of results computed from bakes", registry=registry
         )
         self._live_bytes = Gauge(
             "relume_component_bytes", "Bytes of arrays by component of the server", ["component"], registry=registry
@@ -81,36 +81,36 @@ class Metrics:
         self._workers = Gauge(
             "relume_workers_resident_bytes", "Memory of the server's own worker processes", registry=registry
         )
-        ProcessCollector(registry=registry)  # process_resident_memory_bytes and the like
+        ProcessCollector(registry=registry)  # process_resident_memory_bytes and others
 
     def watch_cache(
         self, used_bytes: Callable[[], int], bytes_by_owner: Callable[[], Mapping[CacheOwner, int]]
     ) -> None:
-        """Where it is read from what the memory holds, in all and by kind and bake."""
+        """Set the source of the cache size, in total and by kind and bake."""
         self._cache.set_function(used_bytes)
         self.registry.register(_CacheCollector(bytes_by_owner))
 
     def watch_owners(self, owners: Mapping[str, Callable[[], int]]) -> None:
-        """Where it is read from who holds memory in this process; what two hold is counted by one."""
+        """Set the sources of memory by component of this process; shared memory is counted once."""
         for owner, get_bytes in owners.items():
             self._live_bytes.labels(owner).set_function(get_bytes)
 
     def watch_workers(self, resident_bytes: Callable[[], int]) -> None:
-        """Where the memory of the server's own worker processes is read from."""
+        """Set the source of the worker processes' memory."""
         self._workers.set_function(resident_bytes)
 
     def watch_jobs(self, count_jobs: Callable[[], Mapping[tuple[str, str], int]]) -> None:
-        """Where it is read from how much long work there is, by kind and state."""
+        """Set the source of the number of jobs, by kind and state."""
         self.registry.register(_JobCollector(count_jobs))
 
     def watch_readiness(self, is_draining: Callable[[], bool], free_bytes: Callable[[], int], least_bytes: int) -> None:
-        """Where it is read from what /readyz asks."""
+        """Set the sources of the readiness metrics."""
         self._draining.set_function(is_draining)
         self._free.set_function(free_bytes)
         self._least_free.set(least_bytes)
 
     def count_request(self, method: str, status: int, seconds: float) -> None:
-        """One HTTP response; a method that nobody knows must not become a label of its own."""
+        """Count an HTTP response; unknown methods share one label."""
         self.request_seconds.observe(seconds)
         self.requests.labels(method if method in METHODS else "other", str(status)).inc()
 

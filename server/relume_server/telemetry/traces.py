@@ -1,8 +1,8 @@
-"""Traces of edits by OpenTelemetry: what happens between an edit's coming in and its frame's going out.
+"""OpenTelemetry traces of edits: from receiving an edit to sending its frame.
 
-Spans are made when a frame has been sent, of times that were taken anyhow: without an exporter nothing of this exists,
-and OpenTelemetry's SDK is not even imported. Where spans go, as what service and how many of them, its own
-variables say (`OTEL_EXPORTER_OTLP_ENDPOINT`, `OTEL_SERVICE_NAME`, `OTEL_TRACES_SAMPLER`, …).
+Spans are created after a frame is sent, from times that are measured anyway: without an exporter there is no cost, and
+OpenTelemetry's SDK is not imported. Destination, service name and sampling are set by its own variables
+(`OTEL_EXPORTER_OTLP_ENDPOINT`, `OTEL_SERVICE_NAME`, `OTEL_TRACES_SAMPLER`, …).
 """
 
 from __future__ import annotations
@@ -24,12 +24,13 @@ SERVICE = "relume"
 
 @dataclass(frozen=True)
 class SpanTimes:
-    """When the parts of an answer were done, seconds of `time.perf_counter`.
+    """Times of one frame, seconds of `time.perf_counter`.
 
     Attributes:
-        received_s: the edit, or the eye, came out of the socket. applied_s: it was checked and applied.
-        started_s: a thread began to bring the picture on. updated_s: that was done. encoded_s: the frame was packed.
-        send_start_s: it was given to the socket. send_end_s: the socket had taken it.
+        received_s: the edit or camera message was received. applied_s: it was validated and applied.
+        started_s: a thread started to update the image. updated_s: the image was updated. encoded_s: the frame was
+            packed.
+        send_start_s: sending started. send_end_s: the socket had accepted the frame.
     """
 
     received_s: float
@@ -41,7 +42,7 @@ class SpanTimes:
     send_end_s: float
 
     def spans(self) -> Mapping[str, tuple[float, float]]:
-        """Spans in a frame's: from when to when."""
+        """Child spans of the frame's span: start and end."""
         return {
             "apply": (self.received_s, self.applied_s),
             "wait": (self.applied_s, self.started_s),
@@ -52,16 +53,16 @@ class SpanTimes:
 
 
 class Traces:
-    """Makes spans; may be used from any thread."""
+    """Creates spans. Thread-safe."""
 
     def __init__(self, provider: TracerProvider) -> None:
         self._provider, self._tracer = provider, provider.get_tracer(SERVICE)
 
     def record_frame(self, name: str, times: SpanTimes, attributes: Mapping[str, str | int | bool]) -> None:
-        """An edit has been answered by a frame.
+        """Record a frame that answers an edit.
 
         Args:
-            name: "edit" or "camera". times: of its parts. attributes: without the prefix that all have.
+            name: "edit" or "camera". times: of the frame. attributes: without the common prefix.
         """
         from opentelemetry.trace import set_span_in_context
 
@@ -76,11 +77,11 @@ class Traces:
         span.end(zero_ns + round(times.send_end_s * 1e9))
 
     def record_freeze(self, start_s: float, attributes: Mapping[str, str | int | bool]) -> None:
-        """A curve, or what else stands still beside a hand, has been made ready; it took from then until now."""
+        """Record the precomputing of a curve, or of other static light, from `start_s` until now."""
         self._span("freeze", start_s, attributes, _zero_ns()).end()
 
     def record_refusal(self, received_s: float, reason: str, attributes: Mapping[str, str | int | bool]) -> None:
-        """An edit that came then was refused."""
+        """Record a rejected edit."""
         from opentelemetry.trace import Status, StatusCode
 
         span = self._span("edit", received_s, attributes, _zero_ns())
@@ -94,12 +95,12 @@ class Traces:
         return self._tracer.start_span(name, start_time=zero_ns + round(start_s * 1e9), attributes=span_attributes)
 
     def close(self) -> None:
-        """Send what waits."""
+        """Send buffered spans."""
         self._provider.shutdown()
 
 
 def open_traces(exporter: SpanExporter | None = None) -> Traces:
-    """Traces that go to a collector by OTLP, or to another exporter."""
+    """Open traces to a collector by OTLP, or to the given exporter."""
     from opentelemetry.sdk.resources import SERVICE_NAME, Resource
     from opentelemetry.sdk.trace import TracerProvider
     from opentelemetry.sdk.trace.export import BatchSpanProcessor
@@ -119,5 +120,5 @@ def open_traces(exporter: SpanExporter | None = None) -> Traces:
 
 
 def _zero_ns() -> int:
-    """Since 1970, when `time.perf_counter` was 0."""
+    """Time since 1970 at `time.perf_counter` 0, nanoseconds."""
     return time.time_ns() - time.perf_counter_ns()

@@ -44,7 +44,7 @@ def test_a_file_that_kills_its_reader_is_rejected(tmp_path: Path) -> None:
     with closing(SandboxedViewArrays(zipped(tmp_path / "a.zip"), *LIMITS)) as apart:
         os.kill(apart._process.pid, signal.SIGKILL)
         apart._process.wait()
-        with pytest.raises(MaterialError, match=r"made their reader fail, or need more than 4\.3 GB"):
+        with pytest.raises(MaterialError, match=r"are damaged, or need more than 4\.3 GB"):
             apart.get_view(0)
 
 

@@ -54,7 +54,7 @@ def test_command_line_reports_errors_in_one_line(home, tmp_path, capsys):
     for arguments, said in (
         (["import", str(tmp_path / "bad.binary")], "not a MERL file"),
         (["import", str(tmp_path / "bad.binary"), "--name", " "], "printable"),
-        (["export", look, "Floor", "--output", str(tmp_path / "x.binary")], "terms stand in the look"),
+        (["export", look, "Floor", "--output", str(tmp_path / "x.binary")], "terms are in the look"),
         (["export", look, "Wall", "--output", str(tmp_path / "x.binary")], "imported here"),
         (["export", look, "Wall", "--output", str(tmp_path / "no" / "x.binary")], "folder that exists"),
     ):

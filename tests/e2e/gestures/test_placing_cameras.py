@@ -81,11 +81,11 @@ def test_a_camera_is_kept_moved_deleted_and_baked(page: Page, server: Server, sc
     canvas.press("ArrowRight")
     dialog.get_by_label("Name").fill("front")
     dialog.get_by_role("button", name="Keep camera").click()
-    expect(dialog.get_by_role("alert")).to_contain_text("own cameras")
+    expect(dialog.get_by_role("alert")).to_contain_text("camera of the scene's file")
     seen = str(canvas.evaluate(SEEN))
     canvas.press("ArrowRight")
     moved(page, seen)  # a picture that comes after the refusal takes nothing of it away
-    expect(dialog.get_by_role("alert")).to_contain_text("own cameras")
+    expect(dialog.get_by_role("alert")).to_contain_text("camera of the scene's file")
     dialog.get_by_label("Name").fill("Aside")
     dialog.get_by_label("Name").press("Enter")
     expect(dialog).to_be_hidden()

@@ -51,7 +51,7 @@ def test_people_log_in_and_roles_say_what_they_may_do(
         page.goto(url)
         page.get_by_label("Token").fill("relume_000000000000_x")
         page.get_by_role("button", name="Log in").click()
-        expect(page.get_by_role("alert")).to_contain_text("this token opens nothing")
+        expect(page.get_by_role("alert")).to_contain_text("this token is not valid")
         log_in(page, access.tokens.add("Vera", "view"))
         page.get_by_role("option", name="Ball").click()
         expect(page.get_by_role("note")).to_contain_text("Vera may look, but not edit")

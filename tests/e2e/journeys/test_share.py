@@ -80,7 +80,7 @@ def test_a_link_in_a_fresh_profile_and_one_that_opens_nothing(editor: Editor, vi
     expect(visitor.page.locator(".card")).to_have_count(2)
 
     visitor.page.goto(f"{server.url}/?share=aaaaaaaaaa")
-    expect(visitor.page.locator(".toast.error")).to_contain_text("ask who sent the link to share it again")
+    expect(visitor.page.locator(".toast.error")).to_contain_text("ask the sender to share it again")
     expect(visitor.page.locator(".scene-card")).to_have_count(1)
 
 

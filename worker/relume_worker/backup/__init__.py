@@ -1,1 +1,1 @@
-"""Backups of a data directory and its ledger: incremental, checked, restored."""
+"""Backups of a data directory and its database: incremental, verified, restorable."""

@@ -1,5 +1,4 @@
-"""What of a data directory belongs into a backup: all but the ledger, which goes as a copy, what is under way, and what
-is made again by itself."""
+"""Files of a data directory that belong in a backup: without the ledger, running work, and derived files."""
 
 from __future__ import annotations
 
@@ -26,17 +25,17 @@ EXCLUDED_PATTERNS = (
     "bakes/*.zarr/edited",
     f"*{UNFINISHED}",
 )
-"""Patterns of paths that stay behind, with all that lies below."""
+"""Patterns of excluded paths, with everything below them."""
 
 
 @dataclass(frozen=True)
 class FileEntry:
-    """A file that belongs into a backup.
+    """A file of a backup.
 
     Attributes:
         path: below the data directory, with "/".
-        num_bytes, mtime_ns: by which a file that has not changed is known.
-        sha256: that it must have; None where nothing says so.
+        num_bytes, mtime_ns: equal if the file has not changed.
+        sha256: expected digest; None if it is unknown.
     """
 
     path: str
@@ -46,7 +45,7 @@ class FileEntry:
 
 
 def walk_files(data_dir: Path) -> Iterator[FileEntry]:
-    """The files, sorted; of a published store those that its manifest names, which never change."""
+    """Yield the files, sorted; of a published store those in its manifest, which never change."""
     digests: dict[str, str] = {}
     for folder, folders, names in os.walk(data_dir):
         relative_folder = Path(folder).relative_to(data_dir).as_posix()
@@ -54,7 +53,7 @@ def walk_files(data_dir: Path) -> Iterator[FileEntry]:
         if fnmatch(relative_folder, "bakes/*.zarr"):
             digests = _digests(Path(folder), relative_folder)
             if not digests:
-                folders.clear()  # it is being published, or deleted
+                folders.clear()  # being published or deleted
                 continue
         is_store = fnmatch(relative_folder, "bakes/*.zarr*")
         for path in (_join(relative_folder, name) for name in sorted(names)):
@@ -62,7 +61,7 @@ def walk_files(data_dir: Path) -> Iterator[FileEntry]:
                 continue
             try:
                 stat = (data_dir / path).stat()
-            except FileNotFoundError:  # deleted since
+            except FileNotFoundError:  # deleted in the meantime
                 continue
             yield FileEntry(path, stat.st_size, stat.st_mtime_ns, digests.get(path) if is_store else None)
 

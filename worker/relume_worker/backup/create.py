@@ -1,7 +1,7 @@
-"""Takes a backup while everything goes on: the ledger first, then the files that it names and all others.
+"""Create a backup while everything runs: the ledger first, then the files that it names and all others.
 
-Scenes and stores are on the disk before the ledger names them, and never change. What the ledger's copy names and the
-disk no longer has was deleted in between: then all is taken anew, which costs little, as nothing is copied twice.
+Scenes and stores are on the disk before the ledger names them, and never change. Files that the ledger's copy names and
+that are missing were deleted meanwhile: then the backup starts again, which is cheap because nothing is copied twice.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from relume_worker.storage import is_in_storage
 ATTEMPTS = 3
 
 StartReport = Callable[[int], ReportBytes]
-"""Told how many bytes there are to deal with; returns whom to tell of progress."""
+"""Called with the total number of bytes; returns the progress callback."""
 
 
 def create_backup(
@@ -35,16 +35,17 @@ def create_backup(
     repository: BackupRepository,
     start_report: StartReport = lambda total: lambda done: None,
 ) -> Snapshot:
-    """Add a snapshot to a folder of backups. Interrupted, it leaves none; the next goes on with what was copied.
+    """Add a snapshot to a backup folder. If it is interrupted, there is no snapshot, and the next backup reuses the
+    copied files.
 
     Args:
-        data_dir: what to back up. ledger: that belongs to it.
-        repository: the folder of backups, made where it is missing.
-        start_report: hears of progress.
+        data_dir: to back up. ledger: of it.
+        repository: the backup folder, created if missing.
+        start_report: for progress.
     Returns:
-        The snapshot; `left_out` says what should be in it.
+        The snapshot; `left_out` lists missing and damaged files.
     Raises:
-        BackupError: the folder holds something else. DiskFullError: there is no room for it.
+        BackupError: the folder contains something else. DiskFullError: the disk is full.
     """
     with repository.lock():
         snapshot = _create_snapshot(data_dir, ledger, repository, start_report)
@@ -70,7 +71,7 @@ def _create_snapshot(
         if not missing or attempt == ATTEMPTS - 1:
             break
         previous_files = {stored_file.path: stored_file for stored_file in files}
-    problems += [f"{path} is not in the data directory, though the ledger names it" for path in sorted(missing)]
+    problems += [f"{path} is missing in the data directory, although the database names it" for path in sorted(missing)]
     return Snapshot(
         _new_name(repository), version("relume"), latest_revision(), stored_ledger, tuple(files), tuple(problems)
     )
@@ -83,7 +84,7 @@ def _previous_files(repository: BackupRepository) -> dict[str, StoredFile]:
 
 
 def _required_paths(copy: Path) -> set[str]:
-    """A file of every scene and finished bake that a ledger names."""
+    """One file of every scene and finished bake in a ledger."""
     engine = connect(f"sqlite:///{copy}")
     with engine.connect() as connection:
         scenes = connection.scalars(select(SceneRow.id))
@@ -103,7 +104,7 @@ def _store_ledger(copy: Path, repository: BackupRepository) -> StoredFile:
 def _store_files(
     data_dir: Path, repository: BackupRepository, previous_files: dict[str, StoredFile], start_report: StartReport
 ) -> tuple[list[StoredFile], list[str]]:
-    """What was kept of the data directory, and what could not be."""
+    """Store the files of the data directory; return the stored ones, and sentences on damaged ones."""
     entries = list(walk_files(data_dir))
     report_bytes = start_report(sum(file.num_bytes for file in entries))
     stored_files: list[StoredFile] = []
@@ -111,14 +112,14 @@ def _store_files(
     for file in entries:
         try:
             stored_file = _store_file(data_dir, file, repository, previous_files.get(file.path), report_bytes)
-        except FileNotFoundError:  # deleted since
+        except FileNotFoundError:  # deleted in the meantime
             continue
         if stored_file is not None:
             stored_files.append(stored_file)
         else:
             damaged_keys.add("/".join(file.path.split("/")[:2]))
     intact = [stored_file for stored_file in stored_files if stored_file.content_key not in damaged_keys]
-    return intact, [f"{name} is damaged: delete it, and bake or import it again" for name in sorted(damaged_keys)]
+    return intact, [f"{name} is damaged; delete it, and bake or import it again" for name in sorted(damaged_keys)]
 
 
 def _store_file(
@@ -128,7 +129,7 @@ def _store_file(
     previous: StoredFile | None,
     report_bytes: ReportBytes,
 ) -> StoredFile | None:
-    """Keep a file; None where its content is not what it should be."""
+    """Store a file; None if its content is not the expected one."""
     is_unchanged = previous is not None and (previous.num_bytes, previous.mtime_ns) == (file.num_bytes, file.mtime_ns)
     for _ in range(ATTEMPTS):
         sha256 = file.sha256 or (previous.sha256 if previous is not None and is_unchanged else None)
@@ -138,12 +139,12 @@ def _store_file(
             return StoredFile(file.path, repository.content_path(sha256).stat().st_size, sha256, file.mtime_ns)
         if file.sha256 is not None:
             return None
-        is_unchanged = False  # it has changed meanwhile
+        is_unchanged = False  # changed in the meantime
     return None
 
 
 def _new_name(repository: BackupRepository) -> str:
-    """The time; a number with it where there is one of this second."""
+    """Name of a snapshot: the time, with a number if there is one of this second."""
     time, existing_names = strftime("%Y%m%dT%H%M%SZ", gmtime()), repository.names()
     names: Sequence[str] = [time, *(f"{time}-{k}" for k in range(1, 100))]
     return next(name for name in names if name not in existing_names)

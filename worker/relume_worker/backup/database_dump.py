@@ -1,4 +1,4 @@
-"""A ledger as one file: of SQLite, whichever database it is a copy of, so that it can be restored into either."""
+"""Copy a ledger of any database into one SQLite file, from which either kind can be restored."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ ROWS_PER_BATCH = 1000
 
 
 def copy_ledger(source: Engine, path: Path) -> None:
-    """Copy all rows as they are at one moment; whoever uses the ledger goes on meanwhile.
+    """Copy all rows of one moment, while the ledger is in use.
 
     Args:
-        source: a ledger of the newest revision.
-        path: of the file, which is not there yet.
+        source: ledger of the newest revision.
+        path: of the file, which must not exist.
     """
     target = open_database(f"sqlite:///{path}")
     try:
         with _snapshot_connection(source) as source_connection, target.begin() as target_connection:
             _copy_rows(source_connection, target_connection)
-        with target.connect() as connection:  # one file, nothing beside it
+        with target.connect() as connection:  # a single file, without a write-ahead log
             connection.exec_driver_sql("PRAGMA journal_mode = DELETE")
     finally:
         target.dispose()
 
 
 def fill_ledger(path: Path, target: Engine) -> None:
-    """Put the rows of a copy into an empty ledger, all or none of them.
+    """Fill an empty ledger with the rows of a copy, all or none.
 
     Args:
-        path: of the copy; upgraded where it is of an older relume. target: a ledger of the newest revision.
+        path: of the copy; upgraded if it is of an older version. target: ledger of the newest revision.
     """
     source = open_database(f"sqlite:///{path}")
     try:
@@ -45,13 +45,13 @@ def fill_ledger(path: Path, target: Engine) -> None:
 
 
 def is_empty(engine: Engine) -> bool:
-    """Whether a ledger has no rows."""
+    """True if a ledger has no rows."""
     with _snapshot_connection(engine) as connection:
         return not any(connection.scalar(select(func.count()).select_from(table)) for table in _tables(connection))
 
 
 def _tables(connection: Connection) -> list[Table]:
-    """Tables of a ledger, those that others name first."""
+    """Tables of a ledger, referenced ones first."""
     metadata = MetaData()
     metadata.reflect(connection)
     return [table for table in metadata.sorted_tables if table.name != "alembic_version"]
@@ -67,10 +67,10 @@ def _copy_rows(source: Connection, target: Connection) -> None:
 
 @contextmanager
 def _snapshot_connection(engine: Engine) -> Iterator[Connection]:
-    """A connection that sees all tables as they are at one moment, and writes nothing."""
+    """Open a read-only connection that sees all tables at one moment."""
     with engine.connect() as connection:
         if engine.dialect.name == "sqlite":
-            connection.exec_driver_sql("BEGIN")  # the driver begins one for writing only
+            connection.exec_driver_sql("BEGIN")  # the driver begins a transaction only for writing
         else:
             connection = connection.execution_options(isolation_level="REPEATABLE READ")
         yield connection

@@ -1,10 +1,10 @@
-"""The folder of backups.
+"""The backup folder.
 
-    relume-backup.json      says that it is one
+    relume-backup.json      marks the folder as one
     files/ab/abcd…          contents, each once, named by their SHA-256
-    snapshots/<time>.json   what a data directory held at that time; written last, so its presence means "whole"
+    snapshots/<time>.json   files of a data directory at that time; written last, so it exists only if complete
 
-A backup that is interrupted leaves files that no snapshot names; the next one finds them there.
+An interrupted backup leaves contents without a snapshot; the next backup reuses them.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from relume.core.filesystem import UNFINISHED, atomic_write
 FORMAT = 1
 MARK = "relume-backup.json"
 COPIES = ".ledger-"
-"""How folders of copies of a ledger begin, while they are made."""
+"""Prefix of temporary folders with copies of a ledger."""
 MAX_SNAPSHOT_BYTES = 1 << 30
 COPY_BYTES = 1 << 20
 
@@ -34,12 +34,12 @@ _SHA256 = re.compile(r"[0-9a-f]{64}")
 _NAME = re.compile(r"\d{8}T\d{6}Z(-\d+)?")
 
 ReportBytes = Callable[[int], None]
-"""Told how many bytes were dealt with since the last time; what it raises ends the work."""
+"""Progress callback with the number of bytes since the last call; its exceptions stop the work."""
 
 
 @dataclass(frozen=True)
 class StoredFile:
-    """A file of a snapshot; `path` is below the data directory, `mtime_ns` what it was there."""
+    """A file of a snapshot; `path` is below the data directory, `mtime_ns` from there."""
 
     path: str
     num_bytes: int
@@ -48,7 +48,7 @@ class StoredFile:
 
     @property
     def content_key(self) -> str:
-        """The bake, scene or other thing that it is a file of: nothing of one is of use without the rest."""
+        """The bake, scene or other object of the file, which is useless if one of its files is missing."""
         return "/".join(self.path.split("/")[:2])
 
 
@@ -57,8 +57,8 @@ class Snapshot:
     """A data directory at one moment.
 
     Attributes:
-        name: its time, UTC. relume: version that took it. revision: of the ledger. ledger: the copy of it.
-        left_out: what should be in it and is not, a sentence each.
+        name: time, UTC. relume: version that made it. revision: of the ledger. ledger: its copy.
+        left_out: one sentence for each file that is missing.
     """
 
     name: str
@@ -75,17 +75,17 @@ class Snapshot:
 
 
 class BackupRepository:
-    """A folder of backups."""
+    """A backup folder."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
     def initialize(self) -> None:
-        """Make it, or take the one that is there. Raises BackupError where the folder holds something else."""
+        """Create the folder, or check an existing one. Raises BackupError if it contains something else."""
         if self.is_repository():
             return
         if self.folder.exists() and (not self.folder.is_dir() or any(self.folder.iterdir())):
-            raise BackupError(f"{self.folder} holds something else than backups of relume; name an empty folder")
+            raise BackupError(f"{self.folder} contains something other than relume backups; give an empty folder")
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         for folder_name in ("files", "snapshots"):
             (self.folder / folder_name).mkdir(exist_ok=True)
@@ -93,24 +93,24 @@ class BackupRepository:
             unfinished.write_text(json.dumps({"format": FORMAT}))
 
     def is_repository(self) -> bool:
-        """Whether it is a folder of backups. Raises BackupError where a newer relume has made it."""
+        """True if it is a backup folder. Raises BackupError if a newer relume made it."""
         try:
             text = (self.folder / MARK).read_text(encoding="utf-8")
         except (FileNotFoundError, NotADirectoryError):
             return False
         if json.loads(text).get("format") != FORMAT:
-            raise BackupError(f"{self.folder} is of a newer relume; use that one")
+            raise BackupError(f"{self.folder} was made by a newer relume; use that version")
         return True
 
     @contextmanager
     def lock(self) -> Iterator[None]:
-        """Make it or take it, and let no other backup into it meanwhile; what killed ones left half-written goes."""
+        """Create or open the folder, lock it for other backups, and delete temporary files of killed ones."""
         self.initialize()
         with (self.folder / MARK).open("rb") as mark:
             try:
                 fcntl.flock(mark, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                raise BackupError(f"another backup into {self.folder} is under way; wait for it") from None
+                raise BackupError(f"another backup into {self.folder} is running; wait for it") from None
             for leftover in self.folder.rglob(UNFINISHED):
                 leftover.unlink(missing_ok=True)
             for leftover in self.folder.glob(f"{COPIES}*"):
@@ -122,12 +122,12 @@ class BackupRepository:
         return self.folder / "files" / sha256[:2] / sha256
 
     def store(self, source: Path, sha256: str, report_bytes: ReportBytes) -> bool:
-        """Keep a content.
+        """Store a content.
 
         Args:
-            source: a file that has it. sha256: that it should have. report_bytes: hears of progress.
+            source: file with the content. sha256: expected digest. report_bytes: for progress.
         Returns:
-            Whether it has; else it has changed, or is damaged.
+            True if the digest is correct; otherwise the file has changed or is damaged.
         """
         target = self.content_path(sha256)
         if target.exists():
@@ -141,28 +141,28 @@ class BackupRepository:
         return sorted(path.stem for path in (self.folder / "snapshots").glob("*.json") if _NAME.fullmatch(path.stem))
 
     def write(self, snapshot: Snapshot) -> None:
-        """Make a snapshot known, all of whose contents are kept."""
+        """Write a snapshot after all its contents."""
         with atomic_write(self.folder / "snapshots" / f"{snapshot.name}.json") as unfinished:
             unfinished.write_text(json.dumps({"format": FORMAT, **asdict(snapshot)}, indent=1))
 
     def read(self, name: str | None = None) -> Snapshot:
-        """A snapshot; the newest where none is named. Raises BackupError."""
+        """Read a snapshot, by default the newest. Raises BackupError."""
         names = self.names() if self.is_repository() else []
         if not names:
-            raise BackupError(f"{self.folder} holds no backup; make one with: relume backup {self.folder}")
+            raise BackupError(f"{self.folder} contains no backup; make one with: relume backup {self.folder}")
         name = name or names[-1]
         if name not in names:
-            raise BackupError(f"there is no backup {name[:40]!r}; there are {', '.join(names[-10:])}")
+            raise BackupError(f"there is no backup {name[:40]!r}; choose from {', '.join(names[-10:])}")
         path = self.folder / "snapshots" / f"{name}.json"
         if path.stat().st_size > MAX_SNAPSHOT_BYTES:
             raise BackupError(f"{path.name} has more than {MAX_SNAPSHOT_BYTES:,} bytes; it is not relume's")
         try:
             return _snapshot(json.loads(path.read_text(encoding="utf-8")))
         except (ValueError, KeyError, TypeError) as error:
-            raise BackupError(f"{path.name} is not a snapshot of relume ({error}); take another") from error
+            raise BackupError(f"{path.name} is not a snapshot of relume ({error}); give another") from error
 
     def find_damaged(self, snapshot: Snapshot, report_bytes: ReportBytes) -> Iterator[StoredFile]:
-        """Files of a snapshot whose contents are missing or are not what they were."""
+        """Yield files of a snapshot whose contents are missing or damaged."""
         for stored_file in snapshot.all:
             path = self.content_path(stored_file.sha256)
             if (
@@ -173,7 +173,7 @@ class BackupRepository:
                 yield stored_file
 
     def quarantine(self, stored_file: StoredFile) -> None:
-        """Give a damaged content another name, so that the next backup copies it anew where it still is."""
+        """Rename a damaged content, so that the next backup copies it again."""
         path = self.content_path(stored_file.sha256)
         if path.exists():
             path.rename(path.with_name(f"{path.name}.damaged"))
@@ -190,13 +190,13 @@ def compute_digest(path: Path, report_bytes: ReportBytes) -> str:
 
 
 def copy_verified(source: Path, target: Path, sha256: str, report_bytes: ReportBytes) -> bool:
-    """Copy a file, which takes its name when it is complete.
+    """Copy a file, which gets its name when it is complete.
 
     Args:
-        source: what is copied. target: where to; its folder exists.
-        sha256: that it should have. report_bytes: hears of progress.
+        source: file to copy. target: in an existing folder.
+        sha256: expected digest. report_bytes: for progress.
     Returns:
-        Whether it has; else there is no copy.
+        True if the digest is correct; otherwise there is no copy.
     """
     digest = hashlib.sha256()
     try:
@@ -214,7 +214,7 @@ def copy_verified(source: Path, target: Path, sha256: str, report_bytes: ReportB
 
 
 class _ContentMismatchError(Exception):
-    """A file has another content than it should."""
+    """The content of a file is not the expected one."""
 
 
 def _snapshot(document: dict[str, Any]) -> Snapshot:
@@ -235,5 +235,5 @@ def _read_stored_file(entry: dict[str, Any]) -> StoredFile:
         or {".", ".."} & set(components)
         or "\0" in stored_file.path
     ):
-        raise ValueError(f"it names {stored_file.path[:80]!r}")
+        raise ValueError(f"its path is {stored_file.path[:80]!r}")
     return stored_file

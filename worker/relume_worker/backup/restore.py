@@ -1,6 +1,7 @@
-"""Puts a backup into an empty data directory and an empty ledger.
+"""Restore a backup into an empty data directory and an empty ledger.
 
-A mark stands in the directory until all is there, and nothing works on one that has it; the same restore goes on there.
+A marker file is in the directory until the restore is complete, and no relume process uses a directory with it; the
+same restore resumes there.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ MARK = "restoring.json"
 
 
 def refuse_unfinished(data_dir: Path) -> None:
-    """Raise BackupError where a restore into a data directory was begun and is not finished."""
+    """Raise BackupError if a restore into a data directory is incomplete."""
     if (data_dir / MARK).exists():
         raise BackupError(
-            f"a restore into {data_dir} was not finished; run relume restore again, which goes on, or empty the folder"
+            f"a restore into {data_dir} was not finished; run relume restore again, which resumes, or empty the folder"
         )
 
 
@@ -37,18 +38,18 @@ def restore(
     ledger_url: str,
     start_report: StartReport = lambda total: lambda done: None,
 ) -> tuple[Snapshot, Sequence[str]]:
-    """Restore a snapshot, every file of it checked. Of what has damaged files nothing is restored, as nothing is
-    backed up: one bake must not cost all others, and what the ledger names and is not there is made again.
+    """Restore a snapshot, verifying every file. An object with damaged files is skipped, so that one bake does not cost
+    all others; the ledger's entry leads to baking it again.
 
     Args:
-        repository: the folder of backups. name: of the snapshot; None: the newest.
-        data_dir: empty or missing, or where the same restore was interrupted. ledger_url: of an empty ledger.
-        start_report: hears of progress.
+        repository: the backup folder. name: of the snapshot; None: the newest.
+        data_dir: empty, missing, or with the same restore interrupted. ledger_url: of an empty ledger.
+        start_report: for progress.
     Returns:
-        The snapshot, and a sentence for each thing that is damaged in the backup.
+        The snapshot, and one sentence for each object that is damaged in the backup.
     Raises:
-        BackupError: there is no such backup, its ledger is damaged, or there is something where it should go.
-        DiskFullError: there is no room for it.
+        BackupError: there is no such backup, its ledger is damaged, or the destination is not empty.
+        DiskFullError: the disk is full.
     """
     snapshot = repository.read(name)
     _mark(repository, snapshot, data_dir, ledger_url)
@@ -66,14 +67,14 @@ def restore(
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "ledger.db"
         if not _restore_file(repository, snapshot.ledger, copy, lambda done: None):
-            raise BackupError("the ledger is damaged in the backup; empty the folder, and restore an older one")
+            raise BackupError("the database is damaged in the backup; empty the folder, and restore an older backup")
         target = open_database(ledger_url)
         try:
-            if is_empty(target):  # else the restore was killed after this, which is all or nothing
+            if is_empty(target):  # otherwise the restore was killed after this step, which is atomic
                 fill_ledger(copy, target)
         finally:
             target.dispose()
-    for leftover in data_dir.rglob(UNFINISHED):  # of restores that were killed
+    for leftover in data_dir.rglob(UNFINISHED):  # of killed restores
         leftover.unlink(missing_ok=True)
     (data_dir / MARK).unlink()
     return snapshot, [
@@ -82,14 +83,14 @@ def restore(
 
 
 def _mark(repository: BackupRepository, snapshot: Snapshot, data_dir: Path, ledger_url: str) -> None:
-    """Say in the data directory what is restored into it; refuse where something else is."""
+    """Write the marker; refuse a directory with other contents."""
     data_dir.mkdir(mode=0o700, parents=True, exist_ok=True)
     mark, document = data_dir / MARK, {"from": str(repository.folder.resolve()), "snapshot": snapshot.name}
     if mark.exists():
         existing = json.loads(mark.read_text(encoding="utf-8"))
         if existing != document:
             raise BackupError(
-                f"the restore of {existing['snapshot']} into {data_dir} was not finished; go on with that one"
+                f"the restore of {existing['snapshot']} into {data_dir} was not finished; resume that one"
             )
         return
     if any(data_dir.iterdir()):
@@ -100,7 +101,7 @@ def _mark(repository: BackupRepository, snapshot: Snapshot, data_dir: Path, ledg
     try:
         if not is_empty(engine):
             mark.unlink()
-            raise BackupError("the ledger has rows already; restore into an empty database (RELUME_DATABASE)")
+            raise BackupError("the database is not empty; restore into an empty one (RELUME_DATABASE)")
     finally:
         engine.dispose()
 
@@ -114,8 +115,8 @@ def _delete(path: Path) -> None:
 def _restore_file(
     repository: BackupRepository, stored_file: StoredFile, target: Path, report_bytes: ReportBytes
 ) -> bool:
-    """Whether a file is there as it was."""
-    if target.exists() and target.stat().st_size == stored_file.num_bytes:  # put there before an interruption, whole
+    """Restore a file; true if it is there with the expected content."""
+    if target.exists() and target.stat().st_size == stored_file.num_bytes:  # complete, from before an interruption
         report_bytes(stored_file.num_bytes)
         return True
     target.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""The database: any SQLAlchemy URL, its tables, its failures."""
+"""The database: connections, tables, revisions, errors."""
 
 from relume_worker.database.connect import open_database
 

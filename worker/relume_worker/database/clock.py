@@ -1,4 +1,4 @@
-"""The clock of the database, by which leases run: processes on several machines share it, whatever their own say."""
+"""The database's clock, on which leases depend: processes on several machines share it."""
 
 from __future__ import annotations
 

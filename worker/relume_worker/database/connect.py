@@ -1,4 +1,4 @@
-"""Opens the database: SQLite, set up for several processes that write, or PostgreSQL."""
+"""Open the database: SQLite, configured for several writing processes, or PostgreSQL."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from relume_worker.database.upgrading import upgrade
 BUSY_TIMEOUT_MS = 30_000
 _RETRY_S = 0.01
 POOL_TIMEOUT_S = 10.0
-MAX_OVERFLOW = 30  # connections beside the five that are kept: threads of the server that may ask at once
+MAX_OVERFLOW = 30  # connections besides the five that stay open, for the server's threads
 
 
 def open_database(url: str) -> Engine:
-    """An engine on `url`, its tables made or upgraded where that only adds.
+    """Return an engine for `url` with its tables created, or upgraded by additive revisions.
 
     Raises:
-        ParameterError: `url` is neither of SQLite nor of PostgreSQL.
-        DatabaseDamagedError, DiskFullError: what the file says. LedgerVersionError: see `upgrading`.
+        ParameterError: `url` is neither SQLite nor PostgreSQL.
+        DatabaseDamagedError, DiskFullError: from the file. LedgerVersionError: see `upgrading`.
     """
     engine = connect(url)
     try:
@@ -39,7 +39,7 @@ def open_database(url: str) -> Engine:
 
 
 def connect(url: str) -> Engine:
-    """An engine on `url`, its tables as they are. Raises ParameterError."""
+    """Return an engine for `url` with its tables unchanged. Raises ParameterError."""
     database_url = _parse(url)
     if database_url.get_backend_name() == "postgresql":
         waits = {"pool_timeout": POOL_TIMEOUT_S, "max_overflow": MAX_OVERFLOW}
@@ -49,8 +49,8 @@ def connect(url: str) -> Engine:
     else:
         if database_url.database:
             Path(database_url.database).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            Path(database_url.database).touch(mode=0o600)  # SQLite would let everybody read it
-        # of connections beside the five that are kept SQLite keeps the file open: its locks are of the process
+            Path(database_url.database).touch(mode=0o600)  # SQLite would make it readable by everyone
+        # SQLite keeps the file open for connections beyond the pool: its locks belong to the process
         engine = create_engine(database_url)
         event.listen(engine, "connect", _set_up_sqlite)
     event.listen(engine, "handle_error", translate_error)
@@ -62,7 +62,7 @@ def _parse(url: str) -> URL:
     try:
         database_url = make_url(url)
     except ArgumentError:
-        raise ParameterError("RELUME_DATABASE", "something else", allowed) from None  # it may hold a password
+        raise ParameterError("RELUME_DATABASE", "something else", allowed) from None  # it may contain a password
     if database_url.drivername == "sqlite":
         return database_url
     if database_url.drivername not in ("postgres", "postgresql", "postgresql+pg8000"):
@@ -75,7 +75,7 @@ def _parse(url: str) -> URL:
 
 
 def _set_up_sqlite(connection: Any, _: object) -> None:
-    """Write-ahead log: readers never wait for a writer. Writers wait for each other instead of failing."""
+    """Use a write-ahead log: readers never wait for a writer, and writers wait for each other instead of failing."""
     connection.execute(f"PRAGMA busy_timeout = {BUSY_TIMEOUT_MS}")
     _enable_write_ahead_log(connection)
     for pragma in ("synchronous = NORMAL", "foreign_keys = ON"):
@@ -83,7 +83,7 @@ def _set_up_sqlite(connection: Any, _: object) -> None:
 
 
 def _enable_write_ahead_log(connection: Any) -> None:
-    """Switch a file that has none to a write-ahead log; SQLite itself does not wait where two begin it at once."""
+    """Switch a file to a write-ahead log; SQLite does not wait if two processes do it at once."""
     deadline_s = time.monotonic() + BUSY_TIMEOUT_MS / 1e3
     while True:
         try:

@@ -1,4 +1,4 @@
-"""What the database says when it fails, in words; and loops that go on meanwhile and say each fault once."""
+"""Database errors as messages; background loops that survive them and log each once."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from relume.core.errors import DatabaseDamagedError, DiskFullError, RelumeError
 log = logging.getLogger(__name__)
 
 DATABASE_ERRORS = (SQLAlchemyError, DatabaseDamagedError, DiskFullError)
-"""What reading or writing the database raises while it is away, damaged, or without room."""
+"""Exceptions of a database that is unavailable, damaged, or full."""
 
 MAX_MESSAGE_LENGTH = 300  # characters
 _DAMAGED = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
-_DISK_FULL = "53100"  # of PostgreSQL, as are these: connections that fail, ends by an operator, too many clients
+_DISK_FULL = "53100"  # PostgreSQL's codes: failed connections, operator shutdowns, too many clients
 _UNAVAILABLE_STATES = ("08", "57P", "53300")
 _INTEGRITY_CLASS = "23"
 
 
 def translate_error(context: ExceptionContext) -> None:
-    """Raise what a failure of the database means where that is known; listens to `handle_error` of an engine.
+    """Translate a database error into relume's exceptions; listens to `handle_error` of an engine.
 
     Raises:
-        DiskFullError, DatabaseDamagedError: it is one of these.
-        OperationalError, IntegrityError: a server does not answer, or refuses a row; pg8000 calls them otherwise.
+        DiskFullError, DatabaseDamagedError: for these causes.
+        OperationalError, IntegrityError: a server does not answer, or rejects a row; pg8000 raises other types.
     """
     cause = context.original_exception
-    code = getattr(cause, "sqlite_errorcode", 0) & 0xFF  # the rest tells kinds of it apart
+    code = getattr(cause, "sqlite_errorcode", 0) & 0xFF  # the rest distinguishes subtypes
     if code == sqlite3.SQLITE_FULL or _state(cause) == _DISK_FULL:
         raise DiskFullError("the database") from cause
     if code in _DAMAGED:
@@ -48,24 +48,24 @@ def translate_error(context: ExceptionContext) -> None:
 
 
 def is_unavailable(error: Exception) -> bool:
-    """Whether a database server does not answer, so that asking again in a while may help."""
+    """True if a database server does not answer, so that retrying later may help."""
     return isinstance(error, DBAPIError) and _is_unanswered(error.orig)
 
 
 def describe_error(error: BaseException) -> str:
-    """A failure in one line."""
+    """Describe an error in one line."""
     cause = error.orig if isinstance(error, DBAPIError) and error.orig is not None else error
     return " ".join(_reply(cause).get("M", str(cause)).split()) or type(cause).__name__
 
 
 def _reply(cause: BaseException | None) -> dict[str, str]:
-    """The fields of a PostgreSQL's error message, by their letters; empty where it has not answered."""
+    """Fields of a PostgreSQL error message by letter; empty if the server has not answered."""
     fields = cause.args[0] if isinstance(cause, pg8000.Error) and cause.args else None
     return fields if isinstance(fields, dict) else {}
 
 
 def _state(cause: BaseException | None) -> str:
-    """SQLSTATE; empty where there is none."""
+    """SQLSTATE; empty if there is none."""
     return _reply(cause).get("C", "")
 
 
@@ -75,12 +75,12 @@ def _is_unanswered(cause: BaseException | None) -> bool:
 
 
 class DatabaseError:
-    """Says what a loop meets in one line, and not again until it has gone or another has come; from any thread.
+    """Logs an error of a loop once, until it is over or another one occurs. Thread-safe.
 
-    A database server that is away is said by `database_outage`, once for the whole process.
+    An unavailable database server is logged by `database_outage`, once for the whole process.
 
     Args:
-        log: where. label: cannot be done, as a sentence begins.
+        log: to write to. label: start of the message, such as "x cannot be read".
     """
 
     def __init__(self, log: logging.Logger, label: str) -> None:
@@ -89,7 +89,7 @@ class DatabaseError:
         self._reported = ""
 
     def report_failure(self, error: Exception) -> None:
-        """Something failed; what nobody foresaw is told with its trace."""
+        """Report an error; an unexpected one is logged with its traceback."""
         if is_unavailable(error):
             return
         line, is_expected = describe_error(error), isinstance(error, (*DATABASE_ERRORS, RelumeError, OSError))
@@ -100,20 +100,20 @@ class DatabaseError:
         self._log.error("%s (%s); trying again", self._label, line, exc_info=None if is_expected else error)
 
     def report_recovered(self) -> None:
-        """It works."""
+        """Report success."""
         with self._lock:
             was_reported, self._reported = self._reported, ""
         if was_reported:
-            self._log.warning("%s: that is over", self._label)
+            self._log.warning("%s: resolved", self._label)
 
 
 class Outage:
-    """Says that a server does not answer, and that it does again: whatever the reasons are meanwhile.
+    """Logs that a server does not answer, and that it answers again, whatever the causes meanwhile.
 
-    Calls overlap: a slow one that began before the last change may end after it, and says nothing new.
+    Calls overlap: a slow call that began before the last change is ignored.
 
     Args:
-        log: where. label: does not answer.
+        log: to write to. label: of the server.
     """
 
     def __init__(self, log: logging.Logger, label: str) -> None:
@@ -121,16 +121,16 @@ class Outage:
         self._is_reported, self._changed_s, self._lock = False, -math.inf, threading.Lock()
 
     def report_failure(self, error: BaseException, began_s: float) -> None:
-        """A call that began at `began_s` (`time.monotonic`) got no answer."""
+        """Report that a call that began at `began_s` (`time.monotonic`) got no answer."""
         if self._changes(True, began_s):
             self._log.error(
                 "%s does not answer (%s); trying again", self._label, describe_error(error)[:MAX_MESSAGE_LENGTH]
             )
 
     def report_recovered(self, began_s: float) -> None:
-        """A call that began at `began_s` (`time.monotonic`) was answered."""
+        """Report that a call that began at `began_s` (`time.monotonic`) was answered."""
         if self._changes(False, began_s):
-            self._log.warning("%s does not answer: that is over", self._label)
+            self._log.warning("%s answers again", self._label)
 
     def _changes(self, is_away: bool, began_s: float) -> bool:
         with self._lock:
@@ -144,7 +144,7 @@ database_outage = Outage(log, "the database")
 
 
 class _CallStart(threading.local):
-    """When the last call on a database began in this thread."""
+    """Time at which this thread's last database call began."""
 
     time_s = -math.inf
 
@@ -153,7 +153,7 @@ _call_start = _CallStart()
 
 
 def watch(engine: Engine) -> None:
-    """Report to `database_outage` which statements and connections of an engine are answered."""
+    """Report answered and failed calls of an engine to `database_outage`."""
 
     def begin(*_: object) -> None:
         _call_start.time_s = time.monotonic()

@@ -1,4 +1,4 @@
-"""Tables of the ledger, as they are now; `revisions` beside this file has the ways from older ones."""
+"""Tables of the ledger; `revisions` next to this file upgrades older ones."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 
 class Base(DeclarativeBase):
-    """The root of all tables in relume's database."""
+    """Base class of all tables in relume's database."""
 
-    type_annotation_map: ClassVar[dict[Any, Any]] = {int: BigInteger().with_variant(Integer(), "sqlite")}  # bytes, rays
+    type_annotation_map: ClassVar[dict[Any, Any]] = {
+        int: BigInteger().with_variant(Integer(), "sqlite")
+    }  # bytes and rays exceed 32 bits
 
 
 class SceneRow(Base):
-    """A registered scene; its files lie in scenes/<id>/.
+    """A registered scene; its files are in scenes/<id>/.
 
     Attributes:
         summary: JSON for lists: views, materials, warnings, number of triangles.
@@ -30,7 +32,7 @@ class SceneRow(Base):
 
 
 class CameraRow(Base):
-    """A camera that somebody placed in a scene; `document` is its JSON, see `relume.scene.make_custom_camera`."""
+    """A placed camera of a scene; `document` is its JSON, see `relume.scene.custom_camera`."""
 
     __tablename__ = "cameras"
 
@@ -40,14 +42,14 @@ class CameraRow(Base):
 
 
 class BakeRow(Base):
-    """A bake. Whoever runs it holds the lease: `owner`, renewed by `heartbeat` (seconds since 1970
-    by the database's clock).
+    """A bake. The process that runs it has the lease: `owner`, renewed by `heartbeat` (seconds since 1970 by the
+    database's clock).
 
     Attributes:
-        code: names the code that makes or made it; None in rows of a relume that did not write that down.
-        client: who asked for it first; None in rows of a relume that did not write that down.
-        run: names its beginning, see `relume_worker.run_marker`; None in rows of a relume that did not.
-        crowding: see `relume_worker.estimate`; None where it is not ready, or was baked before that was measured.
+        code: code version that makes or made it; None in rows of older versions.
+        client: first user who submitted it; None in rows of older versions.
+        run: of its unfinished store, see `relume_worker.run_marker`; None in rows of older versions.
+        crowding: see `relume_worker.estimate`; None if it is not ready, or older than this measurement.
     """
 
     __tablename__ = "bakes"
@@ -75,7 +77,7 @@ class BakeRow(Base):
 
 
 class TaskRow(Base):
-    """A finished task of a bake. A row means that its shards are on disk; nothing else does."""
+    """A finished task of a bake. The row is the only proof that its shards are on disk."""
 
     __tablename__ = "tasks"
     __table_args__ = (Index("tasks_of_bake", "bake_id"),)

@@ -1,4 +1,4 @@
-"""Connections to PostgreSQL by pg8000 that notice after seconds when nobody answers, and say so in one way."""
+"""Connections to PostgreSQL by pg8000, with timeouts and uniform errors."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from typing import Any
 
 import pg8000
 
-TIMEOUT_S = 10.0  # to connect, and for each answer: of a host that is gone as of a server that hangs
+TIMEOUT_S = 10.0  # for connecting, and for each answer: covers dead hosts and hanging servers
 PORT = 5432
-TLS_MODES = ("prefer", "require", "verify-full")  # as libpq calls them; the first is what is done without a word
+TLS_MODES = ("prefer", "require", "verify-full")  # libpq's names; the first is the default
 
 
 class _Connection(pg8000.Connection):  # type: ignore[misc]  # it has no types
-    """pg8000's, which lets errors of the socket through where the first byte of an answer is what fails.
+    """A pg8000 connection whose socket errors are always InterfaceError.
 
-    Here they are always its InterfaceError, by which SQLAlchemy drops connections; and what fails is closed.
+    pg8000 itself passes some through. SQLAlchemy drops connections by this error; failed connections are closed.
     """
 
     def __init__(self, sock: socket.socket, **settings: Any) -> None:
@@ -35,8 +35,8 @@ class _Connection(pg8000.Connection):  # type: ignore[misc]  # it has no types
             super().handle_messages(context)
 
     def close(self) -> None:
-        stream = self._sock  # which pg8000 leaves open where its last word cannot be sent
-        with suppress(pg8000.InterfaceError):  # nobody is there to say goodbye to
+        stream = self._sock  # pg8000 leaves the socket open if its last message cannot be sent
+        with suppress(pg8000.InterfaceError):  # the server is gone
             super().close()
         if stream is not None:
             with suppress(OSError):
@@ -44,14 +44,14 @@ class _Connection(pg8000.Connection):  # type: ignore[misc]  # it has no types
 
 
 def connect_postgresql(_: object, __: object, ___: object, settings: dict[str, Any]) -> _Connection:
-    """A connection of an engine; listens to its `do_connect`. Raises pg8000's errors.
+    """Connect for an engine; listens to its `do_connect`. Raises pg8000's errors.
 
     Args:
-        _, __, ___: dialect, pool record and arguments of that event; not needed.
-        settings: what the URL says: user, host, and port, database, password, sslmode where it has them.
+        _, __, ___: dialect, pool record and arguments of the event; unused.
+        settings: from the URL: user, host, and optionally port, database, password, sslmode.
     """
     address = settings["host"], settings.get("port", PORT)
-    password = settings.get("password", "")  # without one, pg8000 fails on servers that ask for it
+    password = settings.get("password", "")  # otherwise pg8000 fails on servers that require a password
     extra_settings = {
         "password": password,
         "application_name": "relume",
@@ -65,11 +65,11 @@ def connect_postgresql(_: object, __: object, ___: object, settings: dict[str, A
 
 
 def _tls(mode: str) -> ssl.SSLContext | None:
-    """What a connection demands: None takes TLS where it is offered, a context refuses to go on without."""
+    """TLS mode: None uses TLS if it is offered, a context requires it."""
     if mode == "prefer":
         return None
     context = ssl.create_default_context()
-    if mode == "require":  # whoever answers
+    if mode == "require":  # any certificate
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
     return context
 

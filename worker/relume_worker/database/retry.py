@@ -1,4 +1,4 @@
-"""Waits for a database server that is away for some seconds, where giving up would cost what is being made."""
+"""Wait for an unavailable database server if giving up would lose work."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ Given = ParamSpec("Given")
 def with_retry(
     gives_up: Callable[[], bool], call: Callable[Given, Result], *args: Given.args, **kwargs: Given.kwargs
 ) -> Result:
-    """The result of a call on the ledger, asked again as long as the database is away.
+    """Call the ledger, and retry as long as the database is unavailable.
 
     Args:
-        gives_up: whether to wait no longer; then what the call raises passes, as do all other failures at once.
-        call: that may be made twice. args, kwargs: of it.
+        gives_up: true to stop waiting; then the error propagates, as all other errors do at once.
+        call: may run twice. args, kwargs: of the call.
     """
     while True:
         try:

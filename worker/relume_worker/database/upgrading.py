@@ -1,7 +1,7 @@
-"""Brings a database to the newest revision of its schema, by Alembic; see docs/adr/0029-database-revisions.md.
+"""Upgrade a database to the newest revision of its schema with Alembic; see docs/adr/0029-database-revisions.md.
 
-Revisions that only add are made when a database is opened: relumes from before them work on beside. Others wait until
-somebody says `relume db upgrade`.
+Additive revisions are applied when a database is opened: older versions of relume keep working on it. Others wait for
+`relume db upgrade`.
 """
 
 from __future__ import annotations
@@ -20,35 +20,36 @@ from sqlalchemy import Connection, Engine, text
 
 from relume.core.errors import LedgerVersionError
 
-logging.getLogger("alembic").setLevel(logging.WARNING)  # what is made, whoever upgrades says
+logging.getLogger("alembic").setLevel(logging.WARNING)  # the caller reports the revisions
 REVISIONS = Path(__file__).with_name("revisions")
-_LOCK = 0x72656C756D65  # of PostgreSQL, by its number; "relume"
+_LOCK = 0x72656C756D65  # PostgreSQL's advisory lock key: "relume" in numbers
 
 RevisionNote = tuple[str, str]
-"""Name of a revision, and what it does."""
+"""A revision's name, and its description."""
 
 
 def get_revision(connection: Connection) -> str | None:
-    """The revision that a database has; None where it is empty, or from before there were any."""
+    """Revision of a database; None if it is empty, or older than revisions."""
     return MigrationContext.configure(connection).get_current_revision()
 
 
 def latest_revision() -> str:
-    """The revision that this relume works with."""
+    """Newest revision of this version of relume."""
     (head,) = _scripts().get_heads()
     return head
 
 
 def upgrade(engine: Engine, *, is_requested: bool) -> list[RevisionNote]:
-    """Make all revisions that a database lacks, in one transaction; of several processes one makes them.
+    """Apply all missing revisions in one transaction; of several processes one applies them.
 
     Args:
         engine: of the database.
-        is_requested: whether somebody asked for it, so that no older relume is at work; else only what adds is made.
+        is_requested: whether a user asked for it, so that no older version is running; otherwise only additive
+            revisions.
     Returns:
-        The revisions that were made.
+        The applied revisions.
     Raises:
-        LedgerVersionError: a newer relume has upgraded the database, or one that only people may make is lacking.
+        LedgerVersionError: a newer relume has upgraded the database, or a revision needs a user's request.
     """
     with engine.connect() as connection:
         if not _missing_revisions(connection):
@@ -57,7 +58,7 @@ def upgrade(engine: Engine, *, is_requested: bool) -> list[RevisionNote]:
         missing = _missing_revisions(connection)
         if not is_requested and not all(script.module.is_additive for script in missing):
             raise LedgerVersionError(
-                "the ledger is to be changed in a way that relumes from before cannot work with; stop all that use it, "
+                "the database needs an upgrade that older versions of relume cannot use; stop all relume processes, "
                 "run: relume backup FOLDER, then: relume db upgrade"
             )
         config = _config()
@@ -67,11 +68,11 @@ def upgrade(engine: Engine, *, is_requested: bool) -> list[RevisionNote]:
 
 
 def draft_revision(connection: Connection, metadata: object, message: str) -> Path:
-    """Write a revision, to be looked through, that makes what the code's tables have and a database lacks.
+    """Write a draft of the revision that changes a database into the code's tables.
 
     Args:
         connection: to a database of the newest revision. metadata: of the code's tables.
-        message: what it does, in a few words.
+        message: short description.
     Returns:
         The file.
     """
@@ -101,7 +102,7 @@ def _missing_revisions(connection: Connection) -> list[Script]:
     names = [script.revision for script in revisions]
     if current is not None and current not in names:
         raise LedgerVersionError(
-            f"the ledger was upgraded by a newer relume (revision {current[:40]}, this one knows {names[0]}); "
+            f"the database was upgraded by a newer relume (revision {current[:40]}, this version has {names[0]}); "
             "run that relume, or restore a backup from before"
         )
     return revisions[: names.index(current) if current is not None else None][::-1]
@@ -109,18 +110,20 @@ def _missing_revisions(connection: Connection) -> list[Script]:
 
 @contextmanager
 def _exclusive_transaction(engine: Engine) -> Iterator[Connection]:
-    """A transaction in which nobody else changes the schema."""
+    """Open a transaction that excludes other schema changes."""
     with engine.connect() as connection:
         if engine.dialect.name != "sqlite":
             with connection.begin():
                 connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _LOCK})
                 yield connection
             return
-        connection.detach()  # others get connections that check foreign keys
-        connection.exec_driver_sql("PRAGMA foreign_keys = OFF")  # tables that are made anew drop the old for a moment
+        connection.detach()  # other connections check foreign keys
+        connection.exec_driver_sql("PRAGMA foreign_keys = OFF")  # recreated tables are missing for a moment
         connection.commit()
         with connection.begin():
             connection.exec_driver_sql("BEGIN IMMEDIATE")
             yield connection
             if connection.exec_driver_sql("PRAGMA foreign_key_check").first() is not None:
-                raise LedgerVersionError("rows of the ledger would name others that are not there; nothing was changed")
+                raise LedgerVersionError(
+                    "the upgrade would leave rows that reference missing ones; nothing was changed"
+                )

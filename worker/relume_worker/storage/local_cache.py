@@ -1,7 +1,7 @@
-"""What of the object storage is kept in the data directory: scenes, and bakes as long as there is room.
+"""Local cache of object storage in the data directory: scenes, and bakes within a size limit.
 
-A bake that is open holds a lock that all processes of the machine see; others go when room is needed, those that were
-not opened for longest first. What the storage does not have stays.
+An open bake has a lock that all processes of the machine respect; others are evicted when space is needed, least
+recently opened first. Files that are not in the storage are never evicted.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ Opened = TypeVar("Opened")
 
 
 def cache_bytes() -> int:
-    """How many bytes of bakes are kept here: `RELUME_STORAGE_CACHE_BYTES`."""
+    """Size limit of cached bakes in bytes: `RELUME_STORAGE_CACHE_BYTES`."""
     try:
         return max(0, int(os.environ.get("RELUME_STORAGE_CACHE_BYTES", "")))
     except ValueError:
@@ -37,7 +37,7 @@ def cache_bytes() -> int:
 
 
 def push(path: Path) -> None:
-    """Store a scene's folder or a published bake, where there is a storage that lacks it. Raises StorageError."""
+    """Upload a scene's folder or a published bake, if there is a storage without it. Raises StorageError."""
     storage = get_storage()
     if storage is None or storage.has(_name(path)):
         return
@@ -51,7 +51,7 @@ def push(path: Path) -> None:
 
 
 def fetch_if_missing(path: Path) -> Path:
-    """A scene's folder or a bake's store, fetched where it is only in the storage; not there where nobody has it.
+    """Fetch a scene's folder or a bake's store if it is only in the storage; if it is nowhere, the path does not exist.
 
     Args:
         path: in the data directory.
@@ -75,10 +75,10 @@ def fetch_if_missing(path: Path) -> Path:
 
 
 def open_cached(path: Path, open_store: Callable[[Path], Opened]) -> Opened:
-    """Open a bake, fetched where it is only in the storage; it stays here for as long as what was opened lives.
+    """Open a bake, fetched if it is only in the storage; it is locked while the returned object lives.
 
     Args:
-        path: of its store. open_store: what opens it; raises where there is none.
+        path: of its store. open_store: opens it; raises if it does not exist.
     """
     if get_storage() is None:
         return open_store(path)
@@ -93,13 +93,13 @@ def open_cached(path: Path, open_store: Callable[[Path], Opened]) -> Opened:
 
 
 def is_in_storage(path: Path) -> bool:
-    """Whether the storage has a scene or a bake. Raises StorageError."""
+    """True if the storage has a scene or a bake. Raises StorageError."""
     storage = get_storage()
     return storage is not None and storage.has(_name(path))
 
 
 def delete_remote(path: Path) -> None:
-    """Delete a scene or a bake from the storage; here, whoever asks deletes it. Raises StorageError."""
+    """Delete a scene or a bake from the storage; the caller deletes the local files. Raises StorageError."""
     if (storage := get_storage()) is not None:
         storage.delete(_name(path))
         if path.suffix == ".zarr":
@@ -107,7 +107,7 @@ def delete_remote(path: Path) -> None:
 
 
 def _evict_until_fits(bakes: Path, storage: ObjectStorage, num_bytes: int) -> None:
-    """Let go of bakes until there is room for so many bytes more."""
+    """Evict bakes until so many more bytes fit."""
     stores = sorted(bakes.glob("[!.]*.zarr"), key=_last_use_s)
     sizes = {store: folder_bytes(store) for store in stores}
     excess = sum(sizes.values()) + num_bytes - cache_bytes()
@@ -119,7 +119,7 @@ def _evict_until_fits(bakes: Path, storage: ObjectStorage, num_bytes: int) -> No
 
 
 def _evict(store: Path) -> bool:
-    """Delete a store unless somebody has it open."""
+    """Delete a store unless it is open."""
     try:
         lock = _lock(store, "use", fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -132,7 +132,7 @@ def _evict(store: Path) -> bool:
 
 
 def _last_use_s(store: Path) -> float:
-    """When a store was opened last, or made."""
+    """Time when a store was last opened, or made."""
     lock = _lock_path(store, "use")
     return max(path.stat().st_mtime for path in (store, lock) if path.exists())
 
@@ -146,7 +146,7 @@ def _lock_path(path: Path, purpose: str) -> Path:
 
 
 def _lock(path: Path, purpose: str, mode: int) -> int:
-    """A lock of a scene or a bake, see `open_lock_file`; a shared one says when it was opened last."""
+    """Lock a scene or a bake, see `open_lock_file`; a shared lock records the time of opening."""
     descriptor = open_lock_file(_lock_path(path, purpose), mode)
     try:
         if mode == fcntl.LOCK_SH:

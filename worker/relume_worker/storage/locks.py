@@ -1,4 +1,4 @@
-"""Locks that all processes of the machine see: files that are held open."""
+"""Lock files, which all processes of the machine see."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from pathlib import Path
 
 
 def open_lock_file(file: Path, mode: int) -> int:
-    """An open file that holds a lock; closing it gives it up, as does the end of the process.
+    """Open and lock a file; closing it, or the end of the process, releases the lock.
 
     Args:
-        file: made where it is missing. mode: as `fcntl.flock` takes it.
+        file: created if missing. mode: as for `fcntl.flock`.
     Raises:
-        BlockingIOError: somebody else has it, and `mode` is not to wait.
+        BlockingIOError: another process has the lock, and `mode` is non-blocking.
     """
     file.parent.mkdir(parents=True, exist_ok=True)
     descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)

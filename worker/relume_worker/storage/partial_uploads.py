@@ -1,7 +1,7 @@
-"""What an unfinished bake has so far, in object storage: machines that take a bake over go on where another was.
+"""Partial results of an unfinished bake in object storage, from which other machines resume it.
 
-parts/<bake>/<run>/…   files of the unfinished store, as they appear; a task's are there before the ledger knows of it
-parts/<bake>/<run>.json   which tasks that are
+parts/<bake>/<run>/…      files of the unfinished store; a task's files are there before its row is in the ledger
+parts/<bake>/<run>.json   the tasks that are there
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ TaskName = tuple[int, int]
 
 
 class PartialUploads:
-    """Those of one run of a bake; nothing where there is no storage.
+    """Partial results of one run of a bake in object storage; no effect without a storage.
 
-    A storage that is away delays nothing: what it lacks is stored with the next task.
+    An outage of the storage delays nothing: missing files are uploaded with the next task.
 
     Args:
-        staging: the unfinished store. bake_id, run: whose it is.
-        tasks: that are finished and stored.
+        staging: unfinished store. bake_id, run: of the store.
+        tasks: finished and uploaded ones.
     """
 
     def __init__(self, staging: Path, bake_id: str, run: str, tasks: Collection[TaskName]) -> None:
         self._staging, self._storage, self._name = staging, get_storage(), _name(bake_id, run)
         self._tasks, self._stored_files = set(tasks), dict[str, tuple[int, int]]()
-        self._storage_error = DatabaseError(log, f"parts of bake {bake_id} cannot be stored")
+        self._storage_error = DatabaseError(log, f"partial results of bake {bake_id} cannot be uploaded")
 
     def store(self, task: TaskName) -> None:
-        """Store what has appeared since the last time, that of a finished task among it."""
+        """Upload the files that have appeared since the last call, including those of a finished task."""
         if self._storage is None:
             return
         self._tasks.add(task)
@@ -55,10 +55,10 @@ class PartialUploads:
 
 
 def fetch_partial(staging: Path, bake_id: str, run: str, tasks: Collection[TaskName]) -> bool:
-    """Fetch the parts of a run in the place of what is there, where the storage has those of all these tasks.
+    """Replace the unfinished store by a run's partial results, if the storage has all these tasks; true if it has.
 
     Args:
-        staging: where the unfinished store lies. bake_id, run: whose it is. tasks: that the ledger calls finished.
+        staging: unfinished store. bake_id, run: of the store. tasks: finished ones in the ledger.
     Raises:
         StorageError: the storage does not answer.
     """
@@ -76,7 +76,7 @@ def fetch_partial(staging: Path, bake_id: str, run: str, tasks: Collection[TaskN
 
 
 def delete_partial(bake_id: str) -> None:
-    """Delete the parts of all runs of a bake. Raises StorageError."""
+    """Delete the partial results of all runs of a bake. Raises StorageError."""
     if (storage := get_storage()) is not None:
         storage.delete(f"parts/{bake_id}")
 
@@ -86,7 +86,7 @@ def _name(bake_id: str, run: str) -> str:
 
 
 def _files(staging: Path) -> dict[str, tuple[int, int]]:
-    """Whole files of an unfinished store, each with size and time."""
+    """Complete files of an unfinished store, each with size and time."""
     files = {}
     for path in staging.rglob("*"):
         if path.suffix != ".partial" and not path.match(UNFINISHED) and path.is_file():

@@ -1,9 +1,9 @@
-"""Object storage: S3, or what speaks like it; or a folder that machines share.
+"""Object storage: S3 or compatible, or a folder shared by machines.
 
 scenes/<id>/…       files, as in the data directory
 bakes/<id>.zarr/…   a Zarr store that other programs can open
-parts/<id>/…        what unfinished bakes have, see `relume_worker.storage.partial_uploads`
-whole/<name>.json   the files of one of these with size and SHA-256; written last, so its presence means "complete"
+parts/<id>/…        partial results of unfinished bakes, see `relume_worker.storage.partial_uploads`
+whole/<name>.json   index of such a folder: files with size and SHA-256; written last, so it exists only if complete
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ storage_outage = Outage(log, "the object storage")
 
 
 class ObjectStorage:
-    """One place in object storage; safe to use from several threads."""
+    """A location in object storage. Thread-safe."""
 
     def __init__(self, url: str) -> None:
         """
         Args:
-            url: s3://bucket/prefix, or file:///folder; keys and endpoint as AWS_… variables say.
+            url: s3://bucket/prefix, or file:///folder; keys and endpoint from AWS_… variables.
         Raises:
             ParameterError: it is neither.
         """
@@ -55,15 +55,15 @@ class ObjectStorage:
         try:
             self._store = from_url(url, **options)
         except (BaseError, ValueError, OSError) as error:
-            reason = str(error).partition("\n")[0][:200]  # what follows is the library's own
-            raise ParameterError("RELUME_STORAGE", url, f"one that can be used ({reason})") from None
+            reason = str(error).partition("\n")[0][:200]  # the library's own details follow
+            raise ParameterError("RELUME_STORAGE", url, f"one that works ({reason})") from None
 
     def put(self, name: str, folder: Path, files: Sequence[str]) -> None:
-        """Store a folder under a name, whole or not at all; what was there under it is replaced.
+        """Upload a folder under a name atomically; replaces an existing one.
 
         Args:
-            name: such as scenes/<id>. folder: that holds the files.
-            files: their paths in it.
+            name: such as scenes/<id>. folder: with the files.
+            files: paths in the folder.
         Raises:
             StorageError: the storage does not answer, or refuses.
         """
@@ -80,7 +80,7 @@ class ObjectStorage:
             obstore.put(self._store, _index(name), json.dumps({"files": entries}).encode())
 
     def has(self, name: str) -> bool:
-        """Whether a folder is there, whole. Raises StorageError."""
+        """True if a folder is there and complete. Raises StorageError."""
         with _translate_errors():
             try:
                 obstore.head(self._store, _index(name))
@@ -89,14 +89,14 @@ class ObjectStorage:
         return True
 
     def fetch(self, name: str, folder: Path) -> bool:
-        """Fetch a folder, each file checked; those that are there from an interrupted fetch stay.
+        """Fetch a folder, verifying each file; files of an interrupted fetch are kept.
 
         Args:
-            name: that it was stored under. folder: to fetch into; made where it is missing.
+            name: of the uploaded folder. folder: to fetch into; created if missing.
         Returns:
-            Whether there is one of that name.
+            True if there is one of that name.
         Raises:
-            StorageError: the storage does not answer, or what it has is damaged.
+            StorageError: the storage does not answer, or its data are damaged.
         """
         with _translate_errors(), ThreadPoolExecutor(NUM_THREADS) as threads:
             entries = self._entries(name)
@@ -106,20 +106,20 @@ class ObjectStorage:
         return True
 
     def put_files(self, name: str, folder: Path, files: Sequence[str]) -> None:
-        """Store some files of a folder under a name, without a list of them.
+        """Upload some files of a folder under a name, without an index.
 
         Args:
-            name: such as parts/<id>. folder: that holds the files. files: their paths in it.
+            name: such as parts/<id>. folder: with the files. files: paths in the folder.
         Raises:
             StorageError: the storage does not answer, or refuses.
         """
-        if not files:  # nothing is asked, so that nothing can be said of the storage
+        if not files:  # without a request nothing is known of the storage
             return
         with _translate_errors(), ThreadPoolExecutor(NUM_THREADS) as threads:
             list(threads.map(lambda file: obstore.put(self._store, f"{name}/{file}", folder / file), files))
 
     def fetch_files(self, name: str, folder: Path) -> None:
-        """Fetch all files under a name that has no list of them. Raises StorageError."""
+        """Fetch all files under a name without an index. Raises StorageError."""
         with _translate_errors(), ThreadPoolExecutor(NUM_THREADS) as threads:
             keys = [item["path"] for page in obstore.list(self._store, f"{name}/") for item in page]
             files = [key.partition(f"{name}/")[2] for key in keys]
@@ -128,12 +128,12 @@ class ObjectStorage:
             list(threads.map(lambda file: self._stream(f"{name}/{file}", folder / file), files))
 
     def put_document(self, name: str, document: Any) -> None:
-        """Store JSON under a name. Raises StorageError."""
+        """Upload JSON under a name. Raises StorageError."""
         with _translate_errors():
             obstore.put(self._store, f"{name}.json", json.dumps(document).encode())
 
     def document(self, name: str) -> Any:
-        """JSON that is stored under a name; None where there is none. Raises StorageError."""
+        """JSON under a name; None if there is none. Raises StorageError."""
         with _translate_errors():
             try:
                 return json.loads(bytes(obstore.get(self._store, f"{name}.json").bytes()))
@@ -143,15 +143,15 @@ class ObjectStorage:
                 raise StorageError(f"{name} in the object storage is unreadable") from error
 
     def num_bytes(self, name: str) -> int:
-        """Size of a folder; 0 where there is none. Raises StorageError."""
+        """Size of a folder in bytes; 0 if there is none. Raises StorageError."""
         with _translate_errors():
             return sum(size for _, size, _ in self._entries(name) or ())
 
     def delete(self, name: str) -> None:
-        """Delete a folder, if it is there. Raises StorageError."""
+        """Delete a folder, if it exists. Raises StorageError."""
         with _translate_errors():
             keys = [_index(name), *(item["path"] for page in obstore.list(self._store, f"{name}/") for item in page)]
-            for key in keys:  # the index first: what is half deleted is not there
+            for key in keys:  # the index first: a partly deleted folder does not exist
                 try:
                     obstore.delete(self._store, key)
                 except FileNotFoundError:
@@ -180,7 +180,7 @@ class ObjectStorage:
         self._stream(f"{name}/{file}", target, sha256)
 
     def _stream(self, key: str, target: Path, sha256: str | None = None) -> None:
-        """Fetch one file, which appears whole; it is checked where its hash is known."""
+        """Fetch one file, which appears when complete; verified if its digest is known."""
         target.parent.mkdir(parents=True, exist_ok=True)
         digest = hashlib.sha256()
         with atomic_write(target) as unfinished:
@@ -193,7 +193,7 @@ class ObjectStorage:
 
 
 def _s3_options() -> dict[str, Any]:
-    """How S3 is asked; an endpoint without TLS is taken where somebody names one."""
+    """S3 options; an endpoint without TLS is allowed if it is configured."""
     is_plain = os.environ.get("AWS_ENDPOINT_URL", "").startswith("http://")
     waits = {"connect_timeout": timedelta(seconds=5), "timeout": timedelta(minutes=10)}
     return {
@@ -208,14 +208,14 @@ def _index(name: str) -> str:
 
 @contextmanager
 def _translate_errors() -> Iterator[None]:
-    """Say what fails in words for everybody, and once in the log in those of the storage, which name addresses."""
+    """Translate errors into general messages; the storage's own, which contain URLs, are logged once."""
     began_s = time.monotonic()
     try:
         yield
-    except (BaseError, FileNotFoundError) as error:  # what is on the list, and is not there
-        first_line = str(error).split("\n")[0]  # what follows is for those who debug it
+    except (BaseError, FileNotFoundError) as error:  # in the index, but missing
+        first_line = str(error).split("\n")[0]  # the rest is for debugging
         storage_outage.report_failure(StorageError(first_line), began_s)
-        raise StorageError("the object storage cannot be used now; try again in a while") from error
+        raise StorageError("the object storage cannot be used now; try again later") from error
     storage_outage.report_recovered(began_s)
 
 
@@ -225,6 +225,6 @@ def _open_storage(url: str) -> ObjectStorage:
 
 
 def get_storage() -> ObjectStorage | None:
-    """The storage that `RELUME_STORAGE` names, which worker processes inherit; None where there is none."""
+    """Storage of `RELUME_STORAGE`, which worker processes inherit; None if it is not set."""
     url = os.environ.get("RELUME_STORAGE", "")
     return _open_storage(url) if url else None

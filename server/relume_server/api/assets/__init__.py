@@ -1,1 +1,1 @@
-"""Routes of assets that looks name: materials, BTFs, environments, images."""
+"""Routes of assets for looks: materials, BTFs, environments, images."""

@@ -1,4 +1,4 @@
-"""/api/scenes/{scene}/ball: what a material of a scene looks like, on a ball as the library's are."""
+"""/api/scenes/{scene}/ball: preview of a scene's material on a ball, like those of the library."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from relume_worker.scenes import get_scene
 from relume_worker.storage import fetch_if_missing
 
 router = APIRouter(prefix="/api/scenes", tags=["scenes"])
-MAX_STORED = 500  # balls, of about 6 kB each
-_RENDER_LIMITER = CapacityLimiter(1)  # of half a second each: sessions go first
+MAX_STORED = 500  # balls of about 6 kB each
+_RENDER_LIMITER = CapacityLimiter(1)  # half a second each: sessions have priority
 
 
 @router.post("/{scene}/ball", response_class=PngResponse)
 async def render_ball(scene: Id, request: BallRequest, services: ServicesDep) -> PngResponse:
-    """A ball of a material with these terms, in the images that they name. PNG, 64 × 64."""
+    """Ball of a material with these terms and their images. PNG, 64 × 64."""
     terms = [complete_term(("terms", index), term, None) for index, term in enumerate(request.terms)]
     await to_thread.run_sync(get_scene, services.bakes.ledger, scene)
     folder = scene_path(services.settings.data, scene)
@@ -40,14 +40,14 @@ async def render_ball(scene: Id, request: BallRequest, services: ServicesDep) ->
 
 @lru_cache(maxsize=MAX_STORED)
 def _stored(folder: Path, material: str, terms: str) -> bytes:
-    from relume.output.material_previews.preview import preview_png  # loads compiled kernels
+    from relume.output.material_previews.preview import preview_png  # imports compiled kernels
 
     documents = json.loads(terms)
     return preview_png(documents, _images(folder, material, documents))
 
 
 def _images(folder: Path, material: str, documents: Sequence[dict[str, Any]]) -> dict[str, Texture]:
-    """The images that terms name: those that were sent, and the scene's own."""
+    """Images that terms use: uploaded ones, and the scene's textures."""
     from relume.images.image_store import load_texture
 
     named = {document["texture"] for document in documents} - {None}

@@ -1,4 +1,4 @@
-"""/api/materials/btf/jobs: BTFs are rendered or imported, which takes minutes; followed, stopped, gone on with."""
+"""/api/materials/btf/jobs: render or import BTFs, which takes minutes; follow, stop and resume these jobs."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ from relume_server.services import Services, ServicesDep
 PREFIX = "/api/materials/btf/jobs"
 router = APIRouter(prefix=PREFIX, tags=["materials"])
 ImagesFile = Annotated[
-    UploadFile, File(description="zip of images named by light and view (UBO2003), or .btf container (UBO2014)")
+    UploadFile, File(description=".zip of images named by light and view (UBO2003), or .btf container (UBO2014)")
 ]
 MeshFile = Annotated[
     UploadFile,
-    File(description="mesh of one period, seen from above (+Y): .glb, .obj, .ply, or .zip with materials"),
+    File(description="mesh of one period, +Y up: .glb, .obj, .ply, or .zip with materials"),
 ]
 BtfName = Annotated[str, Form(max_length=200)]
 BoundField = Annotated[Bound, Form()]
@@ -51,7 +51,7 @@ async def import_btf(
     name: BtfName = "",
     error: BoundField = BOUND,
 ) -> BtfJobBody:
-    """Queue the import of a zip of images or of a .btf container; what is wrong with it the work says."""
+    """Queue the import of a ZIP of images or of a .btf container; the job validates the file."""
     identity = await run_in_threadpool(_submit_images, images, name, error, reservation, services)
     return await run_in_threadpool(_answer, identity, services, response)
 
@@ -72,7 +72,7 @@ def _submit(
     services: Services,
     prepare: Callable[[Path], object] | None = None,
 ) -> str:
-    """Queue a work that is its caller's from the beginning: it may be done before the next line is reached."""
+    """Queue a job with its owner assigned first, because it may finish before the next line runs."""
     identity = new_id()
     with reservation.owner_assigned("btf-job", identity, num_bytes):
         return services.btfs.submit(request, reservation.owner, prepare, identity)
@@ -82,12 +82,10 @@ def _submit(
 async def make_synthetic_btf(
     request: SyntheticBtfRequest, services: ServicesDep, caller: CallerDep, response: Response
 ) -> BtfJobBody:
-    """Queue the rendering of a small geometry from all sides in light from all sides."""
+    """Queue the rendering of a synthetic BTF from a built-in geometry."""
     name = check_name(request.name or f"{request.geometry.capitalize()} (synthetic)")
     btf_request = BtfRequest(name=name, error=request.error, geometry=request.geometry, size=request.size)
-    async with services.intake.reserving(
-        caller.name, 1
-    ) as reservation:  # how many it will take is known when it is made
+    async with services.intake.reserving(caller.name, 1) as reservation:  # its final size is unknown until it is made
         identity = await run_in_threadpool(_submit, btf_request, 0, reservation, services)
     return await run_in_threadpool(_answer, identity, services, response)
 
@@ -103,7 +101,7 @@ async def make_btf_from_mesh(
     name: BtfName = "",
     error: BoundField = BOUND,
 ) -> BtfJobBody:
-    """Queue the rendering of a small geometry that is sent; what is wrong with the mesh is said at once."""
+    """Queue the rendering of a synthetic BTF from an uploaded mesh, which is validated first."""
     stem = name or f"{plain_stem(geometry.filename) or 'Mesh'} (synthetic)"
     btf_request = BtfRequest(name=check_name(stem), error=error, geometry=MESH, size=size, period=period)
     identity = await services.intake.run_in_slot(
@@ -134,20 +132,20 @@ def list_btf_jobs(
     state: Annotated[JobState | None, Query()] = None,
     user: Annotated[UserName | None, Query()] = None,
 ) -> list[BtfJobBody]:
-    """Those that were asked for and not forgotten, oldest first."""
+    """List BTF jobs, oldest first."""
     jobs = list_jobs(services.btfs, JobFilter(state, user), page, MAX_LISTED, newest_first=False)
     return [_body(job, services) for job in jobs]
 
 
 @router.get("/{job}")
 def get_btf_job(job: Id, services: ServicesDep) -> BtfJobBody:
-    """State and progress."""
+    """State and progress of a BTF job."""
     return _body(services.btfs.get(job), services)
 
 
 @router.delete("/{job}", status_code=204)
 def stop_btf_job(job: Id, services: ServicesDep, delete_files: bool = False) -> Response:
-    """Stop it; what was found so far is kept, unless `delete_files` is true. A BTF that is ready stays."""
+    """Stop a job; its partial results are saved, unless `delete_files` is true. A finished BTF stays."""
     (services.btfs.delete if delete_files else services.btfs.stop)(job)
     if delete_files:
         services.access.quotas.disown("btf-job", job)
@@ -156,7 +154,7 @@ def stop_btf_job(job: Id, services: ServicesDep, delete_files: bool = False) -> 
 
 @router.post("/{job}/resume", status_code=202)
 def resume_btf_job(job: Id, services: ServicesDep) -> BtfJobBody:
-    """Go on with what was stopped."""
+    """Resume a stopped job."""
     services.btfs.resume(job)
     return _body(services.btfs.get(job), services)
 

@@ -1,4 +1,4 @@
-"""/api/materials/btf: list, show and delete BTFs; `relume material` makes and imports them, which takes minutes."""
+"""/api/materials/btf: list, show and delete BTFs; jobs or `relume material` make them, which takes minutes."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ router = APIRouter(prefix="/api/materials/btf", tags=["materials"])
 
 @router.get("")
 def list_btfs(services: ServicesDep, page: PageDep, name: NameFilter = None) -> list[BtfBody]:
-    """BTFs, newest first, or those of a name."""
+    """List BTFs, newest first, filtered by name."""
     return [_body(record) for record in records_page(records(btfs_path(services.settings.data)), name, page)]
 
 
 @router.get("/{material}")
 def get_btf(material: Id, services: ServicesDep) -> BtfBody:
-    """One BTF."""
+    """Return one BTF."""
     return _body(get_record(btfs_path(services.settings.data), material))
 
 
 @router.get("/{material}/thumbnail.png", response_class=PngResponse)
 async def get_btf_thumbnail(material: Id, services: ServicesDep) -> PngResponse:
-    """A ball that is covered with it."""
+    """Ball covered with the BTF."""
     folder = btfs_path(services.settings.data)
     png = await services.pictures.run((folder, material), lambda: render_thumbnail(get_record(folder, material)))
     return PngResponse(png, headers=A_DAY)
@@ -39,7 +39,7 @@ async def get_btf_thumbnail(material: Id, services: ServicesDep) -> PngResponse:
 
 @router.delete("/{material}", status_code=204)
 async def delete_btf(material: Id, services: ServicesDep) -> Response:
-    """Delete a BTF that no saved look, link, session of this server or work under way names."""
+    """Delete a BTF that no saved look, share link, session of this server or running job uses."""
     await remove_unused(STORE, btfs_path(services.settings.data), material, "btf", services)
     return Response(status_code=204)
 

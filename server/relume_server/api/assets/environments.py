@@ -1,4 +1,4 @@
-"""/api/environments: import, list, show and delete environments that looks may name in place of a scene's own."""
+"""/api/environments: import, list, show and delete environments for looks."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ AnyId = Annotated[str, PathPart(max_length=40, description="id of an imported en
 async def import_environment(
     environment: MapFile, services: ServicesDep, reservation: ReservationDep, response: Response, name: MapName = ""
 ) -> EnvironmentBody:
-    """Import an environment, in a process of its own; the body says how look documents name it."""
+    """Import an environment in a separate process; the body has its name for looks."""
     identity = await store_upload(environment, name, "environment", reservation, services)
     response.headers["Location"] = f"/api/environments/{identity}"
     return await run_in_threadpool(get_environment, identity, services)
@@ -39,7 +39,7 @@ async def import_environment(
 
 @router.get("")
 def list_environments(services: ServicesDep, page: PageDep, name: NameFilter = None) -> list[EnvironmentBody]:
-    """The built-in ones, then the imported ones, newest first; or those of a name."""
+    """List the built-in environments, then the imported ones, newest first; filtered by name."""
     listed = [((0.0, float(index), example), _built_in_body(example)) for index, example in enumerate(BUILT_IN)]
     imported = records(environments_path(services.settings.data))
     listed += [((1.0, -record.created, record.id), _body(record)) for record in imported]
@@ -49,7 +49,7 @@ def list_environments(services: ServicesDep, page: PageDep, name: NameFilter = N
 
 @router.get("/{environment}")
 def get_environment(environment: AnyId, services: ServicesDep) -> EnvironmentBody:
-    """One environment."""
+    """Return one environment."""
     if environment in BUILT_IN:
         return _built_in_body(environment)
     return _body(get_record(environments_path(services.settings.data), environment))
@@ -57,7 +57,7 @@ def get_environment(environment: AnyId, services: ServicesDep) -> EnvironmentBod
 
 @router.get("/{environment}/thumbnail.png", response_class=PngResponse, name="get_environment_thumbnail")
 async def get_thumbnail(environment: AnyId, services: ServicesDep) -> PngResponse:
-    """A small tone-mapped picture, 192 × 96."""
+    """Tone-mapped thumbnail, 192 × 96."""
 
     def read_thumbnail() -> bytes:
         if environment in BUILT_IN:
@@ -70,7 +70,7 @@ async def get_thumbnail(environment: AnyId, services: ServicesDep) -> PngRespons
 
 @router.delete("/{environment}", status_code=204)
 def delete_environment(environment: Id, services: ServicesDep) -> Response:
-    """Delete an imported environment; looks that name it are refused from then on."""
+    """Delete an imported environment; looks that use it are no longer valid."""
     STORE.remove(environments_path(services.settings.data), environment)
     services.access.quotas.disown("environment", environment)
     return Response(status_code=204)

@@ -1,4 +1,4 @@
-"""/api/images: send, list, show and delete images that looks may name in place of a material's own."""
+"""/api/images: upload, list, show and delete images that replace a material's textures."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ ImageName = Annotated[str, Form(max_length=200)]
 async def import_image(
     image: ImageFile, services: ServicesDep, reservation: ReservationDep, response: Response, name: ImageName = ""
 ) -> ImageBody:
-    """Keep an image, read in a process of its own; the body says how terms of looks name it."""
+    """Store an image, which is read in a separate process; the body has its name for terms of looks."""
     identity = await store_upload(image, name, "image", reservation, services)
     response.headers["Location"] = f"/api/images/{identity}"
     return await run_in_threadpool(get_image, identity, services)
@@ -46,13 +46,13 @@ async def import_image(
 
 @router.get("")
 def list_images(services: ServicesDep, page: PageDep, name: NameFilter = None) -> list[ImageBody]:
-    """Images, newest first, or those of a name."""
+    """List images, newest first, filtered by name."""
     return [_body(record) for record in records_page(records(images_path(services.settings.data)), name, page)]
 
 
 @router.get("/{image}")
 def get_image(image: Id, services: ServicesDep) -> ImageBody:
-    """One image."""
+    """Return one image."""
     return _body(get_record(images_path(services.settings.data), image))
 
 
@@ -60,8 +60,7 @@ def get_image(image: Id, services: ServicesDep) -> ImageBody:
 async def put_metalness(
     image: Id, request: MetalnessRequest, services: ServicesDep, caller: CallerDep
 ) -> MetalnessBody:
-    """Let an image say where a material is metal: two images are made of it and of the base colour, and the body says
-    what the material's terms become with them."""
+    """Make two images from a metallic map and the base color, and return the material's terms that use them."""
     data, folder = services.settings.data, images_path(services.settings.data)
     await run_in_threadpool(services.access.quotas.check_bytes, caller.name, 0)
     terms = [complete_term(("terms", k), term, None) for k, term in enumerate(request.terms)]
@@ -77,21 +76,20 @@ async def put_metalness(
 
 
 def _assign_owner(services: Services, caller: Caller, folder: Path, identity: str) -> None:
-    """What was made for somebody is theirs, and counts."""
+    """Count a derived image for its caller."""
     if get_record(folder, identity).recipe is not None:
         services.access.quotas.assign_owner(caller.name, "image", identity, folder_bytes(folder / identity))
 
 
 @router.get("/{image}/thumbnail.png", response_class=PngResponse)
 def get_image_thumbnail(image: Id, services: ServicesDep) -> PngResponse:
-    """A small picture of it, 96 × 96."""
+    """Thumbnail, 96 × 96."""
     return PngResponse(thumbnail_path(images_path(services.settings.data), image).read_bytes(), headers=FOREVER)
 
 
 @router.delete("/{image}", status_code=204)
 async def delete_image(image: Id, services: ServicesDep) -> Response:
-    """Delete an image that no saved look, link, session of this server or work under way names, nor any that was made
-    of it; these go with it."""
+    """Delete an image and the images derived from it, if no saved look, share link, session or job uses them."""
     folder = images_path(services.settings.data)
     record = await run_in_threadpool(get_record, folder, image)
     derived_ids = [

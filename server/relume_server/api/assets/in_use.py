@@ -1,4 +1,4 @@
-"""What looks name is not deleted under those who show it."""
+"""Refuse to delete assets that looks use."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from relume_server.auth.quotas import OwnedKind
 from relume_server.errors import InUseError
 from relume_server.services import Services
 
-_MAX_NAMED = 3  # of what uses it, in a message
+_MAX_NAMED = 3  # number of users listed in a message
 
 
 async def remove_unused(
     store: AssetStore, folder: Path, identity: str, kind: OwnedKind, services: Services, called: str | None = None
 ) -> None:
-    """Remove a thing, whose it is too, that no saved look, link, session of this server or work under way names.
+    """Delete an asset that no saved look, share link, session of this server or running job uses.
 
     Args:
-        store, folder, identity: which thing, and where it is kept. kind: of it, in quotas. services: the server's.
-        called: in messages, where its id says little.
+        store, folder, identity: of the asset. kind: for quotas. services: of the server.
+        called: name in messages; default: its id.
     Raises:
-        NotFoundError: it is not there. InUseError: it is named; nothing is removed.
+        NotFoundError: it does not exist. InUseError: it is in use; nothing is deleted.
     """
     quoted_id = f'"{store.prefix}{identity}"'
-    looks = services.live.resumes.looks(time.monotonic())  # of the event loop
+    looks = services.live.resumes.looks(time.monotonic())  # on the event loop's thread
 
     def remove() -> None:
-        store.path(folder, identity)  # whatever its files are like
+        store.path(folder, identity)  # whatever its files contain
         sessions = [bake for bake, document in looks if quoted_id in json.dumps(document)]
         _check_unused(called or f"{store.label} {identity}", quoted_id, services, sessions)
         store.remove(folder, identity)
@@ -48,4 +48,4 @@ def _check_unused(label: str, quoted_id: str, services: Services, sessions: list
         users += [f"{queue.noun} {work}" for work in queue.referencing(quoted_id)]
     if users:
         more = f" and {len(users) - _MAX_NAMED} more" if len(users) > _MAX_NAMED else ""
-        raise InUseError(f"{label} is shown by {', '.join(users[:_MAX_NAMED])}{more}; change or delete these first")
+        raise InUseError(f"{label} is used by {', '.join(users[:_MAX_NAMED])}{more}; change or delete these first")

@@ -1,4 +1,4 @@
-"""/api/materials: the library of fitted materials, the map between them, and their thumbnails."""
+"""/api/materials: the library of fitted materials, its navigation map, and thumbnails."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ PathSegment = Annotated[str, Path(max_length=100)]
 
 @router.get("")
 def list_materials(page: PageDep) -> list[MaterialBody]:
-    """The library: fitted materials under every model that was fitted to them."""
+    """List the library: fitted materials, each under every model fitted to it."""
     return [MaterialBody(**asdict(preset)) for preset in page.in_order(presets())]
 
 
 @router.get("/map")
 def get_material_map() -> MaterialMapBody:
-    """The library's Cook–Torrance materials in the plane of reflectance and roughness, triangulated (Sun 2007)."""
+    """Cook–Torrance materials of the library in the plane of reflectance and roughness, triangulated (Sun 2007)."""
     nav_map = navigation_map()
     return MaterialMapBody(
         points=[
@@ -41,19 +41,19 @@ def get_material_map() -> MaterialMapBody:
 def material_at(
     f0: Annotated[float, Query(ge=0, le=1)], sigma: Annotated[float, Query(gt=0, le=10)]
 ) -> list[dict[str, Any]]:
-    """Terms of any point of the map, between the materials around it."""
+    """Terms at any point of the map, interpolated between the surrounding materials."""
     return navigation_map().at(f0, sigma)
 
 
 @router.get("/{table}/{material}/thumbnail.png", response_class=PngResponse, name="get_material_thumbnail")
 async def thumbnail(table: PathSegment, material: PathSegment) -> PngResponse:
-    """A ball of a library material."""
+    """Ball of a library material."""
     png = await run_in_threadpool(_thumbnail, f"{table}/{material}")
     return PngResponse(png, headers=A_DAY)
 
 
 def _thumbnail(identity: str) -> bytes:
-    from relume.output.material_previews.library_sheet import library_preview_png  # loads compiled kernels
+    from relume.output.material_previews.library_sheet import library_preview_png  # imports compiled kernels
 
     png = library_preview_png(identity)
     if png is None:

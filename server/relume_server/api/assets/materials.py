@@ -34,7 +34,7 @@ async def import_measured(
     response: Response,
     name: MaterialName = "",
 ) -> MeasuredBody:
-    """Import a MERL file, in a process of its own; the body says how look documents name it."""
+    """Import a MERL file in a separate process; the body has its name for looks."""
     identity = await store_upload(material, name, "material", reservation, services)
     response.headers["Location"] = f"/api/materials/measured/{identity}"
     return await run_in_threadpool(get_measured, identity, services)
@@ -42,19 +42,19 @@ async def import_measured(
 
 @router.get("")
 def list_measured(services: ServicesDep, page: PageDep, name: NameFilter = None) -> list[MeasuredBody]:
-    """Measured materials, newest first, or those of a name."""
+    """List measured materials, newest first, filtered by name."""
     return [_body(record) for record in records_page(records(materials_path(services.settings.data)), name, page)]
 
 
 @router.get("/{material}")
 def get_measured(material: Id, services: ServicesDep) -> MeasuredBody:
-    """One measured material."""
+    """Return one measured material."""
     return _body(get_record(materials_path(services.settings.data), material))
 
 
 @router.get("/{material}/thumbnail.png", response_class=PngResponse, name="get_measured_thumbnail")
 async def get_thumbnail(material: Id, services: ServicesDep) -> PngResponse:
-    """A ball of the material."""
+    """Ball of the material."""
     folder = materials_path(services.settings.data)
     png = await services.pictures.run((folder, material), lambda: render_thumbnail(get_record(folder, material)))
     return PngResponse(png, headers=A_DAY)
@@ -62,21 +62,21 @@ async def get_thumbnail(material: Id, services: ServicesDep) -> PngResponse:
 
 @lru_cache(maxsize=256)
 def render_thumbnail(record: MaterialRecord | BtfRecord) -> bytes:
-    """A ball of a material, as a PNG."""
-    from relume.output.material_previews.preview import preview_png  # loads compiled kernels
+    """Render the ball of a material as PNG."""
+    from relume.output.material_previews.preview import preview_png  # imports compiled kernels
 
     return preview_png(complete_terms(record))
 
 
 @router.delete("/{material}", status_code=204)
 async def delete_measured(material: Id, services: ServicesDep) -> Response:
-    """Delete a measured material that no saved look, link, session of this server or work under way names."""
+    """Delete a measured material that no saved look, share link, session of this server or running job uses."""
     await remove_unused(STORE, materials_path(services.settings.data), material, "material", services)
     return Response(status_code=204)
 
 
 def complete_terms(record: MaterialRecord | BtfRecord) -> list[dict[str, Any]]:
-    """Its terms, complete."""
+    """Complete terms of the material."""
     return [complete_term(("measured", k), term, None) for k, term in enumerate(record.terms())]
 
 

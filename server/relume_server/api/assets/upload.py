@@ -1,4 +1,4 @@
-"""What a file that is sent for a shelf goes through: whoever reads it, its slot, and whose it is then."""
+"""Import an uploaded asset: quota, a slot, a separate process, ownership."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ async def store_upload(
     reservation: Reservation,
     services: Services,
 ) -> str:
-    """Keep what was sent, and return its id.
+    """Store an upload, and return its id.
 
     Args:
-        file: that was sent. name: that was given; empty: the file's. kind: of thing that it is.
-        reservation: what it may take.
+        file: of the upload. name: given name; empty: the file's. kind: of the asset.
+        reservation: of its bytes.
     """
     called = check_name(name or plain_stem(file.filename) or kind.capitalize())
 

@@ -1,4 +1,4 @@
-"""Tells a session that a finer bake of its scene goes on or is ready, so that the editor can swap it in."""
+"""Notify sessions when a finer bake of the scene is running or ready, so that the editor can switch to it."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ POLL_S = 0.5
 
 
 class BakeUpdates:
-    """Looks into the ledger, which other processes write too: once for all sessions on a scene.
+    """Polls the database, which other processes change as well: once for all sessions of a scene.
 
     Args:
-        list_bakes: of a scene. threads: that they are asked for in; nothing slow may run there.
+        list_bakes: of a scene. threads: for the query; for short work only.
     """
 
     def __init__(self, list_bakes: Callable[[str], Sequence[BakeStatus]], threads: Executor) -> None:
         self._list_bakes, self._threads = list_bakes, threads
         self._queries: dict[str, tuple[float, asyncio.Task[Sequence[BakeStatus]]]] = {}
-        self._outage = DatabaseError(log, "sessions are not told of finer bakes")
+        self._outage = DatabaseError(log, "sessions are not notified of finer bakes")
 
     async def send_updates(self, socket: ClientSocket, bake: str, scene: str) -> None:
-        """Run for as long as the session does; says each change once."""
+        """Send each change once, while the session runs."""
         last_messages: dict[str, BakeMessage] = {}
         while True:
             for message in self._messages(bake, await self._list_recent(scene)):
@@ -40,7 +40,7 @@ class BakeUpdates:
             await asyncio.sleep(POLL_S)
 
     async def _list_recent(self, scene: str) -> Sequence[BakeStatus]:
-        """What one of the sessions has found lately, or finds now."""
+        """Bakes of a scene, from a recent query of any session or a new one."""
         now_s = time.monotonic()
         self._queries = {
             scene_id: query
@@ -49,12 +49,12 @@ class BakeUpdates:
         }
         if scene not in self._queries:
             self._queries[scene] = now_s, asyncio.create_task(self._ask(scene))
-        return await asyncio.shield(self._queries[scene][1])  # a session that ends does not end it for others
+        return await asyncio.shield(self._queries[scene][1])  # one session's end does not cancel it for others
 
     async def _ask(self, scene: str) -> Sequence[BakeStatus]:
         try:
             statuses = await asyncio.get_running_loop().run_in_executor(self._threads, self._list_bakes, scene)
-        except DATABASE_ERRORS as error:  # for a while; the picture needs it not
+        except DATABASE_ERRORS as error:  # ignored for a while; images do not depend on it
             self._outage.report_failure(error)
             return ()
         self._outage.report_recovered()

@@ -1,4 +1,4 @@
-"""What a client's shader has of a view that it draws, and whether the link carries what changes while a hand moves."""
+"""Data of a view that the client renders itself, and whether the connection is fast enough for its updates."""
 
 from __future__ import annotations
 
@@ -13,39 +13,39 @@ if TYPE_CHECKING:
 
 
 class ClientRenderState:
-    """Of one view. Light that changes brings vectors of all points anew, megabytes where surfaces are glossy: a link
-    that is too slow for them gets pictures while a hand moves, and tables when it rests (ADR 24).
+    """State of one view. A light change updates the coefficients of all probes, megabytes on glossy surfaces: on a
+    connection too slow for them, the client gets images while dragging, and the tables afterwards (ADR 24).
 
     Attributes:
         client_keys: keys of the parts that the client's shader has.
-        is_outdated: a picture was sent in their place.
+        is_outdated: an image was sent instead.
     """
 
     def __init__(self) -> None:
         self.client_keys: Mapping[str, Hashable] = {}
-        self._update_bytes: dict[str, int] = {}  # that a change took last, by what the hand was on
+        self._update_bytes: dict[str, int] = {}  # bytes of the last update, by kind of edit
         self._first_update_bytes = 0
         self._last_kind = ""
         self.is_outdated = False
         self._are_slow = False
 
     def are_too_large(self, newest: Target, window: FrameWindow, is_outdated: bool) -> bool:
-        """Whether those that the newest look needs would stutter on this link.
+        """True if the tables for the newest look would stutter on this connection.
 
         Args:
-            newest: the look. window: that knows the link. is_outdated: the client has no frame of that look yet.
+            newest: target. window: measures the connection. is_outdated: the client has no frame of this look yet.
         """
-        if not is_outdated and not self.is_outdated:  # the eye alone has moved
+        if not is_outdated and not self.is_outdated:  # only the camera has moved
             return False
         num_bytes = self._update_bytes.get(self._edit_kind(newest), self._first_update_bytes)
         self._are_slow = window.is_slow_for(num_bytes, was_slow=self._are_slow)
         return self._are_slow
 
     def on_painted(self, is_outdated: bool, target: Target, painted: Painted) -> None:
-        """Remember what the client has when a frame is sent.
+        """Record a sent frame.
 
         Args:
-            is_outdated: it is the first of its look. target: that it shows. painted: what came of it.
+            is_outdated: it is the first of its look. target: of the frame. painted: result of the step.
         """
         self._last_kind = self._edit_kind(target)
         if painted.client_keys is None:
@@ -57,5 +57,5 @@ class ClientRenderState:
         self.client_keys, self.is_outdated = painted.client_keys, False
 
     def _edit_kind(self, target: Target) -> str:
-        """Of what a hand is on, the first name: materials and lights change different parts."""
+        """First name of the active pointer: materials and lights change different parts."""
         return self._last_kind if target.active_pointer is None else target.active_pointer.split("/")[1]

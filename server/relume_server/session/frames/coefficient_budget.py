@@ -1,4 +1,4 @@
-"""How many coefficients a moving frame may spend, so that a step takes about as long as it should."""
+"""Number of coefficients per interactive step that meets the target time."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ MIN_COEFFICIENTS, MAX_COEFFICIENTS = 8, 512
 
 
 class CoefficientBudget:
-    """Learns from each step; the picture says only how long it took and whether it is exact."""
+    """Adapts after each step, from its time and whether the image is exact."""
 
     def __init__(self) -> None:
         self.max_coefficients = 32
 
     def learn(self, update_ms: float, exact: bool) -> None:
-        """Scale the budget to the target; a step that was exact and quick may not have spent it: allow more."""
+        """Scale the budget toward the target time; a fast exact step may not have used all of it, so it grows."""
         factor = min(4.0, max(0.25, TARGET_MS / max(update_ms, 1e-3)))
         if exact and factor > 1.0:
             factor = 2.0

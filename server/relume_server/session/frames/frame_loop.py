@@ -1,8 +1,8 @@
-"""The sending half of a session: one task that turns the newest wish into the next frame.
+"""Sending half of a session: one task that turns the newest request into the next frame.
 
-A turn does one thing: open a view, note a touched curve, install what was made, paint, or answer. Of several views the
-one under the pointer goes first. Work runs in threads, one hop a frame; a picture is never used by two at once because
-only this task uses it. A freeze works on what does not change, so it runs beside the turns.
+Each turn does one thing: open a view, prepare a curve, install a result, paint, or answer. Of several views the focused
+one goes first. Work runs in threads, one hop per frame; an image is never used twice at once because only this task
+uses it. Precomputing uses immutable data, so it runs in parallel.
 """
 
 from __future__ import annotations
@@ -28,15 +28,13 @@ if TYPE_CHECKING:
     from relume.live.fixed_camera.jobs import Job
     from relume_server.collaboration.member import RoomMember
 
-REFINE_DELAY_S = (
-    0.040  # a hand that moves edits at least this often; refining in between would only delay the next frame
-)
-BACKGROUND_DELAY_S = 0.250  # what only refines a picture takes both cores from the next edit
+REFINE_DELAY_S = 0.040  # a drag sends edits at least this often; refining in between would only delay the next frame
+BACKGROUND_DELAY_S = 0.250  # refinement uses both cores, which the next edit needs
 CHECK_INTERVAL_S = 1.0
 
 
 class FrameLoop:
-    """The shown pictures on their way to one client."""
+    """Sends the frames of the visible views to one client."""
 
     def __init__(self, state: SessionState, library: Library, threads: Threads) -> None:
         self._socket, self._pending, self._visible_views, self._window = (
@@ -57,7 +55,7 @@ class FrameLoop:
         self._refine_at_s = self._background_at_s = 0.0
 
     async def run(self) -> None:
-        """Serve until cancelled or until the client is lost."""
+        """Serve until canceled, or until the client is lost."""
         try:
             while True:
                 self._pending.changed.clear()
@@ -71,7 +69,7 @@ class FrameLoop:
             await self._work.join()
 
     async def _step(self) -> bool:
-        """Do the most urgent thing; whether there was one."""
+        """Do the most urgent task; true if there was one."""
         if self._delivery is not None and self._delivery.done():
             self._delivery.result()
         self._sync_viewports()
@@ -88,7 +86,7 @@ class FrameLoop:
         return True
 
     async def _serve_views(self) -> bool:
-        """Paint the view that is due, answer questions, open a view that is still missing; whether there was any."""
+        """Paint the due view, answer queries, or open a missing view; true if there was anything to do."""
         viewport = self._next_due()
         if viewport is not None:
             await self._paint(viewport)
@@ -100,7 +98,7 @@ class FrameLoop:
         return viewport is not None or has_answered
 
     def _sync_viewports(self) -> None:
-        """Forget views that are not shown any more; those that were asked for again are sent whole."""
+        """Drop views that are no longer visible; views that were requested again are resent."""
         resend_names, self._visible_views.resend_names = self._visible_views.resend_names, set()
         self._viewports = {
             name: viewport for name, viewport in self._viewports.items() if name in self._visible_views.names
@@ -110,7 +108,7 @@ class FrameLoop:
         self._start_next_job()
 
     def _by_urgency(self) -> list[Viewport]:
-        """The view under the pointer, then the others, longest waiting first."""
+        """The focused view, then the others, longest waiting first."""
         focus = self._visible_views.focus
         return sorted(self._viewports.values(), key=lambda viewport: (viewport.name != focus, viewport.served_s))
 
@@ -122,7 +120,7 @@ class FrameLoop:
         return self._window.has_room(viewport.name, self._visible_views)
 
     def _due_s(self, viewport: Viewport) -> float:
-        """When a view is to be painted: at once with a new look, refined when the hand rests."""
+        """Time at which a view is to be painted: at once for a new look, refined after a drag."""
         pending = self._pending
         is_asked = viewport.needs_camera_update(pending) or viewport.has_new_renderer(pending)
         if viewport.is_outdated(pending.target) or is_asked or viewport.has_new_region(pending):
@@ -130,7 +128,7 @@ class FrameLoop:
         return float("inf") if viewport.is_converged else max(self._refine_at_s, viewport.not_before_s)
 
     async def _wait(self) -> None:
-        """Wait for news, for the hand to have rested, or for the time to look after acknowledgements."""
+        """Wait for requests, for the end of a drag, or for an acknowledgment timeout."""
         now_s = time.perf_counter()
         self._window.check(now_s)
         due_s = min((self._due_s(v) for v in self._viewports.values() if self._has_room(v)), default=float("inf"))
@@ -143,7 +141,7 @@ class FrameLoop:
             return
 
     async def _open_view(self, name: str) -> None:
-        """Show a view from the beginning; the look stays. One of several that cannot be shown is left out."""
+        """Show a view from the beginning; the look is unchanged. One of several that cannot be shown is dropped."""
         picture = await self._work.submit_long(self._library.make_picture, self._transfer, name)
         try:
             if self._accepted is not None:
@@ -157,20 +155,20 @@ class FrameLoop:
         if self._answers.open_curve is not None and self._may_edit:
             try:
                 await self._work.run_short(painter.prepare, [picture], self._answers.open_curve)
-            except RelumeError as error:  # the view is shown all the same
+            except RelumeError as error:  # the view is shown anyway
                 await self._socket.refuse(error)
         self._viewports[name] = Viewport(
             self._transfer.views[name], picture, is_free_camera=self._transfer.camera_mode is CameraMode.FREE
         )
 
     def _next_target(self) -> Target:
-        """The look that the pictures are given next."""
+        """Target that the images get next."""
         if self._member is not None:
             self._member.on_painting(self._pending.target)
         return self._pending.target
 
     def _accept(self, target: Target) -> None:
-        """The pictures can show this look, as `_next_target` gave it."""
+        """Record that the images can show the target of `_next_target`."""
         self._accepted = target
         if self._member is not None:
             self._member.on_painted()
@@ -179,7 +177,7 @@ class FrameLoop:
         return [viewport.picture for viewport in self._viewports.values()]
 
     async def _prepare_curve(self, pointer: str) -> None:
-        """Prepare the curve that the user opened, in the newest look; who may not edit is only told its values."""
+        """Prepare the curve that the user opened, in the newest look; view-only clients get its values only."""
         target = self._pending.target
         self._answers.set_open_curve(pointer)
         await self._answers.send_curve(target)
@@ -187,7 +185,7 @@ class FrameLoop:
             self._answers.open_curve = None
 
     async def _prepare(self, pointer: str) -> bool:
-        """Freeze along what the user has in hand, in the newest look there is; False where that was refused."""
+        """Precompute for the active control, in the newest look; false if that was refused."""
         target = self._next_target()
         if target is not self._accepted:
             try:
@@ -197,7 +195,7 @@ class FrameLoop:
                 await self._revert(target, error)
         try:
             jobs = await self._work.run_short(painter.prepare, self._pictures(), pointer)
-        except RelumeError as error:  # the look is another one now, or freezing it takes more memory than there is
+        except RelumeError as error:  # the look has changed, or precomputing needs more memory than there is
             await self._socket.refuse(error)
             return False
         for viewport, job in zip(self._viewports.values(), jobs, strict=True):
@@ -205,7 +203,7 @@ class FrameLoop:
         return True
 
     async def _install(self) -> None:
-        """Hand over what was made, where its view is still shown."""
+        """Install a finished result, if its view is still visible."""
         finished = await self._precomputer.take()
         if finished is None:
             return
@@ -218,7 +216,7 @@ class FrameLoop:
             await self._socket.refuse(result)
 
     def _start_next_job(self) -> None:
-        """Start what is needed most; what runs for nothing is ended."""
+        """Start the most urgent job; cancel one that is no longer needed."""
         running = self._precomputer.running
         if running is not None:
             if self._is_stale(*running):
@@ -233,7 +231,7 @@ class FrameLoop:
                 return
 
     def _preempt(self, viewport: Viewport) -> None:
-        """Something else of a view is seen: what is made of the rest of it goes on later from where it was."""
+        """Interrupt a view's job because its visible region changed; it resumes later."""
         running = self._precomputer.running
         if running is None or running[0] is not viewport or not running[1].is_resumable:
             return
@@ -241,14 +239,14 @@ class FrameLoop:
             self._precomputer.cancel()
 
     def _is_stale(self, viewport: Viewport, job: Job) -> bool:
-        """Whether the user has moved on; an image of an older look is still worth showing where there is none."""
+        """True if a job is no longer needed; an image of an older look is still useful if there is none."""
         if viewport not in self._viewports.values():
             return True
         is_optional = job.state == "precomputing" or job.is_refinement
         return is_optional and (viewport.job is None or viewport.job.key != job.key)
 
     async def _answer(self) -> bool:
-        """The newest probe, and a brush's frame of one view; whether anything was asked."""
+        """Answer the newest pixel probe, or send a highlight of one view; true if there was one."""
         pending, has_answered = self._pending, False
         inspected_view = pending.inspect.view or self._visible_views.focus if pending.inspect is not None else None
         if inspected_view in self._viewports and (inspect_message := pending.pop_inspect()) is not None:
@@ -267,7 +265,7 @@ class FrameLoop:
         return has_answered
 
     async def _paint(self, viewport: Viewport) -> None:
-        """Paint the newest look, or go on with it; a look that the bake cannot follow is taken back."""
+        """Paint the newest look, or refine it; a look that the bake does not support is reverted."""
         painted: Painted | RelumeError
         async with self._work.acquire_slot():
             target = self._next_target()
@@ -301,7 +299,7 @@ class FrameLoop:
         form: str,
         outcome: tuple[FrameRequest, Painted] | None = None,
     ) -> None:
-        """Send a frame when the one before has gone out, while the next is painted; told: what is to be said of it."""
+        """Send a frame after the previous one, while the next is painted; `outcome` is for metrics and traces."""
         if self._delivery is not None:
             await self._delivery
         now_s = time.perf_counter()
@@ -329,12 +327,12 @@ class FrameLoop:
                 self._traces.record_frame(name, times, attributes)
 
     def _note_failed(self, delivery: asyncio.Task[None]) -> None:
-        """The client is gone: whoever waits for news learns it."""
+        """Wake up waiting tasks, because the client is gone."""
         if not delivery.cancelled() and delivery.exception() is not None:
             self._pending.changed.set()
 
     async def _revert(self, target: Target, error: RelumeError) -> None:
-        """Go back to the look before; where there is none, or that one itself fails, the session cannot go on."""
+        """Revert to the previous look; if there is none, or it fails as well, the session ends."""
         before = self._accepted
         if before is None or before is target:
             raise error
@@ -342,18 +340,18 @@ class FrameLoop:
             await self._revert_own(self._member, target, before, error)
         else:
             await self._socket.refuse(error, target.revision)
-            if self._pending.target is target:  # a newer one stands on this and is refused itself
+            if self._pending.target is target:  # a newer edit builds on it and is rejected itself
                 self._pending.target = before
                 self._look.revert(before)
         await self._work.run_short(painter.accept, self._pictures(), before)
 
     async def _revert_own(self, member: RoomMember, target: Target, before: Target, error: RelumeError) -> None:
-        """In a room a session takes back its own newest edits alone, if the pictures can show the look without them.
+        """In a room, revert only this session's own newest edits, if the images support the look without them.
 
-        If they cannot, it is somebody else's edit that this bake cannot follow: it keeps the picture that there was,
-        and tries again with the next edit.
+        If they do not, the bake does not support another participant's edit: the image stays, and the next edit is
+        tried.
         """
-        if self._pending.target is not target:  # the newer one says whether it can be shown
+        if self._pending.target is not target:  # the newer look decides
             return
         without = member.without_own_edits(before)
         if without is not None:

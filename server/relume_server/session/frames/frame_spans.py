@@ -9,11 +9,11 @@ from relume_server.telemetry.traces import SpanTimes
 def trace_fields(
     request: FrameRequest, painted: Painted, num_bytes: int, send_start_s: float, send_end_s: float
 ) -> tuple[str, SpanTimes, dict[str, str | int | bool]]:
-    """Name, times and attributes of its span.
+    """Return the name, times and attributes of a frame's span.
 
     Args:
-        request: that answers something. painted: what came of it. num_bytes: of the message.
-        send_start_s, send_end_s: before and after it went to the socket, seconds of `time.perf_counter`.
+        request: answered by the frame. painted: result of the step. num_bytes: of the message.
+        send_start_s, send_end_s: before and after sending, seconds of `time.perf_counter`.
     """
     received_s = request.received_s or painted.started_s
     applied_s = received_s if request.camera_state is not None else max(received_s, request.target.applied_s)

@@ -1,4 +1,4 @@
-"""What runs in a thread for a frame: bring the picture on, encode what the client lacks, pack the message."""
+"""Work in a thread for one frame: update the image, encode the tiles that the client lacks, pack the message."""
 
 from __future__ import annotations
 
@@ -31,23 +31,23 @@ _NOTHING = object()
 
 @dataclass(frozen=True)
 class FrameRequest:
-    """What a turn of the frame loop asks of a picture.
+    """Input of one step.
 
     Attributes:
-        target: the look that the frame will show.
-        accepting: pictures that have not got that look yet; all take it, or none.
-        missing_tiles: tiles that the client has not got in HDR, besides those that this step changes.
-        only_exact: send nothing unless the step makes the picture exact, or first what is seen of it.
-        region: what is on the client's screen of it; None: all. has_new_region: it has not been told to the picture.
-        is_interactive: a hand waits for it: tiles out of sight come when it rests.
-        is_visible_exact: the client knows that what it sees is exact.
-        is_due: there is something to send even where this step changes nothing.
-        is_client_exact: the client knows that what it has is exact.
-        size: of the picture. jpeg_size: of a JPEG of it, no larger.
-        received_s: when the edit or the eye came in that no frame has answered yet, if there is one.
-        camera_state: that the picture is given before; None where it has its eye, or has none that moves.
-        camera_seq: number of the eye that the frame shows.
-        client_keys: keys of the parts that the client's shader has, where it draws what moves; else None.
+        target: look of the frame.
+        accepting: images that do not have this look yet; all take it, or none.
+        missing_tiles: tiles that the client lacks in HDR, besides those that this step changes.
+        only_exact: send nothing unless the step makes the image, or its visible region, exact.
+        region: visible region; None: all. has_new_region: the image does not know it yet.
+        is_interactive: during a drag: tiles outside the region are sent afterwards.
+        is_visible_exact: the client knows that its visible region is exact.
+        is_due: there is something to send even if this step changes nothing.
+        is_client_exact: the client knows that its image is exact.
+        size: of the image. jpeg_size: of its JPEG, no larger.
+        received_s: time of the edit or camera message that no frame has answered yet, if any.
+        camera_state: to set before the step; None if it is set, or fixed.
+        camera_seq: of the camera that the frame shows.
+        client_keys: keys of the parts that the client's shader has, if it renders; otherwise None.
     """
 
     target: Target
@@ -75,15 +75,15 @@ class FrameRequest:
 
 @dataclass(frozen=True)
 class Painted:
-    """What came of a request.
+    """Result of one step.
 
     Attributes:
-        job: what must be made before the picture can go on to where it should, or None.
-        progress: what the step changed, and what the picture shows since.
-        message: the packed frame, or None where none is to be sent.
-        started_s: when the thread began, seconds of `time.perf_counter`.
-        client_keys: keys of the parts that the client's shader has when it has got the message.
-        deferred_tiles: tiles that it lacks then.
+        job: what must be computed before the image can reach its target, or None.
+        progress: what the step changed, and what the image shows now.
+        message: the packed frame, or None.
+        started_s: start of the thread, seconds of `time.perf_counter`.
+        client_keys: keys of the parts that the client's shader has after the message.
+        deferred_tiles: tiles that the client lacks after the message.
     """
 
     job: Job | None
@@ -97,12 +97,12 @@ class Painted:
 
     @property
     def is_exact(self) -> bool:
-        """Whether all that the client has is exact when it has got the message."""
+        """True if the client's image is exact after the message."""
         return self.progress.exact and not self.deferred_tiles
 
 
 def accept(pictures: Iterable[Picture], target: Target) -> None:
-    """Give pictures a look. Raises what they say where they cannot follow it, or where it needs too much memory."""
+    """Set the look of images. Raises their errors if they do not support it, or it needs too much memory."""
     all_pictures = list(pictures)
     for picture in all_pictures:
         picture.check(target.look)
@@ -111,7 +111,7 @@ def accept(pictures: Iterable[Picture], target: Target) -> None:
 
 
 def prepare(pictures: Iterable[Picture], pointer: str) -> list[Job | None]:
-    """Tell pictures which curve or slider the user has in hand; what each of them needs now."""
+    """Announce an active control to images; returns the job that each needs."""
     all_pictures = list(pictures)
     for picture in all_pictures:
         picture.prepare(pointer)
@@ -119,13 +119,13 @@ def prepare(pictures: Iterable[Picture], pointer: str) -> list[Job | None]:
 
 
 def install(picture: Picture, job: Job, result: Any) -> Job | None:
-    """Hand over what was made; what the picture needs next."""
+    """Install a result; returns the next job of the image."""
     picture.install(job, result)
     return picture.next_job()
 
 
 def paint(picture: Picture, request: FrameRequest) -> Painted:
-    """Advance the picture as far as it can go now, and pack the frame where there is something to show."""
+    """Advance the image as far as possible now, and pack a frame if there is something to show."""
     start_s = time.perf_counter()
     accept(request.accepting, request.target)
     if request.camera_state is not None:
@@ -154,7 +154,7 @@ def paint(picture: Picture, request: FrameRequest) -> Painted:
     deferred_tiles = _tiles_outside_region(missing_tiles, request) if is_in_progress else frozenset()
     if (
         missing_tiles and missing_tiles == deferred_tiles and request.received_s is None
-    ):  # nobody would see anything of it
+    ):  # all outside the visible region
         return Painted(job, progress, None, update_ms, start_s, deferred_tiles=deferred_tiles)
     tiles, payload, alpha = _payload(picture, request, missing_tiles - deferred_tiles)
     encode_ms = (time.perf_counter() - updated_s) * 1e3
@@ -168,7 +168,7 @@ def paint(picture: Picture, request: FrameRequest) -> Painted:
 
 
 def _tiles_outside_region(missing_tiles: frozenset[Tile], request: FrameRequest) -> frozenset[Tile]:
-    """Tiles that a frame can do without while its picture is on its way."""
+    """Tiles that can be sent later while the image changes."""
     if request.region is None or request.form == "jpeg":
         return frozenset()
     left, top, across, down = request.region
@@ -180,7 +180,7 @@ def _tiles_outside_region(missing_tiles: frozenset[Tile], request: FrameRequest)
 
 
 def _waited_ms(request: FrameRequest, start_s: float) -> float:
-    """How long what is answered has waited."""
+    """Waiting time of the answered message."""
     return 0.0 if request.received_s is None else (start_s - request.received_s) * 1e3
 
 
@@ -208,7 +208,7 @@ def _pack_scene_update(
     shader_data: tuple[Mapping[str, ArrayBlock], ShaderConstants],
     start_s: float,
 ) -> Painted:
-    """Pack what the client's shader lacks; nothing where it has all, and has been told that the look is shown."""
+    """Pack the parts that the client's shader lacks; nothing if it has all, and knows that the look is shown."""
     blocks, shader_arrays = shader_data
     client_keys: Mapping[str, Hashable] = request.client_keys or {}
     progress = replace(cast("Any", progress), tiles=[])
@@ -237,7 +237,7 @@ def _pack_scene_update(
 def _payload(
     picture: Picture, request: FrameRequest, requested_tiles: frozenset[Tile]
 ) -> tuple[list[Tile], bytes, bytes | None]:
-    """The tiles of a frame, their pixels, and their coverage where they are not opaque."""
+    """Tiles of a frame, their pixels, and their coverage if they are not opaque."""
     if request.form == "jpeg":
         jpeg = encode_jpeg(picture, request.target.look.display, request.jpeg_size, request.quality)
         return [(0, 0, *request.size)], jpeg, None
@@ -246,11 +246,11 @@ def _payload(
 
 
 def encode_jpeg(picture: Picture, display: DisplayLook, size: tuple[int, int], quality: int) -> bytes:
-    """A picture as it is displayed, no larger than a size."""
+    """Encode an image as displayed, scaled down to a size if needed."""
     image = downsample(picture.image(), size)
     try:
         displayed = tone_map(image, display.exposure, display.tone_map, use_table=True)
-    except ParameterError:  # the server has no such view: the editor says so, and shows this
+    except ParameterError:  # the server lacks the OpenColorIO view: the editor reports it, and shows this
         displayed = tone_map(image, display.exposure, "agx")
     buffer = io.BytesIO()
     Image.fromarray(to_bytes(displayed)).save(buffer, "JPEG", quality=quality)
@@ -258,18 +258,18 @@ def encode_jpeg(picture: Picture, display: DisplayLook, size: tuple[int, int], q
 
 
 def encode_highlight(picture: Picture, pointer: str, from_degrees: float, to_degrees: float) -> bytes:
-    """The payload of a highlight frame: how much of each pixel comes from that stretch of the curve, 0…255."""
+    """Payload of a highlight frame: contribution of a curve's interval to each pixel, 0…255."""
     return to_bytes(picture.highlight_pixels(pointer, from_degrees, to_degrees)).tobytes()
 
 
 def pack(header: FrameHeader, payload: bytes) -> bytes:
-    """A frame as it goes over the wire."""
+    """Pack a frame as a binary message."""
     head = header.model_dump_json().encode()
     return b"".join((struct.pack("<I", len(head)), head, payload))
 
 
 def rounded(bands: NDArray[Any]) -> list[list[float]]:
-    """Band values with six digits, as lists: what a plot needs, in half the bytes."""
+    """Band values with six digits, as lists: enough for a plot, in half the bytes."""
     return [[float(f"{value:.6g}") for value in channel] for channel in bands.tolist()]
 
 

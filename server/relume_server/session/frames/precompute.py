@@ -1,4 +1,4 @@
-"""The freeze of a session: at most one runs, in a thread of its own, and the pictures go on being painted."""
+"""Precomputing of a session: at most one job in a thread of its own, while images are painted."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ STATUS_INTERVAL_S = 0.100
 
 @dataclass(frozen=True)
 class _Running:
-    """A freeze from its start until its result is taken."""
+    """A job from its start until its result is taken."""
 
     viewport: Viewport
     job: Job
@@ -34,7 +34,7 @@ class _Running:
 
 
 class Precomputer:
-    """Starts a job, says how far it is, hands out what it made; `changed` is set when there is something to take."""
+    """Runs a job, reports its progress, and returns its result; `changed` is set when a result can be taken."""
 
     def __init__(
         self, socket: ClientSocket, threads: Threads, metrics: Metrics, traces: Traces | None, changed: asyncio.Event
@@ -51,16 +51,16 @@ class Precomputer:
 
     @property
     def running(self) -> tuple[Viewport, Job] | None:
-        """What is being made, and for which view."""
+        """Running job, and its view."""
         return None if self._running is None else (self._running.viewport, self._running.job)
 
     @property
     def is_done(self) -> bool:
-        """Whether there is something to take."""
+        """True if there is a result to take."""
         return self._running is not None and self._running.reporting.done()
 
     def start(self, viewport: Viewport, job: Job) -> None:
-        """Begin; nothing may be running."""
+        """Start a job; none may be running."""
         self._cancel = cancel = threading.Event()
         progress = [0.0]
         future = asyncio.wrap_future(
@@ -72,15 +72,15 @@ class Precomputer:
         self._running = _Running(viewport, job, future, reporting, time.perf_counter())
 
     def cancel(self) -> None:
-        """What runs is not wanted any more: it ends soon."""
+        """Cancel the running job, which ends soon."""
         self._cancel.set()
 
     async def take(self) -> tuple[Viewport, Job, Any] | None:
-        """What was made, when `is_done`; None where it was cancelled. Raises what making it raised."""
+        """Take the result when `is_done`; None if the job was canceled. Raises the job's exception."""
         running = self._running
         if running is None:
             return None
-        await running.reporting  # where the client is gone, `end` still has a thread to wait for
+        await running.reporting  # if the client is gone, `end` still waits for the thread
         self._running = None
         error = running.future.exception()
         if isinstance(error, CancelledError):
@@ -96,12 +96,12 @@ class Precomputer:
         return running.viewport, running.job, running.future.result()
 
     async def send_ready(self, viewport: Viewport, job: Job) -> None:
-        """Tell the client that this is not waited for any more: it has been handed over, or given up."""
+        """Notify the client that the job is installed or given up."""
         if job.state != "updating":
             await self._socket.send(StatusMessage(state="ready", view=viewport.name, label=job.label, progress=1.0))
 
     async def end(self) -> None:
-        """Cancel what runs and wait for its thread; nobody asks for its result any more."""
+        """Cancel the running job and wait for its thread; its result is dropped."""
         self._cancel.set()
         if self._running is None:
             return
@@ -111,7 +111,7 @@ class Precomputer:
         _note_error(running.reporting)
 
     async def _send_progress(self, future: asyncio.Future[Any], view: str, job: Job, progress: list[float]) -> None:
-        """Say how far it is, each per cent once; what follows a hand is not worth a word."""
+        """Report progress, each percent once; not for jobs of a drag."""
         if job.state == "updating":
             await asyncio.wait({future})
             return
@@ -125,6 +125,6 @@ class Precomputer:
 
 
 def _note_error(done: asyncio.Future[Any]) -> None:
-    """Look at how it ended: sessions that are cut off take nothing any more, and cancelled work is no line of a log."""
+    """Retrieve the exception of a dropped job, so that asyncio does not log it."""
     if not done.cancelled():
         done.exception()

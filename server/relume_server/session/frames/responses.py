@@ -1,4 +1,4 @@
-"""What the client asks besides frames: the open curve, a pixel, the pixels of a stretch of a curve."""
+"""Answers besides frames: the open curve, a pixel, the highlighted pixels of a curve."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from relume_server.session.frames.viewport import Viewport
 
 
 class QueryResponder:
-    """Gives them from the frame loop, between frames.
+    """Answers queries in the frame loop, between frames.
 
     Attributes:
         open_curve: pointer of the curve that the user has opened.
@@ -29,16 +29,16 @@ class QueryResponder:
         self._last_curve_key: dict[str, Any] | None = None
 
     def set_open_curve(self, pointer: str) -> None:
-        """Take note of the curve that the user has opened. It is sent anew: who closes a curve forgets it."""
+        """Set the open curve. It is sent again, because a client that closes a curve forgets it."""
         self.open_curve, self._last_curve_key = pointer, None
 
     async def send_curve(self, target: Target) -> None:
-        """The touched curve in this look, where its term has changed since it was last sent."""
+        """Send the open curve of this look, if its term has changed since it was last sent."""
         if self.open_curve is None:
             return
         try:
             term, curve = find_curve(self.open_curve, target.document)
-        except ParameterError:  # an edit removed it
+        except ParameterError:  # removed by an edit
             self.open_curve = None
             return
         key = {"pointer": self.open_curve, "term": term}
@@ -53,14 +53,14 @@ class QueryResponder:
         self._last_curve_key = key
 
     async def answer_inspect(self, viewport: Viewport, message: InspectMessage) -> None:
-        """What makes up a pixel."""
+        """Answer a pixel probe."""
         try:
             await self._inspect(viewport, message)
         except RelumeError as error:
             await self._socket.refuse(error)
 
     async def answer_highlight(self, viewport: Viewport, frame: int, is_focused: bool) -> bytes | None:
-        """The frame for a view's brush; only the focused one says why there is none."""
+        """Highlight frame of a view; only for the focused view a failure is reported."""
         message, viewport.highlight = viewport.highlight, None
         try:
             return None if message is None else await self._render_highlight(viewport, message, frame)
@@ -118,5 +118,5 @@ class QueryResponder:
 
 
 def _triple(values: Any) -> Any:
-    """Three numbers for a message, where there are any."""
+    """Three numbers for a message, or None."""
     return None if values is None else tuple(float(value) for value in values)

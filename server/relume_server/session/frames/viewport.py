@@ -1,4 +1,4 @@
-"""One view on its way to the client: its picture, and what of it the client has."""
+"""One visible view: its image, and what the client has of it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ REFINE_SEND_INTERVAL_S = 0.100
 
 
 def fit_size(size: tuple[int, int], space: tuple[int, int]) -> tuple[int, int]:
-    """The largest width and height of a picture's shape that fit into a space, never more than its own, at least 1."""
+    """Largest size with the image's aspect ratio that fits into a space, at most the image's own, at least 1."""
     (width, height), (max_width, max_height) = size, space
     fitted_width = min(width, max_width, width * max_height // height)
     fitted_height = min(height, max_height, height * max_width // width)
@@ -31,22 +31,22 @@ def fit_size(size: tuple[int, int], space: tuple[int, int]) -> tuple[int, int]:
 
 
 class Viewport:
-    """Says what the next frame should be, and learns from what came of it.
+    """Chooses the next frame of a view, and records its result.
 
     Attributes:
-        target: the look that it was painted with last.
-        job: what the picture waits for.
-        is_converged: painting again would show nothing new.
-        is_exact: the client's picture of it is exact. progress: what the picture shows since it was painted last.
-        not_before_s: no refined frame goes out earlier.
-        camera_state: that the picture was painted with last, where it moves.
-        highlight: a stretch of a curve whose pixels are to be sent. served_s: when it had its last turn.
+        target: of the last step.
+        job: what the image waits for.
+        is_converged: another step would change nothing.
+        is_exact: the client's image is exact. progress: of the last step.
+        not_before_s: no refined frame is sent earlier.
+        camera_state: of the last step, for a free camera.
+        highlight: pending interval of a curve to highlight. served_s: time of its last turn.
     """
 
     def __init__(self, view: CameraView, picture: Picture, *, is_free_camera: bool) -> None:
         """
         Args:
-            is_free_camera: its eye does; then it shows something at once.
+            view: of the bake. picture: its live image. is_free_camera: then it has something to show at once.
         """
         self.name, self.size, self.picture = view.name, (view.width, view.height), picture
         self.target: Target | None = None
@@ -60,7 +60,7 @@ class Viewport:
         self.camera_state: CameraState | None = None
         self._is_free_camera, self._renderer = is_free_camera, "server"
         self._client_render_state = ClientRenderState()
-        self._is_blank = not is_free_camera  # nothing of it has been shaded: a frame would be black
+        self._is_blank = not is_free_camera  # nothing is shaded yet: a frame would be black
         self._has_unsent = self._is_link_slow = False
         self._answered_target: Target | None = None
         self._visible_exact_target: Target | None = None
@@ -70,28 +70,28 @@ class Viewport:
         self._budget = CoefficientBudget()
 
     def needs_camera_update(self, pending: PendingRequests) -> bool:
-        """Whether it has not been painted with its newest eye."""
+        """True if the newest camera has not been painted."""
         return pending.camera_states.get(self.name) is not self.camera_state
 
     def has_new_renderer(self, pending: PendingRequests) -> bool:
-        """Whether its pixels are to be found elsewhere than they were."""
+        """True if another renderer is requested."""
         return self._is_free_camera and pending.renderer != self._renderer
 
     def has_new_region(self, pending: PendingRequests) -> bool:
-        """Whether something else of it is on the client's screen than was."""
+        """True if the visible region changed."""
         return not self._is_free_camera and pending.regions.get(self.name) != self._region
 
     def is_outdated(self, newest: Target) -> bool:
-        """Whether it has not been painted with this look."""
+        """True if the view has not been painted with this look."""
         return self.target is not newest
 
     def resend(self) -> None:
-        """The client has nothing of it."""
+        """Forget what the client has."""
         self._missing_tiles, self._has_unsent = self._all_tiles, True
         self.is_converged = self.is_exact = False
 
     def on_installed(self, job: Job | None) -> None:
-        """The picture was handed what it waited for, and needs this now."""
+        """Record that a result was installed, and the next job."""
         self.job = job
         self._is_blank = self.is_converged = False
         self.not_before_s = 0.0
@@ -99,7 +99,7 @@ class Viewport:
     def request(
         self, newest: Target, pending: PendingRequests, window: FrameWindow, accepting: Sequence[Picture]
     ) -> FrameRequest:
-        """The next frame: of a new look whatever can be shown, else what refines it."""
+        """Request for the next frame: for a new look whatever can be shown, otherwise a refinement."""
         camera_state = pending.camera_states.get(self.name)
         has_moved = self.needs_camera_update(pending)
         if self.has_new_renderer(pending):
@@ -116,7 +116,7 @@ class Viewport:
         was_sent_recently = time.perf_counter() - self._last_sent_s < REFINE_SEND_INTERVAL_S
         if is_interactive and is_client_rendered:
             is_client_rendered = not self._client_render_state.are_too_large(newest, window, self.is_outdated(newest))
-        elif self._client_render_state.is_outdated and was_sent_recently:  # a hand may go on
+        elif self._client_render_state.is_outdated and was_sent_recently:  # the drag may continue
             is_client_rendered = False
         self._is_link_slow = is_slow = window.is_slow_for(self._interactive_bytes, was_slow=self._is_link_slow)
         needs_jpeg = pending.form == "auto" and is_slow and is_interactive and not is_client_rendered
@@ -153,8 +153,9 @@ class Viewport:
         return self._answered_target is not None and self._answered_target.look.display != newest.look.display
 
     def _has_unsent_data(self, pending: PendingRequests) -> bool:
-        """Whether something is to come at rest: tiles in HDR after a JPEG or after steps that were not sent, or what a
-        shader lacks after pictures that were sent in its place."""
+        """True if something is to be sent after a drag: HDR tiles after a JPEG or after unsent steps, or shader inputs
+        after images that were sent instead.
+        """
         return (bool(self._missing_tiles) or self._has_outdated_tables) and pending.form != "jpeg"
 
     @property
@@ -166,7 +167,7 @@ class Viewport:
         return self._is_free_camera and self._renderer == "client"
 
     def on_painted(self, request: FrameRequest, painted: Painted, pending: PendingRequests) -> None:
-        """Remember what the client has when `painted` is sent."""
+        """Record what the client has after `painted` is sent."""
         tiles, exact = painted.progress.tiles, painted.is_exact
         if request.has_new_region:
             self._region, self._visible_exact_target = request.region, None
@@ -183,7 +184,7 @@ class Viewport:
         if painted.message is None:
             self._missing_tiles = self._missing_tiles.union(tiles)
             self._has_unsent = self._has_unsent or bool(tiles)
-            if painted.deferred_tiles:  # until what is being made is there, or something else is looked at
+            if painted.deferred_tiles:  # until the job is finished, or another region is visible
                 self.is_converged = is_done
             else:
                 self._wait(is_done, pending)
@@ -196,12 +197,12 @@ class Viewport:
         self.not_before_s = 0.0
 
     def _wait(self, is_done: bool, pending: PendingRequests) -> None:
-        """Nothing was sent: nothing is to be shown, or it is too early; a slow link waits for the exact picture."""
+        """Record that nothing was sent: nothing to show, or too early; a slow connection waits for the exact image."""
         has_unsent_data = self._has_unsent or self._has_unsent_data(pending)
         is_late = self._is_link_slow and not self._has_outdated_tables
         self.is_converged = is_done and (self._is_blank or is_late or not has_unsent_data)
         self.not_before_s = self._last_sent_s + REFINE_SEND_INTERVAL_S if is_done else 0.0
 
     def on_sent(self, now_s: float) -> None:
-        """A frame has been handed to the socket."""
+        """Record that a frame is being sent."""
         self._last_sent_s = now_s

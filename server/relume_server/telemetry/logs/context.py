@@ -1,4 +1,4 @@
-"""What is being worked on, as every line of the log has it: it goes along into tasks and threads of a request."""
+"""Log context (request, session, bake, user), which follows a request into its tasks and threads."""
 
 from __future__ import annotations
 
@@ -13,5 +13,5 @@ FIELDS = (REQUEST, SESSION, BAKE, USER)
 
 
 def current() -> dict[str, str]:
-    """Those that are known here."""
+    """Known fields."""
     return {field.name: value for field in FIELDS if (value := field.get())}

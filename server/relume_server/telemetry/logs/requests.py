@@ -1,6 +1,6 @@
-"""Gives every request an id, or takes the one that a proxy gave it, and says it in the answer and in a line of the log.
+"""Assign an id to every request, or keep a proxy's, and return and log it.
 
-Pure ASGI. The line has the path without its query, which may hold a token that resumes a session.
+Pure ASGI. The log has the path without its query, which may contain a resume token.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _FORM = re.compile(r"[A-Za-z0-9._:-]{1,64}")
 
 
 def quoted(path: str) -> str:
-    """A path as it is safe to show: whoever calls chooses it, line breaks and codes for terminals in it as well."""
+    """Escape line breaks and terminal codes in a path, which clients choose."""
     return quote(path, safe="/:@!$&'()*+,;=~")
 
 
@@ -33,7 +33,7 @@ class RequestIds:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Name the request for as long as it is served."""
+        """Set the request id while the request is served."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return

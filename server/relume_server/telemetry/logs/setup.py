@@ -1,4 +1,4 @@
-"""How lines of the log look: text for people, or JSON for machines, with what they are about."""
+"""Log format: text for people, or JSON for machines, with the context."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Format = Literal["plain", "json"]
 
 
 class JsonFormatter(logging.Formatter):
-    """One JSON object a line: time, level, logger, message, what it is about, and the trace where there is one."""
+    """One JSON object per line: time, level, logger, message, context, and trace if there is one."""
 
     def format(self, record: logging.LogRecord) -> str:
         """See `logging.Formatter`."""
@@ -31,10 +31,10 @@ class JsonFormatter(logging.Formatter):
 
 
 class PlainFormatter(logging.Formatter):
-    """A line of text; what it is about stands at its end.
+    """A line of text with the context at its end.
 
-    What clients chose is in it: line breaks and codes for terminals are shown, so that nobody writes lines of their
-    own, and lines of a trace are set in.
+    Messages contain text from clients: line breaks and terminal codes are escaped, so that nobody forges log lines, and
+    tracebacks are indented.
     """
 
     def __init__(self) -> None:
@@ -53,28 +53,29 @@ class PlainFormatter(logging.Formatter):
 
 
 def _escape_unprintable(text: str) -> str:
-    """A text with what cannot be printed as Python writes it."""
+    """Escape unprintable characters like Python."""
     return "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in text)
 
 
 def _attach_context(record: logging.LogRecord) -> bool:
-    """Write down what is worked on where a line is logged, which may not be where it is formatted."""
+    """Store the context in the record at the time of logging; formatting may run in another thread."""
     record.about = current()
     return True
 
 
 _CONNECTION_LOGGERS = "uvicorn.error", "websockets"
-"""Loggers that below a warning write down addresses with their queries, headers, and messages: all of them may hold
-tokens, and `relume_server.telemetry.logs.requests` says the rest."""
+"""Loggers whose lines below WARNING contain URLs with queries, headers and messages, and so possibly tokens;
+`relume_server.telemetry.logs.requests` logs requests instead.
+"""
 
 
 def _is_relevant(record: logging.LogRecord) -> bool:
-    """Not what uvicorn says of each WebSocket that is answered by a refusal: it takes that for no answer."""
+    """Drop uvicorn's line for each refused WebSocket, which it takes for a missing response."""
     return record.name != "uvicorn.error" or "without completing handshake" not in record.getMessage()
 
 
 def set_up(form: Format, level: str) -> None:
-    """Log this process's lines in a form, from a level on, or from a lower one where --verbose asked for that."""
+    """Configure the log of this process: format, and minimum level unless --verbose set a lower one."""
     root = logging.getLogger()
     handler = logging.StreamHandler()
     handler.setFormatter(JsonFormatter() if form == "json" else PlainFormatter())
@@ -83,7 +84,7 @@ def set_up(form: Format, level: str) -> None:
     verbose = [logging.INFO] if any(each.level == logging.INFO for each in root.handlers) else []
     handler.setLevel(min([logging.getLevelNamesMapping()[level.upper()], *verbose]))
     root.handlers = [handler]
-    logging.captureWarnings(True)  # they are lines of this log, too
+    logging.captureWarnings(True)  # include them in this log
     root.setLevel(handler.level)
     for name in _CONNECTION_LOGGERS:
         logging.getLogger(name).setLevel(max(logging.WARNING, handler.level))

@@ -11,5 +11,5 @@ is_additive = True  # False where a relume from before it cannot work on: then p
 
 
 def upgrade() -> None:
-    """From the revision before."""
+    """Upgrade from the previous revision."""
     ${upgrades if upgrades else "pass"}

@@ -1,7 +1,7 @@
-"""The tables as they were before there were revisions.
+"""The tables before revisions were introduced.
 
-A new database gets all of them; one from before revisions gets what it lacks: tables of the server where only the
-command line was used, columns that later versions of relume had added, all of them empty.
+A new database gets all of them; an older one gets what it lacks: tables of the server if only the command line was
+used, and columns that later versions had added, all empty.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ for _name in ("renders", "btfs", "truths"):
 
 
 def upgrade() -> None:
-    """From nothing, or from a database of before."""
+    """Create the tables, or complete an older database."""
     connection = op.get_bind()
     _METADATA.create_all(connection)
     found = sa.inspect(connection)

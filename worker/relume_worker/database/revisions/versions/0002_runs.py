@@ -1,4 +1,4 @@
-"""Bakes name their beginning, so that a machine knows whether finished tasks are in its own folder."""
+"""Run markers of bakes, which tell a machine whether finished tasks are in its own folder."""
 
 from __future__ import annotations
 
@@ -11,5 +11,5 @@ is_additive = True
 
 
 def upgrade() -> None:
-    """From the revision before."""
+    """Upgrade from the previous revision."""
     op.add_column("bakes", sa.Column("run", sa.String(), nullable=True))

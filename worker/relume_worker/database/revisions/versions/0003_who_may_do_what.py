@@ -1,4 +1,4 @@
-"""Who may do what: tokens, what belongs to whom, the audit."""
+"""Tokens, ownership and audit."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ is_additive = True
 
 
 def upgrade() -> None:
-    """From the revision before."""
+    """Upgrade from the previous revision."""
     op.create_table(
         "audit",
         sa.Column("number", sa.BigInteger().with_variant(sa.Integer(), "sqlite"), autoincrement=True, nullable=False),

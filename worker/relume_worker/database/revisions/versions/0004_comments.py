@@ -11,7 +11,7 @@ is_additive = True
 
 
 def upgrade() -> None:
-    """From the revision before."""
+    """Upgrade from the previous revision."""
     op.create_table(
         "comments",
         sa.Column("id", sa.String(), nullable=False),

@@ -1,4 +1,4 @@
-"""Who has asked for a bake: clients have their turns."""
+"""Clients of bakes, for fair scheduling."""
 
 from __future__ import annotations
 
@@ -11,5 +11,5 @@ is_additive = True
 
 
 def upgrade() -> None:
-    """From the revision before."""
+    """Upgrade from the previous revision."""
     op.add_column("bakes", sa.Column("client", sa.String(), nullable=True))

@@ -1,4 +1,4 @@
-"""Who does a step of a render, a comparison or a BTF: several servers may share them."""
+"""Leases of renders, comparisons and BTF jobs, which several servers may share."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ is_additive = True
 
 
 def upgrade() -> None:
-    """From the revision before."""
+    """Upgrade from the previous revision."""
     for table in ("renders", "truths", "btfs"):
         op.add_column(table, sa.Column("owner", sa.String(), nullable=True))
         op.add_column(table, sa.Column("heartbeat", sa.Double(), nullable=True))

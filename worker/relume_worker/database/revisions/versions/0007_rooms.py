@@ -1,4 +1,4 @@
-"""Which server has a room: several servers may share the ledger."""
+"""Leases of rooms, for several servers on one ledger."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ is_additive = True
 
 
 def upgrade() -> None:
-    """From the revision before."""
+    """Upgrade from the previous revision."""
     op.create_table(
         "rooms",
         sa.Column("watch", sa.String(), nullable=False),

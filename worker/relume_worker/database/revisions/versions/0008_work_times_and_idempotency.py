@@ -1,4 +1,4 @@
-"""When long work began and ended, and answers to calls that may come twice."""
+"""Start and end times of jobs, and responses to calls with idempotency keys."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ is_additive = True
 
 
 def upgrade() -> None:
-    """From the revision before."""
+    """Upgrade from the previous revision."""
     for table in ("renders", "truths", "btfs"):
         op.add_column(table, sa.Column("started", sa.Double(), nullable=True))
         op.add_column(table, sa.Column("ended", sa.Double(), nullable=True))

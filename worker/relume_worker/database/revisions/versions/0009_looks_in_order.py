@@ -1,4 +1,4 @@
-"""When looks were saved first, and their thumbnails."""
+"""Creation times and thumbnails of looks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ is_additive = True
 
 
 def upgrade() -> None:
-    """From the revision before."""
+    """Upgrade from the previous revision."""
     op.add_column("looks", sa.Column("created", sa.Double(), nullable=True))
     op.add_column("looks", sa.Column("thumbnail", sa.LargeBinary(), nullable=True))
     op.add_column("looks", sa.Column("thumbnail_of", sa.String(), nullable=True))
