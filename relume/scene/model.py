@@ -58,12 +58,12 @@ class Opacity:
     """Opacity texture of a surface.
 
     Attributes:
-        alpha: 255 is opaque. Top row first.
+        alpha: 255 is opaque. Top row first. (height, width)
         wrap: as in `Texture`.
         cutoff: alpha-test threshold as a fraction of 255; None for stochastic transparency, with alpha the probability.
     """
 
-    alpha: Shaped[NDArray[np.uint8], "height width"]
+    alpha: NDArray[np.uint8]
     wrap: tuple[str, str] = ("repeat", "repeat")
     cutoff: float | None = None
 

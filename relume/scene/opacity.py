@@ -30,7 +30,7 @@ def make_opacity(
     """
     opacity = _opacity(alpha, wrap, factor, cutoff)
     if opacity is not None and _is_invisible(opacity):
-        warnings.append(unsupported(f"{label} is fully transparent in the file, so it is invisible."))
+        warnings.append(unsupported(f"The {label} is fully transparent in the file, so it is invisible."))
     return opacity
 
 

@@ -27,7 +27,7 @@ def with_ground(scene: Scene, name: str | None = None) -> Scene:
         SceneError: the scene has a ground already, or too many materials.
     """
     if any(material.shadow_catcher for material in scene.materials):
-        raise SceneError("the scene already has a ground; import it without one")
+        raise SceneError("the scene already has a ground; use it as it is")
     ground_name = unique_name("Ground", {material.name: 1 for material in scene.materials})
     material = Material(ground_name, (_GRAY,), shadow_catcher=True)
     mesh = _disc(ground_name, *_ball(scene), material=len(scene.materials))

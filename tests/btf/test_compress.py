@@ -109,7 +109,7 @@ def test_one_that_was_stopped_goes_on_and_finds_the_same(tmp_path):
     assert len(read) == 5 + 81  # what was found for another bound does not count
 
 
-@pytest.mark.parametrize(("value", "said"), [(np.nan, "no numbers"), (-1.0, "negative"), (np.inf, "no numbers")])
+@pytest.mark.parametrize(("value", "said"), [(np.nan, "non-finite"), (-1.0, "negative"), (np.inf, "non-finite")])
 def test_values_that_are_none_are_refused(value, said):
     images = Facets(kinds=3)
     good = images.get_view
@@ -160,5 +160,5 @@ def test_more_texels_than_memory_is_meant_for_are_refused_before_any_is_read():
         grid, size = make_direction_grid([(0.0, 1), (40.0, 199), (70.0, 200)]), (300, 300)
 
     assert max_texels(81) > 300 * 300
-    with pytest.raises(MaterialError, match="in 400 directions at most 83,886 can be kept, scale it down"):
+    with pytest.raises(MaterialError, match="the limit for 400 directions is 83,886; scale it down"):
         kept(Large())

@@ -91,7 +91,7 @@ def test_what_is_no_rings_is_refused(described):
 
 @pytest.mark.parametrize("shift", [(0.0,), (0.0, 1.0), (0.0, -0.1), (0.0, np.nan)])
 def test_turns_that_are_no_shares_of_a_step_are_refused(shift):
-    with pytest.raises(MaterialError, match="turned"):
+    with pytest.raises(MaterialError, match="ring shifts"):
         make_direction_grid(((0.0, 1), (30.0, 6)), shift)
 
 

@@ -65,7 +65,7 @@ def whole(path):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda files: files.pop(FIRST), r"\(40, 90\) and seen from \(40, 0\).* is missing; put it"),
+        (lambda files: files.pop(FIRST), r"\(40, 90\) and view from \(40, 0\).* is missing; add it"),
         (lambda files: [files.pop(FIRST), files.pop(SECOND)], "is missing, the first of 2;"),
         (lambda files: [files.pop(n) for n in list(files) if "tl070" in n], "is missing, the first of 50;"),
         (lambda files: files.update({FIRST: told_as(60_000, files[FIRST])}), "scale the images down"),
@@ -85,7 +85,7 @@ def whole(path):
         (renamed(FIRST, FIRST.replace("tv040 pv000", "tv095 pv000")), "below the horizon"),
         (lambda files: files.clear(), "named by their directions"),
         (lambda files: files.update({"\x1b[2J\n" + FIRST.rpartition("/")[2]: b""}), r"of \?\[2J\?00000 tl040"),
-        (lambda files: files.update({FIRST: of_exr(np.full((6, 5, 3), np.nan))}), "no numbers"),
+        (lambda files: files.update({FIRST: of_exr(np.full((6, 5, 3), np.nan))}), "non-finite"),
     ],
 )
 def test_bad_ones_are_refused_with_what_is_wrong(tmp_path, change, said):
@@ -100,7 +100,7 @@ def test_directions_that_are_not_evenly_on_rings_are_refused(tmp_path):
             new = name.replace(" pl090 ", " pl100 ").replace("pv090.png", "pv100.png")
             files[new] = files.pop(name)
 
-    with pytest.raises(MaterialError, match="evenly on rings"):
+    with pytest.raises(MaterialError, match="uniformly spaced on rings"):
         ZippedBtf(zipped(tmp_path / "crooked.zip", crooked))
 
 
@@ -129,7 +129,12 @@ def test_large_images_are_kept_as_means_of_linear_values(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     ("content", "said"),
-    [(b"", "not a zip"), (b"hello", "not a zip"), (b"PK\x03\x04 and nothing", "cut off"), (b"PK" * 9999, "cut off")],
+    [
+        (b"", "not a zip"),
+        (b"hello", "not a zip"),
+        (b"PK\x03\x04 and nothing", "truncated"),
+        (b"PK" * 9999, "truncated"),
+    ],
 )
 def test_what_is_no_zip_is_refused(tmp_path, content, said):
     (tmp_path / "no.zip").write_bytes(content)

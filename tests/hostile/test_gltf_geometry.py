@@ -65,7 +65,7 @@ def test_import_refuses_indices_out_of_range() -> None:
 def test_import_refuses_positions_that_are_not_finite(value: float) -> None:
     positions = QUAD.copy()
     positions[2, 1] = value
-    assert "not finite" in refused(Glb().quad(POSITION=positions).bytes())
+    assert "NaN, infinite or huge" in refused(Glb().quad(POSITION=positions).bytes())
 
 
 def test_import_refuses_a_mesh_without_triangles() -> None:
@@ -84,7 +84,7 @@ def test_import_drops_degenerate_triangles_with_a_warning() -> None:
     glb.document["meshes"][0]["primitives"][0]["indices"] = glb.accessor(corners)
     scene = imported(glb.bytes())
     assert len(scene.meshes[0].faces) == 1
-    assert any("2 triangles" in warning for warning in scene.warnings)
+    assert any("Removed 2 zero-area triangles" in warning for warning in scene.warnings)
 
 
 def test_import_refuses_a_mesh_of_degenerate_triangles_only() -> None:
@@ -119,7 +119,7 @@ def test_import_refuses_nodes_that_are_nowhere(nodes: list[dict[str, Any]]) -> N
 def test_nodes_that_are_no_tree_appear_once_with_one_warning(nodes: list[dict[str, Any]]) -> None:
     scene = imported(changed(nodes=nodes))
     assert len(scene.meshes) == 1
-    assert len([warning for warning in scene.warnings if "reached twice" in warning]) == 1
+    assert len([warning for warning in scene.warnings if "several parents" in warning]) == 1
 
 
 def test_import_refuses_instances_without_end(monkeypatch: pytest.MonkeyPatch) -> None:

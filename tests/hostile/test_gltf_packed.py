@@ -80,7 +80,7 @@ def test_attributes_that_draco_has_besides_end_in_words_within_a_limit_of_memory
         "decompress_draco(sys.stdin.buffer.read(), 3, 60_000, 'the mesh')"
     )
     ended = subprocess.run([sys.executable, "-c", limited], input=packed, capture_output=True, check=False)
-    assert ended.stderr.splitlines()[-1].startswith(b"relume.core.errors.SceneError: the mesh cannot be unpacked")
+    assert ended.stderr.splitlines()[-1].startswith(b"relume.core.errors.SceneError: the mesh cannot be decompressed")
 
 
 @pytest.mark.parametrize("accessor", [0, 1, 2])

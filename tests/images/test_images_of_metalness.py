@@ -133,7 +133,7 @@ def test_one_texel_of_sixteen_bits_is_metal_everywhere_or_nowhere(value, shelf, 
 def test_what_has_no_base_colour_or_no_highlight_says_so(shelf, sent):
     scene = imported(BASE, metallic=0)
     for term in complete(scene.materials[0].terms):
-        with pytest.raises(ParameterError, match=r"lambert.*ggx: add what is missing"):
+        with pytest.raises(ParameterError, match=r"lambert.*ggx; add the missing one"):
             made(shelf, scene, [term], sent(METAL, "Metal"))
 
 

@@ -91,10 +91,10 @@ def test_pictures_are_those_of_a_scene_that_has_the_map(bakes, plain, named):
     turned = {"environment": {"map": None, "rotation": 40.0}}
     for roughness, others in ((mean, {}), (0.3, turned)):
         found = shown(bare, rough(plain, named, mean), rough(plain, named, roughness, **others))
-        expected = shown(baked, rough(plain, True, roughness, **others))
+        expected = shown(baked, rough(plain, "roughness", roughness, **others))
         assert relative_rmse(found, expected) < most
         assert np.median(np.abs(found - expected) / expected) < usual
-        assert relative_rmse(shown(bare, rough(plain, True, roughness, **others)), expected) > 0.05
+        assert relative_rmse(shown(bare, rough(plain, "roughness", roughness, **others)), expected) > 0.05
 
 
 def test_levels_are_those_of_the_bake(bakes, plain, named):
@@ -112,14 +112,14 @@ def test_levels_are_those_of_the_bake(bakes, plain, named):
 
 def test_a_look_without_it_shows_again_what_it_did(bakes, plain, named):
     bare, _ = bakes
-    before = shown(bare, rough(plain, True, 0.4))
-    np.testing.assert_array_equal(shown(bare, rough(plain, named, 0.4), rough(plain, True, 0.4)), before)
+    before = shown(bare, rough(plain, "roughness", 0.4))
+    np.testing.assert_array_equal(shown(bare, rough(plain, named, 0.4), rough(plain, "roughness", 0.4)), before)
 
 
 def test_the_picture_goes_on_showing_what_it_did_until_it_is_there(bakes, plain, named):
     bare, _ = bakes
     picture = Picture(bare, "front", bare.cache)
-    picture.set_look(rough(plain, True, 0.4))
+    picture.set_look(rough(plain, "roughness", 0.4))
     before = run_until_exact(picture).image()
     picture.set_look(rough(plain, named, 0.41))
     advance = picture.advance(None)
@@ -135,7 +135,7 @@ def test_truths_show_it(plain, named):
         for scene, follows in ((plain, named), (own, "roughness"))
     )
     assert relative_rmse(found, expected) < 1e-3
-    assert relative_rmse(reference_image(plain, "front", rough(plain, True, mean), (16, 16), 0), expected) > 0.05
+    assert relative_rmse(reference_image(plain, "front", rough(plain, "roughness", mean), (16, 16), 0), expected) > 0.05
 
 
 def test_terms_of_a_material_follow_one(plain, named):

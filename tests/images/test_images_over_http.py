@@ -142,7 +142,7 @@ def test_what_an_image_of_metalness_makes_is_listed_and_goes_with_it(client):
     listed = {one["texture"]: (one["metalness"], one["base"]) for one in client.get(URL).json()}
     assert [listed[texture] for texture in textures] == 2 * [(image["texture"], None)]
     for changed, says in (
-        ({"terms": terms[:1]}, "add what is missing"),
+        ({"terms": terms[:1]}, "add the missing one"),
         ({"terms": [{**terms[0], "texture": "diffuse"}, terms[1]]}, "import the scene again"),
     ):
         response = client.post(f"{url}/metalness", json={**asked, **changed})

@@ -85,8 +85,8 @@ def put(at, form, *values):
         (put(0, "<3i", 90, 90, 360), "does not begin"),
         (put(0, "<3i", 1_000_000_000, 1_000_000_000, 1_000_000_000), "does not begin"),
         (put(0, "<3i", -90, -90, 180), "does not begin"),
-        (put(12 + 8 * 12345, "<d", math.nan), "not finite"),
-        (put(12 + 8 * 12345, "<d", -math.inf), "not finite"),
+        (put(12 + 8 * 12345, "<d", math.nan), "non-finite"),
+        (put(12 + 8 * 12345, "<d", -math.inf), "non-finite"),
         (put(12 + 8 * 12345, "<d", 1e300), "above 1e"),
     ],
 )

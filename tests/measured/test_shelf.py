@@ -54,7 +54,9 @@ def test_another_file_of_the_same_id_is_not_taken_for_it(copied, planes, tmp_pat
     write_merl(tmp_path / "a.binary", planes)
     assert kept["sha256"][:16] == identity
     record.write_text(json.dumps({**kept, "sha256": identity + "0" * 48}))
-    with pytest.raises(MaterialError, match=f"another file is the measured material {identity}; delete that one first"):
+    with pytest.raises(
+        MaterialError, match=f"another file has the id of the measured material {identity}; delete that one first"
+    ):
         store_material(folder, tmp_path / "a.binary", "Mine")
     assert get_record(folder, identity).name == kept["name"]
     del kept["sha256"]  # as it was kept before

@@ -190,7 +190,7 @@ def test_make_scene_refuses_parts_that_do_not_fit() -> None:
 @pytest.mark.parametrize(
     ("lights", "message"),
     [
-        ([Light(f"L{k}", {"kind": "point"}) for k in range(65)], "65 lights, 64 are allowed"),
+        ([Light(f"L{k}", {"kind": "point"}) for k in range(65)], "65 lights, the limit is 64"),
         ([Light("A", {"kind": "point"}), Light("A", {"kind": "spot"})], "each its own"),
         ([Light("", {"kind": "point"})], "1 to 80"),
         ([Light("x" * 81, {"kind": "point"})], "1 to 80"),

@@ -110,9 +110,9 @@ def test_anisotropy_stretches_along_the_turned_tangent() -> None:
 @pytest.mark.parametrize(
     ("is_bumpy", "has_own", "words"),
     [
-        (False, True, "smooth, as what it covers; its own normal texture is not used"),
-        (True, True, "as bumpy as what it covers; its own normal texture is not used"),
-        (True, False, "as bumpy as what it covers; in the file it is smooth"),
+        (False, True, "is smooth; in the file it has its own normal map."),
+        (True, True, "follows the base normal map; in the file it has its own normal map."),
+        (True, False, "follows the base normal map; in the file it is smooth."),
         (False, False, None),
     ],
 )
@@ -121,7 +121,7 @@ def test_it_is_told_where_a_coat_has_other_bumps_than_what_it_covers(is_bumpy, h
     bumps = {"index": glb.texture([[[200, 150, 220]]])}
     coat = {"clearcoatFactor": 1} | ({"clearcoatNormalTexture": bumps} if has_own else {})
     scene = imported({"clearcoat": coat}, glb, **({"normalTexture": bumps} if is_bumpy else {}))
-    told = [str(warning) for warning in scene.warnings if "coat" in str(warning)]
+    told = [str(warning) for warning in scene.warnings if "Clearcoat" in str(warning)]
     assert len(told) == (words is not None)
     assert all(words in warning for warning in told)
 
@@ -146,7 +146,7 @@ def test_anisotropy_in_all_directions_is_a_round_highlight() -> None:
     index = glb.texture([[[255, 128, 255], [0, 128, 255]]])
     scene = imported({"anisotropy": {"anisotropyStrength": 1, "anisotropyTexture": {"index": index}}}, glb)
     assert scene.materials[0].terms[1]["model"] == "ggx"
-    assert any("all directions" in warning for warning in scene.warnings)
+    assert any("no main direction" in warning for warning in scene.warnings)
 
 
 def test_sheen_is_a_term_that_dims_what_lies_below_it() -> None:
@@ -189,7 +189,7 @@ def test_what_is_not_valid_is_a_warning_and_not_used(extensions: dict[str, Any])
     scene = imported(extensions)
     assert scene.materials[0].terms == terms_of({})
     assert len(scene.warnings) == 1
-    assert "not valid" in scene.warnings[0]
+    assert "it is invalid" in scene.warnings[0]
 
 
 def glass_of(extensions: dict[str, Any], **material: Any) -> Glass:
@@ -244,7 +244,7 @@ def test_frosted_glass_and_textures_of_transmission_are_said() -> None:
     scene = imported({"transmission": passing, "dispersion": {"dispersion": 1}}, glb)
     assert scene.materials[0].glass is not None
     np.testing.assert_allclose(scene.materials[0].glass.tint, [0.25, 0.125, 0.0625])
-    for word in ("frosted", "transmission texture", "dispersion"):
+    for word in ("Frosted", "transmission texture", "Dispersion"):
         assert len([warning for warning in scene.warnings if word in str(warning)]) == 1
 
 
@@ -257,4 +257,4 @@ def test_frosted_glass_and_textures_of_transmission_are_said() -> None:
     ],
 )
 def test_transmission_out_of_range_is_said(extensions: dict[str, Any]) -> None:
-    assert any("is not valid" in str(warning) for warning in imported(extensions).warnings)
+    assert any("is invalid" in str(warning) for warning in imported(extensions).warnings)

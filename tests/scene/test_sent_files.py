@@ -38,8 +38,8 @@ def test_a_file_that_was_not_sent_is_missing_even_where_the_disk_has_it(tmp_path
     kept(tmp_path, companion=b"newmtl Red\nKd 1 0 0\n")
     sent = UploadedFiles({}, "meshes/triangle.obj")
     missing = import_scene(TRIANGLE.replace(b"../looks/red.mtl", b"companion"), "test", LIGHT, sent)
-    assert any("is not beside the scene" in warning for warning in missing.warnings)
-    with pytest.raises(SceneError, match="outside the folder"):
+    assert any("Missing material file" in warning for warning in missing.warnings)
+    with pytest.raises(SceneError, match="outside the scene's folder"):
         import_scene(TRIANGLE.replace(b"../looks", b"../../../etc"), "test", LIGHT, sent)
 
 

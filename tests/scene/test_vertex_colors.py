@@ -72,7 +72,7 @@ def test_of_a_material_with_textures_they_are_their_mean_and_it_says_so() -> Non
     texture = {"index": glb.texture([[[255, 255, 255], [0, 0, 0]]])}
     glb.quad({"name": "Wood", "pbrMetallicRoughness": {"baseColorTexture": texture}}, COLOR_0=COLORS)
     scene = import_gltf(glb.bytes(), "quad", LIGHT)
-    assert len([warning for warning in scene.warnings if "replaced by their mean" in warning]) == 1
+    assert len([warning for warning in scene.warnings if "replaced by their average" in warning]) == 1
 
 
 def test_a_ply_file_shows_them() -> None:
@@ -92,7 +92,7 @@ def test_an_obj_file_of_one_object_shows_them_and_others_say_that_they_do_not(ob
     lines = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\n" + "".join(f"o {k}\nf 1 2 3\n" for k in range(objects))
     scene = import_obj(lines.encode(), "x", LIGHT, NoFiles())
     if objects == 2:
-        assert "vertex colours" in str(scene.warnings[0])
+        assert "Vertex colors" in str(scene.warnings[0])
         return
     (material,), (mesh,) = scene.materials, scene.meshes
     shown = MipMap(material.textures["diffuse"]).sample(mesh.uvs, np.zeros(3, np.float32))

@@ -129,7 +129,8 @@ def view_bytes(container: GltfContainer, index: int, label: str) -> memoryview:
     view = _item_at(container.document.bufferViews, index, f"the buffer view of {label}")
     for extension in UNSUPPORTED_COMPRESSION:
         if extension in view.extensions:
-            raise SceneError(f"{label} are compressed by {extension}; decompress: {UNSUPPORTED_COMPRESSION[extension]}")
+            command = UNSUPPORTED_COMPRESSION[extension]
+            raise SceneError(f"{label} uses {extension}, which can't be read; run: {command}")
     compression = read_meshopt(view, label)
     if compression is None:
         return _bytes(container, view, label)

@@ -164,7 +164,8 @@ def _buffer(i: int, buffer: Buffer, binary: memoryview | None, companions: Compa
 def _check_extensions(document: Document) -> None:
     for name in document.extensionsRequired:
         if name in UNSUPPORTED_COMPRESSION:
-            raise SceneError(f"the file is compressed by {name}; decompress it: {UNSUPPORTED_COMPRESSION[name]}")
+            command = UNSUPPORTED_COMPRESSION[name]
+            raise SceneError(f"the file uses KTX2 textures ({name}), which can't be read; run: {command}")
 
 
 def _refuse_constant(constant: str) -> Any:

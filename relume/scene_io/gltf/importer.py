@@ -135,8 +135,8 @@ class _SceneBuilder:
         if node.mesh >= len(self._document.meshes):
             raise SceneError(f"mesh {node.mesh} does not exist; export the scene again")
         if node.skin is not None:
-            message = f"{quote(node.name)} is shown in its rest pose (skinning isn't supported)."
-            self.warnings.append(approximated(message))
+            name = quote(node.name or self._document.meshes[node.mesh].name or "A mesh")
+            self.warnings.append(approximated(f"{name} is shown in its rest pose (skinning isn't supported)."))
         mesh = self._document.meshes[node.mesh]
         instances = read_instances(node, self._accessors, self._remaining_instances, self.warnings)
         self._remaining_instances -= len(mesh.primitives) * len(instances)

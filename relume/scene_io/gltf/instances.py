@@ -46,9 +46,9 @@ def read_instances(
     try:
         attributes = Instancing.model_validate(node.extensions[EXTENSION]).attributes
     except (ValidationError, RecursionError):
-        warnings.append(unsupported(f"The instances of {quote(node.name)} are invalid; it appears once."))
+        warnings.append(unsupported(f"The instances of {quote(node.name or 'node')} are invalid; it appears once."))
         return np.eye(4)[None]
-    label = f"instances of {quote(node.name)}"
+    label = f"instances of {quote(node.name or 'node')}"
     arrays = {
         name: accessors.floats(attributes[name], (width,), f"{name} of the {label}").astype(np.float64)
         for name, width in _WIDTHS.items()

@@ -41,14 +41,14 @@ def walk_nodes(document: Document, warnings: list[ImporterWarning]) -> Iterator[
             raise SceneError(f"node {index} does not exist, there are {len(document.nodes)}; export the scene again")
         if index in visited:
             if index not in warned and len(warned) < _MAX_WARNINGS:
-                name = quote(document.nodes[index].name)
-                message = f"Node {index} {name} has several parents, which glTF doesn't allow; it appears once."
+                name = f" {quote(document.nodes[index].name)}" if document.nodes[index].name else ""
+                message = f"Node {index}{name} has several parents, which glTF doesn't allow; it appears once."
                 warnings.append(unsupported(message))
             warned.add(index)
             continue
         if depth > MAX_DEPTH:
-            raise SceneError(f"nodes are nested more than {MAX_DEPTH} deep; flatten the scene")
             raise SceneError(f"nodes are nested more than {MAX_DEPTH} levels deep; flatten the scene")
+        visited.add(index)
         node = document.nodes[index]
         to_world = parent @ local[index]
         if not np.isfinite(to_world).all() or np.abs(to_world).max() > 1e12:
