@@ -15,7 +15,7 @@ from hostile_scenes import refused
 def test_import_opens_no_external_image(uri: str) -> None:
     glb = Glb().quad({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})
     glb.document |= {"images": [{"uri": uri}], "textures": [{"source": 0}]}
-    assert "outside the f" in refused(glb.bytes())
+    assert "outside the " in refused(glb.bytes())
 
 
 def test_import_refuses_jpegs_of_too_many_scans() -> None:

@@ -176,7 +176,7 @@ def test_ply_files_that_are_wrong_are_refused(data: bytes) -> None:
 @pytest.mark.filterwarnings("default::DeprecationWarning")  # as where no test runs
 @pytest.mark.parametrize("more", [b"x\n", b"1 2 3 and so on\n", b"\x00", b"0x10"])
 def test_a_ply_with_words_behind_its_numbers_is_refused_outside_of_tests_too(more: bytes) -> None:
-    assert "words where numbers should be" in refused(text() + more)
+    assert "text instead of numbers" in refused(text() + more)
 
 
 def test_archives_that_are_wrong_are_refused() -> None:

@@ -23,7 +23,7 @@ def test_another_scene_of_the_same_id_is_not_written_over_the_first(tmp_path: Pa
     save_scene(scene, tmp_path)
     white = Environment("sky", np.ones((2, 4, 3), np.float32))
     other = dataclasses.replace(small_scene(environment=white), id=scene.id)
-    with pytest.raises(SceneError, match=f"another scene is here as {scene.id}; delete that one first"):
+    with pytest.raises(SceneError, match=f"another scene with the id {scene.id} exists; delete it first"):
         save_scene(other, tmp_path)
     assert load_scene(tmp_path).id == scene.id
     document = json.loads((tmp_path / "scene.json").read_text())

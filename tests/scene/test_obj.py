@@ -202,5 +202,5 @@ def test_a_gltf_file_may_name_files_beside_it(tmp_path: Path) -> None:
         "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"nodes":[{"mesh":0}]}"""
     (tmp_path / "scene.gltf").write_text(text)
     np.testing.assert_array_equal(import_scene(tmp_path / "scene.gltf", "test", LIGHT).meshes[0].positions, positions)
-    with pytest.raises(SceneError, match="in another file"):
+    with pytest.raises(SceneError, match="outside the file"):
         import_scene(text.encode(), "test", LIGHT)

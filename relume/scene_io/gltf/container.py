@@ -109,7 +109,7 @@ def _resolve(uri: str, companions: Companions, label: str) -> bytes:
     content = companions.read(uri, label)
     if content is None:
         printable = uri[:60].encode("ascii", "replace").decode()
-        raise SceneError(f"{label} is in another file, {printable!r}, which is missing; add it or {PACK}")
+        raise SceneError(f"{label} is outside the file, in {printable!r}, which is missing; add it or {PACK}")
     return content
 
 

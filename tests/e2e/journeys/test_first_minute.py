@@ -128,7 +128,7 @@ def test_several_files_are_several_scenes_and_what_is_lacking_is_said(
     expect(start.get_by_text("lacks far away.bin: drop them too")).to_be_visible()
     start.get_by_role("button", name="Import 2 scenes").click()
     expect(start.get_by_text("1 of 2 scenes could not be imported")).to_be_visible()
-    expect(start.get_by_role("list", name="Chosen scenes")).to_contain_text("buffer 0 lies outside the file")
+    expect(start.get_by_role("list", name="Chosen scenes")).to_contain_text("buffer 0 is outside the file")
     expect(start.get_by_role("button", name="Open one")).to_be_visible()
     assert len(server.call("/api/scenes")) == before + 1
     drop(start, tmp_path / "far away.bin")
