@@ -19,7 +19,7 @@ from relume.core.cache import Cache
 from relume.look import validate
 from relume.methods.registry import open_transfer
 from relume.output.render_image import render_image
-from relume.scene.examples.cornell import rectangle, sunny_sky
+from relume.scene.examples.cornell import rectangle, sunny_environment
 from relume.scene.examples.still_life.grids import sphere
 from relume.scene.examples.still_life.still_life import look_at
 from relume.scene.model import Glass, Material, Scene
@@ -91,7 +91,7 @@ def glass_scene() -> Scene:
         sphere(0.35, 48).transform(rotation, [0.1, 0.36, -0.3]).mesh("red", 4),
     ]
     camera = look_at("front", (0.3, 1.1, 3.4), (0.0, 0.4, 0.0), 0.7)
-    return make_scene("glass", meshes, materials, [camera], sunny_sky())
+    return make_scene("glass", meshes, materials, [camera], sunny_environment())
 
 
 def _render_relume(scene: Scene, size: tuple[int, int], tiny: bool, folder: Path) -> F64:

@@ -16,7 +16,7 @@ from relume.core.cache import Cache
 from relume.look import validate
 from relume.methods.registry import open_transfer
 from relume.output.render_image import render_image
-from relume.scene.examples.cornell import rectangle, sunny_sky
+from relume.scene.examples.cornell import rectangle, sunny_environment
 from relume.scene.examples.still_life.grids import sphere
 from relume.scene.examples.still_life.still_life import look_at
 from relume.scene.model import Material, Scene
@@ -81,7 +81,7 @@ def mirror_room() -> Scene:
         sphere(0.45, 96).transform(rotation, [0.7, 0.45, 0.2]).mesh("brass", 5),
     ]
     camera = look_at("front", (0.6, 1.3, 4.0), (-0.1, 0.5, 0.0), 0.7)
-    return make_scene("mirrors", meshes, [_material(name) for name in names], [camera], sunny_sky())
+    return make_scene("mirrors", meshes, [_material(name) for name in names], [camera], sunny_environment())
 
 
 def _material(name: str) -> Material:

@@ -30,7 +30,7 @@ from relume.methods.free_camera_transfer import BakedFreeCamera
 from relume.methods.registry import METHODS, open_bake, open_transfer
 from relume.output.render_image import render_image
 from relume.scene.examples.catalog import built_in
-from relume.scene.examples.cornell import sunny_sky
+from relume.scene.examples.cornell import sunny_environment
 from relume.scene.model import Scene
 from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
@@ -106,7 +106,7 @@ def _figure(kind: str, tiny: bool) -> Figure:
     name, size = _LOOK_VARIANTS[kind]
     terms, scene = _make_terms(kind), built_in("cornell_box" if tiny else name)
     if kind == "hard_sun":
-        scene = replace(scene, environment=sunny_sky(radius=_HARD[0], rows=_HARD[1]))
+        scene = replace(scene, environment=sunny_environment(radius=_HARD[0], rows=_HARD[1]))
     size, spp, num_lights, num_probes = ((40, 30), 2, 60, 2000) if tiny else (size, _SPP.get(kind, 32), 1000, 50_000)
     recipe = Recipe("probes", (scene.cameras[0].name,), size, num_lights, num_probes=num_probes)
     with tempfile.TemporaryDirectory() as folder:

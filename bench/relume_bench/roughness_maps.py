@@ -17,7 +17,7 @@ from relume.core.cache import Cache
 from relume.look import validate
 from relume.methods.registry import open_transfer
 from relume.output.render_image import render_image
-from relume.scene.examples.cornell import rectangle, sunny_sky
+from relume.scene.examples.cornell import rectangle, sunny_environment
 from relume.scene.examples.still_life.grids import sphere
 from relume.scene.examples.still_life.still_life import look_at
 from relume.scene.model import Material, Scene, Texture, TextureEncoding
@@ -69,7 +69,7 @@ def make_roughness_map_scene() -> Scene:
         sphere(0.6, 64).transform(np.eye(3), [0, 0.6, 0]).mesh("ball", 1),
     ]
     camera = look_at("front", (0.3, 1.2, 3.4), (0.0, 0.45, 0.0), 0.7)
-    return make_scene("rough", meshes, materials, [camera], sunny_sky())
+    return make_scene("rough", meshes, materials, [camera], sunny_environment())
 
 
 def _tiles(side: int = 256) -> F32:

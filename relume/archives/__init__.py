@@ -1,1 +1,1 @@
-"""Archives from outside, opened within bounds."""
+"""Archives from untrusted sources, with limits."""

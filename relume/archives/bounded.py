@@ -1,7 +1,7 @@
-"""Opens a .zip whose list of entries is bounded: `zipfile` reads that list whole, one of millions takes gigabytes.
+"""Opens a .zip with a limit on its directory: `zipfile` reads it whole, which takes gigabytes for millions of entries.
 
-The records at a file's end say how long the list is, twice where there is a ZIP64 one, and `zipfile` chooses: what it
-reads is bounded, not what a record says.
+The records at a file's end state the directory's size, twice with ZIP64, and `zipfile` chooses between them. The limit
+is therefore on the bytes that it reads, not on the stated size.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from typing import BinaryIO, cast
 
 
 class LongDirectoryError(Exception):
-    """The list of entries is longer than it may be."""
+    """The directory exceeds its limit."""
 
 
 class _BoundedFile:
-    """A file of which no more is read at once than a list of entries may take, until it is open."""
+    """A file that limits the size of each read until the archive is open."""
 
     def __init__(self, file: BinaryIO, max_directory_bytes: int) -> None:
         self._file, self._max_directory_bytes = file, max_directory_bytes
@@ -30,12 +30,12 @@ class _BoundedFile:
 
 
 def open_bounded(file: BinaryIO, max_directory_bytes: int) -> zipfile.ZipFile:
-    """The archive in a file that stays open.
+    """Open the archive in a file, which stays open.
 
     Args:
-        file: seekable. max_directory_bytes: that the list of its entries may take.
+        file: seekable. max_directory_bytes: limit on the directory.
     Raises:
-        LongDirectoryError: it takes more. And whatever `zipfile` raises for damaged data.
+        LongDirectoryError: the directory exceeds it. And whatever `zipfile` raises for damaged data.
     """
     bounded = _BoundedFile(file, max_directory_bytes)
     archive = zipfile.ZipFile(cast(BinaryIO, bounded))

@@ -1,4 +1,4 @@
-"""Assets that looks name: environments, measured materials, BTFs; each kind has a store of its own.
+"""Assets that looks refer to: environments, measured materials, BTFs; each kind has its own store.
 
 Read first: `asset_store`.
 """

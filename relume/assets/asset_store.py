@@ -1,10 +1,10 @@
-"""Stores of imported things: one folder each, named by the hash of the file it came from.
+"""Stores of imported assets: one folder each, named by the hash of the imported file.
 
-    <folder>/<id>/<record>    JSON: format, id, name, time of import, and what the kind keeps there
+    <folder>/<id>/<record>    JSON: format, id, name, time of import, and fields of the kind
                   …           files of the kind
 
-Look documents name one as "<prefix><id>"; no other string becomes part of a path. A name means the same content
-wherever it is found, so a process looks through all folders that it was told to use.
+Looks refer to an asset as "<prefix><id>"; no other string becomes part of a path. Equal names mean equal content in
+every folder, so a process searches all folders that it is configured with.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _ID = re.compile(rf"[0-9a-f]{{{ID_DIGITS}}}")
 
 
 class AssetRecord(Protocol):
-    """What every kind's record says of a thing."""
+    """Common fields of all records."""
 
     @property
     def name(self) -> str: ...
@@ -48,7 +48,7 @@ Entry = TypeVar("Entry", bound=AssetRecord)
 
 
 def check_name(name: str) -> str:
-    """A name that people give, without blanks around it. Raises ParameterError unless it is 1 to 80 printable."""
+    """Strip a name that a user chose. Raises ParameterError unless it has 1 to 80 printable characters."""
     name = name.strip()
     if not name.isprintable() or not 1 <= len(name) <= 80:
         raise ParameterError("name", name, "1 to 80 printable characters")
@@ -62,11 +62,11 @@ def _digest(source: Path) -> str:
 
 @dataclass(frozen=True)
 class AssetStore:
-    """One kind of imported things.
+    """The store of one kind of assets.
 
     Attributes:
-        label: one of them is called, in messages. prefix: of names in looks. record: name of the JSON file.
-        problem: error where one is damaged or the store is full.
+        label: of the kind, in messages. prefix: of names in looks. record: name of the JSON file.
+        problem: raised if an asset is damaged or the store is full.
         max_entries: of a folder.
     """
 
@@ -78,12 +78,12 @@ class AssetStore:
     _folders: list[Path] = field(default_factory=list)
 
     def add_search_folder(self, folder: Path) -> None:
-        """Find things of this folder too from now on; it need not exist yet."""
+        """Also search this folder from now on; it need not exist yet."""
         self._folders.append(folder)
 
     @contextmanager
     def with_search_folder(self, folder: Path) -> Iterator[Path]:
-        """Find things of this folder too for as long as the block runs."""
+        """Also search this folder within the `with` block."""
         self.add_search_folder(folder)
         try:
             yield folder
@@ -92,19 +92,18 @@ class AssetStore:
 
     @staticmethod
     def content_id(source: Path) -> str:
-        """The id of what a file holds."""
+        """The id of a file's content."""
         return _digest(source)[:ID_DIGITS]
 
     def store(self, folder: Path, source: Path, name: str, fill: Callable[[Path], dict[str, Any]]) -> str:
-        """Keep what a file holds under the file's hash, and return its id; what is here already takes the new name.
+        """Store an asset under the hash of its file, and return its id; an existing asset gets the new name.
 
         Args:
-            folder: where things of this kind are kept. source: the file.
-            name: that people read.
-            fill: writes the kind's files into an empty folder, and returns what the record says besides.
+            folder: of the store. source: the file.
+            name: shown to users.
+            fill: writes the kind's files into an empty folder, and returns the kind's fields of the record.
         Raises:
-            self.problem: the store is full, or what is here under the id came from another file. And what `fill`
-                raises; then nothing is kept.
+            self.problem: the store is full, or the id belongs to another file. If `fill` raises, nothing is stored.
         """
         digest = _digest(source)
         identity = digest[:ID_DIGITS]
@@ -116,12 +115,12 @@ class AssetStore:
         return identity
 
     def adopt(self, folder: Path, staged_folder: Path) -> None:
-        """Take over a thing that was kept in a folder on the same disk; what is here already takes its name.
+        """Move an asset from a staging folder on the same disk into the store; an existing asset gets its name.
 
         Args:
-            folder: where things of this kind are kept. staged_folder: the thing's own folder.
+            folder: of the store. staged_folder: the asset's own folder.
         Raises:
-            self.problem: the store is full, it is damaged, or what is here under the id came from another file.
+            self.problem: the store is full, the asset is damaged, or the id belongs to another file.
         """
         record, target = self.load_record(staged_folder), folder / staged_folder.name
         if not target.exists():
@@ -132,23 +131,23 @@ class AssetStore:
 
     def _check_capacity(self, folder: Path) -> None:
         if len(self.paths(folder)) >= self.max_entries:
-            raise self.problem(f"{self.max_entries} {self.label}s are kept already; delete one first")
+            raise self.problem(f"the store has {self.max_entries} {self.label}s, its limit; delete one first")
 
     def _set_name(self, target: Path, name: str, digest: str | None) -> None:
-        """Give a thing that is here its newest name, if it came from the same file."""
+        """Rename an existing asset, after checking that it came from the same file."""
         document = self.load_record(target)
-        if document.get("sha256", digest) != digest:  # two files were made for that: it takes billions of tries
-            clash = f"another file is the {self.label} {target.name}"
-            raise self.problem(f"{clash}; delete that one first, if it is not yours")
+        if document.get("sha256", digest) != digest:  # a deliberate collision of 64-bit ids
+            clash = f"another file has the id of the {self.label} {target.name}"
+            raise self.problem(f"{clash}; delete that one first if you don't need it")
         if document["name"] != name:
             with atomic_write(target / self.record) as unfinished:
                 unfinished.write_text(json.dumps({**document, "name": name}))
 
     def _create(self, folder: Path, target: Path, name: str, fill: Callable[[Path], dict[str, Any]]) -> None:
-        """Write a thing's folder, and give it its name when it is complete."""
+        """Write an asset's files into a staging folder, and rename it when it is complete."""
         folder.mkdir(parents=True, exist_ok=True)
         document = {"format": FORMAT_VERSION, "id": target.name, "name": name, "created": time.time()}
-        # by this name a server finds what a killed process left
+        # servers clean up folders with this prefix, which killed processes leave
         with tempfile.TemporaryDirectory(dir=folder, prefix=UNFINISHED.rstrip("*")) as staging:
             staged_folder = Path(staging) / target.name
             staged_folder.mkdir()
@@ -156,33 +155,33 @@ class AssetStore:
             _move_into_place(staged_folder, target)
 
     def paths(self, folder: Path) -> list[Path]:
-        """Folders of all things in a folder."""
+        """Folders of all assets in a folder."""
         return [path for path in folder.iterdir() if _ID.fullmatch(path.name)] if folder.is_dir() else []
 
     def records(self, folder: Path, read: Callable[[Path, str], Entry]) -> list[Entry]:
-        """Records of all things in a folder, newest first; one that is damaged, which the log names, hides no others.
+        """Records of all assets in a folder, newest first; damaged ones are logged and skipped.
 
         Args:
-            folder: of the store. read: the record of one, by folder and id.
+            folder: of the store. read: returns a record by folder and id.
         """
         records = []
         for path in self.paths(folder):
             try:
                 records.append(read(folder, path.name))
             except self.problem as problem:
-                log.warning("left out of a list: %s", problem)
+                log.warning("skipped in a list: %s", problem)
             except NotFoundError:  # deleted meanwhile
                 continue
         return sorted(records, key=lambda record: (-record.created, record.name))
 
     def path(self, folder: Path, identity: str) -> Path:
-        """Folder of one thing. Raises NotFoundError."""
+        """Folder of an asset. Raises NotFoundError."""
         if not _ID.fullmatch(identity) or not (folder / identity).is_dir():
             raise NotFoundError(f"there is no {self.label} {identity[:40]!r}; import it first")
         return folder / identity
 
     def load_record(self, path: Path) -> dict[str, Any]:
-        """The record of a thing by its folder. Raises self.problem where it is damaged."""
+        """Read the record in an asset's folder. Raises self.problem if it is damaged."""
         try:
             with (path / self.record).open("rb") as file:
                 text = file.read(MAX_JSON_BYTES + 1)
@@ -196,10 +195,10 @@ class AssetStore:
         return document
 
     def open_array(self, path: Path, file: str) -> np.ndarray[Any, Any]:
-        """An array of a thing by its folder, which stays on the disk and is read where it is needed.
+        """Memory-map an array of an asset.
 
         Args:
-            path: the folder. file: name of the .npy file in it.
+            path: the asset's folder. file: name of the .npy file in it.
         Raises:
             self.problem: it is damaged.
         """
@@ -210,23 +209,23 @@ class AssetStore:
         return array.view(np.ndarray)
 
     def remove(self, folder: Path, identity: str) -> None:
-        """Delete a thing; looks that name it are refused from now on. Raises NotFoundError."""
+        """Delete an asset; looks that refer to it are rejected from now on. Raises NotFoundError."""
         remove_folder(self.path(folder, identity))
 
     def damaged_error(self, path: Path) -> RelumeError:
-        """The error to raise."""
+        """Return the error for a damaged asset."""
         return self.problem(f"the {self.label} {path.name} is damaged; delete its folder and import it again")
 
     def exists(self, name: str) -> bool:
-        """Whether a look's name means a thing that is here."""
+        """True if a name in a look refers to an available asset."""
         return self._resolve_or_none(name) is not None
 
     def list_names(self) -> list[str]:
-        """All names that mean something."""
+        """Return all names that looks can use."""
         return sorted({self.prefix + path.name for folder in self._folders for path in self.paths(folder)})
 
     def resolve(self, name: str) -> Path:
-        """The folder of what a look names. Raises NotFoundError."""
+        """Return the folder of a look's asset. Raises NotFoundError."""
         path = self._resolve_or_none(name)
         if path is None:
             raise NotFoundError(f"there is no {self.label} {name[:40]!r}; import its file again")
@@ -240,9 +239,9 @@ class AssetStore:
 
 
 def _move_into_place(staged_folder: Path, target: Path) -> None:
-    """Give a folder that is complete its name."""
+    """Rename a complete folder; another process may have been faster."""
     try:
         os.rename(staged_folder, target)
     except OSError:
-        if not target.exists():  # somebody else has imported it in the meantime
+        if not target.exists():  # otherwise another process imported it in the meantime
             raise

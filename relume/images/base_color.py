@@ -1,8 +1,8 @@
-"""The base colour of a material, found from its terms: imports keep what it scatters and what its highlights reflect.
+"""The base color of a material, inferred from its terms by inverting the import of metallic materials.
 
-With b the base colour, m the metalness, and d the reflectance head-on of what is no metal, files of glTF have
+With the base color b, the metalness m, and the dielectric reflectance d at normal incidence, glTF imports compute
 
-    D = b (1 - m),  F = d (1 - m) + b m   of what scatters and of highlights (`relume.scene_io.gltf.blend`)
+    D = b (1 - m),  F = d (1 - m) + b m   for diffuse terms and highlights (`relume.scene_io.gltf.blend`)
 
 so b = D + F - d (1 - m), where d (1 - m)² - (D + F) (1 - m) + D = 0.
 """
@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 
 from relume.brdf.registry import TERMS
 from relume.brdf.term_validation import complete_term
@@ -21,8 +22,7 @@ from relume.core.errors import ParameterError
 from relume.images.image_store import ImageRecipe, get_recipe, load_texture
 from relume.images.read_image import limit_size
 from relume.scene.model import Material, Texture
-from relume.scene.texture_encoding import F32, F64, SRGB_TO_LINEAR, U8
-from relume.scene.texture_encoding import encode_rows as coded
+from relume.scene.texture_encoding import F32, F64, SRGB_TO_LINEAR, U8, encode_rows
 from relume.scene_io.gltf.blend import select_rows
 from relume.scene_io.gltf.texture_resampling import Raster, Wrap
 from relume.scene_io.gltf.to_terms import dielectric_reflectance
@@ -32,35 +32,35 @@ ReadMaterial = Callable[[str, str], Material]
 """Reads a scene's material by the scene's id and the material's name. Raises SceneError, NotFoundError."""
 
 DIELECTRIC = 0.04
-"""Reflectance head-on of what is no metal, where a material does not say it."""
-_MAX_DIELECTRIC = 0.2  # of gems, about: what reflects more than that head-on is metal somewhere
-# bytes of display values say it no better; of what is as near, the less metal is likelier
+"""Default dielectric reflectance at normal incidence."""
+_MAX_DIELECTRIC = 0.2  # about that of gems; higher reflectances must be partly metal
+# precision of roots with 8-bit sRGB; of two roots as close as this, the less metallic is more likely
 _ROOT_TOLERANCE, _NOISE = 0.02, 1e-6
 _ONES = np.ones(3)
 
 
 class BaseColor(NamedTuple):
-    """A base colour, and what is no metal with it.
+    """A base color, with the reflectance of the dielectric part.
 
     Attributes:
-        source: what it comes from, as `relume.images.image_store.ImageRecipe.base`.
-        pixels: display values and how they wrap; None where it is the same everywhere. (height, width, 4) uint8
-        factor: that multiplies it, and is the colour of what scatters; scale: multiplies it as well, as part of the
-            texture. dielectric: reflectance head-on of what is no metal. (3,) each
-        scene, material: whose own textures it is; empty where it is not.
+        source: origin, as `relume.images.image_store.ImageRecipe.base`.
+        pixels: sRGB bytes with alpha, and wrap modes; None for a uniform color.
+        factor: multiplies the pixels; the color of diffuse terms. scale: also multiplies them, as part of the texture.
+        dielectric: reflectance at normal incidence.
+        scene, material: origin of the textures, or empty.
     """
 
     source: str | None
-    pixels: tuple[U8, Wrap] | None
-    factor: F64
-    dielectric: F64
-    scale: F64 = _ONES
+    pixels: tuple[Shaped[U8, "height width 4"], Wrap] | None
+    factor: Shaped[F64, " 3"]
+    dielectric: Shaped[F64, " 3"]
+    scale: Shaped[F64, " 3"] = _ONES
     scene: str = ""
     material: str = ""
 
 
 def base_color_terms(terms: Sequence[Document]) -> tuple[list[int], list[int]]:
-    """Which terms show the base colour of what is no metal, and which of metals; first the highlight that has f0.
+    """Find the terms that show the base color of the dielectric and of the metallic part; first the one with f0.
 
     Args:
         terms: of a material, complete.
@@ -72,32 +72,32 @@ def base_color_terms(terms: Sequence[Document]) -> tuple[list[int], list[int]]:
         k for k, term in enumerate(terms) if TERMS[term["model"]].texture == "specular" and "f0" in term["params"]
     ]
     if not diffuse_indices or not specular_indices:
-        allowed = "a term that scatters light, such as lambert, and one with f0, such as ggx: add what is missing"
+        allowed = "a diffuse term, such as lambert, and a highlight with f0, such as ggx; add the missing one"
         raise ParameterError("terms", [term["model"] for term in terms], allowed)
-    specular_indices.sort(key=lambda k: terms[k]["texture"] is None)  # coats have no texture, and lie over what has one
+    specular_indices.sort(key=lambda k: terms[k]["texture"] is None)  # coats, which have no texture, come last
     return _with_same_texture(terms, diffuse_indices), _with_same_texture(terms, specular_indices)
 
 
 def _with_same_texture(terms: Sequence[Document], term_indices: Sequence[int]) -> list[int]:
-    """Those that have the texture of the first."""
+    """Indices of the terms with the same texture as the first."""
     return [k for k in term_indices if terms[k]["texture"] == terms[term_indices[0]]["texture"]]
 
 
-def diffuse_fraction(dielectric: F64) -> float:
-    """The share of light that what is no metal does not reflect before it scatters, as imports have it."""
+def diffuse_fraction(dielectric: Shaped[F64, " 3"]) -> float:
+    """Fraction of light that a dielectric transmits to its diffuse layer, as in imports."""
     return 1 - dielectric_reflectance(float(dielectric.max()), 1.0)
 
 
 def find_base_color(
     diffuse_term: Document, specular_term: Document, scene: str, material: str, read: ReadMaterial
 ) -> BaseColor:
-    """Find the base colour of a material.
+    """Infer the base color of a material.
 
     Args:
-        diffuse_term, specular_term: the first of each of its `places`.
-        scene, material: whose textures the terms name by channel. read: that material.
+        diffuse_term, specular_term: the first of each list from `base_color_terms`.
+        scene, material: origin of the terms' texture channels. read: reads that material.
     Raises:
-        NotFoundError, SceneError: an image or the scene cannot be had.
+        NotFoundError, SceneError: an image or the scene is unavailable.
     """
     texture_name, f0 = diffuse_term["texture"], _f0(specular_term)
     if is_user_image(texture_name) and (recipe := get_recipe(texture_name)) is not None:
@@ -133,7 +133,7 @@ def find_base_color(
 
 
 def _recompute_base(recipe: ImageRecipe, color: F64, read: ReadMaterial) -> BaseColor:
-    """That which was under another image of metalness."""
+    """Restore the base color that an earlier metalness image was applied to."""
     dielectric = np.array(recipe.dielectric)
     factor = color / diffuse_fraction(dielectric)
     if is_user_image(recipe.base):
@@ -155,11 +155,11 @@ def _base_from_texture(
 
 
 def _display_bytes(texture: Texture) -> tuple[U8, F64]:
-    """A texture as display values, no more than images may have, and what multiplies them. (height, width, 4), (3,)"""
+    """Convert a texture to sRGB bytes of limited size, and a scale. (height, width, 4), (3,)"""
     pixels = texture.pixels
     if texture.encoding is None:
         values, scale = pixels, np.maximum(pixels.max(axis=(0, 1)).astype(np.float64), 1e-6)
-        pixels = coded(lambda rows: values[rows].astype(np.float32), values.shape[:2], scale, texture.wrap).pixels
+        pixels = encode_rows(lambda rows: values[rows].astype(np.float32), values.shape[:2], scale, texture.wrap).pixels
     else:
         scale = np.array(texture.encoding.scale)
     pixels = limit_size(pixels)
@@ -168,10 +168,10 @@ def _display_bytes(texture: Texture) -> tuple[U8, F64]:
 
 
 def _base_map(scene_material: Material) -> Texture:
-    """The base colour, texel by texel, of a scene's material whose own textures share it out.
+    """Base color of a scene's material with diffuse and specular textures, texel by texel.
 
     Raises:
-        ParameterError: it has other terms in the scene than materials of glTF have.
+        ParameterError: its terms in the scene are not those of glTF materials.
     """
     terms = [complete_term(("terms", k), term, None) for k, term in enumerate(scene_material.terms)]
     diffuse_term, specular_term = (terms[indices[0]] for indices in base_color_terms(terms))
@@ -192,19 +192,19 @@ def _base_map(scene_material: Material) -> Texture:
         ]
         return np.asarray(_solve_base_color(*reflectances), np.float32)
 
-    return coded(values, raster.size if images else (1, 1), _ONES, raster.wrap)
+    return encode_rows(values, raster.size if images else (1, 1), _ONES, raster.wrap)
 
 
 def _solve_base_color(diffuse: F64, specular: F64) -> F64:
-    """b of D and F. The mean of the channels has the roots 1 - m and b / d; where both may be 1 - m, that is by which D
-    rises with D + F from channel to channel, else the less metallic. (..., 3) each"""
+    """Solve for b from D and F. The mean over channels has the roots 1 - m and b / d. If both are possible values of
+    1 - m, choose the one that fits the differences between channels, or else the less metallic. (..., 3) each"""
     total = diffuse + specular
     mean, diffuse_mean = (values.mean(axis=-1, keepdims=True) for values in (total, diffuse))
     root = np.sqrt(np.maximum(mean**2 - 4 * DIELECTRIC * diffuse_mean, 0))
     smaller_root, larger_root = 2 * diffuse_mean / np.maximum(mean + root, 1e-9), (mean + root) / (2 * DIELECTRIC)
 
-    def squared_residual(no_metal: F64) -> F64:
-        residual = diffuse - diffuse_mean - no_metal * (total - mean)
+    def squared_residual(dielectric_weight: F64) -> F64:
+        residual = diffuse - diffuse_mean - dielectric_weight * (total - mean)
         return np.asarray((residual**2).sum(axis=-1, keepdims=True))
 
     use_smaller = (larger_root > 1 + _ROOT_TOLERANCE) | (
@@ -216,5 +216,5 @@ def _solve_base_color(diffuse: F64, specular: F64) -> F64:
 
 
 def _f0(term: Document) -> F64:
-    """Reflectance head-on of a highlight. (3,)"""
+    """Reflectance of a highlight at normal incidence. (3,)"""
     return np.broadcast_to(np.asarray(term["params"]["f0"], np.float64), 3)

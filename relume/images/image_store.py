@@ -1,15 +1,14 @@
-"""Images that were sent for materials; `relume.assets.asset_store` keeps them.
+"""Store of images that users uploaded for materials, in `relume.assets.asset_store`.
 
-An image in the place of a map of roughness says by its green how rough each texel is, as files of glTF do: the number
-itself, no display value. One in the place of a normal map says x, y and z by its colours, from −1 to 1.
+As a roughness map, an image's green channel is the roughness, as in glTF: linear, without the sRGB curve. As a normal
+map, its RGB are x, y and z in [−1, 1].
 
-    <folder>/<id>/texels.npy       bytes of display values, or reflectances. (height, width, 3) uint8 or float16
+    <folder>/<id>/texels.npy       sRGB bytes, or reflectances. (height, width, 3) uint8 or float16
                   thumbnail.png
-                  image.json       name, and what had to be changed; of those that `relume.images.metalness` makes what
-                  of,
-                                   what their values are multiplied by, and how they continue outside
+                  image.json       name and warnings; for images from `relume.images.metalness` also their recipe, scale
+                                   and wrap modes
 
-Look documents name one as "image:<id>".
+Looks refer to one as "image:<id>".
 """
 
 from __future__ import annotations
@@ -36,18 +35,18 @@ from relume.scene.model import WRAPS, Texture, TextureEncoding
 
 THUMBNAIL_SIDE = 96
 _TEXELS, _THUMBNAIL = "texels.npy", "thumbnail.png"
-_MIN_MEAN_ROUGHNESS = 1 / 255  # of a mean: black images are smooth everywhere
+_MIN_MEAN_ROUGHNESS = 1 / 255  # divisor for black images
 
 
 class ImageRecipe(NamedTuple):
-    """What an image was made of that nobody sent, see `relume.images.metalness`.
+    """The inputs of a derived image, see `relume.images.metalness`.
 
     Attributes:
-        channel: whose place it takes.
-        metalness: the image that says where the material is metal. base: that of the base colour; or "diffuse" or
-            "scene" where the scene's own textures say that colour; None where it is the same everywhere.
-        scene, material: whose textures these are; empty where they were not needed.
-        factor: what multiplies the base colour. dielectric: reflectance head-on of what is no metal. Three numbers each
+        channel: texture channel that it replaces.
+        metalness: the metalness image. base: the base color image; or "diffuse" or "scene" for the scene's own
+            textures; None for a uniform color.
+        scene, material: origin of these textures, or empty.
+        factor: of the base color. dielectric: reflectance at normal incidence. Three numbers each.
     """
 
     channel: str
@@ -60,17 +59,17 @@ class ImageRecipe(NamedTuple):
 
     @property
     def images(self) -> tuple[str, ...]:
-        """The images among them."""
+        """Uploaded images among the inputs."""
         return tuple(name for name in (self.metalness, self.base) if is_user_image(name))
 
 
 @dataclass(frozen=True)
 class ImageRecord:
-    """What lists show of an image.
+    """An image in lists.
 
     Attributes:
-        created: seconds since 1970. size: width and height. warnings: what was changed, one sentence each.
-        roughness: the mean of it, as a map of roughness. recipe: other images; None where it was sent.
+        created: seconds since 1970. size: width and height. warnings: about the import, one sentence each.
+        roughness: mean, as a roughness map. recipe: inputs of a derived image; None for an uploaded one.
     """
 
     id: str
@@ -83,17 +82,17 @@ class ImageRecord:
 
     @property
     def texture(self) -> str:
-        """The name by which terms of looks mean this image."""
+        """Name of the image in terms of looks."""
         return IMAGES.prefix + self.id
 
 
 def store(folder: Path, source: Path, name: str) -> ImageRecord:
-    """Keep an image under the hash of its file; the same content twice is the same, its newest name wins.
+    """Import an image file; an existing one with this content gets the new name.
 
     Args:
-        folder: of the asset store. source: a .png, .jpg, .webp or .exr file. name: what people call it.
+        folder: of the asset store. source: a .png, .jpg, .webp or .exr file. name: shown to users.
     Raises:
-        SceneError: the file cannot be used, or the store is full.
+        SceneError: the file is unusable, or the store is full.
     """
     texture, warnings = read_image(source, name)
 
@@ -104,10 +103,10 @@ def store(folder: Path, source: Path, name: str) -> ImageRecord:
 
 
 def store_derived(folder: Path, name: str, recipe: ImageRecipe, compute: Callable[[], Texture]) -> ImageRecord:
-    """Keep an image that is made of others under the hash of what it is made of; one that is here is not made again.
+    """Store a derived image under the hash of its recipe; an existing one is not computed again.
 
     Args:
-        folder: of the asset store. name: what people call it. recipe: the others. compute: its texels, bytes.
+        folder: of the asset store. name: shown to users. recipe: its inputs. compute: returns its texels, as bytes.
     Raises:
         SceneError: the store is full. And what `compute` raises.
     """
@@ -129,7 +128,7 @@ def store_derived(folder: Path, name: str, recipe: ImageRecipe, compute: Callabl
 
 
 def _write(folder: Path, texture: Texture) -> dict[str, Any]:
-    """Write an image's files; returns what its record says of them."""
+    """Write an image's files; return their fields of the record."""
     height, width = texture.pixels.shape[:2]
     np.save(folder / _TEXELS, texture.pixels)
     (folder / _THUMBNAIL).write_bytes(_thumbnail(texture))
@@ -137,19 +136,19 @@ def _write(folder: Path, texture: Texture) -> dict[str, Any]:
 
 
 def records(folder: Path) -> list[ImageRecord]:
-    """All images of a folder, newest first."""
+    """Return all images of a folder, newest first."""
     return IMAGES.records(folder, get_record)
 
 
 def get_record(folder: Path, identity: str) -> ImageRecord:
-    """One image. Raises NotFoundError; SceneError where its files are damaged."""
+    """Return one image. Raises NotFoundError; SceneError if its files are damaged."""
     path = IMAGES.path(folder, identity)
     document = IMAGES.load_record(path)
     size, warnings = document.get("size"), document.get("warnings")
     if not isinstance(warnings, list) or not isinstance(size, list) or [*map(type, size)] != [int, int]:
         raise IMAGES.damaged_error(path)
     parsed_warnings, roughness = tuple(map(warning_of, warnings)), document.get("roughness")
-    if not isinstance(roughness, float):  # kept before images were maps of roughness
+    if not isinstance(roughness, float):  # records of older versions lack it
         roughness = mean_roughness(IMAGES.prefix + identity)
     recipe = _parse_recipe(document, path)
     return ImageRecord(
@@ -158,13 +157,13 @@ def get_record(folder: Path, identity: str) -> ImageRecord:
 
 
 def get_recipe(name: str) -> ImageRecipe | None:
-    """What the image that a look names was made of; None where it was sent. Raises what `load_texture` raises."""
+    """Return the recipe of a look's image; None for an uploaded one. Raises what `load_texture` raises."""
     path = IMAGES.resolve(name)
     return _parse_recipe(IMAGES.load_record(path), path)
 
 
 def _parse_recipe(document: dict[str, Any], path: Path) -> ImageRecipe | None:
-    """Written by `store_derived`: damaged where anything of it is missing."""
+    """Parse the recipe that `store_derived` wrote; raises the error for a damaged asset if a field is missing."""
     fields = document.get("made_of")
     try:
         if fields is None:
@@ -177,41 +176,41 @@ def _parse_recipe(document: dict[str, Any], path: Path) -> ImageRecipe | None:
 
 
 def thumbnail_path(folder: Path, identity: str) -> Path:
-    """A small picture of one. Raises NotFoundError."""
+    """Return the path of its thumbnail. Raises NotFoundError."""
     return IMAGES.path(folder, identity) / _THUMBNAIL
 
 
 def load_texture(name: str) -> Texture:
-    """What a term's `texture` names; its texels stay on the disk and are read where they are needed.
+    """Load the image of a term's `texture`; its texels are memory-mapped.
 
     Raises:
-        NotFoundError: it is not here. SceneError: its files are damaged.
+        NotFoundError: it does not exist. SceneError: its files are damaged.
     """
     return _load(IMAGES.resolve(name))
 
 
 def load_roughness_map(name: str) -> Texture:
-    """What a term's `roughness_map` names: roughness over its mean. Raises what `load_texture` raises."""
+    """Load the image of a term's `roughness_map`: roughness over its mean. Raises what `load_texture` raises."""
     return _load_roughness(IMAGES.resolve(name))
 
 
 def load_normal_map(map_: NormalMap) -> Texture:
-    """What a material's `normal_map` names, `map_`: normals of tangent space. Raises what `load_texture` raises."""
+    """Load the image of a material's `normal_map`: tangent-space normals. Raises what `load_texture` raises."""
     return _load_normals(IMAGES.resolve(map_.image), map_.scale)
 
 
 def mean_roughness(name: str) -> float:
-    """The mean of it, before it was divided by that. Raises what `load_texture` raises."""
+    """Mean of a roughness map. Raises what `load_texture` raises."""
     return _load_mean(IMAGES.resolve(name))
 
 
-@asset_cached("image of normals")
+@asset_cached("normal map image")
 def _load_normals(path: Path, scale: float) -> Texture:
     texture = _load(path)
     return Texture(_raw_bytes(texture), texture.wrap, TextureEncoding("normal", (scale, scale, 1.0)))
 
 
-@asset_cached("image of roughness")
+@asset_cached("roughness map image")
 def _load_roughness(path: Path) -> Texture:
     inverse_mean = 1 / max(_load_mean(path), _MIN_MEAN_ROUGHNESS)
     return Texture(
@@ -230,7 +229,7 @@ def _roughness_bytes(texture: Texture) -> NDArray[np.uint8]:
 
 
 def _raw_bytes(texture: Texture, channels: slice = slice(None)) -> NDArray[np.uint8]:
-    """The numbers of its file, no display values, as bytes. (height, width, channels)"""
+    """Bytes of the file without the sRGB curve. (height, width, channels)"""
     values = texture.pixels[..., channels]
     return values if texture.encoding else np.rint(255 * values.astype(np.float32)).astype(np.uint8)
 
@@ -255,7 +254,7 @@ def _load(path: Path) -> Texture:
 
 
 def _thumbnail(texture: Texture) -> bytes:
-    """A square of what it shows, as a list has room for. PNG"""
+    """Thumbnail for lists, a square PNG."""
     pixels = texture.pixels
     display = pixels if texture.encoding else to_bytes(srgb_encode(pixels.astype(np.float32)))
     size = THUMBNAIL_SIDE, THUMBNAIL_SIDE

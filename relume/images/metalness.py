@@ -1,9 +1,9 @@
-"""What an image of metalness makes of a material, as imports make it of the map of a file.
+"""Metalness images: conversion of a material's terms, as imports convert metallic maps.
 
-Where a texel is metal it scatters nothing, and highlights have its base colour (`relume.scene_io.gltf.blend`). So the
-image is no texture of a term itself: two are made of it and of the base colour, texel by texel, and kept on the same
-shelf (docs/adr/0007-texture-slots-and-images.md). Blue says how much a texel is metal, as in files of glTF: the number
-itself, no display value.
+Metal has no diffuse reflection, and its highlight has the base color (`relume.scene_io.gltf.blend`). The image is
+therefore not used as a texture: two textures are computed from it and the base color, and put into the same store
+(docs/adr/0007-texture-slots-and-images.md). The blue channel is the metalness, as in glTF: linear, without the sRGB
+curve.
 """
 
 from __future__ import annotations
@@ -30,22 +30,22 @@ from relume.scene_io.gltf.blend import MetallicBlend
 from relume.scene_io.gltf.texture_resampling import Raster
 
 _MIN_F0 = 1e-4
-_MAX_NAME_LENGTH = 60  # of an image's name that those made of it begin with
+_MAX_NAME_LENGTH = 60  # of the image's name, in the names of the derived images
 
 
 def with_metalness(
     folder: Path, terms: Sequence[Document], image: str, scene: str, material: str, read: ReadMaterial
 ) -> list[dict[str, Any]]:
-    """Let an image say where a material is metal.
+    """Apply a metalness image to a material.
 
     Args:
-        folder: of the shelf. terms: of the material, complete. image: id of the image.
-        scene, material: whose textures the terms name by channel. read: that material.
+        folder: of the image store. terms: of the material, complete. image: id of the image.
+        scene, material: origin of the terms' texture channels. read: reads that material.
     Returns:
-        The terms: what scatters light and the highlights have textures that are made of the image, and f0 is the mean.
+        The terms: diffuse terms and highlights have textures that are derived from the image, and f0 is the mean.
     Raises:
-        ParameterError: the material has nothing that scatters light, or no highlight with f0.
-        NotFoundError, SceneError: an image or the scene cannot be had, or the shelf is full.
+        ParameterError: the material has no diffuse term, or no highlight with f0.
+        NotFoundError, SceneError: an image or the scene is unavailable, or the store is full.
     """
     diffuse_indices, specular_indices = base_color_terms(terms)
     base = find_base_color(terms[diffuse_indices[0]], terms[specular_indices[0]], scene, material, read)
@@ -59,12 +59,12 @@ def with_metalness(
         return store_derived(folder, f"{record.name[:_MAX_NAME_LENGTH]}, {suffix}", recipe, compute).texture
 
     new_terms = [dict(term) for term in terms]
-    diffuse = store_texture("diffuse", "what scatters", lambda: _scale_texture(blend.diffuse(), base.scale))
+    diffuse = store_texture("diffuse", "diffuse", lambda: _scale_texture(blend.diffuse(), base.scale))
     for index in diffuse_indices:
         new_terms[index]["texture"] = diffuse
-    # what was metal scattered less
+    # metal had less diffuse reflection
     new_terms[diffuse_indices[0]]["color"] = _triple(base.factor * diffuse_fraction(base.dielectric))
-    specular = store_texture("specular", "highlights", lambda: blend.normalized_f0(mean, highest))
+    specular = store_texture("specular", "specular", lambda: blend.normalized_f0(mean, highest))
     for index in specular_indices:
         new_terms[index]["texture"] = specular
     specular_term = new_terms[specular_indices[0]]

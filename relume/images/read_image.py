@@ -1,4 +1,4 @@
-"""Reads images of base colours, which may be hostile: PNG, JPEG and WebP as bytes, OpenEXR as reflectances."""
+"""Import of material images from untrusted sources: PNG, JPEG and WebP as bytes, OpenEXR as reflectances."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -14,43 +15,43 @@ from relume.core.import_warnings import ImporterWarning, approximated, unsupport
 from relume.image_io.decode import Decoder
 from relume.image_io.read_linear import EXR_MAGIC, read_pixels
 from relume.scene.model import Texture, TextureEncoding
+from relume.scene.unique_names import quote
 
 MAX_FILE_BYTES = 100_000_000
 MAX_SIDE = 4_096
 
 
 def read_image(path: Path, name: str) -> tuple[Texture, tuple[ImporterWarning, ...]]:
-    """Read a file of an image, and say what was changed.
+    """Read an image file; also return warnings about changes.
 
     Args:
-        path: the file. name: what people call it.
+        path: the file. name: shown to users.
     Returns:
-        Bytes of display values, or reflectances in half precision, held to [0, 1]; alpha is left out.
+        sRGB bytes, or reflectances in half precision, clamped to [0, 1]; without alpha.
     Raises:
-        SceneError: none of the formats, damaged, or too large.
+        SceneError: unsupported format, damaged, or too large.
     """
     label = f"image {name!r}"
     num_bytes = path.stat().st_size
     if num_bytes > MAX_FILE_BYTES:
-        raise SceneError(f"{label} has {num_bytes / 1e6:,.0f} MB, {MAX_FILE_BYTES / 1e6:,.0f} MB are taken; scale it")
+        raise SceneError(
+            f"{label} has {num_bytes / 1e6:,.0f} MB, the limit is {MAX_FILE_BYTES / 1e6:,.0f}; scale it down"
+        )
     data = path.read_bytes()
     if data.startswith(EXR_MAGIC):
-        return _read_exr(data, label)
+        return _read_exr(data, label, f"image {quote(name)}")
     pixels = Decoder().decode(data, label)
     limited, warnings = limit_size(pixels[..., :3]), tuple[ImporterWarning, ...]()
     if limited.shape != pixels[..., :3].shape:
         sizes = [f"{array.shape[1]}×{array.shape[0]}" for array in (pixels, limited)]
-        warnings = (approximated(f"{label} is {sizes[0]}; it is kept as {sizes[1]}, each texel the mean of its own"),)
+        warnings = (approximated(f"Image {quote(name)} was scaled from {sizes[0]} to {sizes[1]}."),)
     if pixels[..., 3].min() < 255:
-        warnings = (
-            *warnings,
-            approximated(f"{label} is transparent somewhere; its colours are taken as they are there"),
-        )
+        warnings = (*warnings, approximated(f"The transparency of image {quote(name)} was ignored."))
     return Texture(np.ascontiguousarray(limited), encoding=TextureEncoding("srgb")), warnings
 
 
-def limit_size(texels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Hold an image to `MAX_SIDE`, each texel the mean of its own. texels: (height, width, channels)"""
+def limit_size(texels: Shaped[NDArray[np.uint8], "height width channels"]) -> NDArray[np.uint8]:
+    """Scale an image down to at most `MAX_SIDE` texels per side, by means of whole blocks."""
     longest_side = max(texels.shape[:2])
     if longest_side <= MAX_SIDE:
         return texels
@@ -59,18 +60,17 @@ def limit_size(texels: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 def _check_size(label: str, width: int, height: int) -> None:
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
-        raise SceneError(f"{label} is {width}×{height}; at most {MAX_SIDE}×{MAX_SIDE} is taken, scale it down")
+        raise SceneError(f"{label} is {width}×{height} pixels, the limit is {MAX_SIDE}×{MAX_SIDE}; scale it down")
 
 
-def _read_exr(data: bytes, label: str) -> tuple[Texture, tuple[ImporterWarning, ...]]:
+def _read_exr(data: bytes, label: str, quoted_label: str) -> tuple[Texture, tuple[ImporterWarning, ...]]:
     pixels = read_pixels(data, ".exr", label, partial(_check_size, label))
     warnings = []
     broken = ~np.isfinite(pixels).all(axis=-1, keepdims=True)
     if broken.any():
-        warnings.append(unsupported(f"{int(broken.sum()):,} texels of {label} are not finite; they are black now"))
+        num_broken = int(broken.sum())
+        warnings.append(unsupported(f"{num_broken:,} NaN or infinite texels of {quoted_label} were made black."))
     clamped = np.clip(np.where(broken, np.float32(0), pixels), 0, 1)
     if (clamped != pixels).any(axis=-1, keepdims=True)[~broken].any():
-        warnings.append(
-            approximated(f"{label} reflects less than nothing or more than all somewhere; it is held to that")
-        )
+        warnings.append(approximated(f"Values of {quoted_label} below 0 or above 1 were clamped."))
     return Texture(clamped.astype(np.float16)), tuple(warnings)

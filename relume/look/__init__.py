@@ -1,4 +1,4 @@
-"""The look: the JSON document that users edit. Documents are values: no function here changes one."""
+"""The look: the JSON document that users edit. Documents are immutable: no function here modifies its arguments."""
 
 from relume.look.document import complete, default_look, validate
 from relume.look.model import (

@@ -1,4 +1,4 @@
-"""What has become of a look, path by path: how edits of several people are told to each other."""
+"""Differences between two looks as JSON Patch operations, which tell the members of a room about each other's edits."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ Operation = dict[str, Any]
 
 
 def diff_looks(before: Mapping[str, Any], after: Mapping[str, Any], excluded: Collection[str] = ()) -> list[Operation]:
-    """The operations `add`, `remove` and `replace` of a JSON Patch that lead from a look to another.
+    """Return the JSON Patch operations `add`, `remove` and `replace` that turn one look into another.
 
-    Lists of objects of one length are compared object by object; any other list is one value, as is each edited curve
-    of a term: half of a drawn curve never travels alone. Parts that both share are not looked into.
+    Two lists of objects with the same length are compared object by object. Any other list is a single value, and so is
+    each edited curve of a term: a drawn curve is always sent whole. Shared objects are skipped.
 
     Args:
-        before: a look document. after: another. excluded: sections that are left out.
+        before: a look document. after: another. excluded: sections to ignore.
     """
     names = [name for name in {**before, **after} if name not in excluded]
     return list(_members((), before, after, names))
@@ -50,7 +50,7 @@ def _changes(path: tuple[str, ...], before: Any, after: Any) -> Iterator[Operati
 
 
 def _are_aligned_lists(before: Any, after: Any) -> bool:
-    """Whether both are lists of as many objects."""
+    """True if both are lists of objects with the same length."""
     return (
         isinstance(before, list | tuple)
         and isinstance(after, list | tuple)

@@ -1,4 +1,4 @@
-"""Complete looks: the scene's default, and partial looks merged into it, checked as they are merged."""
+"""Complete looks: the scene's default look, and partial looks that are validated and merged into it."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from relume.look.model import BackgroundKind, Look, PathFilter, ToneMap
 from relume.scene.model import Light, Material
 
 MAX_TERMS = 16
-MAX_BOUNCES = 24  # between white walls, which reflect 0.73, a thousandth of the light is left after 22
+MAX_BOUNCES = 24  # white walls reflect at most 0.73: a thousandth of the light remains after 22 bounces
 NORMAL_SCALE = (0.0, 10.0)
-RANGES: dict[str, dict[str, tuple[float, float]]] = {  # of each number of a field; degrees, stops
+RANGES: dict[str, dict[str, tuple[float, float]]] = {  # of each number in a field; degrees, stops
     "environment": {"intensity": (0.0, MAX_INTENSITY), "color": (0.0, MAX_COLOR), "rotation": (-360.0, 360.0)},
     "background": {"color": (0.0, MAX_COLOR), "blur": (2.0, 60.0)},
     "transport": {"bounces": (0, MAX_BOUNCES)},
@@ -42,10 +42,10 @@ _SECTIONS = tuple(Look.model_fields)
 
 
 def default_look(scene_materials: Sequence[Material], scene_lights: Sequence[Light] = ()) -> dict[str, Any]:
-    """The complete look of a scene that nobody has edited.
+    """Return the complete, unedited look of a scene.
 
     Raises:
-        ParameterError: a material's own terms, or a light's fields, are not valid.
+        ParameterError: a material's terms or a light's fields are invalid.
     """
     return {
         "materials": {
@@ -64,30 +64,30 @@ def default_look(scene_materials: Sequence[Material], scene_lights: Sequence[Lig
 
 
 def complete(partial: Mapping[str, Any], default: Mapping[str, Any]) -> dict[str, Any]:
-    """A complete, valid document: what `partial` does not name is as in `default`.
+    """Complete a partial look: fields that `partial` omits are taken from `default`.
 
-    A material's list of terms is taken whole; a term's missing fields have its model's defaults.
+    A material's list of terms is replaced as a whole. Missing fields of a term get its model's defaults.
 
     Raises:
-        ParameterError: with the JSON pointer of the first thing that is wrong, and what is allowed there.
+        ParameterError: with the JSON pointer of the first invalid value, and the allowed values.
     """
     return complete_changes(partial, default, default)
 
 
 def validate(document: Mapping[str, Any], default: Mapping[str, Any]) -> Look:
-    """The complete look of a document, which may be partial. Raises ParameterError as `complete` does."""
+    """Return the complete look of a possibly partial document. Raises ParameterError as `complete` does."""
     return Look.model_validate(complete(document, default))
 
 
 def complete_changes(partial: Any, default: Mapping[str, Any], previous: Mapping[str, Any]) -> dict[str, Any]:
-    """`complete`, checking only what an edit changed, which is little.
+    """Do the same as `complete`, but validate only the changes of an edit.
 
     Args:
-        partial: the look after an edit; anything.
-        default: the complete look of the scene that nobody has edited.
-        previous: a valid document; what is part of it, as an object, is not checked again.
+        partial: the look after an edit, not yet validated.
+        default: the complete, unedited look of the scene.
+        previous: a valid document; objects that `partial` shares with it are not validated again.
     Returns:
-        A document that shares with `previous` all that did not change.
+        A document that shares all unchanged objects with `previous`.
     Raises:
         ParameterError: as `complete` does.
     """
@@ -113,9 +113,7 @@ def _complete_material(name: str, partial: Any, default: Mapping[str, Any], prev
     if partial is previous[name] or partial is default[name]:
         return partial
     pointer: Pointer = ("materials", name)
-    fields = _merge(
-        pointer, partial, {**default[name], "normal_map": None}
-    )  # only a scene's ground may be a shadow catcher
+    fields = _merge(pointer, partial, {**default[name], "normal_map": None})  # only a ground has `shadow_catcher`
     if not isinstance(fields.get("shadow_catcher", True), bool):
         raise invalid_value((*pointer, "shadow_catcher"), fields["shadow_catcher"], "true or false")
     normals = _complete_normals((*pointer, "normal_map"), fields.pop("normal_map", None))
@@ -127,7 +125,7 @@ def _complete_material(name: str, partial: Any, default: Mapping[str, Any], prev
 
 
 def _complete_normals(pointer: Pointer, partial: Any) -> dict[str, Any]:
-    """The image in the place of a material's normal map, with its scale; left out where there is none."""
+    """Complete the image that replaces a material's normal map; empty if there is none."""
     if partial is None:
         return {}
     fields = _merge(pointer, partial, {"image": None, "scale": 1.0})
@@ -150,7 +148,7 @@ def _complete_terms(pointer: Pointer, partial: Any, previous: Sequence[Any]) -> 
 
 
 def _complete_environment(partial: Any, default: Mapping[str, Any], previous: Mapping[str, Any]) -> dict[str, Any]:
-    fields = _merge(("environment",), partial, {**DEFAULTS["environment"], **default})  # older stores name no map
+    fields = _merge(("environment",), partial, {**DEFAULTS["environment"], **default})  # older stores have no map
     if fields["map"] != previous.get("map"):
         _check_map(("environment", "map"), fields["map"])
     ranges = RANGES["environment"]
@@ -163,12 +161,12 @@ def _complete_environment(partial: Any, default: Mapping[str, Any], previous: Ma
 def _check_map(pointer: Pointer, name: Any) -> None:
     if name is not None and not (isinstance(name, str) and environments.environment_exists(name)):
         available = names_text(environments.environment_names())
-        raise invalid_value(pointer, name, f"null for the scene's own, or an environment that is here: {available}")
+        raise invalid_value(pointer, name, f"null for the scene's own, or an available environment: {available}")
 
 
 def _complete_background(partial: Any, default: Mapping[str, Any]) -> dict[str, Any]:
     pointer = ("background",)
-    fields = _merge(pointer, partial, {**DEFAULTS["background"], **default})  # older stores know of no background
+    fields = _merge(pointer, partial, {**DEFAULTS["background"], **default})  # older stores have no background
     if fields["kind"] not in get_args(BackgroundKind):
         raise invalid_value((*pointer, "kind"), fields["kind"], f"one of {names_text(get_args(BackgroundKind))}")
     check_triple((*pointer, "color"), fields["color"], *RANGES["background"]["color"])
@@ -178,7 +176,7 @@ def _complete_background(partial: Any, default: Mapping[str, Any]) -> dict[str, 
 
 def _complete_transport(partial: Any, default: Mapping[str, Any]) -> dict[str, Any]:
     pointer = ("transport",)
-    fields = _merge(pointer, partial, {**DEFAULTS["transport"], **default})  # older stores know of no transport
+    fields = _merge(pointer, partial, {**DEFAULTS["transport"], **default})  # older stores have no transport
     if fields["show"] not in get_args(PathFilter):
         raise invalid_value((*pointer, "show"), fields["show"], f"one of {names_text(get_args(PathFilter))}")
     bounces = fields["bounces"]
@@ -195,7 +193,7 @@ def _complete_display(partial: Any, default: Mapping[str, Any]) -> dict[str, Any
 
 
 def _check_tone_map(pointer: Pointer, value: Any) -> None:
-    """Whether the server has such a view is told where it is shown: looks travel between servers."""
+    """Check the form only. Looks move between servers, so the renderer reports a view that its config lacks."""
     is_name = isinstance(value, str) and value in get_args(ToneMap)
     is_view = isinstance(value, Mapping) and value.keys() == {"display", "view"}
     if is_view:
@@ -206,7 +204,7 @@ def _check_tone_map(pointer: Pointer, value: Any) -> None:
 
 
 def _is_printable_name(name: str) -> bool:
-    return 0 < len(name) <= MAX_NAME and name.isprintable()  # half of a surrogate pair is no text that can be sent
+    return 0 < len(name) <= MAX_NAME and name.isprintable()  # a lone surrogate cannot be encoded as UTF-8
 
 
 def _merge(pointer: Pointer, partial: Any, default: Mapping[str, Any]) -> dict[str, Any]:

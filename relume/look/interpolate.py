@@ -1,8 +1,8 @@
-"""Looks between looks: what an animation shows from one keyframe to the next.
+"""Interpolation of looks between the keyframes of an animation.
 
-Numbers go evenly from one value to the other, parameters whose sliders are logarithmic evenly in their logarithm. What
-has nothing between, as a model, a map or a light that only one look has, changes half way. Across the navigation map
-(Sun 2007, 4.2) materials of its kind go through those that lie between them.
+Numbers are interpolated linearly; parameters with a logarithmic slider are interpolated in the logarithm. Values that
+cannot be interpolated, such as a model, a map, or a light in only one of the looks, switch half way. In mode "map",
+Cook–Torrance materials follow a path across the navigation map (Sun 2007, 4.2).
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ InterpolationMode = Literal["parameters", "map"]
 
 
 def enclosing_keyframes(num_looks: int, fraction: float) -> tuple[int, int, float]:
-    """Find the two of some looks, at even distances, that a share of the way through them lies between.
+    """Find the two keyframes that enclose a time of an animation; keyframes are equally spaced.
 
     Args:
-        num_looks: at least one. fraction: 0 for the first, 1 for the last.
+        num_looks: at least one. fraction: 0 at the first keyframe, 1 at the last.
     Returns:
-        Their places, the same where it lies on one of them, and the share of the way from the one to the other.
+        Indices of both keyframes, equal if the time is exactly at one, and the weight of the second.
     """
     position = fraction * (num_looks - 1)
     first = min(int(position), num_looks - 1)
@@ -33,11 +33,11 @@ def enclosing_keyframes(num_looks: int, fraction: float) -> tuple[int, int, floa
 def interpolate_looks(
     looks: Sequence[Mapping[str, Any]], fraction: float, mode: InterpolationMode = "parameters"
 ) -> Mapping[str, Any]:
-    """The look at a share of the way through some.
+    """Return the look at a time of an animation.
 
     Args:
-        looks: complete documents, at least one, at even distances. fraction: 0 for the first, 1 for the last.
-        mode: of materials: from parameter to parameter, or across the navigation map where both are of its kind.
+        looks: complete documents, at least one, equally spaced. fraction: 0 at the first, 1 at the last.
+        mode: interpolate materials by their parameters, or across the navigation map if both are on it.
     """
     first, second, weight = enclosing_keyframes(len(looks), fraction)
     if first == second:
@@ -45,9 +45,7 @@ def interpolate_looks(
     start, end = looks[first], looks[second]
     interpolated: Mapping[str, Any] = _interpolate(start, end, weight)
     if mode == "map":
-        from relume.look.library.navigation_path import (
-            path_on_map,  # SciPy, which a process that describes its API does without
-        )
+        from relume.look.library.navigation_path import path_on_map  # imports SciPy, slow and rarely needed
 
         for name, material in interpolated["materials"].items():
             ends = [look["materials"].get(name) for look in (start, end)]
@@ -73,7 +71,7 @@ def _interpolate(start: Any, end: Any, weight: float) -> Any:
 
 
 def _interpolate_fields(start: Mapping[str, Any], end: Mapping[str, Any], weight: float) -> dict[str, Any]:
-    """What both have is between; all else is that of the nearer."""
+    """Interpolate fields that both have; other fields are those of the nearer keyframe."""
     nearest = start if weight < 0.5 else end
     return {
         name: _interpolate(start[name], end[name], weight) if name in start and name in end else value
@@ -94,7 +92,7 @@ def _interpolate_terms(start: Mapping[str, Any], end: Mapping[str, Any], weight:
 
 
 def _interpolate_log(start: Any, end: Any, weight: float) -> Any:
-    if isinstance(start, list) or isinstance(end, list):  # a value for each channel in one of them at least
+    if isinstance(start, list) or isinstance(end, list):  # at least one has a value for each channel
         first, second = (value if isinstance(value, list) else [value] * 3 for value in (start, end))
         return [_interpolate_log(a, b, weight) for a, b in zip(first, second, strict=True)]
     if start <= 0 or end <= 0:

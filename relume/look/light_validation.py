@@ -1,4 +1,4 @@
-"""The lights of a look, completed and checked; a field of another kind is an error, never ignored."""
+"""Validation and defaults for the lights of a look. A field that a light's kind does not have is an error."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from relume.scene.model import Light
 from relume.scene.validate import MAX_EMISSION, MAX_LIGHT_NAME, MAX_LIGHTS, MAX_METERS
 
 MAX_INTENSITY = 1e4
-MIN_DIRECTION = 1e-6  # of its longest component
-LIGHT_RANGES: dict[str, tuple[float, float]] = {  # of each number of a field; metres, degrees
+MIN_DIRECTION = 1e-6  # smallest allowed longest component
+LIGHT_RANGES: dict[str, tuple[float, float]] = {  # of each number in a field; meters, degrees
     "intensity": (0.0, MAX_INTENSITY),
     "color": (0.0, MAX_COLOR),
     "emission": (0.0, MAX_EMISSION),
@@ -46,7 +46,7 @@ _ADDABLE = [kind for kind in get_args(LightKind) if kind != "mesh"]
 
 
 def default_lights(lights: Sequence[Light], material_names: Sequence[str]) -> dict[str, Any]:
-    """The lights that a scene brings, complete. Raises ParameterError where one is not valid."""
+    """Return the complete lights of a scene. Raises ParameterError if one is invalid."""
     documents = {}
     for light in lights:
         pointer: Pointer = ("lights", light.name)
@@ -60,17 +60,17 @@ def default_lights(lights: Sequence[Light], material_names: Sequence[str]) -> di
 
 
 def complete_lights(partial: Any, default: Mapping[str, Any], previous: Mapping[str, Any]) -> dict[str, Any]:
-    """The scene's own lights as `partial` changes them, then those that it adds. Raises ParameterError.
+    """Merge `partial` into the scene's lights and append the lights that it adds. Raises ParameterError.
 
     Args:
-        default: of the scene. previous: of a valid look; what is part of it, as an object, is not checked again.
+        default: of the scene. previous: of a valid look; objects shared with it are not validated again.
     """
     pointer: Pointer = ("lights",)
     if not isinstance(partial, Mapping):
         raise invalid_value(pointer, partial, "an object with a field for each light to change or to add")
     names = [*default, *(name for name in partial if name not in default)]
     if len(names) > MAX_LIGHTS:
-        raise invalid_value(pointer, f"{len(names)} lights", f"at most {MAX_LIGHTS}, those of the scene included")
+        raise invalid_value(pointer, f"{len(names)} lights", f"at most {MAX_LIGHTS}, including the scene's own")
     return {name: _complete_light(name, partial, default.get(name), previous.get(name)) for name in names}
 
 
@@ -87,19 +87,19 @@ def _complete_light(name: str, lights: Mapping[str, Any], default: Any, previous
 
 
 def _base_fields(pointer: Pointer, partial: Mapping[str, Any], default: Mapping[str, Any] | None) -> Mapping[str, Any]:
-    """What the fields that are not given are: the scene's light's, or, where the kind is new, that kind's own."""
+    """Values for omitted fields: those of the scene's light, or the defaults of a new kind."""
     kind = partial.get("kind", default["kind"] if default else None)
     if default is not None and kind == default["kind"]:
         return default
     if default is not None and default["kind"] == "mesh":
-        raise invalid_value((*pointer, "kind"), kind, "'mesh': these surfaces shine; add a light of another name")
+        raise invalid_value((*pointer, "kind"), kind, "'mesh' for this emissive mesh; add a light with another name")
     if kind not in _ADDABLE:
         raise invalid_value((*pointer, "kind"), kind, f"one of {names_text(_ADDABLE)}")
     return default_light(kind)
 
 
 def default_light(kind: str) -> dict[str, Any]:
-    """A light of a kind with all that nobody has said of it, complete."""
+    """Return the complete default light of a kind."""
     return {"kind": kind, **_COMMON_DEFAULTS, **_KIND_DEFAULTS[kind]}
 
 
@@ -132,7 +132,7 @@ def _check_field(pointer: Pointer, field: str, value: Any, base: Mapping[str, An
                 raise invalid_value(pointer, f"{value[0]:g} and {value[1]:g}", "inner ≤ outer, and outer above 0")
         case "material":
             if base["material"] not in ("", value):
-                raise invalid_value(pointer, value, f"{base['material']!r}: which surfaces shine is the scene's")
+                raise invalid_value(pointer, value, f"{base['material']!r}: the scene decides which mesh emits")
 
 
 def _check_pair(pointer: Pointer, value: Any, minimum: float, maximum: float) -> None:

@@ -1,6 +1,6 @@
-"""The types of a complete look: what `validate` returns and what the API's schema shows.
+"""Types of a complete look, returned by `validate` and shown in the API schema.
 
-Terms stay dictionaries, so that `relume.brdf.curves` reads the same thing from a look and from its JSON.
+Terms stay dictionaries, so that `relume.brdf.curves` handles looks and their JSON alike.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Annotated, Literal, NamedTuple, NotRequired
 
 from pydantic import BaseModel, ConfigDict, Field
-from typing_extensions import TypedDict  # pydantic asks for this one before Python 3.12
+from typing_extensions import TypedDict  # pydantic requires it before Python 3.12
 
 from relume.brdf.texture_slots import NormalMap
 from relume.image_io.ocio.view import OcioView
@@ -22,8 +22,8 @@ BackgroundKind = Literal["map", "blurred", "color", "transparent"]
 
 
 class DrawnCurve(TypedDict):
-    """A curve drawn by hand: `points`, [degrees, value], or `bands`, J values or three times J; or a change to one of
-    them or to what the parameters give: `factors` and `offsets` of bands, `handles`, [degrees, was, becomes]."""
+    """A curve drawn by hand: `points`, [degrees, value], or `bands`, J values for all channels or 3 × J; or a change of
+    that curve or of the generated one: `factors` and `offsets` per band, `handles`, [degrees, was, becomes]."""
 
     points: NotRequired[list[tuple[float, float]]]
     bands: NotRequired[list[float] | list[list[float]]]
@@ -34,11 +34,11 @@ class DrawnCurve(TypedDict):
 
 
 class TermLook(TypedDict):
-    """One term: colour · texture · quotient · Π curves; drawn curves stand in for those that `params` would give.
+    """One term: color · texture · quotient · Π curves. Drawn curves replace those generated from `params`.
 
-    `data` names the measured material, for models that need one and for no other. `roughness_map`: what scales the
-    width of the term: "roughness", the material's own map where it has one, or "image:<id>", one that was sent; null:
-    nothing. `texture` names one of the material's own images by its channel, or one that was sent.
+    `data`: name of the measured material, only for models that need one. `roughness_map`: scales the width of the
+    highlight: "roughness" for the material's own map, "image:<id>" for an uploaded one, null for none. `texture`: a
+    texture channel of the material, or an uploaded image.
     """
 
     model: str
@@ -55,18 +55,17 @@ class _FrozenModel(BaseModel):
 
 
 class NormalMapLook(_FrozenModel):
-    """An image in the place of a material's normal map: "image:<id>", and how strong its bumps are, as `scale` of
-    glTF."""
+    """An uploaded image that replaces a material's normal map: "image:<id>", and its strength as glTF's `scale`."""
 
     image: str
     scale: float = 1.0
 
 
 class MaterialLook(_FrozenModel):
-    """A material is the sum of its terms.
+    """A material: the sum of its terms.
 
-    A `catcher` does not show them: it shows what lies behind it, as dark as its shadows and as bright as what is
-    reflected onto it. `normal_map` stands in the place of the scene's own.
+    A `shadow_catcher` hides its terms: it shows the background times the ratio of light with and without the objects.
+    `normal_map` replaces the scene's own.
     """
 
     terms: tuple[TermLook, ...]
@@ -75,13 +74,13 @@ class MaterialLook(_FrozenModel):
 
     @property
     def normals(self) -> NormalMap | None:
-        """The same as a value; none of a catcher, whose own surface is not seen."""
+        """The normal map override; none for a shadow catcher, which hides its own surface."""
         normal_map = None if self.shadow_catcher else self.normal_map
         return None if normal_map is None else NormalMap(normal_map.image, normal_map.scale)
 
 
 class EnvironmentKey(NamedTuple):
-    """What a picture's light depends on, brightness and tint apart: pictures of equal keys are lit alike.
+    """Everything that images depend on linearly through the environment, except brightness and tint.
 
     Attributes:
         map: as in `EnvironmentLook`. rotation: degrees in [0, 360).
@@ -95,8 +94,8 @@ BAKED_ENVIRONMENT = EnvironmentKey(None, 0.0)
 
 
 class EnvironmentLook(_FrozenModel):
-    """The light around: multiplied by `intensity` and `color`, turned about +Y by `rotation` degrees, counter-clockwise
-    seen from above. `map` names it, see `relume.assets.environments`; None: the scene's own."""
+    """The environment: multiplied by `intensity` and `color`, rotated about +Y by `rotation` degrees, counter-clockwise
+    from above. `map` names it, see `relume.assets.environments`; None: the scene's own."""
 
     map: str | None
     intensity: float
@@ -105,19 +104,19 @@ class EnvironmentLook(_FrozenModel):
 
     @property
     def key(self) -> EnvironmentKey:
-        """The part that tells which environment it is, whatever its brightness."""
+        """Map and rotation, without brightness."""
         return EnvironmentKey(self.map, self.rotation % 360)
 
     @property
     def gain(self) -> Rgb:
-        """What multiplies each channel of the environment: intensity · color."""
+        """Factor of each channel of the environment: intensity · color."""
         red, green, blue = self.color
         return self.intensity * red, self.intensity * green, self.intensity * blue
 
 
 class LightGeometry(NamedTuple):
-    """Where a local light is and how it is shaped, fields that its kind has not left as they are here: lights of equal
-    geometry differ by a factor for each channel alone. Fields as in the look."""
+    """Position and shape of a local light; fields that its kind lacks have their defaults. Lights with equal geometry
+    differ only by a factor for each channel. Fields as in the look."""
 
     kind: LightKind
     position: Xyz = (0.0, 0.0, 0.0)
@@ -129,7 +128,7 @@ class LightGeometry(NamedTuple):
 
 
 class _LightLook(_FrozenModel):
-    """What lights of all kinds have; `emission` in the unit of the kind."""
+    """Common fields of all lights; the unit of `emission` depends on the kind."""
 
     intensity: float
     color: Rgb
@@ -138,27 +137,26 @@ class _LightLook(_FrozenModel):
 
     @property
     def gain(self) -> Rgb:
-        """What multiplies each channel of a light of unit emission: intensity · color · emission, nothing where
-        disabled."""
+        """Factor of each channel of a light with unit emission: intensity · color · emission; zero if disabled."""
         scale = self.intensity if self.enabled else 0.0
         red, green, blue = (scale * c * e for c, e in zip(self.color, self.emission, strict=True))
         return red, green, blue
 
     @property
     def geometry(self) -> LightGeometry:
-        """Everything but brightness and colour: where it is, which way it shines, and its shape."""
+        """Everything except brightness and color."""
         return LightGeometry(**{name: value for name, value in vars(self).items() if name in LightGeometry._fields})
 
 
 class PointLook(_LightLook):
-    """Shines alike in all directions; emission is radiant intensity, W/sr."""
+    """A point light that emits equally in all directions; emission is radiant intensity, W/sr."""
 
     kind: Literal["point"]
     position: Xyz
 
 
 class SpotLook(_LightLook):
-    """A point that shines into a cone of half-angles inner and outer, degrees; emission is W/sr along the axis."""
+    """A point light with inner and outer cone half-angles in degrees; emission is intensity on the axis, W/sr."""
 
     kind: Literal["spot"]
     position: Xyz
@@ -167,17 +165,17 @@ class SpotLook(_LightLook):
 
 
 class DirectionalLook(_LightLook):
-    """Light from infinitely far that travels along `direction`; emission is irradiance across it, W/m²."""
+    """Light from infinity that travels along `direction`; emission is irradiance perpendicular to it, W/m²."""
 
     kind: Literal["directional"]
     direction: Xyz
 
 
 class RectangleLook(_LightLook):
-    """Shines to the side that `direction` points to; emission is radiance. The camera does not see it.
+    """A rectangular area light that emits toward `direction`; emission is radiance. The camera does not see it.
 
-    `rotation` turns it about `direction`, degrees; at 0 its height lies in the plane of `direction` and +Y, or +Z where
-    `direction` is vertical. `size`: width and height, metres.
+    `rotation` rotates it about `direction`, degrees; at 0 its height lies in the plane of `direction` and +Y, or of +Z
+    if `direction` is vertical. `size`: width and height, meters.
     """
 
     kind: Literal["rectangle"]
@@ -188,7 +186,7 @@ class RectangleLook(_LightLook):
 
 
 class MeshLook(_LightLook):
-    """All surfaces of a material shine, and are seen to; emission is radiance."""
+    """All surfaces of a material emit and are visible; emission is radiance."""
 
     kind: Literal["mesh"]
     material: str
@@ -198,11 +196,11 @@ LightLook = Annotated[PointLook | SpotLook | DirectionalLook | RectangleLook | M
 
 
 class LightPaths(NamedTuple):
-    """Which light paths a picture shows: light reaches a surface directly from a light, or by way of other surfaces.
+    """Light paths of an image: direct illumination and a range of bounces.
 
     Attributes:
-        direct: whether direct ones count.
-        first, last: how many surfaces the others have on their way; none of them counts where last < first.
+        direct: includes direct illumination.
+        first, last: range of bounces of the indirect illumination; none if last < first.
     """
 
     direct: bool
@@ -211,49 +209,48 @@ class LightPaths(NamedTuple):
 
     @property
     def has_indirect(self) -> bool:
-        """Whether any paths between surfaces count."""
+        """True if any indirect light is included."""
         return self.last >= self.first
 
     def without_reflections(self) -> LightPaths:
-        """Only those of these paths that reach a surface straight from a light."""
+        """These paths without indirect illumination."""
         return LightPaths(self.direct, 1, 0)
 
     def without_direct(self) -> LightPaths:
-        """Only those of these paths that go by way of other surfaces."""
+        """These paths without direct illumination."""
         return self._replace(direct=False)
 
 
 class TransportLook(_FrozenModel):
-    """Which light is shown: `bounces` reflections between surfaces at most, and of such paths all, those without any,
-    those with any, those with one, or those with more."""
+    """Light paths to show: all, direct, indirect, first bounce or further bounces, with at most `bounces` bounces."""
 
     show: PathFilter
     bounces: int
 
     @property
     def paths(self) -> LightPaths:
-        """The paths as numbers, which are equal wherever the pictures are."""
+        """The paths as numbers; equal if and only if the images are equal."""
         first = 2 if self.show == "further_bounces" else 1
         max_bounces = {"direct": 0, "first_bounce": 1}.get(self.show, self.bounces)
         paths = LightPaths(self.show in ("all", "direct"), first, min(max_bounces, self.bounces))
         return paths if paths.has_indirect else paths.without_reflections()
 
     def supported_by(self, *, has_indirect: bool) -> LightPaths:
-        """Those of the paths that a method follows. reflects: whether it has light between surfaces."""
+        """The paths that a method supports. has_indirect: the method has indirect illumination."""
         return self.paths if has_indirect else self.paths.without_reflections()
 
 
 class DisplayLook(_FrozenModel):
-    """How radiance becomes a picture: `exposure` in stops, then the tone map, or a view of an OpenColorIO config."""
+    """Conversion from radiance to display: `exposure` in stops, then the tone map or an OpenColorIO view."""
 
     exposure: float
     tone_map: ToneMap | OcioView
 
 
 class BackgroundLook(_FrozenModel):
-    """The background: what the camera sees where no surface is; it lights nothing.
+    """The background, visible behind all surfaces; it lights nothing.
 
-    The map of the environment, the same `blurred` by that many degrees, one `color` (radiance), or nothing.
+    The environment map, the same `blurred` by an angle in degrees, one `color` (radiance), or transparent.
     """
 
     kind: BackgroundKind
@@ -262,7 +259,7 @@ class BackgroundLook(_FrozenModel):
 
 
 class Look(_FrozenModel):
-    """A complete, valid look; made by `relume.look.validate`."""
+    """A complete, valid look, made by `relume.look.validate`."""
 
     materials: dict[str, MaterialLook]
     environment: EnvironmentLook
@@ -272,7 +269,7 @@ class Look(_FrozenModel):
     display: DisplayLook
 
     def without_compositing(self) -> Look:
-        """The same with nothing that is only put behind or under the objects: what brute force can be asked for."""
+        """The look without shadow catchers and with the environment as background, as the reference renders it."""
         plain = {
             name: material.model_copy(update={"shadow_catcher": False}) for name, material in self.materials.items()
         }

@@ -19,18 +19,18 @@ _PATCH_ERRORS = (jsonpatch.JsonPatchException, jsonpointer.JsonPointerException,
 
 
 def apply_patch(document: Mapping[str, Any], patch: Any, default: Mapping[str, Any]) -> dict[str, Any]:
-    """The complete, valid look after a patch; neither argument is changed, unchanged parts are shared.
+    """Return the complete, valid look after a patch. The arguments stay unmodified; unchanged objects are shared.
 
-    What a patch removes is as in the scene's default again. Replacing the path "" replaces the whole look. Only what
-    the patch touches is checked.
+    Values that a patch removes revert to the scene's default. Replacing the path "" replaces the whole look. Only
+    objects that the patch changes are validated.
 
     Args:
-        document: a complete look, as `complete` or an earlier call returned it.
+        document: a complete look, as returned by `complete` or an earlier call.
         patch: list of at most 256 operations `add`, `remove`, `replace`, `test`.
         default: the scene's default look.
     Raises:
         EditError: the patch is malformed, does not fit the document, or a test failed.
-        ParameterError: the patched look is not valid.
+        ParameterError: the patched look is invalid.
     """
     if not isinstance(patch, list | tuple) or len(patch) > MAX_OPERATIONS:
         raise EditError(f"an edit is a list of at most {MAX_OPERATIONS} operations; send several edits")
@@ -39,7 +39,7 @@ def apply_patch(document: Mapping[str, Any], patch: Any, default: Mapping[str, A
         try:
             patched = _apply(patched, _check_operation(operation, k))
         except RecursionError as error:  # jsonpatch copies values recursively
-            raise EditError(f"operation {k} has a value nested too deep; no look is nested like that") from error
+            raise EditError(f"the value of operation {k} is nested too deeply for a look") from error
         except _PATCH_ERRORS as error:
             location = f"{operation['op']} at {operation['path']!r}"
             raise EditError(f"operation {k} cannot be applied, {location}: {_failure_reason(error)}") from error
@@ -47,12 +47,12 @@ def apply_patch(document: Mapping[str, Any], patch: Any, default: Mapping[str, A
 
 
 def rebase(document: Any, patch: Iterable[dict[str, Any]]) -> Any:
-    """A look after a patch that was made for another state of it; operations that do not fit are left out.
+    """Apply a patch that was made for another state of a look; operations that do not fit are skipped.
 
-    The editor does the same (`client_web/src/state/document/jsonPatch.ts`). Nothing is completed or checked.
+    The editor does the same (`client_web/src/state/document/jsonPatch.ts`). The result is not completed or validated.
 
     Args:
-        document: a look; it is not changed, unchanged parts are shared. patch: operations that are well formed.
+        document: a look, not modified; unchanged objects are shared. patch: well-formed operations.
     """
     for operation in patch:
         with suppress(*_PATCH_ERRORS):
@@ -61,10 +61,10 @@ def rebase(document: Any, patch: Iterable[dict[str, Any]]) -> Any:
 
 
 def _failure_reason(error: Exception) -> str:
-    """Say what went wrong without the piece of a look that the libraries quote."""
+    """Describe the failure without quoting the look, as the libraries' messages do."""
     if isinstance(error, jsonpatch.JsonPatchTestFailed):
         return "the test failed"
-    return "there is nothing like that in this look"
+    return "the path does not exist in this look"
 
 
 def _check_operation(operation: Any, k: int) -> dict[str, Any]:
@@ -79,7 +79,7 @@ def _check_operation(operation: Any, k: int) -> dict[str, Any]:
 
 
 def _apply(document: Any, operation: dict[str, Any]) -> Any:
-    """One operation on a copy of the containers along its path: the rest of the document is shared."""
+    """Apply one operation to copies of the containers along its path; the rest of the document is shared."""
     path = jsonpointer.JsonPointer(operation["path"]).parts
     if not path and operation["op"] == "remove":
         raise EditError('the whole look cannot be removed; replace the path "" by {} for the default look')

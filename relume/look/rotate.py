@@ -1,4 +1,4 @@
-"""Looks whose light stands elsewhere: turned about an upright line, as it is seen from a turntable."""
+"""Looks with rotated environment and lights, for turntables."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-_VERTICAL = 2e-6  # of a direction's square, off the upright line: as `relume.lights.local_lights.rectangle` has it
+_VERTICAL = 2e-6  # horizontal part of a squared direction, as in `relume.lights.local_lights.rectangle`
 
 
 def rotated_environment(document: Mapping[str, Any], degrees: float) -> dict[str, Any]:
-    """A look whose environment is turned further about +Y, counter-clockwise seen from above.
+    """Rotate the environment of a look about +Y, counter-clockwise from above.
 
     Args:
         document: a complete look. degrees: any number.
@@ -20,10 +20,10 @@ def rotated_environment(document: Mapping[str, Any], degrees: float) -> dict[str
 
 
 def rotated_lights(document: Mapping[str, Any], degrees: float, center: Sequence[float]) -> dict[str, Any]:
-    """A look whose environment and lamps are turned about an upright line; surfaces that shine stay where they are.
+    """Rotate the environment and the lights of a look about a vertical axis; emissive meshes stay in place.
 
     Args:
-        document: a complete look. degrees: counter-clockwise seen from above. center: a place on that line, metres.
+        document: a complete look. degrees: counter-clockwise from above. center: a point on the axis, meters.
     """
     lights = {name: _rotate_light(light, degrees, center) for name, light in document["lights"].items()}
     return {**rotated_environment(document, degrees), "lights": lights}
@@ -39,7 +39,7 @@ def _rotate_light(light: Mapping[str, Any], degrees: float, center: Sequence[flo
     if "direction" in light:
         rotated["direction"] = _rotate_vector(light["direction"], degrees)
         x, y, z = light["direction"]
-        if "rotation" in light and x * x + z * z < _VERTICAL * y * y:  # its height then lies along z, which turns not
+        if "rotation" in light and x * x + z * z < _VERTICAL * y * y:  # its height is then along z, which is fixed
             rotated["rotation"] = _wrap_degrees(light["rotation"] + (degrees if y > 0 else -degrees))
     return rotated
 
@@ -51,5 +51,5 @@ def _rotate_vector(vector: Sequence[float], degrees: float) -> list[float]:
 
 
 def _wrap_degrees(degrees: float) -> float:
-    """The same angle as sliders have it, in [-180, 180)."""
+    """Wrap an angle to the range of sliders, [-180, 180)."""
     return (degrees + 180) % 360 - 180

@@ -1,4 +1,4 @@
-"""Cameras that people place: part of a recipe, beside those that came with the scene."""
+"""Cameras that users place: part of a recipe, in addition to the cameras of the scene."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from relume.scene.model import Camera, Scene
 
 MAX_NAME = 80
 MIN_YFOV, MAX_YFOV = 1.0, 170.0  # degrees
-MAX_DISTANCE_M = 1e6  # metres from the origin; beyond, float32 cannot tell one pixel's ray from the next
+MAX_DISTANCE_M = 1e6  # meters from the origin; beyond, float32 rays of neighboring pixels are equal
 _FIELDS = ("name", "to_world", "yfov")
-# how far axes may be from right angles; below which nothing is done to them
+# largest allowed deviation from right angles; deviation below which axes are kept as they are
 _ANGLE_TOLERANCE, _RIGID_TOLERANCE = 1e-3, 1e-8
 
 
 @dataclass(frozen=True)
 class CustomCamera:
-    """A camera as it stands in a recipe; made by `make_custom_camera`.
+    """A camera in a recipe, made by `make_custom_camera`.
 
     Attributes:
         to_world: camera to world, 16 numbers by row; rigid.
@@ -35,23 +35,23 @@ class CustomCamera:
 
     @property
     def camera(self) -> Camera:
-        """As scenes have it."""
+        """Convert to a camera of a scene."""
         return Camera(self.name, np.array(self.to_world).reshape(4, 4), math.radians(self.yfov))
 
     def document(self) -> dict[str, Any]:
-        """As JSON; the inverse of `read_custom_camera`."""
+        """Convert to JSON; the inverse of `read_custom_camera`."""
         return {"name": self.name, "to_world": list(self.to_world), "yfov": self.yfov}
 
 
 def make_custom_camera(name: str, to_world: Sequence[float], yfov: float) -> CustomCamera:
-    """Check a camera that somebody placed.
+    """Validate a camera that a user placed.
 
     Args:
-        name: what views of it are called.
-        to_world: camera to world, 16 numbers by row; it looks along its -Z. Scale is taken out.
+        name: of its views.
+        to_world: camera to world, 16 numbers by row; the camera looks along its -Z. Scale is removed.
         yfov: vertical field of view, degrees.
     Raises:
-        ParameterError: one of them is not of a camera.
+        ParameterError: a value is invalid.
     """
     _check_name(name)
     if not (math.isfinite(yfov) and MIN_YFOV <= yfov <= MAX_YFOV):
@@ -60,7 +60,7 @@ def make_custom_camera(name: str, to_world: Sequence[float], yfov: float) -> Cus
 
 
 def read_custom_camera(document: object) -> CustomCamera:
-    """The camera of a JSON document. Raises ParameterError."""
+    """Read the camera of a JSON document. Raises ParameterError."""
     if not isinstance(document, Mapping) or set(document) != set(_FIELDS):
         raise ParameterError("camera", document, "an object with " + ", ".join(_FIELDS))
     name, to_world, yfov = (document[field] for field in _FIELDS)
@@ -74,7 +74,7 @@ def read_custom_camera(document: object) -> CustomCamera:
 
 
 def with_cameras(scene: Scene, cameras: Iterable[Camera]) -> Scene:
-    """The scene with more cameras, which win over those of the same name; it stays the same scene, by its id too."""
+    """Add cameras to a scene; they replace cameras of the same name. The scene's id stays the same."""
     added = {camera.name: camera for camera in cameras}
     scene_cameras = [camera for camera in scene.cameras if camera.name not in added]
     return replace(scene, cameras=(*scene_cameras, *added.values()))
@@ -87,7 +87,7 @@ def _check_name(name: str) -> None:
 
 
 def _rigid(to_world: Sequence[float]) -> tuple[float, ...]:
-    """The frame without scale. Raises ParameterError where its axes are not those of a camera."""
+    """Remove the scale of a frame. Raises ParameterError if its axes are not those of a camera."""
     allowed = "16 finite numbers by row, the last four 0, 0, 0, 1"
     if len(to_world) != 16:
         raise ParameterError("to_world", f"{len(to_world)} numbers", allowed)
@@ -95,13 +95,12 @@ def _rigid(to_world: Sequence[float]) -> tuple[float, ...]:
     if not np.isfinite(frame).all() or not np.array_equal(frame[3], (0, 0, 0, 1)):
         raise ParameterError("to_world", list(to_world), allowed)
     if np.abs(frame[:3, 3]).max() > MAX_DISTANCE_M:
-        raise ParameterError(
-            "to_world", frame[:3, 3].tolist(), f"an eye at most {MAX_DISTANCE_M:,.0f} m from the origin"
-        )
-    max_value = np.abs(frame[:3, :3]).max()  # asked first: squares of larger ones overflow
+        allowed = f"a camera position at most {MAX_DISTANCE_M:,.0f} m from the origin"
+        raise ParameterError("to_world", frame[:3, 3].tolist(), allowed)
+    max_value = np.abs(frame[:3, :3]).max()  # checked first: squares of larger values overflow
     lengths = np.linalg.norm(frame[:3, :3], axis=0) if max_value <= 1e12 else np.full(3, max_value)
     if lengths.min() < 1e-12 or lengths.max() > 1e12:
-        raise ParameterError("to_world", frame[:3, :3].tolist(), "three axes of a length, none of them zero")
+        raise ParameterError("to_world", frame[:3, :3].tolist(), "three axes with a length between 1e-12 and 1e12")
     axes = frame[:3, :3] / lengths
     if not np.allclose(axes.T @ axes, np.eye(3), rtol=0, atol=_ANGLE_TOLERANCE):
         raise ParameterError("to_world", frame[:3, :3].tolist(), "three axes at right angles")
@@ -110,7 +109,7 @@ def _rigid(to_world: Sequence[float]) -> tuple[float, ...]:
     if not np.allclose(frame[:3, :3].T @ frame[:3, :3], np.eye(3), rtol=0, atol=_RIGID_TOLERANCE):
         u, _, v = np.linalg.svd(axes)  # the nearest rotation
         frame[:3, :3] = u @ v
-    return tuple((frame + 0.0).ravel().tolist())  # -0 becomes 0: one text for one camera
+    return tuple((frame + 0.0).ravel().tolist())  # -0 becomes 0: equal cameras have equal text
 
 
 def _is_number(value: object) -> bool:

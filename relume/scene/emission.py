@@ -1,6 +1,6 @@
-"""Images of what surfaces shine: a light's emission is the mean over its surfaces, the image says where it is more.
+"""Emission textures: a light's emission is the mean over its surfaces, and the texture holds relative values.
 
-L(x) = emission · image(x),   mean of the image over the surfaces = 1 in every channel
+L(x) = emission · image(x), with mean(image) = 1 over the surfaces in each channel
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import luminance
@@ -18,19 +19,21 @@ from relume.scene.texture_encoding import decode, periodic
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_SUBDIVISIONS = 4  # along a side of a triangle: the middles of so many squared smaller ones are looked up
+_SUBDIVISIONS = 4  # along each edge of a triangle; the texture is sampled at the centers of the small triangles
 _FACES_PER_BATCH = 65_536
-_MIN_MEAN = 1e-6  # of a channel's mean: darker ones shine nothing
+_MIN_MEAN = 1e-6  # of a channel; below, it emits nothing
 
 
-def normalize_emission(material: Material, emission: F64, meshes: Sequence[Mesh]) -> tuple[Material, F64]:
-    """Bring an image of what a material shines to the mean of one.
+def normalize_emission(
+    material: Material, emission: Shaped[F64, " 3"], meshes: Sequence[Mesh]
+) -> tuple[Material, Shaped[F64, " 3"]]:
+    """Divide a material's emission texture by its mean over the surfaces.
 
     Args:
-        material: its image "emission" has sRGB bytes. emission: that multiplies the image. (3,)
-        meshes: that wear the material.
+        material: its texture "emission" has sRGB bytes. emission: factor of the texture.
+        meshes: that use the material.
     Returns:
-        The material, without the image where it is the same all over; and the mean radiance of its surfaces. (3,)
+        The material, without the texture if it is uniform; and the mean radiance of its surfaces.
     """
     texture = material.textures["emission"]
     areas = [_areas(mesh) for mesh in meshes]
@@ -44,8 +47,8 @@ def normalize_emission(material: Material, emission: F64, meshes: Sequence[Mesh]
     return replace(material, textures={**other_textures, "emission": normalized}), emission * mean
 
 
-def average_over_faces(texture: Texture, mesh: Mesh) -> F64:
-    """The mean of an image over each triangle of a mesh. (num_faces, 3)"""
+def average_over_faces(texture: Texture, mesh: Mesh) -> Shaped[F64, "triangles 3"]:
+    """Mean of a texture over each triangle of a mesh."""
     means = np.empty((len(mesh.faces), 3))
     for start in range(0, len(mesh.faces), _FACES_PER_BATCH):
         corners = mesh.uvs[mesh.faces[start : start + _FACES_PER_BATCH]].astype(np.float64)
@@ -57,13 +60,12 @@ def average_over_faces(texture: Texture, mesh: Mesh) -> F64:
 
 
 def has_emission_images(scene: Scene) -> bool:
-    """Whether any surface shines as an image says."""
+    """True if any material has an emission texture."""
     return any("emission" in material.textures for material in scene.materials)
 
 
-def relative_emission(scene: Scene) -> F32:
-    """How brightly each triangle of a scene shines, as eyes weigh the scene's own colours of it, over its material's
-    mean. (num_faces,)"""
+def relative_emission(scene: Scene) -> Shaped[F32, " triangles"]:
+    """Luminance of each triangle's emission, relative to the mean of its material, for unedited light colors."""
     emission_by_material = {light.fields.get("material"): light.fields["emission"] for light in scene.lights}
     relative = []
     for mesh in scene.meshes:
@@ -81,7 +83,7 @@ def relative_emission(scene: Scene) -> F32:
 
 
 def _subdivision_centers() -> list[tuple[float, float, float]]:
-    """Barycentric coordinates of the middles of the small triangles that a triangle is divided into."""
+    """Barycentric coordinates of the centers of the small triangles."""
     n = _SUBDIVISIONS
     upright = [(i + 1 / 3, j + 1 / 3) for i in range(n) for j in range(n - i)]
     inverted = [(i + 2 / 3, j + 2 / 3) for i in range(n) for j in range(n - i - 1)]
@@ -94,7 +96,7 @@ def _areas(mesh: Mesh) -> F64:
 
 
 def _nearest(texture: Texture, uv: F64) -> F32:
-    """The texels that places (n, 2) lie in. (n, 3)"""
+    """Look up the nearest texels at UV coordinates (n, 2). (n, 3)"""
     height, width = texture.pixels.shape[:2]
     column = periodic(np.floor(uv[:, 0] * width), width, texture.wrap[0])
     row = periodic(np.floor(uv[:, 1] * height), height, texture.wrap[1])

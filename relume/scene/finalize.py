@@ -1,4 +1,4 @@
-"""The end of every import: warnings in order and in bounds, then a checked scene."""
+"""The last step of every import: sorts and limits the warnings, then builds a validated scene."""
 
 from __future__ import annotations
 
@@ -23,24 +23,21 @@ def finalize(
     variants: Mapping[str, dict[str, Any]] | None = None,
     lights: Sequence[Light] = (),
 ) -> Scene:
-    """The scene of an imported file: as `make_scene`, the warnings that weigh most first and at most `MAX_WARNINGS`.
+    """Make the scene of an imported file; the most severe warnings come first, at most `MAX_WARNINGS`.
 
     Args:
-        name: what people call the scene.
-        meshes, materials, cameras: at least one of each; a mesh's `material` counts in `materials`.
+        name: shown to users.
+        meshes, materials, cameras: at least one of each; a mesh's `material` is an index into `materials`.
         environment: the distant light.
-        warnings: what the importer did not understand, one sentence each.
+        warnings: of the importer, one sentence each.
         variants: partial looks by name.
-        lights: local lights, each of a name of its own.
+        lights: local lights with unique names.
     Raises:
-        SceneError: the parts do not make a scene (see `relume.scene.validate`).
+        SceneError: the arguments are not a valid scene (see `relume.scene.validate`).
     """
     all_warnings = [*environment.warnings, *warnings]
     sorted_warnings = sorted(all_warnings, key=lambda warning: SEVERITIES.index(warning.severity))[:MAX_WARNINGS]
     if len(all_warnings) > len(sorted_warnings):
-        sorted_warnings.append(
-            ImporterWarning(
-                f"and {len(all_warnings) - len(sorted_warnings):,} more of the kind", sorted_warnings[-1].severity
-            )
-        )
+        num_omitted = len(all_warnings) - len(sorted_warnings)
+        sorted_warnings.append(ImporterWarning(f"… and {num_omitted:,} more.", sorted_warnings[-1].severity))
     return make_scene(name, meshes, materials, cameras, environment, sorted_warnings, variants, lights)

@@ -1,4 +1,4 @@
-"""Many small meshes as few large ones."""
+"""Merging of meshes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from relume.scene.model import Mesh
 
 
 def merge_by_material(meshes: Iterable[Mesh]) -> list[Mesh]:
-    """Make one mesh of all meshes of each material, under the name of the first."""
+    """Merge all meshes of each material into one, named after the first."""
     groups: dict[int, list[Mesh]] = {}
     for mesh in meshes:
         groups.setdefault(mesh.material, []).append(mesh)
@@ -19,7 +19,7 @@ def merge_by_material(meshes: Iterable[Mesh]) -> list[Mesh]:
 
 
 def merge_meshes(meshes: Sequence[Mesh]) -> Mesh:
-    """All triangles of some meshes, under the name and with the material of the first."""
+    """Merge meshes into one with the name and material of the first."""
     starts = accumulate((len(mesh.positions) for mesh in meshes[:-1]), initial=0)
     positions, normals, tangents, uvs = (
         np.concatenate([getattr(mesh, name) for mesh in meshes]) for name in ("positions", "normals", "tangents", "uvs")

@@ -1,6 +1,6 @@
-"""A scene as relume sees it: triangles in world space, materials by name, cameras, one environment, local lights.
+"""The scene model: triangles in world space, materials by name, cameras, one environment, local lights.
 
-Right-handed, +Y up, metres. Importers produce it, bakes read it; nothing changes it afterwards.
+Right-handed, +Y up, meters. Importers create scenes and bakes read them; they are immutable.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.environments.environment import Environment
@@ -19,16 +20,16 @@ U32 = NDArray[np.uint32]
 
 
 WRAPS = ("repeat", "mirror", "clamp")
-"""How textures may continue; stores and kernels know them by their places here."""
+"""Wrap modes of textures; stores and kernels identify them by their index."""
 
 
 @dataclass(frozen=True)
 class TextureEncoding:
-    """What the bytes of a texture stand for: see `relume.image_io.decode`.
+    """Meaning of a texture's bytes: see `relume.image_io.decode`.
 
     Attributes:
-        kind: "srgb", display values of colours; "normal", normals of tangent space; or "share", one number of [0, 1].
-        scale: multiplies the values. turn: of normals about +Z, radians.
+        kind: "srgb" for colors in sRGB, "normal" for tangent-space normals, or "share" for one number in [0, 1].
+        scale: multiplies the values. turn: rotation of normals about +Z, radians.
     """
 
     kind: str
@@ -38,28 +39,28 @@ class TextureEncoding:
 
 @dataclass(frozen=True)
 class Texture:
-    """An image, ready to be sampled.
+    """An image that can be sampled.
 
     Attributes:
-        pixels: top row first. (height, width, 3) uint8 where it has a coding, else float32, the values themselves;
-            (height, width, 1) of shares
-        wrap: how u and v continue outside [0, 1): "repeat", "mirror" or "clamp" each.
-        encoding: what bytes stand for; None where pixels are linear RGB, or normals.
+        pixels: top row first. uint8 with three channels, or one for kind "share", if there is an encoding; otherwise
+            float32 with three.
+        wrap: wrap modes of u and v outside [0, 1): "repeat", "mirror" or "clamp".
+        encoding: of bytes; None if pixels are linear RGB or normals.
     """
 
-    pixels: NDArray[Any]
+    pixels: Shaped[NDArray[Any], "height width channels"]
     wrap: tuple[str, str] = ("repeat", "repeat")
     encoding: TextureEncoding | None = None
 
 
 @dataclass(frozen=True)
 class Opacity:
-    """Where a surface is there.
+    """Opacity texture of a surface.
 
     Attributes:
-        alpha: 255 where it is. Top row first. (height, width) uint8
-        wrap: as that of a texture.
-        cutoff: share of 255 from which it is there; None where it is there for as many rays as alpha says.
+        alpha: 255 is opaque. Top row first. (height, width)
+        wrap: as in `Texture`.
+        cutoff: alpha-test threshold as a fraction of 255; None for stochastic transparency, with alpha the probability.
     """
 
     alpha: NDArray[np.uint8]
@@ -69,13 +70,13 @@ class Opacity:
 
 @dataclass(frozen=True)
 class Glass:
-    """A surface that light passes.
+    """Transmission through a surface.
 
     Attributes:
-        tint: share of the light that passes once, but for what is reflected. Three numbers within [0, 1].
-        ior: index of refraction, within [1, 4].
-        thickness: of a solid whose rim it is, about, metres; 0 for a pane, which bends nothing.
-        absorbed: inside of a solid, per metre. Three numbers.
+        tint: transmittance of one passage, without reflection. Three numbers in [0, 1].
+        ior: index of refraction, in [1, 4].
+        thickness: approximate thickness of a solid with this boundary, meters; 0 for a thin pane without refraction.
+        absorbed: absorption coefficients inside a solid, per meter. Three numbers.
     """
 
     tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -86,41 +87,40 @@ class Glass:
 
 @dataclass(frozen=True)
 class Mesh:
-    """Triangles of one material, node transforms applied.
+    """Triangles of one material, with node transforms applied.
 
     Attributes:
-        positions: world space, metres. (num_vertices, 3) float32
-        normals: unit, world space. (num_vertices, 3) float32
-        tangents: unit, world space, with handedness in w; zeros where the file has none. (num_vertices, 4) float32
-        uvs: texture coordinates, v from the top as in glTF; zeros where there are none. (num_vertices, 2) float32
-        faces: counter-clockwise seen from outside. (num_faces, 3) uint32
+        positions: world space, meters.
+        normals: unit, world space.
+        tangents: unit, world space, with handedness in w; zero if the file has none.
+        uvs: UV coordinates, v from the top as in glTF; zero if the file has none.
+        faces: counter-clockwise from outside.
         material: index into `Scene.materials`.
     """
 
     name: str
-    positions: F32
-    normals: F32
-    tangents: F32
-    uvs: F32
-    faces: U32
+    positions: Shaped[F32, "vertices 3"]
+    normals: Shaped[F32, "vertices 3"]
+    tangents: Shaped[F32, "vertices 4"]
+    uvs: Shaped[F32, "vertices 2"]
+    faces: Shaped[U32, "triangles 3"]
     material: int
 
 
 @dataclass(frozen=True)
 class Material:
-    """A named material: its default terms (look-document form) and its images.
+    """A named material: its default terms and its textures.
 
     Attributes:
-        terms: the material's default terms as they stand in a look document.
-        textures: per-sample multipliers by channel name; a term that names `"texture": "diffuse"` is multiplied by
-            `textures["diffuse"]`. Known channels: "diffuse", "specular"; and "roughness", over the roughness that
-            terms say, which scales the width of those with `"roughness_map": "roughness"`; and "emission", over the
-            mean of what the material's surfaces shine.
-        normal_map: tangent-space normals in [-1, 1]; None where there is none.
-        double_sided: whether both sides are seen; single-sided back faces are shaded as if turned round.
-        shadow_catcher: it is a ground that looks may show by its shadows alone, and the default look does.
-        opacity: where it has holes; None where it is whole.
-        glass: how light passes it; None where none does.
+        terms: default terms, as in a look document.
+        textures: by channel. "diffuse" and "specular" multiply the terms that name them, such as
+            `"texture": "diffuse"`. "roughness" is relative to the roughness of the terms and scales the width of those
+            with `"roughness_map": "roughness"`. "emission" is relative to the mean emission of the surfaces.
+        normal_map: tangent-space normals in [-1, 1]; None without normal mapping.
+        double_sided: both sides are visible; back faces of single-sided materials are shaded with a flipped normal.
+        shadow_catcher: a ground that looks may use as a shadow catcher, as the default look does.
+        opacity: None for an opaque surface.
+        glass: None for a surface without transmission.
     """
 
     name: str
@@ -134,21 +134,21 @@ class Material:
 
     @property
     def is_alpha_tested(self) -> bool:
-        """Whether rays may pass it, by holes or as glass."""
+        """True if rays can pass the surface, through its opacity texture or as glass."""
         return self.opacity is not None or self.glass is not None
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A view: looks along its -Z, `yfov` vertical, in radians.
+    """A view: looks along its -Z, with the vertical field of view `yfov` in radians.
 
     Attributes:
-        to_world: camera to world. (4, 4) float64, rigid
-        aspect: width ÷ height, as its file says; None where it does not. Pictures may have any other.
+        to_world: camera to world, rigid.
+        aspect: width ÷ height from the file, or None. Images may have any other.
     """
 
     name: str
-    to_world: NDArray[np.float64]
+    to_world: Shaped[NDArray[np.float64], "4 4"]
     yfov: float
     aspect: float | None = None
 
@@ -158,7 +158,7 @@ class Light:
     """A named local light.
 
     Attributes:
-        fields: `kind` and what else is not that kind's default, as they stand in a look document.
+        fields: `kind` and all fields that differ from its defaults, as in a look document.
     """
 
     name: str
@@ -167,12 +167,12 @@ class Light:
 
 @dataclass(frozen=True)
 class Scene:
-    """Everything that a bake needs to know of what is seen.
+    """Everything that a bake traces.
 
     Attributes:
-        id: hash of the content, hexadecimal; the same content has the same id.
-        warnings: what the importer did not understand, one sentence each.
-        variants: partial looks by the names that the file gives them.
+        id: hash of the content, hexadecimal.
+        warnings: of the importer, one sentence each.
+        variants: partial looks by name, from the file.
     """
 
     id: str

@@ -1,17 +1,18 @@
-"""Maps of roughness: at how many levels of it a material is shown, and which one each of its samples has.
+"""Quantization of roughness maps into levels.
 
-A normal map that is seen from far makes its material rougher: the facets of what a pixel covers lean as its normals do.
-With n̄ their mean, slopes have the variance σ² = (1 − |n̄|) / |n̄| along each axis (Toksvig 2005), and a lobe of facets
-whose slopes have the variance α² / 2 becomes one of α² + 2 σ² (Olano and Baker 2010). So, α = r²,
+A minified normal map makes a material rougher: normals vary within the footprint of a pixel. With their mean n̄, slopes
+have the variance σ² = (1 − |n̄|) / |n̄| along each axis (Toksvig 2005), and a microfacet lobe with slope variance α² / 2
+widens to α² + 2 σ² (Olano and Baker 2010). With α = r²,
 
-    r'(x) = (r(x)⁴ + 2 σ²(x))^¼,   over the r that the material's own terms say,
+    r'(x) = (r(x)⁴ + 2 σ²(x))^¼,   stored relative to the material's own roughness r.
 
-which is exact while a look leaves that r as it is, and grows with it where it does not.
+This is exact for the unedited r and scales in proportion if a look changes r.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.scene.model import Material, Texture
@@ -21,32 +22,32 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 MAX_LEVELS = 24
-# Levels are even in the root of the roughness: evenly rough ones would be told apart where they are smooth, and even
-# ratios where they are rough.
+# Levels are uniform in the square root of the roughness: with uniform roughness, steps would be visible at low
+# values, and with uniform log roughness at high ones.
 _STEP = 0.02
-_OUTLIER_FRACTION = 1e-3  # share of texels at each end that no level is made for
-_BLOCKS = (8, 64)  # texels across, whose normals are taken together
-_MIN_LENGTH = 0.2  # of a mean of normals: rougher than anything is
+_OUTLIER_FRACTION = 1e-3  # fraction of texels at each end of the range to ignore
+_BLOCKS = (8, 64)  # side lengths of texel blocks whose normals are averaged
+_MIN_LENGTH = 0.2  # clamp of mean normals; corresponds to more than any roughness
 
 
 def levels_of_material(material: Material) -> tuple[float, ...]:
-    """The levels of a material: roughness over what its terms say, rising. None where it has no map, or a plain one."""
+    """Roughness levels relative to the material's terms, ascending; empty if the roughness is uniform."""
     texture, base = material.textures.get("roughness"), base_roughness(material)
     return levels_of_texture(texture, base, 1.0 if base is None else min_mean_normal_length(material.normal_map))
 
 
 def levels_of_texture(texture: Texture | None, base: float | None, min_length: float) -> tuple[float, ...]:
-    """The levels between the ends of a map, as `levels_of_material` has them.
+    """Roughness levels over the range of a map, as `levels_of_material` returns them.
 
     Args:
-        texture: roughness over its mean, of bytes; None: one everywhere. base: that mean, see `rougher`; None: bumps
-            widen nothing. min_length: from `min_mean_normal_length`.
+        texture: roughness over its mean, as bytes; None for a constant 1. base: that mean, see `rougher`; None without
+            widening by normals. min_length: from `min_mean_normal_length`.
     """
     return levels_in_range(*ratio_range(texture), base, min_length)
 
 
 def ratio_range(texture: Texture | None) -> tuple[float, float]:
-    """The ratios between which a map of roughness lies, but for strays. texture: it; None: one everywhere."""
+    """Range of the ratios in a roughness map, without outliers; (1, 1) for None."""
     if texture is None:
         return 1.0, 1.0
     roots, count = _histogram(texture)
@@ -59,7 +60,7 @@ def ratio_range(texture: Texture | None) -> tuple[float, float]:
 
 
 def levels_in_range(lowest: float, highest: float, base: float | None, min_length: float) -> tuple[float, ...]:
-    """The levels between two ratios, `lowest` and `highest`, where bumps widen what they stand for.
+    """Roughness levels between the ratios `lowest` and `highest`, after widening by normals.
 
     base, min_length: see `levels_of_texture`.
     """
@@ -73,8 +74,7 @@ def levels_in_range(lowest: float, highest: float, base: float | None, min_lengt
 
 
 def base_roughness(material: Material) -> float | None:
-    """The roughness r of the terms that a material's normal map widens; None where none follows a map, or there is no
-    normal map."""
+    """Roughness r of the terms that a material's normal map widens; None without a roughness or normal map."""
     if material.normal_map is None:
         return None
     mapped_terms = (term for term in material.terms if term.get("roughness_map"))
@@ -82,41 +82,36 @@ def base_roughness(material: Material) -> float | None:
     return next((float(np.mean(value)) for value in roughness_values if value is not None), None)
 
 
-def rougher(ratio: F32, length: F32, base: float) -> F32:
-    """Roughness over `base`, of what covers normals that differ.
+def rougher(ratio: Shaped[F32, " n"], length: Shaped[F32, " n"], base: float) -> Shaped[F32, " n"]:
+    """Roughness relative to `base`, widened by the variation of normals.
 
     Args:
-        ratio: of a map of roughness. (n,) length: of the mean of the normals, at most 1. (n,)
+        ratio: of a roughness map. length: of the mean normal, at most 1.
         base: the roughness of the material's terms.
-    Returns:
-        (n,) float32
     """
     return np.asarray(((base * ratio) ** 4 + 2 * _variance(length)) ** 0.25 / base, np.float32)
 
 
-def smoother(ratio: F32, length: F32, base: float) -> F32:
-    """Roughness over `base` without the bumps that widened it: `rougher` the other way.
-
-    ratio, length, own: as there. Returns (n,) float32
-    """
+def smoother(ratio: Shaped[F32, " n"], length: Shaped[F32, " n"], base: float) -> Shaped[F32, " n"]:
+    """Roughness relative to `base` without the widening by normals: the inverse of `rougher`, with its arguments."""
     return np.asarray(np.maximum((base * ratio) ** 4 - 2 * _variance(length), 0) ** 0.25 / base, np.float32)
 
 
 def _variance(length: F32) -> F32:
-    """Of the slopes of normals whose mean is so long, σ². (n,)"""
+    """Slope variance σ² of normals whose mean has this length. (n,)"""
     clamped = np.clip(length, _MIN_LENGTH, 1)
     return np.asarray((1 - clamped) / clamped, np.float32)
 
 
-def select_level(ratios: tuple[float, ...], ratio: F32, threshold: F32 | float = 0.5) -> NDArray[np.uint8]:
-    """Choose one of the two levels between which each ratio lies.
+def select_level(
+    ratios: tuple[float, ...], ratio: Shaped[F32, " n"], threshold: Shaped[F32, " n"] | float = 0.5
+) -> Shaped[NDArray[np.uint8], " n"]:
+    """Choose one of the two levels that enclose each ratio.
 
     Args:
-        ratios: of the levels, rising. ratio: (n,)
-        threshold: how far it must be from the lower to the higher one to have that. Where neighbours differ in it, they
-            have both, in the right shares: no contours are seen. Within (0, 1). (n,)
-    Returns:
-        (n,)
+        ratios: of the levels, ascending. ratio: to quantize.
+        threshold: smallest fractional position for the higher level, in (0, 1). Thresholds that vary between neighbors
+            dither the levels, so that no contours are visible.
     """
     roots, root = np.sqrt(ratios), np.sqrt(ratio)
     level = np.interp(root, roots, np.arange(len(roots)))
@@ -124,10 +119,10 @@ def select_level(ratios: tuple[float, ...], ratio: F32, threshold: F32 | float =
 
 
 def min_mean_normal_length(normals: Texture | None) -> float:
-    """About the shortest mean of normals that a pixel covers: of blocks of some sizes, but for strays.
+    """Approximate length of the shortest mean normal in a pixel's footprint: blocks of two sizes, no outliers.
 
     Args:
-        normals: a normal map; without one it is 1.
+        normals: a normal map; 1 without one.
     """
     lengths = [1.0]
     for rows in () if normals is None else decode_rows(normals):
@@ -141,6 +136,6 @@ def min_mean_normal_length(normals: Texture | None) -> float:
 
 
 def _histogram(texture: Texture) -> tuple[F64, F64]:
-    """The root of the ratio that each byte stands for, rising, and how many texels have it. (256,) each"""
+    """Root of the ratio for each byte, ascending, and its number of texels. (256,) each"""
     values = decode(np.arange(256, dtype=np.uint8)[:, None], texture.encoding)[:, 0]
     return np.sqrt(values, dtype=np.float64), np.bincount(texture.pixels.ravel(), minlength=256).astype(np.float64)

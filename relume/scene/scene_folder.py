@@ -1,4 +1,4 @@
-"""A scene as a folder: scene.json (words and numbers) and arrays.npz (arrays), named by the hash of its content."""
+"""A scene as a folder: scene.json (text and numbers) and arrays.npz, identified by the hash of the content."""
 
 from __future__ import annotations
 
@@ -42,17 +42,17 @@ def make_scene(
     variants: Mapping[str, dict[str, Any]] | None = None,
     lights: Sequence[Light] = (),
 ) -> Scene:
-    """Checks the parts and joins them to a scene that knows its id.
+    """Validate the arguments and make a scene with its id.
 
     Args:
-        name: what people call the scene.
-        meshes, materials, cameras: at least one of each; a mesh's `material` counts in `materials`.
+        name: shown to users.
+        meshes, materials, cameras: at least one of each; a mesh's `material` is an index into `materials`.
         environment: the distant light.
-        warnings: what the importer did not understand, one sentence each.
+        warnings: of the importer, one sentence each.
         variants: partial looks by name.
-        lights: local lights, each of a name of its own.
+        lights: local lights with unique names.
     Raises:
-        SceneError: the parts do not make a scene (see `relume.scene.validate`).
+        SceneError: the arguments are not a valid scene (see `relume.scene.validate`).
     """
     check_scene(meshes, materials, cameras, environment, lights)
     contents = (tuple(meshes), tuple(materials), tuple(cameras), environment, tuple(warnings), dict(variants or {}))
@@ -67,7 +67,7 @@ def scene_id(document: dict[str, Any], arrays: Arrays) -> str:
 
 
 def scene_digest(document: dict[str, Any], arrays: Arrays) -> str:
-    """SHA-256 over all arrays and all that stands in the document but warnings and aspects, in hexadecimal digits."""
+    """SHA-256 of all arrays and of the document without warnings and aspects, in hexadecimal digits."""
     digest = hashlib.sha256()
     content = {key: value for key, value in document.items() if key not in ("id", "warnings", "aspects")}
     digest.update(json.dumps(content, sort_keys=True, allow_nan=False).encode())
@@ -79,17 +79,17 @@ def scene_digest(document: dict[str, Any], arrays: Arrays) -> str:
 
 
 def save_scene(scene: Scene, folder: str | Path) -> None:
-    """Writes the scene into `folder` (made where missing); readers see the old files or the new, never half of one.
+    """Write a scene into `folder`, which is created if missing; readers see either the old or the new files.
 
     Raises:
-        SceneError: the folder has a scene of the same id and other content.
+        SceneError: the folder has a scene with the same id and different content.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     document, arrays = _to_document(scene)
     document |= {"id": scene.id, "sha256": scene_digest(document, arrays)}
-    if _digest_in(folder, scene.id) not in (None, document["sha256"]):  # made for that: it takes billions of tries
-        raise SceneError(f"another scene is here as {scene.id}; delete that one first, if it is not yours")
+    if _digest_in(folder, scene.id) not in (None, document["sha256"]):  # a deliberate collision of 64-bit ids
+        raise SceneError(f"another scene with the id {scene.id} exists; delete it first if you don't need it")
     with atomic_write(folder / "arrays.npz") as unfinished:
         np.savez(unfinished, allow_pickle=False, **arrays)
     with atomic_write(folder / "scene.json") as unfinished:
@@ -97,7 +97,7 @@ def save_scene(scene: Scene, folder: str | Path) -> None:
 
 
 def _digest_in(folder: Path, scene_id: str) -> str | None:
-    """Of the scene of that id in a folder; None where there is none, it cannot be read, or it was saved without."""
+    """SHA-256 of the scene with that id in a folder; None if it is missing, unreadable, or saved without one."""
     try:
         document = _read_document(folder / "scene.json")
         return document.get("sha256") if document.get("id") == scene_id else None
@@ -106,10 +106,10 @@ def _digest_in(folder: Path, scene_id: str) -> str | None:
 
 
 def load_scene(folder: str | Path) -> Scene:
-    """Reads what `save_scene` wrote.
+    """Read a scene that `save_scene` wrote.
 
     Raises:
-        SceneError: a file is missing, damaged, larger than allowed, or does not hash to the id it claims.
+        SceneError: a file is missing, damaged, too large, or its content does not match its id.
     """
     folder = Path(folder)
     try:
@@ -125,12 +125,12 @@ def load_scene(folder: str | Path) -> Scene:
         raise SceneError(f"the scene in {folder.name!r} is damaged ({detail}); {REMEDY}") from None
     check_scene(scene.meshes, scene.materials, scene.cameras, scene.environment, scene.lights)
     if scene_id(*_to_document(scene)) != scene.id:
-        raise SceneError(f"the scene in {folder.name!r} is not the one that was saved there; {REMEDY}")
+        raise SceneError(f"the scene in {folder.name!r} was modified after it was saved; {REMEDY}")
     return scene
 
 
 def load_cameras(folder: str | Path) -> list[Camera]:
-    """The cameras alone of what `save_scene` wrote. Raises SceneError where they cannot be read."""
+    """Read only the cameras of a saved scene. Raises SceneError if they cannot be read."""
     try:
         return _cameras(_read_document(Path(folder) / "scene.json"))
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as problem:
@@ -138,7 +138,7 @@ def load_cameras(folder: str | Path) -> list[Camera]:
 
 
 def load_material(folder: str | Path, name: str) -> Material:
-    """One material of what `save_scene` wrote, with its own arrays alone.
+    """Read only one material of a saved scene, with its arrays.
 
     Raises:
         SceneError: it cannot be read. NotFoundError: the scene has no such material.
@@ -151,7 +151,7 @@ def load_material(folder: str | Path, name: str) -> Material:
                 return _assemble_material(index, document, arrays)
     except (OSError, ValueError, KeyError, TypeError, RecursionError, zipfile.BadZipFile) as problem:
         raise SceneError(f"the materials of the scene in {folder.name!r} cannot be read; {REMEDY}") from problem
-    raise NotFoundError(f"the scene has no material {name[:80]!r}; give one that it has")
+    raise NotFoundError(f"the scene has no material {name[:80]!r}; give one of its materials")
 
 
 def _textures(material: Material) -> Iterator[tuple[str, Texture]]:
@@ -161,7 +161,7 @@ def _textures(material: Material) -> Iterator[tuple[str, Texture]]:
 
 
 def _to_document(scene: Scene) -> tuple[dict[str, Any], Arrays]:
-    """The scene as a JSON document and named arrays, one to one."""
+    """Convert a scene to a JSON document and named arrays, without loss."""
     arrays: Arrays = {"environment": scene.environment.radiance}
     for i, mesh in enumerate(scene.meshes):
         arrays |= {f"mesh{i}_{key}": getattr(mesh, key) for key in MESH_ARRAYS}
@@ -179,7 +179,7 @@ def _to_document(scene: Scene) -> tuple[dict[str, Any], Arrays]:
                 "terms": list(material.terms),
                 "textures": {channel: list(texture.wrap) for channel, texture in _textures(material)},
                 "double_sided": material.double_sided,
-                # ids of scenes without these stay what they were
+                # omitted if empty: the ids of older scenes stay valid
                 **_encoding_documents(material),
                 **({"shadow_catcher": True} if material.shadow_catcher else {}),
                 **({"opacity": _opacity_document(material.opacity)} if material.opacity else {}),
@@ -210,7 +210,7 @@ def _opacity_document(opacity: Opacity) -> dict[str, Any]:
 
 
 def _from_document(document: dict[str, Any], arrays: Arrays) -> Scene:
-    """The inverse of `_to_document`; raises what Python raises where something is missing or of the wrong kind."""
+    """The inverse of `_to_document`; raises built-in exceptions for missing or invalid values."""
     meshes = [
         Mesh(name=str(m["name"]), material=int(m["material"]), **{k: arrays[f"mesh{i}_{k}"] for k in MESH_ARRAYS})
         for i, m in enumerate(document["meshes"])
@@ -258,7 +258,7 @@ def _assemble_texture(pixels: NDArray[Any], wrap: list[Any], encoding: dict[str,
         return Texture(pixels, (wrap_u, wrap_v))
     red, green, blue = map(float, encoding["scale"])
     if encoding["kind"] not in ("srgb", "normal", "share"):
-        raise SceneError(f"a texture of the scene has a coding that is not known; {REMEDY}")
+        raise SceneError(f"a texture of the scene has an unknown encoding; {REMEDY}")
     return Texture(
         pixels, (wrap_u, wrap_v), TextureEncoding(str(encoding["kind"]), (red, green, blue), float(encoding["turn"]))
     )
@@ -289,8 +289,7 @@ def _read_document(path: Path) -> dict[str, Any]:
 
 
 def _read_arrays(path: Path, prefix: str = "") -> Arrays:
-    """Those whose names begin so. Members are stored, not compressed, so that none can be larger than the file that is
-    there."""
+    """Read the arrays whose names begin with `prefix`. Members are uncompressed, so none exceeds the file's size."""
     size_bytes = path.stat().st_size
     if size_bytes > MAX_ARRAY_BYTES:
         raise SceneError(f"{path.name} is larger than {MAX_ARRAY_BYTES >> 30} GB; {REMEDY}")
@@ -307,12 +306,12 @@ def _read_arrays(path: Path, prefix: str = "") -> Arrays:
 
 
 def _read_array(file: BinaryIO, size_bytes: int) -> NDArray[Any]:
-    """One .npy member, its header checked against its length before anything of that size is made."""
+    """Read one .npy member; its header is checked against its length before memory is allocated."""
     if npy_format.read_magic(file) != (1, 0):
         raise SceneError(f"arrays.npz was not written by relume; {REMEDY}")
     shape, fortran_order, dtype = npy_format.read_array_header_1_0(file)
     needed_bytes = math.prod(shape) * dtype.itemsize
     if fortran_order or dtype not in _STORED or not 0 <= needed_bytes <= size_bytes:
-        raise SceneError(f"arrays.npz holds an array that relume does not write; {REMEDY}")
+        raise SceneError(f"arrays.npz contains an array that relume does not write; {REMEDY}")
     data = file.read(needed_bytes)
     return np.frombuffer(bytearray(data), dtype).reshape(shape)

@@ -1,4 +1,4 @@
-"""A ground under a scene: products come floating, and a shadow says where they stand."""
+"""A shadow-catching ground plane for scenes without one, such as product models."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from relume.scene.unique_names import unique_name
 
 F64 = NDArray[np.float64]
 
-_RADIUS_FACTOR = 10.0  # than the ball about the scene: there a shadow is less than a thousandth
+_RADIUS_FACTOR = 10.0  # times the scene's bounding radius: at that distance a shadow is below a thousandth
 _CORNERS = 96
-_RELATIVE_DEPTH = 1e-4  # of the ball's radius: surfaces that lie flat on it do not lie in it
+_RELATIVE_DEPTH = 1e-4  # of the bounding radius; keeps the ground below coplanar surfaces
 _GRAY = {"model": "lambert", "color": [0.5, 0.5, 0.5], "texture": None}
 
 
 def with_ground(scene: Scene, name: str | None = None) -> Scene:
-    """The scene on a large disc below its lowest point, which catches shadows and is a material of its own.
+    """Add a large disc below the lowest point of a scene, with a material of its own that can be a shadow catcher.
 
     Args:
-        name: of the new scene; that of the old one where None.
+        name: of the new scene; None for the old name.
     Raises:
-        SceneError: it has a ground already, or no room for another material.
+        SceneError: the scene has a ground already, or too many materials.
     """
     if any(material.shadow_catcher for material in scene.materials):
-        raise SceneError("the scene stands on a ground already; use it as it is")
+        raise SceneError("the scene already has a ground; use it as it is")
     ground_name = unique_name("Ground", {material.name: 1 for material in scene.materials})
     material = Material(ground_name, (_GRAY,), shadow_catcher=True)
     mesh = _disc(ground_name, *_ball(scene), material=len(scene.materials))
@@ -44,7 +44,7 @@ def with_ground(scene: Scene, name: str | None = None) -> Scene:
 
 
 def _ball(scene: Scene) -> tuple[F64, float]:
-    """The lowest point below the middle of all that there is, and the radius of the ball about it."""
+    """Center of the scene projected to its lowest point, and the bounding radius."""
     low = np.min([mesh.positions.min(axis=0) for mesh in scene.meshes], axis=0).astype(np.float64)
     high = np.max([mesh.positions.max(axis=0) for mesh in scene.meshes], axis=0).astype(np.float64)
     middle = (low + high) / 2
@@ -52,7 +52,7 @@ def _ball(scene: Scene) -> tuple[F64, float]:
 
 
 def _disc(name: str, center: F64, radius: float, *, material: int) -> Mesh:
-    """A disc that faces up, triangles about its middle."""
+    """A disc that faces up, as a triangle fan."""
     angle = 2 * np.pi * np.arange(_CORNERS) / _CORNERS
     boundary = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=1) * _RADIUS_FACTOR * radius
     positions = np.concatenate([[[0.0, 0.0, 0.0]], boundary]) + center - [0.0, _RELATIVE_DEPTH * radius, 0.0]

@@ -1,4 +1,4 @@
-"""What bytes of textures stand for: a fifth of the memory that values would take, decoded where they are looked up."""
+"""Encodings of textures as bytes, decoded at each lookup: a fifth of the memory of float values."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import srgb_decode, srgb_encode
@@ -15,18 +16,20 @@ U8 = NDArray[np.uint8]
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-ROWS_PER_BATCH = 256  # that are decoded together: a whole image of 8,192² would be 800 MB of values
+ROWS_PER_BATCH = 256  # rows to decode together; a whole image of 8,192² would take 800 MB
 SRGB_TO_LINEAR = srgb_decode((np.arange(256) / 255).astype(np.float32))
-_MIN_LENGTH = np.float32(1e-3)  # of a normal that says where it points
+_MIN_LENGTH = np.float32(1e-3)  # of a normal with a defined direction
 
 
-def decode(texels: NDArray[Any], encoding: TextureEncoding | None) -> F32:
-    """Find the values of texels.
+def decode(
+    texels: Shaped[NDArray[Any], "*batch channels"], encoding: TextureEncoding | None
+) -> Shaped[F32, "*batch channels"]:
+    """Decode texels.
 
     Args:
-        texels: bytes; values themselves where there is no coding. (..., 3), or (..., 1) of shares
+        texels: bytes, or float values if there is no encoding; one channel for kind "share", otherwise three.
     Returns:
-        Linear RGB, unit normals, or shares. Shaped like `texels`, float32
+        Linear RGB, unit normals, or values of one channel.
     """
     if encoding is None:
         return np.asarray(texels, np.float32)
@@ -45,25 +48,25 @@ def decode(texels: NDArray[Any], encoding: TextureEncoding | None) -> F32:
 
 
 def decode_rows(texture: Texture) -> Iterator[F32]:
-    """The values of a texture, some rows after others. (rows, width, 3 or 1) each"""
+    """Yield the decoded rows of a texture in batches. (rows, width, 3 or 1) each"""
     for start in range(0, len(texture.pixels), ROWS_PER_BATCH):
         yield decode(texture.pixels[start : start + ROWS_PER_BATCH], texture.encoding)
 
 
-def mean_value(texture: Texture) -> F64:
-    """The mean value. (3,)"""
+def mean_value(texture: Texture) -> Shaped[F64, " channels"]:
+    """Mean of the decoded texture."""
     total = sum(rows.sum(axis=(0, 1), dtype=np.float64) for rows in decode_rows(texture))
     return np.asarray(total / (texture.pixels.shape[0] * texture.pixels.shape[1]))
 
 
 def encode_rows(
-    values: Callable[[slice], F32], size: tuple[int, int], max_value: F64, wrap: tuple[str, str]
+    values: Callable[[slice], F32], size: tuple[int, int], max_value: Shaped[F64, " 3"], wrap: tuple[str, str]
 ) -> Texture:
-    """Make a texture of values that are computed some rows at a time.
+    """Encode a texture whose values are computed in batches of rows.
 
     Args:
-        values: of rows, (rows, width, 3); or one of all texels that are alike. size: height and width.
-        max_value: no value is above. (3,) wrap: of the texture.
+        values: returns (rows, width, 3), or (1, 1, 3) for a uniform texture. size: height and width.
+        max_value: upper bound of the values. wrap: of the texture.
     """
     pixels = np.empty((*size, 3), np.uint8)
     scale = np.maximum(max_value, 1e-6)
@@ -75,11 +78,11 @@ def encode_rows(
     return Texture(pixels, wrap, TextureEncoding("srgb", (red, green, blue)))
 
 
-def periodic(index: NDArray[np.float64], size: int, wrap: str) -> NDArray[np.int64]:
-    """Wrap texel indices into the image. Indices far outside stay exact: they are reduced in float64.
+def periodic(index: Shaped[NDArray[np.float64], " n"], size: int, wrap: str) -> Shaped[NDArray[np.int64], " n"]:
+    """Wrap texel indices into the image. Reduction in float64 keeps distant indices exact.
 
     Args:
-        index: whole numbers. (n,) size: texels along the axis. wrap: see `relume.scene.model.Texture`.
+        index: whole numbers. size: texels along the axis. wrap: see `relume.scene.model.Texture`.
     """
     if wrap == "clamp":
         return np.clip(index, 0, size - 1).astype(np.int64)

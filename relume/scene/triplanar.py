@@ -1,4 +1,4 @@
-"""Materials of triangles that have no place in textures: what covers them is projected along the world's axes."""
+"""Detection of materials without UV coordinates, for tri-planar mapping."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from relume.scene.model import Scene
 
 
 def find_triplanar(scene: Scene) -> list[bool]:
-    """Tell, of each material, whether most of its triangles have no place in textures."""
+    """Return, for each material, True if most of its triangles have no area in UV space."""
     num_faces, num_without_uvs = np.zeros((2, len(scene.materials)), np.int64)
     for mesh in scene.meshes:
         corners = mesh.uvs[mesh.faces]

@@ -1,4 +1,4 @@
-"""Names that are safe to show, to point at and to tell apart."""
+"""Names that are printable and unique."""
 
 from __future__ import annotations
 
@@ -8,17 +8,22 @@ UNREADABLE = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\u
 
 
 def unique_name(preferred: str, used_names: dict[str, int]) -> str:
-    """At most 80 characters, none that JSON Pointers or terminals mind, and not taken before."""
+    """Return a unique name of at most 80 characters, without characters special to JSON pointers or terminals."""
     plain = UNREADABLE.sub("", preferred[:1000]).replace("/", "-").replace("~", "-").strip()[:68].strip()
     return append_number(plain or "unnamed", " ", used_names)
 
 
+def quote(name: str) -> str:
+    """Quote a name from a file for a message, without unreadable characters."""
+    return f"“{UNREADABLE.sub('', name[:80])}”"
+
+
 def append_number(plain: str, separator: str, used_names: dict[str, int]) -> str:
-    """A name that is not taken: the plain one, or it with the first free number from 2.
+    """Return an unused name: `plain`, or `plain` with the first free number from 2.
 
     Args:
-        plain: the wanted name.
-        separator: stands between the name and the number.
+        plain: the preferred name.
+        separator: between the name and the number.
         used_names: the last number tried for each name; the new name is added.
     """
     name = plain

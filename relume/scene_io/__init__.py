@@ -1,1 +1,1 @@
-"""Scene files read: glTF, OBJ and PLY; untrusted, bounded before they are allocated."""
+"""Import of glTF, OBJ and PLY scenes; untrusted files are checked before memory is allocated."""

@@ -1,4 +1,4 @@
-"""Scene files of any kind that relume reads, told apart by what they begin with."""
+"""Import of scene files in any supported format, detected from their content."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ def import_scene(
     environment: Environment | None = None,
     companions: Companions | None = None,
 ) -> Scene:
-    """Reads .glb, .gltf, .obj, .ply, or a .zip with one of them and the files that it names.
+    """Import .glb, .gltf, .obj, .ply, or a .zip with one of them and the files that it needs.
 
     Args:
-        source: a path, whose folder may hold the files that the scene names; or bytes, which stand alone.
-        name: what people call the scene.
-        environment: the light; the studio of the built-in scene where None.
-        companions: the files that came with it, where they do not lie in its folder or in the same archive.
+        source: a path, whose folder may have further files; or the bytes of a file.
+        name: of the scene, shown to users.
+        environment: None for the built-in studio.
+        companions: further files, if they are not in the folder or in the same archive.
 
     Raises:
-        SceneError: the file cannot be used; the message says why and what to do.
+        SceneError: the file is unusable; the message says why and what to do.
     """
     data = read_file(source)
     if not data:
@@ -47,11 +47,11 @@ def import_scene(
         return import_gltf(data, name, environment, companions)
     if b"\0" not in data[:4_096] and OBJ_LINE.search(data[: 1 << 20]):
         return import_obj(data, name, environment, companions)
-    raise SceneError("the scene file is none of .glb, .gltf, .obj, .ply or .zip; export it as .glb")
+    raise SceneError("the scene file is not .glb, .gltf, .obj, .ply or .zip; export it as .glb")
 
 
 def read_file(source: str | Path | bytes) -> bytes:
-    """The bytes of a file of bounded size. Raises SceneError."""
+    """Read a file of limited size. Raises SceneError."""
     if isinstance(source, bytes):
         data = source
     else:
@@ -60,7 +60,7 @@ def read_file(source: str | Path | bytes) -> bytes:
                 raise SceneError(f"{Path(source).name!r} is larger than {MAX_FILE_BYTES >> 20} MB; simplify the scene")
             data = Path(source).read_bytes()
         except OSError as problem:
-            raise SceneError(f"{Path(source).name!r} cannot be read ({problem.strerror}); check the path") from None
+            raise SceneError(f"{str(source)!r} cannot be read ({problem.strerror}); check the path") from None
     if len(data) > MAX_FILE_BYTES:
-        raise SceneError(f"the scene file has {len(data) >> 20} MB, {MAX_FILE_BYTES >> 20} MB are allowed; simplify it")
+        raise SceneError(f"the scene file is {len(data) >> 20} MB, the limit {MAX_FILE_BYTES >> 20} MB; simplify it")
     return data

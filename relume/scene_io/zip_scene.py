@@ -1,4 +1,4 @@
-"""A scene in a .zip file: one scene file with what it names, bounded before any of it is unpacked."""
+"""A scene in a .zip file: one scene file and its companions, with limits that are checked before decompression."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ TOO_MANY_ENTRIES = f"the .zip file has more than {MAX_ENTRIES:,} entries; pack o
 
 
 def open_zip(data: bytes) -> tuple[bytes, Archive]:
-    """The scene file in the archive, and its companions.
+    """Open the scene file in an archive, and its companions.
 
     Raises:
-        SceneError: the archive is damaged, encrypted, too large, or holds no scene file or several.
+        SceneError: the archive is damaged, encrypted, too large, or does not contain exactly one scene file.
     """
     if b"PK\5\6" not in data:
         raise SceneError("the .zip file is truncated; download or pack it again")
@@ -34,7 +34,7 @@ def open_zip(data: bytes) -> tuple[bytes, Archive]:
     _check_entries(entries)
     scenes = [entry for entry in entries if entry.filename.lower().endswith(SCENE_SUFFIXES)]
     if len(scenes) != 1:
-        raise SceneError(f"the .zip file holds {len(scenes)} scene files; pack one of .glb, .gltf, .obj or .ply")
+        raise SceneError(f"the .zip file contains {len(scenes)} scene files; pack one of .glb, .gltf, .obj or .ply")
     folder = posixpath.dirname(scenes[0].filename.replace("\\", "/"))
     return read_entry(archive, scenes[0]), Archive(archive, folder)
 
@@ -48,9 +48,9 @@ def _check_entries(entries: list[zipfile.ZipInfo]) -> None:
         if entry.flag_bits & 1:
             raise SceneError("the .zip file is encrypted; pack it without a password")
         if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            raise SceneError("the .zip file is packed in an unusual way; pack it with deflate")
+            raise SceneError("the .zip file has an unsupported compression; pack it with deflate")
 
 
 def _is_litter(name: str) -> bool:
-    """What desktops add to archives."""
+    """True for files that operating systems add to archives."""
     return name.startswith("__MACOSX/") or posixpath.basename(name).startswith(".")

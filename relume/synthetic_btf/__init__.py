@@ -1,1 +1,1 @@
-"""Synthetic BTFs: small periodic geometry rendered for all view and light directions. Nothing here was measured."""
+"""Synthetic BTFs: small periodic geometry rendered for all view and light directions, without measurements."""

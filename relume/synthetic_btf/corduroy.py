@@ -1,4 +1,4 @@
-"""Corduroy: soft cords beside each other, of a pile that lies unevenly."""
+"""Corduroy: soft parallel cords with an uneven pile."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import numpy as np
 
 from relume.synthetic_btf.tileable_geometry import Tile
 
-_CORDS = 4  # a period
+_CORDS = 4  # per period
 _HEIGHT, _PILE = 0.09, 0.012
-_STEPS = 112  # of the grid, along each side
-_WAVES = 10  # of the pile's unevenness
+_STEPS = 112  # of the grid, per side
+_WAVES = 10  # largest frequency of the pile's unevenness along the cords
 _SEED = 3
 
 TERMS = ({"model": "oren_nayar", "color": [0.62, 0.45, 0.22], "params": {"sigma": 0.6, "albedo": 0.6}},)
 
 
 def corduroy() -> Tile:
-    """One period of it, a height over the plane."""
+    """Return one period as a height field."""
     u, v = np.meshgrid(np.linspace(0, 1, _STEPS + 1), np.linspace(0, 1, _STEPS + 1), indexing="xy")
     rng = np.random.default_rng(_SEED)
     pile = np.zeros_like(u)
@@ -27,7 +27,7 @@ def corduroy() -> Tile:
     height = _HEIGHT * round_top + _PILE * pile * (0.3 + 0.7 * round_top)
     positions = np.stack([u, v, height], axis=-1)
     step = 1 / _STEPS
-    inner = height[:-1, :-1]  # one period: differences go round
+    inner = height[:-1, :-1]  # one period, for periodic differences
     slope = [
         np.pad((np.roll(inner, -1, k) - np.roll(inner, 1, k)) / (2 * step), ((0, 1), (0, 1)), "wrap") for k in (1, 0)
     ]

@@ -1,4 +1,4 @@
-"""Pebbles: round stones of many sizes in sand."""
+"""Pebbles: round stones of different sizes in sand."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ F64 = NDArray[np.float64]
 
 
 def pebbles() -> Tile:
-    """One period of it: ellipsoids, half in a plane."""
+    """Return one period: ellipsoids, half buried in a plane."""
     centers, radii = _scatter_stones(np.random.default_rng(_SEED))
     theta, phi = np.linspace(0, 0.62 * np.pi, _RINGS + 1), np.arange(2 * _RINGS) * (np.pi / _RINGS)
     t, p = (grid.ravel() for grid in np.meshgrid(theta, phi, indexing="ij"))
@@ -33,7 +33,7 @@ def pebbles() -> Tile:
     faces = np.concatenate(
         [np.stack([a, a + ring_size, b], axis=1), np.stack([b, a + ring_size, b + ring_size], axis=1)]
     )
-    faces = faces[~((faces < ring_size).sum(axis=1) > 1)]  # at the pole a ring is a point
+    faces = faces[~((faces < ring_size).sum(axis=1) > 1)]  # the first ring is a point at the pole
     shape = np.array([1, 1, _FLAT])
     normal = unit / shape
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -52,7 +52,7 @@ def pebbles() -> Tile:
 
 
 def _scatter_stones(rng: np.random.Generator) -> tuple[F64, F64]:
-    """Places and radii of stones that hardly touch, the largest first. (n, 2) and (n,)"""
+    """Positions and radii of stones that hardly touch, the largest first. (n, 2) and (n,)"""
     radii = np.sort(rng.uniform(*_RADII, _STONES))[::-1]
     centers: list[F64] = []
     placed_radii: list[float] = []
@@ -60,7 +60,7 @@ def _scatter_stones(rng: np.random.Generator) -> tuple[F64, F64]:
         for _ in range(_TRIES // _STONES):
             candidate = rng.random(2)
             offsets = np.array(centers).reshape(-1, 2) - candidate
-            offsets -= np.rint(offsets)  # beside the square is the next
+            offsets -= np.rint(offsets)  # periodic
             if not centers or (np.linalg.norm(offsets, axis=1) > 0.92 * (np.array(placed_radii) + radius)).all():
                 centers.append(candidate)
                 placed_radii.append(float(radius))

@@ -1,18 +1,16 @@
-"""What a small geometry sends from each place of its plane to each side, lit from each: the values of its BTF.
+"""Rendering of a tileable geometry for all view and light directions: the values of its BTF.
 
     B_x(v, l) = ∫_texel [ f(l, v) cos θ_l V(l) + ρ/π · E_l ] dx ,
 
-where an eye far off towards v sees the geometry through the texel. Straight light is traced from many directions ω_j,
-evenly over the hemisphere, others at each place of a texel; values are on the way to those that tell it best,
+with parallel view rays toward v through the texel. Direct illumination is traced for many directions ω_j, uniform over
+the hemisphere and different for each sample of a texel; values are a regularized least-squares fit to it,
 
     B(v, ·) → argmin Σ_j ( Σ_l hat_l(ω_j) B(v, l) − f(ω_j, v) cos θ_j V(ω_j) )² ,
 
-with hat_l of `relume.assets.btf.direction_rings` (docs/btf.md#against-the-geometry). Eyes are points, as far lenses
-are: between them relief is found by its height (`relume.assets.btf.parallax`),
-which a blur would only hide. E_l is the irradiance by light that other faces
-have sent on, which do so as matt surfaces of the same reflectance ρ: found once for the middles of all faces,
-by rays to other
-faces, as often as it takes.
+with hat_l of `relume.assets.btf.direction_rings` (docs/btf.md#against-the-geometry). View directions are exact, without
+blur: between them, parallax is computed from the height (`relume.assets.btf.parallax`). E_l is the irradiance by
+indirect illumination, from diffuse reflection with the same reflectance ρ: solved once for the centers of all faces,
+with form factors from random rays, over several bounces.
 """
 
 from __future__ import annotations
@@ -21,6 +19,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
@@ -37,17 +36,17 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 _GRAZING = np.radians(82.5)  # θ of the lowest rays
-_SURFACE_OFFSET = 1e-5  # periods that rays begin off surfaces
-_RAYS_PER_FACE = 96  # to other faces
+_SURFACE_OFFSET = 1e-5  # of ray origins, in periods
+_RAYS_PER_FACE = 96  # for form factors
 _BOUNCES = 5
-_CAMERA_HEIGHT = 4.0  # periods above the plane that eyes' rays begin
+_CAMERA_HEIGHT = 4.0  # periods from the plane to the origins of view rays
 _MAX_PAIRS = 1 << 19
-_STEPS = 2  # towards the least squares: all the way, what single places see by chance would be kept, too
+_STEPS = 2  # of the least-squares iteration; more would fit the noise of single samples
 _GOLDEN = np.pi * (3 - 5**0.5)
 
 
 class _SurfaceSamples(NamedTuple):
-    """Places on the geometry. position: off it. (n, 3) float32. normal: shading. (n, 3) float32. material: (n,)"""
+    """Points on the geometry. position: off it. (n, 3) float32. normal: shading. (n, 3) float32. material: (n,)"""
 
     position: F32
     normal: F32
@@ -58,10 +57,10 @@ class _SurfaceSamples(NamedTuple):
 
 
 class _LightSamples(NamedTuple):
-    """Light at one place of each texel: where it comes from, and what its light adds to the values of all l.
+    """Light directions for one sample of each texel, and their contributions to the values of all l.
 
     Attributes:
-        directions: ω. (L, 3). weights: of the texel's values. (L of values, L of ω)
+        directions: ω. (L, 3). weights: in the texel's values. (L of values, L of ω)
     """
 
     directions: F64
@@ -69,12 +68,12 @@ class _LightSamples(NamedTuple):
 
 
 class TileGeometry:
-    """A tile and what is beside it, ready to be lit and looked at.
+    """A tile with its repetitions, as a ray-tracing scene.
 
     Args:
-        tile: one period. grid: of directions to lights and to eyes. size: height and width of the texture, texels.
-        samples_per_side: places along each side of a texel that are looked at, each in light from other directions.
-        seed: of the rays between faces.
+        tile: one period. grid: of light and view directions. size: height and width of the texture, texels.
+        samples_per_side: samples along each side of a texel, each with different light directions.
+        seed: of the rays for form factors.
     """
 
     def __init__(
@@ -86,27 +85,23 @@ class TileGeometry:
         ]
         self._num_faces, self._material = len(tile.faces), tile.material
         centered = centered_height(tile)
-        # that rays pass on their way, and what reaches over the square's sides
+        # periods that rays cross, and geometry that extends over the square's sides
         self._num_repeats = max(1, int(np.ceil(np.ptp(centered.positions[:, 2]) * np.tan(_GRAZING))))
         self._repeated_tile = repeat_tile(centered, self._num_repeats)
         self._positions = self._repeated_tile.positions.astype(np.float32)
         self._embree = EmbreeScene.build(self._positions, self._repeated_tile.faces.astype(np.uint32))
         self._directions = directions(grid)
 
-    def get_view(self, view: int) -> F32:
-        """Every texel's values from one direction. (lights, texels, 3) float32"""
+    def get_view(self, view: int) -> Shaped[F32, "lights texels 3"]:
+        """Values of all texels from one view direction."""
         wo = self._directions[view]
         out = np.zeros((self.grid.num_directions, self.size[0] * self.size[1], 3))
         for subsample, light_samples in enumerate(self._light_samples):
             out += self._shade_hits(self._trace_view(subsample, wo), wo, light_samples)
         return np.maximum(out, 0).astype(np.float32)
 
-    def height(self) -> F32:
-        """How far over the texture's plane the geometry reaches at each texel; in holes, as far as it reaches down.
-
-        Returns:
-            In sides of the texture. (height, width) float32
-        """
+    def height(self) -> Shaped[F32, "height width"]:
+        """Height of the geometry above the texture's plane, in side lengths of the texture; lowest vertex at holes."""
         up, samples_per_side, deepest = np.array([0.0, 0.0, 1.0]), self._samples_per_side, self._positions[:, 2].min()
         above = [
             _CAMERA_HEIGHT - self._trace_view(subsample, up).distance
@@ -115,7 +110,7 @@ class TileGeometry:
         return np.asarray(np.maximum(above, deepest).mean(axis=0), np.float32).reshape(self.size)
 
     def _trace_view(self, subsample: int, wo: F64) -> Hits:
-        """What is seen from afar at one place of each texel."""
+        """Trace view rays for one sample of each texel."""
         (height, width), samples_per_side = self.size, self._samples_per_side
         row, column = np.divmod(np.arange(height * width), width)
         x = (column + (subsample % samples_per_side + 0.5) / samples_per_side) / width
@@ -125,7 +120,7 @@ class TileGeometry:
 
     @cached_property
     def _light_samples(self) -> list[_LightSamples]:
-        """The light of each place: the same for all texels, so that what it misses is no noise."""
+        """Light directions for each sample; equal for all texels, so that errors are not noise."""
         num_subsamples = self._samples_per_side**2
         if num_subsamples == 1:
             return [_LightSamples(self._directions, np.eye(len(self._directions)))]
@@ -143,7 +138,7 @@ class TileGeometry:
         ]
 
     def _shade_hits(self, hits: Hits, wo: F64, light_samples: _LightSamples) -> F64:
-        """What hits add to values towards wo, by light. (lights, hits, 3)"""
+        """Contribution of hits to the values toward wo, by light. (lights, hits, 3)"""
         is_hit, values = hits.face >= 0, np.zeros((self.grid.num_directions, len(hits.face), 3))
         surface_hits = hits.rows(is_hit)
         samples = self._surface_samples(surface_hits, wo)
@@ -159,12 +154,12 @@ class TileGeometry:
         return values
 
     def _direct(self, samples: _SurfaceSamples, wo: F64, lights: F64) -> F64:
-        """f cos θ V of all pairs of places and lights. (places, lights, 3)"""
+        """f cos θ V of all pairs of points and lights. (points, lights, 3)"""
         n = samples.normal.astype(np.float64)
         t = any_tangent(samples.normal).astype(np.float64)
         frame = np.stack([t, np.cross(n, t), n], axis=1)
         cosine = np.maximum(n @ lights.T, 0) * self._visible(samples, lights)
-        sample_index, light_index = np.nonzero(cosine)  # half of all pairs are dark
+        sample_index, light_index = np.nonzero(cosine)  # half of the pairs are unlit
         local = np.einsum("nij,nj->ni", frame[sample_index], lights[light_index])
         wo_local = np.einsum("pij,j->pi", frame, wo)[sample_index]
         out = np.zeros((*cosine.shape, 3))
@@ -191,7 +186,7 @@ class TileGeometry:
         normal = (n * b).sum(axis=1)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         normal = np.where(np.einsum("nc,nc->n", normal, face_normal)[:, None] < 0, -normal, normal)
-        deficit = np.maximum(0.01 - normal @ wo, 0)[:, None]  # what is seen faces the eye
+        deficit = np.maximum(0.01 - normal @ wo, 0)[:, None]  # shading normals must face the viewer
         normal += deficit * wo
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         position = (p * b).sum(axis=1) + _SURFACE_OFFSET * face_normal
@@ -207,7 +202,7 @@ class TileGeometry:
 
     @cached_property
     def _indirect_irradiance(self) -> F64:
-        """E of each face of the tile, by light: what has been sent on at least once. (faces, lights, 3)"""
+        """E of each face of the tile, by light: irradiance after at least one bounce. (faces, lights, 3)"""
         face_centers = Hits(
             np.arange(self._num_faces, dtype=np.int32)
             + self._num_faces * (2 * self._num_repeats + 2) * self._num_repeats,
@@ -226,7 +221,7 @@ class TileGeometry:
         return np.asarray(indirect)
 
     def _form_factors(self, samples: _SurfaceSamples) -> csr_array:
-        """Form factors: what share of the hemisphere over each face others take. (faces, faces)"""
+        """Form factors: fractions of the hemisphere over each face that other faces cover. (faces, faces)"""
         rng, num = np.random.default_rng(self._seed), self._num_faces
         u, azimuth_sample = rng.random((2, num, _RAYS_PER_FACE))
         u = (np.arange(_RAYS_PER_FACE) + u) / _RAYS_PER_FACE
@@ -243,6 +238,6 @@ class TileGeometry:
 
 
 def _uniform_hemisphere(num: int) -> F64:
-    """Directions evenly over the hemisphere, on a spiral. (num, 3)"""
+    """Uniform directions over the hemisphere, on a spiral. (num, 3)"""
     k = np.arange(num, dtype=np.float64)
     return polar(np.arccos(1 - (k + 0.5) / num), k * _GOLDEN)

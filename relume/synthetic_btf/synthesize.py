@@ -1,6 +1,6 @@
-"""Makes synthetic BTFs: renders a small geometry from all sides in light from all sides, and compresses that.
+"""Synthesis of BTFs: renders a geometry for all view and light directions, and compresses the values.
 
-What is rendered stays in a folder until it is compressed, so that a run that was killed goes on where it was.
+Rendered values stay in a folder until they are compressed, so that an interrupted run can resume.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from relume.synthetic_btf.weave import weave
 
 GEOMETRIES = {"weave": weave, "pebbles": pebbles, "corduroy": corduroy}
 MESH: Final = "mesh"
-"""Geometry that a file holds."""
+"""Geometry from a file."""
 MIN_SIZE = 8
 MAX_GRID = 8
 _SEED = 1
-_LIGHT = "fitted"  # what values tell of it, see `relume.synthetic_btf.render`: others are other BTFs
-_RENDER_PROGRESS = 0.8  # of the time, about
+_LIGHT = "fitted"  # how values are fitted, see `relume.synthetic_btf.render`; part of the BTF's hash
+_RENDER_PROGRESS = 0.8  # approximate fraction of the time
 
 
 class SyntheticBtf(NamedTuple):
-    """What is to be made.
+    """A request for a synthetic BTF.
 
     Attributes:
-        geometry: one of `GEOMETRIES`, or `MESH`. size: texels along each side.
-        grid: places along each side of a texel that are looked at, each in light from other directions.
-        bound: relative RMS that compression may miss.
+        geometry: one of `GEOMETRIES`, or `MESH`. size: texels per side.
+        grid: samples along each side of a texel, each with different light directions.
+        bound: allowed relative RMS error of the compression.
         file: of a mesh. period: of it, see `read_tile`.
     """
 
@@ -55,7 +55,7 @@ class SyntheticBtf(NamedTuple):
     period: float | None = None
 
     def check(self) -> None:
-        """Raise ParameterError where it cannot be made."""
+        """Raise ParameterError if a value is out of range."""
         if self.geometry not in GEOMETRIES and self.file is None:
             raise ParameterError("geometry", self.geometry, f"one of {', '.join(GEOMETRIES)}")
         if not (self.size >= MIN_SIZE and self.size**2 <= MAX_TEXELS):
@@ -66,11 +66,11 @@ class SyntheticBtf(NamedTuple):
             raise ParameterError("--error", self.bound, "0.0001 to 0.5")
 
     def tile(self) -> Tile:
-        """The geometry. Raises SceneError, ParameterError where a file holds none."""
+        """Return the geometry. Raises SceneError, ParameterError if the file is unusable."""
         return GEOMETRIES[self.geometry]() if self.file is None else read_tile(self.file, self.period)
 
     def recipe(self, tile: Tile) -> dict[str, Any]:
-        """What it is made from, all of it: the same is the same BTF."""
+        """Describe all inputs; equal recipes are the same BTF."""
         fields = {name: getattr(self, name) for name in ("geometry", "size", "grid", "bound")}
         if self.file is not None:
             hashed = hashlib.sha256(json.dumps(tile.materials, sort_keys=True).encode())
@@ -88,15 +88,15 @@ def synthesize_btf(
     is_canceled: Callable[[], bool],
     partial_folder: Path | None = None,
 ) -> BtfRecord:
-    """Render and compress; the same again is the same BTF, and one that was begun goes on.
+    """Render and compress a BTF; an equal request is the same BTF, and an interrupted one resumes.
 
     Args:
-        folder: of the asset store. request: what. name: what people call it.
-        progress: called with the share done. is_canceled: asked now and then.
-        partial_folder: folder of what was rendered so far; by default in `folder`, by what is wanted.
+        folder: of the asset store. request: what to render. name: shown to users.
+        progress: called with the completed fraction. is_canceled: checked regularly.
+        partial_folder: folder of rendered values; by default in `folder`, named by the request.
     Raises:
-        ParameterError: it cannot be made. CancelledError: `is_canceled` said so; what was rendered stays.
-        MaterialError: the store is full. SceneError: the mesh cannot be used.
+        ParameterError: a value is out of range. CancelledError: `is_canceled` is true; rendered values stay.
+        MaterialError: the store is full. SceneError: the mesh is unusable.
     """
     request.check()
     tile = request.tile()

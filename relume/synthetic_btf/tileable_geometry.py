@@ -1,4 +1,4 @@
-"""One period of a small geometry: what lies over the unit square, and repeats beside it without end."""
+"""One period of a tileable geometry: over the unit square, repeated without end."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple, Self
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 F64 = NDArray[np.float64]
@@ -14,41 +15,43 @@ Terms = tuple[Mapping[str, Any], ...]
 
 
 class Tile(NamedTuple):
-    """A geometry over [0, 1]², x to the right and y up in its texture, z towards the eye; z = 0 is the texture's plane.
+    """A geometry over [0, 1]²: x to the right and y up in its texture, z toward the viewer, the texture at z = 0.
 
-    Triangles may reach over the square's sides: what is beside it does so too.
+    Triangles may extend over the square's sides, as do those of the neighboring periods.
 
     Attributes:
-        positions: (n, 3). normals: unit. (n, 3). faces: counter-clockwise seen from outside. (m, 3)
-        material: of each face. (m,)
-        materials: terms of each, in the form of look documents; isotropic.
+        normals: unit. faces: counter-clockwise from outside.
+        material: of each face.
+        materials: terms of each, as in look documents; isotropic.
     """
 
-    positions: F64
-    normals: F64
-    faces: I64
-    material: I64
+    positions: Shaped[F64, "vertices 3"]
+    normals: Shaped[F64, "vertices 3"]
+    faces: Shaped[I64, "triangles 3"]
+    material: Shaped[I64, " triangles"]
     materials: tuple[Terms, ...]
 
     @classmethod
-    def with_single_material(cls, positions: F64, normals: F64, faces: I64, terms: Terms) -> Self:
-        """One whose faces all have the same material.
-
-        Args:
-            positions, normals, faces: see the class. terms: of the material.
-        """
+    def with_single_material(
+        cls,
+        positions: Shaped[F64, "vertices 3"],
+        normals: Shaped[F64, "vertices 3"],
+        faces: Shaped[I64, "triangles 3"],
+        terms: Terms,
+    ) -> Self:
+        """Make a tile with one material for all faces."""
         return cls(positions, normals, faces, np.zeros(len(faces), np.int64), (terms,))
 
 
 def centered_height(tile: Tile) -> Tile:
-    """Put the middle of its heights to z = 0."""
+    """Move the center of the height range to z = 0."""
     z = tile.positions[:, 2]
     shift = np.array([0, 0, 0.5 * (z.min() + z.max())])
     return tile._replace(positions=tile.positions - shift)
 
 
 def repeat_tile(tile: Tile, num_repeats: int) -> Tile:
-    """Put as many periods beside it, on each side."""
+    """Add `num_repeats` periods on each side."""
     offsets = [(x, y, 0) for y in range(-num_repeats, num_repeats + 1) for x in range(-num_repeats, num_repeats + 1)]
     count = len(tile.positions)
     return tile._replace(
@@ -59,13 +62,15 @@ def repeat_tile(tile: Tile, num_repeats: int) -> Tile:
     )
 
 
-def extruded(path: F64, radius: float, num_corners: int, flat: float = 1.0) -> tuple[F64, F64, I64]:
-    """A yarn along a path: its positions, normals and faces.
+def extruded(
+    path: Shaped[F64, "points 3"], radius: float, num_corners: int, flat: float = 1.0
+) -> tuple[Shaped[F64, "vertices 3"], Shaped[F64, "vertices 3"], Shaped[I64, "triangles 3"]]:
+    """Extrude a yarn along a path: positions, normals and faces.
 
     Args:
-        path: of its middle, in a plane that z lies in; the yarn lacks its first and its last place, which say how it
-            goes on. (n, 3). radius: across z.
-        num_corners: corners of its cross-section. flat: its height over its width.
+        path: center line, in a plane that contains z; its first and last points only give the direction. radius: of the
+            yarn, across z.
+        num_corners: of its cross-section. flat: its height over its width.
     """
     along, path = path[2:] - path[:-2], path[1:-1]
     along /= np.linalg.norm(along, axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""Plain weave: yarns that go over and under each other by turns, warp and weft."""
+"""Plain weave: warp and weft yarns that alternate over and under each other."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import numpy as np
 
 from relume.synthetic_btf.tileable_geometry import Tile, extruded
 
-_YARNS = 16  # a period, in each direction; even
-_STEPS, _AROUND = 8, 10  # of a yarn's path a crossing, and of its cross-section
-_WIDTH, _FLAT, _LIFT = 0.43, 0.45, 0.42  # radius and lift in shares of the spacing
-_UNEVENNESS = 0.12  # of these
-_WAVES = 3  # of a yarn that lies unevenly, a period
+_YARNS = 16  # per period, in each direction; even
+_STEPS, _AROUND = 8, 10  # segments of a yarn between crossings, and corners of its cross-section
+_WIDTH, _FLAT, _LIFT = 0.43, 0.45, 0.42  # radius and amplitude as fractions of the spacing
+_UNEVENNESS = 0.12  # of radius and amplitude
+_WAVES = 3  # of a yarn's sideways wave, per period
 _SEED = 5
 
 TERMS = (
@@ -20,7 +20,7 @@ TERMS = (
 
 
 def weave() -> Tile:
-    """One period of it."""
+    """Return one period."""
     spacing, rng = 1 / _YARNS, np.random.default_rng(_SEED)
     s = np.arange(-1, _YARNS * _STEPS + 2) / (_YARNS * _STEPS)
     yarn_meshes = []

@@ -27,7 +27,7 @@ def test_import_refuses_a_glb_cut_by_one_byte() -> None:
     "uri", ["mesh.bin", "../secret.bin", "http://127.0.0.1/x.bin", "/etc/passwd", "file:///etc/passwd"]
 )
 def test_import_opens_no_external_buffer(uri: str) -> None:
-    assert "outside the f" in rejected(changed(buffers=[{"uri": uri, "byteLength": 4}]))
+    assert "outside the " in rejected(changed(buffers=[{"uri": uri, "byteLength": 4}]))
 
 
 def test_import_explains_how_to_pack() -> None:

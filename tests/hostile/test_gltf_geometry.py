@@ -45,7 +45,7 @@ def test_import_refuses_zeros_without_data_that_claim_gigabytes() -> None:
 def test_import_refuses_views_that_reach_beyond_their_buffer() -> None:
     glb = Glb().quad()
     glb.document["bufferViews"][0]["byteLength"] = 10**9
-    assert "beyond its buffer" in rejected(glb.bytes())
+    assert "exceeds its buffer" in rejected(glb.bytes())
 
 
 @pytest.mark.parametrize("stride", [0, 4, 8, 253, 10**9])
@@ -65,7 +65,7 @@ def test_import_refuses_indices_out_of_range() -> None:
 def test_import_refuses_positions_that_are_not_finite(value: float) -> None:
     positions = QUAD.copy()
     positions[2, 1] = value
-    assert "not finite" in rejected(Glb().quad(POSITION=positions).bytes())
+    assert "NaN, infinite or huge" in rejected(Glb().quad(POSITION=positions).bytes())
 
 
 def test_import_refuses_a_mesh_without_triangles() -> None:
@@ -84,7 +84,7 @@ def test_import_drops_degenerate_triangles_with_a_warning() -> None:
     glb.document["meshes"][0]["primitives"][0]["indices"] = glb.accessor(corners)
     scene = imported(glb.bytes())
     assert len(scene.meshes[0].faces) == 1
-    assert any("2 triangles" in warning for warning in scene.warnings)
+    assert any("Removed 2 zero-area triangles" in warning for warning in scene.warnings)
 
 
 def test_import_refuses_a_mesh_of_degenerate_triangles_only() -> None:
@@ -119,7 +119,7 @@ def test_import_refuses_missing_nodes(nodes: list[dict[str, Any]]) -> None:
 def test_nodes_of_an_invalid_tree_appear_once_with_one_warning(nodes: list[dict[str, Any]]) -> None:
     scene = imported(changed(nodes=nodes))
     assert len(scene.meshes) == 1
-    assert len([warning for warning in scene.warnings if "reached twice" in warning]) == 1
+    assert len([warning for warning in scene.warnings if "several parents" in warning]) == 1
 
 
 def test_import_refuses_too_many_instances(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ from hostile_scenes import rejected
 def test_import_opens_no_external_image(uri: str) -> None:
     glb = Glb().quad({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})
     glb.document |= {"images": [{"uri": uri}], "textures": [{"source": 0}]}
-    assert "outside the f" in rejected(glb.bytes())
+    assert "outside the " in rejected(glb.bytes())
 
 
 def test_import_refuses_jpegs_of_too_many_scans() -> None:

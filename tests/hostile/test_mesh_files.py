@@ -80,7 +80,7 @@ def test_obj_of_degenerate_faces_only_is_refused() -> None:
 def test_unused_numbers_that_are_not_finite_are_a_warning() -> None:
     scene = import_scene(OBJ.replace(b"vt 0 0", b"vt nan 0").replace(b"vn 0 0 1", b"vn inf 0 1"), "test", LIGHT)
     assert np.isfinite(scene.meshes[0].normals).all()
-    assert len([warning for warning in scene.warnings if "not all finite" in warning]) == 2
+    assert len([warning for warning in scene.warnings if "NaN, infinite or huge" in warning]) == 2
 
 
 ESCAPES = [
@@ -102,11 +102,11 @@ def test_no_name_leads_out_of_the_folder(name: str, tmp_path: Path) -> None:
     for content in (library, OBJ):
         path.write_bytes(content)
         (tmp_path / "in" / "m.mtl").write_bytes(image)
-        with pytest.raises(SceneError, match="outside the folder"):
+        with pytest.raises(SceneError, match="outside the scene's folder"):
             import_scene(path, "test", LIGHT)
-    assert "outside the folder" in rejected(packed({"scene.obj": library}))
-    assert "outside the folder" in rejected(packed({"scene.obj": OBJ, "m.mtl": image}))
-    assert "outside the folder" in rejected(library)
+    assert "outside the scene's folder" in rejected(packed({"scene.obj": library}))
+    assert "outside the scene's folder" in rejected(packed({"scene.obj": OBJ, "m.mtl": image}))
+    assert "outside the scene's folder" in rejected(library)
 
 
 def test_no_link_leads_out_of_the_folder(tmp_path: Path) -> None:
@@ -176,7 +176,7 @@ def test_invalid_ply_files_are_refused(data: bytes) -> None:
 @pytest.mark.filterwarnings("default::DeprecationWarning")  # as outside of tests
 @pytest.mark.parametrize("more", [b"x\n", b"1 2 3 and so on\n", b"\x00", b"0x10"])
 def test_a_ply_with_text_after_its_numbers_is_refused(more: bytes) -> None:
-    assert "words where numbers should be" in rejected(text() + more)
+    assert "text instead of numbers" in rejected(text() + more)
 
 
 def test_invalid_archives_are_refused() -> None:
@@ -186,7 +186,7 @@ def test_invalid_archives_are_refused() -> None:
     assert "0 scene files" in rejected(packed({"a.txt": OBJ}))
     assert "2 scene files" in rejected(packed({"a.obj": OBJ, "b.ply": text()}))
     assert "entries" in rejected(packed({f"{i}.txt": b"" for i in range(1_001)}))
-    assert "unusual way" in rejected(packed({"a.obj": OBJ}, zipfile.ZIP_LZMA))
+    assert "unsupported compression" in rejected(packed({"a.obj": OBJ}, zipfile.ZIP_LZMA))
     encrypted = bytearray(good)
     encrypted[good.index(b"PK\1\2") + 8] |= 1
     assert "password" in rejected(bytes(encrypted))
@@ -241,7 +241,7 @@ def test_an_empty_file_is_called_empty() -> None:
 
 
 def test_an_archive_in_an_archive_is_not_opened() -> None:
-    assert "none of" in rejected(packed({"a.obj": packed({"a.obj": OBJ})}))
+    assert "is not .glb" in rejected(packed({"a.obj": packed({"a.obj": OBJ})}))
 
 
 FUZZED = {"obj": OBJ, "text": text(True), "little": binary("<", True), "zip": packed({"a.obj": OBJ, "m.mtl": MTL})}

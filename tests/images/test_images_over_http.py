@@ -142,7 +142,7 @@ def test_images_derived_from_a_metallic_map_are_deleted_with_it(client):
     listed = {entry["texture"]: (entry["metalness"], entry["base"]) for entry in client.get(URL).json()}
     assert [listed[texture] for texture in textures] == 2 * [(image["texture"], None)]
     for changed, message in (
-        ({"terms": terms[:1]}, "add what is missing"),
+        ({"terms": terms[:1]}, "add the missing one"),
         ({"terms": [{**terms[0], "texture": "diffuse"}, terms[1]]}, "import the scene again"),
     ):
         response = client.post(f"{url}/metalness", json={**requested, **changed})

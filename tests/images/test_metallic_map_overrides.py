@@ -133,7 +133,7 @@ def test_a_16_bit_map_of_one_texel_is_metal_everywhere_or_nowhere(value, library
 def test_materials_without_base_color_or_highlight_are_rejected(library, uploaded):
     scene = imported(BASE, metallic=0)
     for term in complete(scene.materials[0].terms):
-        with pytest.raises(ParameterError, match=r"lambert.*ggx: add what is missing"):
+        with pytest.raises(ParameterError, match=r"lambert.*ggx; add the missing one"):
             override(library, scene, [term], uploaded(METAL, "Metal"))
 
 

@@ -25,8 +25,8 @@ def imported() -> Scene:
 
 def test_warnings_are_sorted_by_severity() -> None:
     assert [(warning.severity, str(warning)) for warning in imported().warnings] == [
-        ("unsupported", "the material file 'none.mtl' is not beside the scene; import both together"),
-        ("ignored", "lines of kind 'l' are not used; only faces are"),
+        ("unsupported", "Missing material file “none.mtl”: import it together with the scene."),
+        ("ignored", "The file's lines aren't supported; only faces are shown."),
     ]
 
 
@@ -53,7 +53,7 @@ def test_long_lists_omit_the_least_severe_warnings() -> None:
     warnings = [ignored("a little thing")] * MAX_WARNINGS + [approximated("a mean")] * 3 + [unsupported("a hole")]
     listed = finalize("test", scene.meshes, scene.materials, scene.cameras, LIGHT, warnings).warnings
     assert listed[:4] == ("a hole", "a mean", "a mean", "a mean")
-    assert (listed[-1], listed[-1].severity, len(listed)) == ("and 4 more of the kind", "ignored", MAX_WARNINGS + 1)
+    assert (listed[-1], listed[-1].severity, len(listed)) == ("… and 4 more.", "ignored", MAX_WARNINGS + 1)
 
 
 def test_a_warning_survives_serialization_and_pickling() -> None:

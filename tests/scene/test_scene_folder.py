@@ -23,7 +23,7 @@ def test_another_scene_with_the_same_id_does_not_overwrite_the_first(tmp_path: P
     save_scene(scene, tmp_path)
     white = Environment("sky", np.ones((2, 4, 3), np.float32))
     other = dataclasses.replace(small_scene(environment=white), id=scene.id)
-    with pytest.raises(SceneError, match=f"another scene is here as {scene.id}; delete that one first"):
+    with pytest.raises(SceneError, match=f"another scene with the id {scene.id} exists; delete it first"):
         save_scene(other, tmp_path)
     assert load_scene(tmp_path).id == scene.id
     document = json.loads((tmp_path / "scene.json").read_text())
@@ -190,7 +190,7 @@ def test_make_scene_refuses_parts_that_do_not_fit() -> None:
 @pytest.mark.parametrize(
     ("lights", "message"),
     [
-        ([Light(f"L{k}", {"kind": "point"}) for k in range(65)], "65 lights, 64 are allowed"),
+        ([Light(f"L{k}", {"kind": "point"}) for k in range(65)], "65 lights, the limit is 64"),
         ([Light("A", {"kind": "point"}), Light("A", {"kind": "spot"})], "each its own"),
         ([Light("", {"kind": "point"})], "1 to 80"),
         ([Light("x" * 81, {"kind": "point"})], "1 to 80"),

@@ -72,7 +72,7 @@ def test_textured_materials_use_the_mean_vertex_color_with_a_warning() -> None:
     texture = {"index": glb.texture([[[255, 255, 255], [0, 0, 0]]])}
     glb.quad({"name": "Wood", "pbrMetallicRoughness": {"baseColorTexture": texture}}, COLOR_0=COLORS)
     scene = import_gltf(glb.bytes(), "quad", LIGHT)
-    assert len([warning for warning in scene.warnings if "replaced by their mean" in warning]) == 1
+    assert len([warning for warning in scene.warnings if "replaced by their average" in warning]) == 1
 
 
 def test_vertex_colors_of_ply_files_are_used() -> None:
@@ -92,7 +92,7 @@ def test_vertex_colors_of_obj_files_are_used_for_one_object_only(objects: int) -
     lines = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\n" + "".join(f"o {k}\nf 1 2 3\n" for k in range(objects))
     scene = import_obj(lines.encode(), "x", LIGHT, NoFiles())
     if objects == 2:
-        assert "vertex colours" in str(scene.warnings[0])
+        assert "Vertex colors" in str(scene.warnings[0])
         return
     (material,), (mesh,) = scene.materials, scene.meshes
     shown = MipMap(material.textures["diffuse"]).sample(mesh.uvs, np.zeros(3, np.float32))

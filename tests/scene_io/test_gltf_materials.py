@@ -110,9 +110,9 @@ def test_anisotropy_stretches_along_the_rotated_tangent() -> None:
 @pytest.mark.parametrize(
     ("is_bumpy", "has_own", "message"),
     [
-        (False, True, "smooth, as what it covers; its own normal texture is not used"),
-        (True, True, "as bumpy as what it covers; its own normal texture is not used"),
-        (True, False, "as bumpy as what it covers; in the file it is smooth"),
+        (False, True, "is smooth; in the file it has its own normal map."),
+        (True, True, "follows the base normal map; in the file it has its own normal map."),
+        (True, False, "follows the base normal map; in the file it is smooth."),
         (False, False, None),
     ],
 )
@@ -121,7 +121,7 @@ def test_a_coat_with_another_normal_map_gives_a_warning(is_bumpy, has_own, messa
     bumps = {"index": glb.texture([[[200, 150, 220]]])}
     coat = {"clearcoatFactor": 1} | ({"clearcoatNormalTexture": bumps} if has_own else {})
     scene = imported({"clearcoat": coat}, glb, **({"normalTexture": bumps} if is_bumpy else {}))
-    messages = [str(warning) for warning in scene.warnings if "coat" in str(warning)]
+    messages = [str(warning) for warning in scene.warnings if "Clearcoat" in str(warning)]
     assert len(messages) == (message is not None)
     assert all(message in warning for warning in messages)
 
@@ -146,7 +146,7 @@ def test_anisotropy_of_varying_direction_is_a_round_highlight() -> None:
     index = glb.texture([[[255, 128, 255], [0, 128, 255]]])
     scene = imported({"anisotropy": {"anisotropyStrength": 1, "anisotropyTexture": {"index": index}}}, glb)
     assert scene.materials[0].terms[1]["model"] == "ggx"
-    assert any("all directions" in warning for warning in scene.warnings)
+    assert any("no main direction" in warning for warning in scene.warnings)
 
 
 def test_sheen_is_a_term_that_attenuates_the_base() -> None:
@@ -189,7 +189,7 @@ def test_invalid_parameters_give_a_warning_and_are_ignored(extensions: dict[str,
     scene = imported(extensions)
     assert scene.materials[0].terms == terms_of({})
     assert len(scene.warnings) == 1
-    assert "not valid" in scene.warnings[0]
+    assert "it is invalid" in scene.warnings[0]
 
 
 def glass_of(extensions: dict[str, Any], **material: Any) -> Glass:
@@ -246,7 +246,7 @@ def test_rough_glass_and_transmission_textures_give_a_warning() -> None:
     scene = imported({"transmission": passing, "dispersion": {"dispersion": 1}}, glb)
     assert scene.materials[0].glass is not None
     np.testing.assert_allclose(scene.materials[0].glass.tint, [0.25, 0.125, 0.0625])
-    for word in ("frosted", "transmission texture", "dispersion"):
+    for word in ("Frosted", "transmission texture", "Dispersion"):
         assert len([warning for warning in scene.warnings if word in str(warning)]) == 1
 
 
@@ -259,4 +259,4 @@ def test_rough_glass_and_transmission_textures_give_a_warning() -> None:
     ],
 )
 def test_transmission_out_of_range_gives_a_warning(extensions: dict[str, Any]) -> None:
-    assert any("is not valid" in str(warning) for warning in imported(extensions).warnings)
+    assert any("is invalid" in str(warning) for warning in imported(extensions).warnings)

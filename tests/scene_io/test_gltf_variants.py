@@ -74,7 +74,7 @@ def test_a_texture_is_kept_if_it_differs_by_a_color_only() -> None:
     shown = np.array(ggx["color"]) * ggx["params"]["f0"] * get_texture_values(scene.materials[0].textures["diffuse"])
     expected = np.array([0.5, 0.4, 0.0]) * get_texture_values(scene.materials[0].textures["diffuse"])
     np.testing.assert_allclose(shown, expected, atol=1e-4)  # f0 has a minimum above 0
-    assert not any("mean colour" in warning for warning in scene.warnings)
+    assert not any("average color" in warning for warning in scene.warnings)
 
 
 def test_another_texture_becomes_its_mean_with_a_warning() -> None:
@@ -86,7 +86,7 @@ def test_another_texture_becomes_its_mean_with_a_warning() -> None:
     lambert = scene.variants["day"]["materials"]["Red"]["terms"][0]
     np.testing.assert_allclose(lambert["color"], np.array([0.5, 0.25, 0.5]) * DIELECTRIC_TRANSMISSION, atol=1e-6)
     assert lambert["texture"] is None
-    assert any("mean colour" in warning for warning in scene.warnings)
+    assert any("average color" in warning for warning in scene.warnings)
 
 
 def test_another_normal_map_is_a_warning() -> None:

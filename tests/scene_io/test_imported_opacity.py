@@ -74,7 +74,7 @@ def test_constant_opacity_is_stored_as_one_texel() -> None:
 )
 def test_a_fully_transparent_material_gives_a_warning(material: dict[str, Any]) -> None:
     scene = imported(**material)
-    assert "transparent everywhere" in str(scene.warnings[0])
+    assert "fully transparent" in str(scene.warnings[0])
     opacity = scene.materials[0].opacity
     assert opacity is not None
     assert opacity.alpha.max() <= 102

@@ -146,7 +146,7 @@ def test_plastic_of_every_program_reflects_as_a_dielectric(
     assert params_of(material)["f0"] == pytest.approx([f0] * 3, abs=1e-6)
     assert params_of(material)["roughness"] == pytest.approx(roughness, abs=1e-3)
     (import_warning,) = scene.warnings
-    assert import_warning.startswith("Ks of material 'M' is read as ")
+    assert import_warning.startswith("Ks of material “M” was read as ")
     assert "4 % (F0 0.04)" in import_warning
     assert ("Blender" in import_warning) == library.startswith("# Blender")
     assert import_warning.severity == "approximated"
@@ -202,7 +202,7 @@ def test_one_warning_covers_all_materials(tmp_path: Path) -> None:
     (tmp_path / "m.mtl").write_text(MAYA + MAYA.replace("newmtl M", "newmtl N"))
     (tmp_path / "thing.obj").write_text(TRIANGLE + "usemtl N\nf 3/3 2/2 1/1\n")
     (import_warning,) = import_scene(tmp_path / "thing.obj", "thing", LIGHT).warnings
-    assert "'M' and 1 more" in import_warning
+    assert "“M” and 1 more" in import_warning
 
 
 @pytest.mark.parametrize("line", ["Ka spectral x.rfl", "illum on", "Pc -1", "aniso nan"])
@@ -242,14 +242,14 @@ def test_a_normal_map_has_the_strength_in_the_file(tmp_path: Path, option: str, 
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("map_Bump heights.png", ("'heights.png'", "heights")),
-        ("map_Bump C:\\art\\tiles_nrm.png", ("tiles_nrm.png", "left out")),
-        ("bump /home/ann/tiles_nrm.png", ("tiles_nrm.png", "left out")),
-        ("map_Bump tiles_nrm.png", ("'tiles_nrm.png'", "not beside")),
-        ("map_Bump broken.png", ("map_Bump", "left out")),
-        ("disp tiles_disp.png", ("'tiles_disp.png'", "not used")),
-        ("map_Pm tiles_metal.png", ("'tiles_metal.png'", "not used")),
-        (f"map_Ns {'deep/' * 40}gloss.png", ("gloss.png'", "not used")),
+        ("map_Bump heights.png", ("“heights.png”", "height map")),
+        ("map_Bump C:\\art\\tiles_nrm.png", ("tiles_nrm.png", "Skipped")),
+        ("bump /home/ann/tiles_nrm.png", ("tiles_nrm.png", "Skipped")),
+        ("map_Bump tiles_nrm.png", ("“tiles_nrm.png”", "Missing")),
+        ("map_Bump broken.png", ("map_Bump", "Skipped")),
+        ("disp tiles_disp.png", ("“tiles_disp.png”", "not supported")),
+        ("map_Pm tiles_metal.png", ("“tiles_metal.png”", "not supported")),
+        (f"map_Ns {'deep/' * 40}gloss.png", ("gloss.png”", "not supported")),
     ],
 )
 def test_a_missing_map_is_a_named_error(tmp_path: Path, line: str, message: tuple[str, ...]) -> None:

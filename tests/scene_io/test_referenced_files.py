@@ -38,8 +38,8 @@ def test_a_file_that_was_not_uploaded_is_missing_even_if_it_is_on_disk(tmp_path:
     uploaded(tmp_path, companion=b"newmtl Red\nKd 1 0 0\n")
     outgoing = UploadedFiles({}, "meshes/triangle.obj")
     missing = import_scene(TRIANGLE.replace(b"../looks/red.mtl", b"companion"), "test", LIGHT, outgoing)
-    assert any("is not beside the scene" in warning for warning in missing.warnings)
-    with pytest.raises(SceneError, match="outside the folder"):
+    assert any("Missing material file" in warning for warning in missing.warnings)
+    with pytest.raises(SceneError, match="outside the scene's folder"):
         import_scene(TRIANGLE.replace(b"../looks", b"../../../etc"), "test", LIGHT, outgoing)
 
 

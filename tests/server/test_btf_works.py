@@ -72,7 +72,7 @@ def test_a_container_becomes_a_material_whatever_it_is_called(
     assert (listed["id"], listed["directions"], listed["size"]) == (body["material"], 10, [6, 5])
     path.write_bytes(path.read_bytes()[:2000])
     body = wait_for(client, send(client, path), "ready", "failed")
-    assert "cut off" in body["problem"]
+    assert "truncated" in body["problem"]
     wait_until_gone(settings.data / "btf-jobs" / body["id"])
 
 

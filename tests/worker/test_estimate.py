@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from relume.methods.registry import METHODS
-from relume.scene.examples.cornell import sunny_sky
+from relume.scene.examples.cornell import sunny_environment
 from relume.scene.examples.still_life import demo_scene
 from relume.scene.examples.still_life.grids import sphere
 from relume.scene.examples.still_life.still_life import look_at
@@ -77,7 +77,7 @@ def ball(fineness):
     mesh = sphere(1.0, fineness).mesh("ball", 0)
     material = Material("Clay", ({"model": "lambert", "color": [0.5, 0.5, 0.5]},))
     camera = look_at("front", (0.0, 0.5, 4.0), (0.0, 0.0, 0.0), 0.7)
-    return make_scene("ball", [mesh], [material], [camera], sunny_sky())
+    return make_scene("ball", [mesh], [material], [camera], sunny_environment())
 
 
 def test_bakes_of_other_methods_judge_by_what_a_ray_takes_in_each():

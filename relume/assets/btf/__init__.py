@@ -1,4 +1,4 @@
-"""Bidirectional texture functions: one BRDF a texel, cosine included, compressed by local PCA (Müller et al. 2004).
+"""Bidirectional texture functions: one BRDF per texel, with cosine, compressed by local PCA (Müller et al. 2004).
 
 Read first: `local_pca_btf`, `compress`.
 """

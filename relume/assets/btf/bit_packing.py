@@ -1,6 +1,6 @@
-"""Whole numbers of a few bits each, without gaps: clusters and weights of a BTF on the disk.
+"""Bit packing of small integers: clusters and weights of a BTF on disk.
 
-A row is C numbers of b_j bits, sign included: n is written as n + 2^(b_j − 1) − 1, its highest bit first.
+A row is C numbers of b_j bits, with sign: n is stored as n + 2^(b_j − 1) − 1, most significant bit first.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from typing import Any
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -17,37 +18,35 @@ I8 = NDArray[np.int8]
 U8 = NDArray[np.uint8]
 
 
-def max_code(bits: NDArray[np.integer]) -> NDArray[np.int64]:
-    """The largest number of so many bits, that is as far from zero as the least: 2^(b − 1) − 1. (C,)"""
+def max_code(bits: Shaped[NDArray[np.integer], " columns"]) -> Shaped[NDArray[np.int64], " columns"]:
+    """Largest magnitude that fits with both signs: 2^(b − 1) − 1."""
     return np.asarray(2 ** (bits.astype(np.int64) - 1) - 1)
 
 
 def cluster_bits(num: int) -> int:
-    """That tell which of so many clusters a texel is in."""
+    """Number of bits for the index of one of `num` clusters."""
     return max(1, (num - 1).bit_length())
 
 
-def pack(rows: I8, bits: U8) -> U8:
-    """Pack rows.
+def pack(rows: Shaped[I8, "n columns"], bits: Shaped[U8, " columns"]) -> Shaped[U8, " bytes"]:
+    """Pack rows into `packed_bytes` bytes.
 
     Args:
-        rows: (n, C), none below −`max_code` of its bits, none above that + 1. bits: of each column, 1 to 8. (C,)
-    Returns:
-        (bytes,) of `packed_bytes`
+        rows: from −`max_code` of the column's bits to `max_code` + 1. bits: of each column, 1 to 8.
     """
     shifted = (rows + max_code(bits)).astype(np.uint8)
     columns = [np.unpackbits(column[:, None], axis=1)[:, 8 - b :] for column, b in zip(shifted.T, bits, strict=True)]
     return np.packbits(np.concatenate([np.zeros((len(rows), 0), np.uint8), *columns], axis=1))
 
 
-def packed_bytes(num: int, bits: U8) -> int:
-    """Bytes of so many rows."""
+def packed_bytes(num: int, bits: Shaped[U8, " columns"]) -> int:
+    """Number of bytes for `num` rows."""
     return -(-num * int(bits.sum(dtype=np.int64)) // 8)
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _unpack_kernel(data, bits, out):  # type: ignore[no-untyped-def]
-    """found: (bytes,). out: (n, C), written"""
+    """data: (bytes,). bits: (C,). out: (n, C), written"""
     bit_offset: Any = 0
     for row in range(out.shape[0]):
         for column in range(out.shape[1]):
@@ -61,13 +60,11 @@ def _unpack_kernel(data, bits, out):  # type: ignore[no-untyped-def]
             bit_offset += width
 
 
-def unpack(data: U8, bits: U8, num: int) -> I8:
-    """Undo `packed`.
+def unpack(data: Shaped[U8, " bytes"], bits: Shaped[U8, " columns"], num: int) -> Shaped[I8, "n columns"]:
+    """Invert `pack`.
 
     Args:
-        data: what it gave. bits: as there. num: of rows.
-    Returns:
-        (num, C)
+        data: result of `pack`. bits: as there. num: number of rows.
     """
     out = np.empty((num, len(bits)), np.int8)
     _unpack_kernel(data, bits, out)

@@ -1,19 +1,19 @@
-"""The container of the Bonn measurements of 2014, ".btf": a BTF as products of two matrices for each colour channel.
+"""The container of the Bonn measurements of 2014, ".btf": a BTF as products of two matrices for each color channel.
 
-    "!DFMF08FCR"                                 then everything little-endian, without gaps
-    u32 bytes of this part, u32 version          three texts of 80 bytes, 4 f32 (pixels per mm, scale of RGB);
-                                                 version > 1: u32, whether the light's cosine is in the values;
-                                                 > 2: u32 bytes, XML; > 3: u32 channels, of each u32 bytes, its name
-    u32 views, of each 2 f32 θ φ                 and u32 lights, of each 2 f32 θ φ; the same lights for each view
-    u32 width, u32 height                        u32 rotations, of each 9 f32
-    u32 components, i32 colour model             3 f32 mean, 9 f32 matrix, of models that have one
-    of each channel: u8 bytes of a number        u32 components C, u32 rows N, u32 columns M, C singular values,
-                                                 N × C, M × C that these are in
+    "!DFMF08FCR"                                 everything else is little-endian, without padding
+    u32 bytes of this section, u32 version       three texts of 80 bytes, 4 f32 (pixels per mm, scale of RGB);
+                                                 version > 1: u32, nonzero if values include the light's cosine;
+                                                 > 2: u32 bytes, XML; > 3: u32 channels, for each u32 bytes, its name
+    u32 views, for each 2 f32 θ φ                and u32 lights, for each 2 f32 θ φ; the same lights for each view
+    u32 width, u32 height                        u32 rotations, for each 9 f32
+    u32 components, i32 color model              3 f32 mean, 9 f32 matrix, used by some models
+    for each channel: u8 bytes of a number       u32 components C, u32 rows N, u32 columns M, C singular values,
+                                                 N × C, M × C, including the singular values
 
-N are pairs of directions, light after light for each view, and M texels, row after row, or the other way about. This is
-what Bonn's own btflib and the reader that PyPI's btf-extractor is made of agree on.
+N are pairs of directions, all lights for each view, and M texels, row by row, or vice versa. This agrees with Bonn's
+btflib and with the reader in PyPI's btf-extractor.
 
-All sizes are held against the file's before anything is read by them; matrices stay on the disk.
+All sizes are checked against the file's before they are used; matrices are memory-mapped.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.btf.compress import MAX_TEXELS
@@ -32,7 +33,7 @@ F64 = NDArray[np.float64]
 Matrix = NDArray[Any]
 
 FIRST_BYTE = b"!"
-"""Of all containers of the Bonn measurements; a zip has another."""
+"""Of all containers of the Bonn measurements, unlike zip files."""
 _SIGNATURE = b"!DFMF08FCR"
 _TEXTS = 3 * 80
 _MAX_COMPONENTS = 1024
@@ -41,35 +42,31 @@ _CHANNELS = 3
 
 
 class Channel(NamedTuple):
-    """Values of pairs of directions and of texels: their product. (V · L, C), (texels, C), on the disk"""
+    """Factors of one color channel; their product has a value for each pair of directions and texel. Memory-mapped."""
 
-    pairs: Matrix
-    texels: Matrix
+    pairs: Shaped[Matrix, "pairs components"]
+    texels: Shaped[Matrix, "texels components"]
 
 
 class BonnContainer(NamedTuple):
-    """What a file holds.
+    """The content of a file.
 
     Attributes:
-        has_cosine: whether the light's cosine is in its values.
-        views, lights: θ and φ, radians. (V, 2), (L, 2)
-        size: height and width, texels. model: of its colours. channels: three.
+        has_cosine: values include the light's cosine.
+        views, lights: θ and φ, radians.
+        size: height and width, texels. model: of its colors. channels: three.
     """
 
     has_cosine: bool
-    views: F64
-    lights: F64
+    views: Shaped[F64, "views 2"]
+    lights: Shaped[F64, "lights 2"]
     size: tuple[int, int]
     model: int
     channels: tuple[Channel, ...]
 
 
 class _Reader:
-    """Parts of a file, one after another.
-
-    Args:
-        path: of the file.
-    """
+    """Reads a file sequentially."""
 
     def __init__(self, path: Path) -> None:
         self._bytes = np.memmap(path, np.uint8, "r") if path.stat().st_size else np.zeros(0, np.uint8)
@@ -77,23 +74,23 @@ class _Reader:
 
     @property
     def remaining_bytes(self) -> int:
-        """Bytes."""
+        """Number of unread bytes."""
         return len(self._bytes) - self._offset
 
     @property
     def offset(self) -> int:
-        """Bytes before what comes next."""
+        """Number of bytes that were read."""
         return self._offset
 
     def skip(self, count: int) -> NDArray[np.uint8]:
-        """The next bytes, on the disk."""
+        """Read bytes, memory-mapped."""
         if count > self.remaining_bytes:
-            raise damaged_error(f"{count:,} bytes are to follow, {self.remaining_bytes:,} do")
+            raise damaged_error(f"{count:,} bytes should follow, {self.remaining_bytes:,} do")
         self._offset += count
         return self._bytes[self._offset - count : self._offset]
 
     def read_numbers(self, kind: str, *shape: int) -> Matrix:
-        """The next numbers, on the disk."""
+        """Read an array, memory-mapped."""
         dtype, count = np.dtype(kind), 1
         for extent in shape:
             count *= extent
@@ -101,38 +98,37 @@ class _Reader:
         return np.ndarray(shape, dtype, data)
 
     def read_count(self, label: str, maximum: int, minimum: int = 1) -> int:
-        """The next number of things, bounded."""
+        """Read a count, and check its limits."""
         value = int(self.read_numbers("<u4", 1)[0])
         if not minimum <= value <= maximum:
             raise MaterialError(
-                f"the .btf file says that it has {value:,} {label}; {minimum:,} to {maximum:,} can be read: choose a "
-                f"smaller "
-                "version of it, or download it again"
+                f"the .btf file claims to have {value:,} {label}, outside the limits of {minimum:,} to {maximum:,}; "
+                "choose a smaller version of it, or download it again"
             )
         return value
 
 
 def damaged_error(detail: str) -> MaterialError:
-    """What is wrong with a file that is not whole."""
-    return MaterialError(f"the .btf file is cut off or damaged: {detail}; download it again")
+    """Return the error for a damaged file."""
+    return MaterialError(f"the .btf file is truncated or damaged: {detail}; download it again")
 
 
 def read_container(path: Path) -> BonnContainer:
-    """Read what a file says of itself, and find its matrices.
+    """Read the header of a file, and memory-map its matrices.
 
     Args:
         path: of the file.
     Raises:
-        MaterialError: it is another kind of container, damaged, or larger than what can be kept.
+        MaterialError: it is another kind of container, damaged, or too large.
     """
     file = _Reader(path)
     _check_kind(file)
     has_cosine = _read_description(file)
     views, lights = _directions(file)
-    width, height = (file.read_count(label, MAX_TEXELS) for label in ("texels a row", "rows of texels"))
+    width, height = (file.read_count(label, MAX_TEXELS) for label in ("texels per row", "rows of texels"))
     if width * height > MAX_TEXELS:
         raise MaterialError(
-            f"the BTF has {width}×{height} texels; at most {MAX_TEXELS:,} can be kept, choose a smaller version of it"
+            f"the BTF has {width}×{height} texels, the limit is {MAX_TEXELS:,}; choose a smaller version of it"
         )
     file.read_numbers("<f4", file.read_count("rotations", MAX_TEXELS, 0), 9)
     file.read_count("components", _MAX_COMPONENTS)
@@ -141,32 +137,32 @@ def read_container(path: Path) -> BonnContainer:
     pairs = len(views) * len(lights)
     channels = tuple(_channel(file, pairs, width * height) for _ in range(_CHANNELS))
     if file.remaining_bytes:
-        raise damaged_error(f"{file.remaining_bytes:,} bytes follow where it should end")
+        raise damaged_error(f"{file.remaining_bytes:,} bytes follow its end")
     return BonnContainer(has_cosine, views, lights, (height, width), model, channels)
 
 
 def _check_kind(file: _Reader) -> None:
-    """Pass the signature."""
+    """Read and check the signature."""
     kind = bytes(file.skip(min(len(_SIGNATURE), file.remaining_bytes)))
     if kind != _SIGNATURE:
         raise MaterialError(
-            "the .btf file is no decorrelated full matrix factorization (DFMF), as those of UBO2014 are, but "
-            f"{kind.decode('ascii', 'replace')!r}; write its images into a zip, named by their directions such as "
+            "the .btf file is not a decorrelated full matrix factorization (DFMF), as those of UBO2014 are, but "
+            f"{kind.decode('ascii', 'replace')!r}; write its images to a zip, named by their directions such as "
             "'tl030 pl060 tv045 pv270.png', and import that"
         )
 
 
 def _read_description(file: _Reader) -> bool:
-    """Pass what people wrote. Whether the light's cosine is in the values."""
+    """Skip the description; return True if values include the light's cosine."""
     start = file.offset
     size, version = (int(number) for number in file.read_numbers("<u4", 2))
     file.skip(_TEXTS)
     file.read_numbers("<f4", 4)
-    has_cosine = version > 1 and file.read_count("marks of the cosine", 2**32 - 1, 0) != 0
+    has_cosine = version > 1 and file.read_count("cosine flags", 2**32 - 1, 0) != 0
     if version > 2:
         file.skip(file.read_count("bytes of XML", file.remaining_bytes, 0))
     if version > 3:
-        file.read_count("colour channels", _CHANNELS, _CHANNELS)
+        file.read_count("color channels", _CHANNELS, _CHANNELS)
         for _ in range(_CHANNELS):
             file.skip(file.read_count("bytes of a channel's name", file.remaining_bytes, 0))
     if file.offset - start != size:
@@ -175,14 +171,14 @@ def _read_description(file: _Reader) -> bool:
 
 
 def _directions(file: _Reader) -> tuple[F64, F64]:
-    """Views and lights: θ and φ."""
+    """Read view and light directions: θ and φ."""
     views: list[Matrix] = []
     lights: Matrix | None = None
     for _ in range(file.read_count("view directions", MAX_DIRECTIONS)):
         views.append(file.read_numbers("<f4", 2))
         view_lights = file.read_numbers("<f4", file.read_count("light directions", MAX_DIRECTIONS), 2)
         if lights is not None and not np.array_equal(lights, view_lights, equal_nan=True):
-            raise MaterialError("light directions of the BTF differ from view to view; resample it")
+            raise MaterialError("the views of the BTF have different light directions; resample it")
         lights = view_lights
     return np.array(views, np.float64), np.array(lights, np.float64)
 
@@ -190,7 +186,7 @@ def _directions(file: _Reader) -> tuple[F64, F64]:
 def _channel(file: _Reader, pairs: int, texels: int) -> Channel:
     kind = _FLOATS.get(int(file.read_numbers("u1", 1)[0]))
     if kind is None:
-        raise damaged_error("its numbers have neither two, four nor eight bytes")
+        raise damaged_error("its numbers do not have two, four or eight bytes")
     components = file.read_count("components", _MAX_COMPONENTS)
     rows, columns = (int(number) for number in file.read_numbers("<u4", 2))
     if (rows, columns) not in ((pairs, texels), (texels, pairs)):

@@ -1,6 +1,6 @@
-"""Zip files of images whose names say light and view: "… tl030 pl060 tv045 pv270.jpg", degrees of θ and φ (Bonn).
+"""Zip files of images with light and view in their names: "… tl030 pl060 tv045 pv270.jpg", degrees of θ and φ (Bonn).
 
-Never unpacked; sizes are bounded before anything is decoded.
+They are never extracted; sizes are checked before decoding.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.archives.bounded import LongDirectoryError, open_bounded
@@ -29,21 +30,21 @@ _MAX_NAME_LENGTH = 100  # characters of a name
 _ZIP = b"PK"
 _NOT_A_BTF = (
     "the file is not a zip of images that are named by their directions, such as 'tl030 pl060 tv045 pv270.jpg', "
-    "and no .btf container either"
+    "nor a .btf container"
 )
-_TOO_MANY = f"the zip has more than {_MAX_ENTRIES:,} files; pack the images alone"
-_DAMAGED = "the zip is cut off or damaged; pack it again, and send all of it"
+_TOO_MANY = f"the zip has more than {_MAX_ENTRIES:,} files; pack only the images"
+_DAMAGED = "the zip is truncated or damaged; pack it again, and upload all of it"
 
 Direction = tuple[int, int]
 
 
 class ZippedBtf:
-    """The images of a zip; implements `relume.assets.btf.compress.ViewArrays` but for keeping what it has read.
+    """The images of a zip; implements `relume.assets.btf.compress.ViewArrays` without a cache.
 
     Args:
         path: of the file.
     Raises:
-        MaterialError: it is no such file, or images are missing, doubled, or of different sizes.
+        MaterialError: it is no such file, or images are missing, duplicate, or of different sizes.
     """
 
     def __init__(self, path: Path) -> None:
@@ -63,23 +64,23 @@ class ZippedBtf:
         if missing:
             (view, light), more = missing[0], f", the first of {len(missing):,}" if len(missing) > 1 else ""
             raise MaterialError(
-                f"the image with light from {light} and seen from {view} (degrees of θ and φ) is missing{more}; put it "
-                "into the zip, which needs one from each direction in light from each"
+                f"the image with light from {light} and view from {view} (degrees of θ and φ) is missing{more}; add it "
+                "to the zip, which needs one for each pair of directions"
             )
 
-    def get_view(self, view: int) -> F32:
-        """Every texel's values from one direction. (lights, texels, 3) float32"""
+    def get_view(self, view: int) -> Shaped[F32, "lights texels 3"]:
+        """Values of all texels from one view direction."""
         view_direction = self._order[view]
         return np.stack([self._read(view_direction, light).reshape(-1, 3) for light in self._order])
 
     def _read(self, view: Direction, light: Direction) -> F32:
-        """One image, of as many texels as are kept, linear. (height, width, 3)"""
+        """Read one image, linear, scaled to the allowed number of texels. (height, width, 3)"""
         image = self._photograph(view, light)
         if image.shape != self._pixels:
             sizes = (f"{shape[1]}×{shape[0]}" for shape in (image.shape, self._pixels))
             filename = _printable(self._by_pair[view, light].filename)
             raise MaterialError(
-                "the image {} has {} pixels, the first one {}; scale all alike".format(filename, *sizes)
+                "the image {} has {} pixels, the first one {}; scale all images to one size".format(filename, *sizes)
             )
         return limit_texels(image, self._max_texels)
 
@@ -109,7 +110,7 @@ def _open_zip(path: Path) -> zipfile.ZipFile:
 
 
 def _index_by_directions(entries: list[zipfile.ZipInfo]) -> dict[tuple[Direction, Direction], zipfile.ZipInfo]:
-    """Images by their view and light."""
+    """Images by view and light."""
     if len(entries) > _MAX_ENTRIES:
         raise MaterialError(_TOO_MANY)
     by_pair: dict[tuple[Direction, Direction], zipfile.ZipInfo] = {}
@@ -121,9 +122,7 @@ def _index_by_directions(entries: list[zipfile.ZipInfo]) -> dict[tuple[Direction
         light_theta, light_phi, view_theta, view_phi = (int(group) for group in match.groups())
         pair = (_direction(view_theta, view_phi), _direction(light_theta, light_phi))
         if pair in by_pair:
-            raise MaterialError(
-                f"two images have the directions of {_printable(entry.filename)}; leave one of them out"
-            )
+            raise MaterialError(f"two images have the directions of {_printable(entry.filename)}; remove one of them")
         by_pair[pair] = entry
     if not by_pair:
         raise MaterialError(_NOT_A_BTF)
@@ -139,16 +138,16 @@ def _check_entry(entry: zipfile.ZipInfo) -> None:
     if entry.flag_bits & 1:
         raise MaterialError("the zip is encrypted; pack it without a password")
     if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-        raise MaterialError("the zip is packed in an unusual way; pack it with deflate")
+        raise MaterialError("the zip has an unsupported compression; pack it with deflate")
 
 
 def _printable(name: str) -> str:
-    """The end of a file's name, for messages."""
+    """The end of a file name, for messages."""
     return "".join(character if character.isprintable() else "?" for character in name[-_MAX_NAME_LENGTH:])
 
 
 def _direction(theta: int, phi: int) -> Direction:
-    """A direction of a name; at the pole φ says nothing."""
+    """A direction in a name; at the pole φ is ignored."""
     if theta >= 90 or phi > 360:
         raise missing_direction(theta, phi)
     return theta, 0 if theta == 0 else phi % 360

@@ -1,10 +1,10 @@
-"""BTFs that were imported or made; `relume.assets.asset_store` keeps them.
+"""Store of imported and synthetic BTFs, in `relume.assets.asset_store`.
 
     <folder>/<id>/mean.npy, eigen.npy, …        arrays of `relume.assets.btf.local_pca_btf.LocalPcaBtf`
-                  packed.npy                    clusters and weights, in as few bits as they need
-                  (`relume.assets.btf.bit_packing`) btf.json                      name, what it is, how well it is kept
+                  packed.npy                    clusters and weights, bit-packed (`relume.assets.btf.bit_packing`)
+                  btf.json                      name, origin, directions, error of the compression
 
-Look documents name one as "btf:<id>".
+Looks refer to one as "btf:<id>".
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ _ARRAYS = {
 
 @dataclass(frozen=True)
 class BtfRecord:
-    """What lists show of a BTF.
+    """A BTF in lists.
 
     Attributes:
         created: seconds since 1970.
-        synthetic: which geometry it was rendered from; None where it was measured.
-        size: height and width, texels. directions: of light, and as many of view.
-        clusters, components: that are kept. error: relative RMS, by how many components are used, from none on.
-        ratio: of what was measured, a byte a channel, to what is kept.
+        synthetic: name of the geometry; None for a measured BTF.
+        size: height and width, texels. directions: of light, the same number as of view.
+        clusters, components: of the compression. error: relative RMS by the number of components, from zero.
+        ratio: bytes of the measurement, one per channel, over compressed bytes.
     """
 
     id: str
@@ -59,25 +59,25 @@ class BtfRecord:
 
     @property
     def data(self) -> str:
-        """The name by which look documents mean it."""
+        """Name of the BTF in looks."""
         return STORE.prefix + self.id
 
     def terms(self) -> list[dict[str, Any]]:
-        """It as terms of a look, without a texture of the scene's: it is its own."""
+        """Its terms in a look; they use no texture of the scene."""
         return [{"model": "measured_btf", "data": self.data, "texture": None}]
 
 
 def store_btf(
     folder: Path, source: Path, name: str, synthetic: str | None, compute: Callable[[], LocalPcaBtf]
 ) -> BtfRecord:
-    """Keep a BTF under the hash of what it came from; the same twice is the same BTF, its newest name wins.
+    """Store a BTF under the hash of its source; an existing one gets the new name.
 
     Args:
-        folder: of the asset store. source: the file that was imported, or says what was made.
-        name: what people call it. synthetic: which geometry it was rendered from; None where it was measured.
-        compute: reads or renders, and compresses; not called where it is here already.
+        folder: of the asset store. source: the imported file, or a description of the synthesis.
+        name: shown to users. synthetic: name of the geometry; None for a measured BTF.
+        compute: reads or renders, and compresses; not called if the BTF exists.
     Raises:
-        MaterialError: the store is full. And what `compute` raises; then nothing is kept.
+        MaterialError: the store is full. If `compute` raises, nothing is stored.
     """
 
     def fill(staged_folder: Path) -> dict[str, Any]:
@@ -104,12 +104,12 @@ def store_btf(
 
 
 def records(folder: Path) -> list[BtfRecord]:
-    """All BTFs of a folder, newest first."""
+    """Return all BTFs of a folder, newest first."""
     return STORE.records(folder, get_record)
 
 
 def get_record(folder: Path, identity: str) -> BtfRecord:
-    """One of them. Raises NotFoundError; MaterialError where its files are damaged."""
+    """Return one BTF. Raises NotFoundError; MaterialError if its files are damaged."""
     path = STORE.path(folder, identity)
     document, btf = STORE.load_record(path), _load(path)
     synthetic, ratio = document.get("synthetic"), document.get("ratio")
@@ -122,10 +122,10 @@ def get_record(folder: Path, identity: str) -> BtfRecord:
 
 
 def load_btf(data: str) -> LocalPcaBtf:
-    """What a look's `data` names.
+    """Load the BTF of a look's `data`.
 
     Raises:
-        NotFoundError: it is not here. MaterialError: its files are damaged.
+        NotFoundError: it does not exist. MaterialError: its files are damaged.
     """
     return _load(STORE.resolve(data))
 
@@ -134,11 +134,11 @@ def load_btf(data: str) -> LocalPcaBtf:
 def _load(path: Path) -> LocalPcaBtf:
     document = STORE.load_record(path)
     try:
-        shift = [float(value) for value in document.get("shift", [])]  # all rings began at φ = 0 before there was one
+        shift = [float(value) for value in document.get("shift", [])]  # older files have none: all rings start at φ = 0
         grid = make_direction_grid([(float(theta), int(count)) for theta, count in document["rings"]], shift)
         error = tuple(float(value) for value in document["error"])
         arrays = {name: _array(path, name) for name in _ARRAYS if name != "height" or (path / "height.npy").exists()}
-        arrays.setdefault("height", np.zeros((1, 1), np.float32))  # before there was one
+        arrays.setdefault("height", np.zeros((1, 1), np.float32))  # older files have none
         bits, cluster, weight = _texels(path, document, arrays["levels"])
     except (OSError, ValueError, KeyError, TypeError, EOFError) as problem:
         raise STORE.damaged_error(path) from problem
@@ -151,8 +151,8 @@ def _load(path: Path) -> LocalPcaBtf:
 
 
 def _texels(path: Path, document: Mapping[str, Any], levels: NDArray[np.int32]) -> tuple[U8, U8, I8]:
-    """Bits, clusters and weights. Raises ValueError, KeyError, TypeError, OSError, EOFError where they do not fit."""
-    if "bits" not in document:  # each had a byte before they were packed
+    """Bits, clusters and weights. Raises ValueError, KeyError, TypeError, OSError, EOFError if inconsistent."""
+    if "bits" not in document:  # older files: one byte each, not packed
         weight = _array(path, "weight")
         if weight.dtype != np.int8 or weight.ndim != 3:
             raise ValueError("weights")
@@ -161,7 +161,7 @@ def _texels(path: Path, document: Mapping[str, Any], levels: NDArray[np.int32]) 
     if len(bits) > MAX_COMPONENTS or not ((bits >= 2) & (bits <= 8)).all():
         raise ValueError("bits")
     component_bits = bits.astype(np.uint8)
-    if "cluster_bits" not in document:  # so had clusters
+    if "cluster_bits" not in document:  # older files: clusters not packed
         cluster = _clusters(path)
         return component_bits, cluster, _read_packed_rows(path, component_bits, cluster.shape[1])
     width = int(document["cluster_bits"])
@@ -185,7 +185,7 @@ def _clusters(path: Path) -> U8:
 
 
 def _read_packed_rows(path: Path, bits: U8, num: int) -> I8:
-    """Rows of so many texels from each side. (V, num, columns)"""
+    """Rows of `num` texels for each view. (V, num, columns)"""
     rows = _array(path, "packed")
     if rows.dtype != np.uint8 or rows.ndim != 2 or rows.shape[1] != packed_bytes(num, bits):
         raise ValueError("packed")
@@ -193,7 +193,7 @@ def _read_packed_rows(path: Path, bits: U8, num: int) -> I8:
 
 
 def _array(path: Path, name: str) -> np.ndarray[Any, Any]:
-    """One of them; the large one stays on the disk until tables are made of it, which lists do not need."""
+    """Load an array; the large one is memory-mapped, since lists do not need it."""
     array: np.ndarray[Any, Any] = np.load(
         path / f"{name}.npy", mmap_mode="r" if name == "eigen" else None, allow_pickle=False
     )
@@ -201,7 +201,7 @@ def _array(path: Path, name: str) -> np.ndarray[Any, Any]:
 
 
 def _is_consistent(btf: LocalPcaBtf) -> bool:
-    """Whether its arrays fit each other: kernels read them without looking."""
+    """True if array shapes and indices are consistent: kernels do not check them."""
     directions = btf.grid.num_directions
     components, clusters = len(btf.error) - 1, btf.mean.shape[1] if btf.mean.ndim == 4 else 0
     if not (1 <= clusters <= MAX_CLUSTERS and 0 <= components <= MAX_COMPONENTS):

@@ -1,8 +1,8 @@
-"""From all values of a BTF to what is kept: local PCA of the texels, one view direction after another (Müller 2004).
+"""Compression of a BTF by local PCA of the texels, one view direction after another (Müller 2004).
 
-Seen from one side, a texel is a row of its values in light from all sides, a few hundred numbers. Rows are brought to
-what spans nearly all of them, clustered there, and mapped back; how far clusters and components have to go for an error
-bound is found from some of the views. The error that is told is that of what was kept, as it is rounded.
+For one view direction, a texel is a row of its values for all light directions, a few hundred numbers. Rows are
+projected onto the subspace of nearly all of their energy, clustered there, and mapped back. Numbers of clusters and
+components for an error bound are chosen on a subset of the views. The reported error includes quantization.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.btf.bit_packing import cluster_bits, max_code
@@ -27,31 +28,31 @@ F64 = NDArray[np.float64]
 
 MAX_CLUSTERS, MAX_COMPONENTS = 64, 16
 MAX_TEXELS = 512 * 512
-# texels times directions: values of one side take 400 MB, and are there up to four times
+# texels times directions: values of one view take 400 MB, and up to four copies exist
 _MAX_TEXEL_DIRECTIONS = 1 << 25
-_CLUSTERS = (1, 2, 4, 8, 16, 32, 64)  # among which the number is chosen
-_SEED = 0  # of the first clusters
-_SPAN = 64  # R: numbers that a texel's row is brought to
-_NUM_CHOICE_VIEWS = 5  # views that numbers are chosen by
-_CHOICE_PROGRESS = 0.2  # of the time, about
-_EXTRA_COMPONENTS = 2  # components that are found, in case that other views need them
-_MIN_RATIO = 2.5  # what is larger is no compression
-_LAST_COMPONENT_BITS = (3, 4, 5, 6, 8)  # of the weights of the last component, among which the number is chosen
+_CLUSTERS = (1, 2, 4, 8, 16, 32, 64)  # candidates
+_SEED = 0  # of the initial clusters
+_SPAN = 64  # R: dimension of the subspace
+_NUM_CHOICE_VIEWS = 5  # views for choosing the parameters
+_CHOICE_PROGRESS = 0.2  # approximate fraction of the time
+_EXTRA_COMPONENTS = 2  # additional components, in case other views need them
+_MIN_RATIO = 2.5  # smallest useful compression
+_LAST_COMPONENT_BITS = (3, 4, 5, 6, 8)  # candidates for the bits of the last component's weights
 
 
 class ViewArrays(Protocol):
-    """All values of a BTF, as they are read."""
+    """All values of a BTF."""
 
     grid: DirectionGrid
     size: tuple[int, int]
 
-    def get_view(self, view: int) -> F32:
-        """Every texel's values from one direction. (lights, texels, 3) float32, finite, not negative"""
+    def get_view(self, view: int) -> Shaped[F32, "lights texels 3"]:
+        """Values of all texels from one view direction, finite and not negative."""
         ...
 
 
 class _Span(NamedTuple):
-    """rows ≈ centre + z basis, orthonormal. z: (texels, R). basis: (R, F). lost: squares missed. energy: of all."""
+    """rows ≈ center + z basis, orthonormal. z: (texels, R). basis: (R, F). residual, energy: sums of squares."""
 
     z: F32
     basis: F32
@@ -61,7 +62,7 @@ class _Span(NamedTuple):
 
 
 class _PcaChoice(NamedTuple):
-    """clusters, components: of each view. bits: of the weights of each component. (components,) uint8"""
+    """clusters, components: of each view. bits: of each component's weights. (components,) uint8"""
 
     clusters: int
     components: int
@@ -69,7 +70,7 @@ class _PcaChoice(NamedTuple):
 
 
 class _CompressedView(NamedTuple):
-    """One side's part: a view of `LocalPcaBtf`'s arrays; squares of all, and missed by each number of components."""
+    """One view of `LocalPcaBtf`'s arrays; total energy, and residual energy by the number of components."""
 
     cluster: NDArray[np.uint8]
     weight: NDArray[np.int8]
@@ -82,7 +83,7 @@ class _CompressedView(NamedTuple):
 
 
 def max_texels(directions: int) -> int:
-    """How many can be kept of a BTF of so many directions."""
+    """Largest allowed number of texels for a number of directions."""
     return min(MAX_TEXELS, _MAX_TEXEL_DIRECTIONS // directions)
 
 
@@ -93,26 +94,25 @@ def compress(
     is_canceled: Callable[[], bool],
     partial_compression: PartialCompression | None = None,
 ) -> LocalPcaBtf:
-    """Choose clusters and components so that no more is kept than an error bound needs.
+    """Compress a BTF with as few clusters, components and bits as an error bound allows.
 
     Args:
-        images: the BTF. bound: relative RMS that is allowed.
-        progress: called with the share done. is_canceled: asked before each view.
-        partial_compression: parts that were found before, which are not found again; new ones are put there.
+        images: the BTF. bound: allowed relative RMS error.
+        progress: called with the completed fraction. is_canceled: checked before each view.
+        partial_compression: stores partial results, and provides earlier ones.
     Raises:
-        MaterialError: values are not finite, or negative, or the BTF is black. CancelledError: `is_canceled` said so.
+        MaterialError: values are not finite, or negative, or the BTF is black. CancelledError: `is_canceled` is true.
     """
     (height, width), num_views = images.size, images.grid.num_directions
     if not 0 < height * width <= max_texels(num_views):
         raise MaterialError(
-            f"the BTF has {width}×{height} texels; in {num_views} directions at most {max_texels(num_views):,} can be "
-            f"kept, "
+            f"the BTF has {width}×{height} texels, the limit for {num_views} directions is {max_texels(num_views):,}; "
             "scale it down"
         )
 
     def read_rows(view: int, fraction: float) -> F32:
         if is_canceled():
-            raise CancelledError("the compression was cancelled")
+            raise CancelledError("the compression was canceled")
         progress(fraction)
         return _view_rows(images, view)
 
@@ -140,7 +140,7 @@ def compress(
 def _load_or_compute(
     partial_compression: PartialCompression | None, name: str, compute: Callable[[], Arrays]
 ) -> Arrays:
-    """What was found before, else find it now."""
+    """Load a partial result, or compute and save it."""
     arrays = None if partial_compression is None else partial_compression.load(name)
     if arrays is None:
         arrays = compute()
@@ -150,7 +150,7 @@ def _load_or_compute(
 
 
 def _choose_from_views(images: ViewArrays, bound: float, read_rows: Callable[[int, float], F32]) -> _PcaChoice:
-    """Choose clusters, components and bits by some of the views."""
+    """Choose clusters, components and bits on a subset of the views."""
     num_views = images.grid.num_directions
     sampled_views = np.unique(np.linspace(0, num_views - 1, _NUM_CHOICE_VIEWS).round().astype(int))
     spans = [
@@ -161,10 +161,10 @@ def _choose_from_views(images: ViewArrays, bound: float, read_rows: Callable[[in
 
 
 def _view_rows(images: ViewArrays, view: int) -> F32:
-    """Every texel's values from one side. (texels, lights · 3)"""
+    """Values of all texels from one view direction. (texels, lights · 3)"""
     values = images.get_view(view)
     if not np.isfinite(values).all() or values.min() < 0:
-        raise MaterialError("values of the BTF are negative or no numbers")
+        raise MaterialError("the BTF has negative or non-finite values")
     return np.ascontiguousarray(values.transpose(1, 0, 2)).reshape(values.shape[1], -1)
 
 
@@ -172,7 +172,7 @@ def _span(rows: F32) -> _Span:
     center = rows.mean(axis=0)
     deviations = rows - center
     components = leading_components(deviations, _SPAN)
-    basis = components if len(components) else np.zeros((1, rows.shape[1]), np.float32)  # all texels are alike
+    basis = components if len(components) else np.zeros((1, rows.shape[1]), np.float32)  # all texels are equal
     z = deviations @ basis.T
     residual = max(_energy(deviations) - _energy(z), 0.0)
     return _Span(z, basis, center, residual, _energy(rows))
@@ -183,7 +183,7 @@ def _energy(rows: F32) -> float:
 
 
 def _choose_pca(spans: list[_Span], bound: float) -> _PcaChoice:
-    """Find what keeps some views to a bound in the least space, else what errs least; and some components more."""
+    """Minimize the size within the error bound, or else the error; and add some components."""
     best: tuple[tuple[float, ...], _PcaChoice] | None = None
     texels, values = len(spans[0].z), spans[0].basis.shape[1]
     energy = max(sum(span.energy for span in spans), 1e-30)
@@ -205,12 +205,12 @@ def _choose_pca(spans: list[_Span], bound: float) -> _PcaChoice:
 
 
 def _size(num_clusters: int, bits: NDArray[np.uint8], texels: int, values: int) -> float:
-    """Bytes of a view, nearly."""
+    """Approximate bytes of a view."""
     return num_clusters * (2 + len(bits)) * values + texels * (cluster_bits(num_clusters) + float(bits.sum())) / 8
 
 
 def _rounding_error(z: F32, clusters: Clusters) -> F64:
-    """Squares that rounding of weights misses, were the largest of each cluster one step. (C,)"""
+    """Squared error of rounding weights, if the largest of each cluster were one step. (C,)"""
     out = np.zeros(clusters.components.shape[1])
     for k in np.unique(clusters.cluster_index):
         weight = (z[clusters.cluster_index == k] - clusters.mean[k]) @ clusters.components[k].T
@@ -219,13 +219,13 @@ def _rounding_error(z: F32, clusters: Clusters) -> F64:
 
 
 def _allocate_bits(residual: F64, last: int) -> NDArray[np.uint8]:
-    """Bits of weights: `last` for the last component, one more for four times as many squares that one tells. (C,)"""
+    """Bits of weights: `last` for the last component, one more for four times its explained energy. (C,)"""
     explained = np.maximum(-np.diff(residual), 1e-30)
     return np.asarray(np.clip(last + np.rint(0.5 * np.log2(explained / explained[-1:])), last, 8), np.uint8)
 
 
 def _compress_view(read_rows: Callable[[], F32], size: tuple[int, int], choice: _PcaChoice, view: int) -> Arrays:
-    """Cluster the texels of one view, and round what tells them: a `_CompressedView`."""
+    """Cluster and quantize the texels of one view: a `_CompressedView`."""
     rows, rng = read_rows(), np.random.default_rng((_SEED, view))
     span = _span(rows)
     num, max_steps = choice.components, max_code(choice.bits)
@@ -252,7 +252,7 @@ def _compress_view(read_rows: Callable[[], F32], size: tuple[int, int], choice: 
 
 
 def _assign_clusters(z: F32, clusters: Clusters) -> tuple[NDArray[np.intp], F32]:
-    """Which cluster tells each row best, and by which weights. (n,), (n, C)"""
+    """Nearest cluster of each row, and its weights. (n,), (n, C)"""
     cluster_index, weight = (
         np.argmin(distances(z, clusters), axis=1),
         np.empty((len(z), clusters.components.shape[1]), np.float32),
@@ -263,7 +263,7 @@ def _assign_clusters(z: F32, clusters: Clusters) -> tuple[NDArray[np.intp], F32]
 
 
 def _residual_energy(rows: F32, compressed_view: _CompressedView) -> F64:
-    """Squares that what is kept misses of the finest texels, by how many components are used. (C + 1,)"""
+    """Residual energy of the finest texels by the number of components. (C + 1,)"""
     num = compressed_view.step.shape[1]
     residual_energy, cluster_index = np.zeros(num + 1), compressed_view.cluster[: len(rows)]
     tables = (
@@ -284,7 +284,7 @@ def _residual_energy(rows: F32, compressed_view: _CompressedView) -> F64:
 def _stack_views(
     images: ViewArrays, compressed_views: list[_CompressedView], bits: NDArray[np.uint8], energy: float
 ) -> LocalPcaBtf:
-    """Put the views together. Clusters that a view has fewer of are empty there."""
+    """Stack the views; those with fewer clusters are padded."""
     nothing = np.zeros((images.size[0] * images.size[1], 1), np.float32)
     shapes = [level.shape[:2] for level in build_mip_levels(nothing, images.size)]
     ends = np.cumsum([0, *(height * width for height, width in shapes)])
@@ -316,13 +316,15 @@ def _stack_views(
     )
 
 
-def build_mip_levels(z: F32, size: tuple[int, int]) -> list[F32]:
-    """Average texels over 2 × 2, again and again, down to one: what a distant eye sees.
+def build_mip_levels(
+    z: Shaped[F32, "texels channels"], size: tuple[int, int]
+) -> list[Shaped[F32, "height width channels"]]:
+    """Average blocks of 2 × 2 texels repeatedly, down to one texel.
 
     Args:
-        z: of the finest, row after row. (height · width, R). size: height and width.
+        z: of the finest level, row by row. size: height and width.
     Returns:
-        (height, width, R) of each level, the finest first.
+        All levels, the finest first.
     """
     levels = [z.reshape(*size, z.shape[1])]
     while levels[-1].shape[:2] != (1, 1):

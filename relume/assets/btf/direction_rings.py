@@ -1,8 +1,8 @@
-"""The directions that a BTF was measured in: rings about the normal, and how values between them are found.
+"""Grid of the directions of a BTF: rings about the normal, with interpolation between them.
 
-Between two rings the mean goes along θ, on each ring along φ: four directions, whose weights are continuous everywhere
-and sum to one. There is no seam where φ is 0, and none at the pole. Beyond the last ring it is the last ring's value;
-for light times what is left of the cosine, which a BTF's values contain.
+Interpolation is linear in θ between two rings, and in φ on each: four directions with weights that are continuous and
+sum to one, also across φ = 0 and at the pole. Beyond the last ring, the last ring's value is used, for light
+directions times the ratio of cosines, since a BTF's values include the cosine.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import MaterialError
@@ -24,37 +25,37 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 UBO_81 = ((0.0, 1), (15.0, 6), (30.0, 12), (45.0, 18), (60.0, 20), (75.0, 24))
-"""Degrees of θ and directions of each ring of the Bonn measurements, φ from 0 on (Sattler 2003)."""
+"""θ in degrees and number of directions of each ring in the Bonn measurements, φ from 0 (Sattler 2003)."""
 MAX_DIRECTIONS = 400
-_MIN_RING_DIRECTIONS = 4  # directions of rings but the first: fewer leave no room for a mean
+_MIN_RING_DIRECTIONS = 4  # of all rings except the first, for interpolation
 
 
 class DirectionGrid(NamedTuple):
-    """Rings of directions, numbered from the pole outwards, on each by rising φ.
+    """Rings of directions, indexed from the pole outward and by ascending φ.
 
     Attributes:
-        theta: of each ring, rising from 0, radians. (rings,) float32
-        first: number of the first direction of each, then the number of all. (rings + 1,) int32
-        shift: φ of the first direction of each, in steps from one to the next, [0, 1). (rings,) float32
+        theta: of each ring, ascending from 0, radians.
+        first: index of the first direction of each ring, then the number of directions.
+        shift: φ of the first direction of each ring, in steps between its directions, [0, 1).
     """
 
-    theta: F32
-    first: NDArray[np.int32]
-    shift: F32
+    theta: Shaped[F32, " rings"]
+    first: Shaped[NDArray[np.int32], " rings+1"]
+    shift: Shaped[F32, " rings"]
 
     @property
     def num_directions(self) -> int:
-        """Of all rings."""
+        """Number of directions on all rings."""
         return int(self.first[-1])
 
 
 def make_direction_grid(theta_and_counts: Sequence[tuple[float, int]], shift: Sequence[float] = ()) -> DirectionGrid:
-    """Rings from their θ in degrees and how many directions each has.
+    """Make a grid from θ in degrees and the number of directions of each ring.
 
     Args:
-        theta_and_counts: θ and number of each. shift: as in `DirectionGrid`; 0 for all where there is none.
+        theta_and_counts: of each ring. shift: as in `DirectionGrid`; by default zero.
     Raises:
-        MaterialError: they do not begin with the pole, do not rise, or are too many.
+        MaterialError: the first ring is not the pole, θ does not ascend, or there are too few or too many directions.
     """
     theta, count = (
         np.array([row[0] for row in theta_and_counts]),
@@ -62,12 +63,12 @@ def make_direction_grid(theta_and_counts: Sequence[tuple[float, int]], shift: Se
     )
     shifts = np.array(shift or np.zeros(len(theta)), np.float32)
     if shifts.shape != theta.shape or not ((shifts >= 0) & (shifts < 1)).all():
-        raise MaterialError("the rings of the BTF's directions are each turned by a share of a step, from 0 to below 1")
+        raise MaterialError("the ring shifts of the BTF must be in [0, 1), one for each ring")
     rises = len(theta) >= 2 and theta[0] == 0 and bool((np.diff(theta) > 0).all()) and theta[-1] < 90
     if not rises or count[0] != 1 or (count[1:] < _MIN_RING_DIRECTIONS).any() or count.sum() > MAX_DIRECTIONS:
         raise MaterialError(
-            "the directions of the BTF are no rings about the normal: one at the pole, then at least "
-            f"{_MIN_RING_DIRECTIONS} on each ring above the horizon, at most {MAX_DIRECTIONS} in all"
+            "the directions of the BTF are not rings about the normal: one at the pole, then at least "
+            f"{_MIN_RING_DIRECTIONS} on each ring above the horizon, at most {MAX_DIRECTIONS} in total; resample it"
         )
     first = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
     return DirectionGrid(np.radians(theta).astype(np.float32), first, shifts)
@@ -75,29 +76,29 @@ def make_direction_grid(theta_and_counts: Sequence[tuple[float, int]], shift: Se
 
 @lru_cache(maxsize=1)
 def ubo_grid() -> DirectionGrid:
-    """Those of `UBO_81`."""
+    """The grid of `UBO_81`."""
     return make_direction_grid(UBO_81)
 
 
-def directions(grid: DirectionGrid) -> F64:
-    """All of them, unit, local frame, z = normal. (n, 3)"""
+def directions(grid: DirectionGrid) -> Shaped[F64, "n 3"]:
+    """All directions of a grid, unit, local frame, z = normal."""
     count = np.diff(grid.first)
     theta = np.repeat(grid.theta.astype(np.float64), count)
     phi = np.concatenate([2 * np.pi * (np.arange(n) + start) / n for n, start in zip(count, grid.shift, strict=True)])
     return polar(theta, phi)
 
 
-def polar(theta: F64, phi: F64) -> F64:
-    """Unit vectors of angles in radians. (n, 3)"""
+def polar(theta: Shaped[F64, " n"], phi: Shaped[F64, " n"]) -> Shaped[F64, "n 3"]:
+    """Unit vectors from angles in radians."""
     return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def interpolation_weights_at(grid, theta, azimuth_fraction, index, weight):  # type: ignore[no-untyped-def]
-    """Do as `interpolation_weights` of angles.
+    """Same as `interpolation_weights`, for angles.
 
     Args:
-        grid, index, weight: as there. theta: radians, up to π/2. azimuth_fraction: φ, a share of a turn.
+        grid, index, weight: as there. theta: radians, up to π/2. azimuth_fraction: φ / 2π.
     """
     lower = 0
     while lower < grid.theta.shape[0] - 2 and theta >= grid.theta[lower + 1]:
@@ -121,23 +122,25 @@ def interpolation_weights_at(grid, theta, azimuth_fraction, index, weight):  # t
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def interpolation_weights(grid, x, y, z, index, weight):  # type: ignore[no-untyped-def]
-    """Find the four directions about one, and their weights.
+    """Find the four grid directions around a direction, and their weights.
 
     Args:
         grid: the `DirectionGrid`. x, y, z: the direction, unit, above the horizon.
         index: written. (4,) int32. weight: written. (4,) float32
     Returns:
-        What is left of the cosine beyond the last ring: z over the last ring's, at most one.
+        Cosine factor beyond the last ring: z over the last ring's cosine, at most one.
     """
     interpolation_weights_at(grid, acos_clamped(z), azimuth_fraction(x, y), index, weight)
     return np.float32(min(max(z, np.float32(0)) / math.cos(grid.theta[grid.theta.shape[0] - 1]), np.float32(1)))
 
 
-def interpolation_weights_numpy(grid: DirectionGrid, w: F64) -> tuple[NDArray[np.int64], F64, F64]:
-    """Do as `interpolation_weights` for directions (n, 3), in plain NumPy: its oracle.
+def interpolation_weights_numpy(
+    grid: DirectionGrid, w: Shaped[F64, "n 3"]
+) -> tuple[Shaped[NDArray[np.int64], "n 4"], Shaped[F64, "n 4"], Shaped[F64, " n"]]:
+    """NumPy version of `interpolation_weights`, as its reference in tests and for arrays.
 
     Returns:
-        Directions (n, 4), weights (n, 4), what is left of the cosine (n,).
+        Directions, weights, cosine factors.
     """
     theta = np.arccos(np.clip(w[:, 2], 0, 1))
     all_theta, first = grid.theta.astype(np.float64), grid.first.astype(np.int64)

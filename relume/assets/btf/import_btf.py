@@ -1,4 +1,4 @@
-"""BTFs of files: read, compressed, kept. One that was begun goes on."""
+"""Import of BTF files: reads, compresses and stores them. An interrupted import resumes."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ def import_btf(
     partial_folder: Path | None = None,
     images: ViewArrays | None = None,
 ) -> BtfRecord:
-    """Import a zip of images or a .btf container; the same again is the same BTF.
+    """Import a zip of images or a .btf container; equal files are the same BTF.
 
     Args:
-        folder: of the asset store. file: what is in it says which of them it is. name: what people call it.
-        bound: relative RMS that may be missed. progress: called with the share done. is_canceled: asked now and then.
-        partial_folder: folder of what was found so far; by default in `folder`, by the file's content.
-        images: of the file, where somebody else reads it.
+        folder: of the asset store. file: of either kind. name: shown to users.
+        bound: allowed relative RMS error. progress: called with the completed fraction. is_canceled: checked regularly.
+        partial_folder: folder of partial results; by default in `folder`, named by the file's content.
+        images: of the file, if the caller reads it.
     Raises:
-        MaterialError: it is no such file, or the store is full. CancelledError: `is_canceled` said so; what was found
-            stays.
+        MaterialError: it is no such file, or the store is full. CancelledError: `is_canceled` is true; partial results
+            stay.
     """
     images = images or open_images(file)
     partial_folder = partial_folder or folder / "making" / STORE.content_id(file)
@@ -44,7 +44,7 @@ def import_btf(
     def compress_images() -> LocalPcaBtf:
         try:
             return compress(images, bound, progress, is_canceled, partial_compression)
-        except MaterialError:  # the file's own fault: nothing could go on from here
+        except MaterialError:  # a fault of the file: it cannot resume
             shutil.rmtree(partial_folder, ignore_errors=True)
             raise
 
@@ -54,7 +54,7 @@ def import_btf(
 
 
 def open_images(file: Path) -> ZippedBtf | MatrixBtf:
-    """The images of a zip or of a .btf container. Raises MaterialError."""
+    """Open the images of a zip or of a .btf container. Raises MaterialError."""
     with file.open("rb") as stream:
         is_container = stream.read(1) == FIRST_BYTE
     return MatrixBtf(file) if is_container else ZippedBtf(file)

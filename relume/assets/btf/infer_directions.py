@@ -1,8 +1,9 @@
-"""Directions that a file tells, one after another, as rings: which of them is which."""
+"""Inference of a direction grid from the unordered directions of a file."""
 
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.btf.direction_rings import MAX_DIRECTIONS, DirectionGrid, directions, make_direction_grid, polar
@@ -10,25 +11,25 @@ from relume.core.errors import MaterialError
 
 F64 = NDArray[np.float64]
 
-_MIN_RING_DISTANCE = 0.5  # degrees of θ from one ring to the next, at least
-_MAX_DEVIATION = 1.5  # degrees that directions may be from where the ring has them: names have whole degrees
-_MIN_SHIFT = 1e-3  # of a step: rings that begin so near φ = 0 begin there
+_MIN_RING_DISTANCE = 0.5  # degrees of θ between rings
+_MAX_DEVIATION = 1.5  # degrees from a direction to its place in the grid: names have whole degrees
+_MIN_SHIFT = 1e-3  # of a step; smaller shifts are rounded to zero
 
 
-def infer_rings(theta: F64, phi: F64) -> tuple[DirectionGrid, NDArray[np.intp]]:
-    """Put directions onto rings about the normal; each ring may begin at a φ of its own.
+def infer_rings(
+    theta: Shaped[F64, " n"], phi: Shaped[F64, " n"]
+) -> tuple[DirectionGrid, Shaped[NDArray[np.intp], " n"]]:
+    """Fit rings about the normal to directions; each ring may start at its own φ.
 
     Args:
-        theta, phi: of each direction, degrees. (n,) each
+        theta, phi: of each direction, degrees.
     Returns:
-        The rings; of each of their directions, its number among those that were given. (n,)
+        The grid; for each of its directions, the index of the given one.
     Raises:
-        MaterialError: they are not above the horizon, too many, or not evenly on rings.
+        MaterialError: directions are not above the horizon, too many, or not uniformly on rings.
     """
     if len(theta) > MAX_DIRECTIONS:
-        raise MaterialError(
-            f"the BTF has {len(theta):,} directions; at most {MAX_DIRECTIONS} can be kept, leave some out"
-        )
+        raise MaterialError(f"the BTF has {len(theta):,} directions, the limit is {MAX_DIRECTIONS}; leave some out")
     invalid = np.flatnonzero(~((theta >= 0) & (theta < 90) & np.isfinite(phi)))
     if len(invalid):
         raise missing_direction(theta[invalid[0]], phi[invalid[0]])
@@ -46,20 +47,20 @@ def infer_rings(theta: F64, phi: F64) -> tuple[DirectionGrid, NDArray[np.intp]]:
     )
     max_deviation = np.abs(polar(np.radians(theta[order]), np.radians(phi[order])) - directions(grid)).max()
     if len(np.unique(order)) != len(theta) or max_deviation > np.radians(_MAX_DEVIATION):
-        raise MaterialError("the directions of the BTF are not evenly on rings about the normal; resample it to such")
+        raise MaterialError("the directions of the BTF are not uniformly spaced on rings about the normal; resample it")
     return grid, order
 
 
 def missing_direction(theta: float, phi: float) -> MaterialError:
-    """What is wrong with a direction, in degrees, that is not above the horizon."""
+    """Return the error for a direction, in degrees, that is not above the horizon."""
     return MaterialError(
-        f"a direction of the BTF lies at θ = {theta:.4g}°, φ = {phi:.4g}°: at or below the horizon, or nowhere; leave "
-        "out what is seen or lit from there"
+        f"the BTF has a direction at θ = {theta:.4g}°, φ = {phi:.4g}°, which is not above the horizon; leave out the "
+        "images with it"
     )
 
 
 def _ring_shift(phi: F64) -> float:
-    """Where a ring begins, in steps: the mean of where each of its directions says. [0, 1)"""
+    """Shift of a ring, in steps: the mean over its directions. [0, 1)"""
     if len(phi) == 1:
         return 0.0
     offset = float(np.angle(np.exp(1j * np.radians(phi) * len(phi)).mean()) / (2 * np.pi) % 1.0)
@@ -67,7 +68,7 @@ def _ring_shift(phi: F64) -> float:
 
 
 def _order_ring(ring: NDArray[np.intp], phi: F64, shift: float) -> NDArray[np.intp]:
-    """The directions of a ring, given as `ring`, from its beginning on; some twice where they are not evenly on it."""
+    """Indices of a ring's directions in order of φ; some repeat if they are not uniformly spaced."""
     position = np.rint(phi[ring] * len(ring) / 360 - shift).astype(np.int64) % len(ring)
     order = np.full(len(ring), ring[0])
     order[position] = ring

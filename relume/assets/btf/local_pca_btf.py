@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.btf.bit_packing import cluster_bits, packed_bytes
@@ -23,42 +24,40 @@ F64 = NDArray[np.float64]
 I8 = NDArray[np.int8]
 
 
-INT8_MAX = 127  # of what is kept in a byte
+INT8_MAX = 127
 MAX_HEIGHT = 4.0
-"""Of a relief, in sides of its texture: a ray would pass many periods of a higher one."""
+"""Largest height of a relief, in side lengths of its texture: a ray would cross many periods of a higher one."""
 U8 = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False)
 class LocalPcaBtf:
-    """What is kept of a BTF of V view and L light directions, in K clusters with C components for each view.
+    """A compressed BTF with V view and L light directions, in K clusters with C components for each view.
 
     Attributes:
         grid: of both directions.
-        levels: first texel, height, width of the texels and of their means over 2 × 2, over 4 × 4, and so on.
-            (levels, 3) int32
-        cluster: of each texel of each level. (V, texels) uint8
-        weight: α, in steps that are in those of `step`. (V, texels, C) int8
-        bits: that weights of each component need, sign included. (C,) uint8
-        mean: M. (V, K, L, 3) float16
-        eigen: E, in steps of `step`. (V, K, C, L, 3) int8
-        step: (V, K, C) float32
-        average: of all texels. (V, L, 3) float32
-        height: of the relief over the plane, in sides of the texture; one zero where it is not known.
-            (height, width) float32
-        error: of the texels, relative RMS, by how many components are used, from none on. (C + 1,)
+        levels: first texel, height and width of each mip level.
+        cluster: of each texel of each level.
+        weight: α, in units that `step` includes.
+        bits: for the weights of each component, with sign.
+        mean: M.
+        eigen: E, in units of `step`.
+        step: quantization step of the product of weight and eigenvector.
+        average: over all texels.
+        height: of the relief above the plane, in side lengths of the texture; one zero if unknown.
+        error: relative RMS of the texels by the number of components, from zero to C.
     """
 
     grid: DirectionGrid
-    levels: NDArray[np.int32]
-    cluster: NDArray[np.uint8]
-    weight: I8
-    bits: U8
-    mean: NDArray[np.float16]
-    eigen: I8
-    step: F32
-    average: F32
-    height: F32
+    levels: Shaped[NDArray[np.int32], "levels 3"]
+    cluster: Shaped[NDArray[np.uint8], "V texels"]
+    weight: Shaped[I8, "V texels C"]
+    bits: Shaped[U8, " C"]
+    mean: Shaped[NDArray[np.float16], "V K L 3"]
+    eigen: Shaped[I8, "V K C L 3"]
+    step: Shaped[F32, "V K C"]
+    average: Shaped[F32, "V L 3"]
+    height: Shaped[F32, "height width"]
     error: tuple[float, ...]
 
     @property
@@ -68,12 +67,12 @@ class LocalPcaBtf:
 
     @property
     def num_components(self) -> int:
-        """C."""
+        """Number of components, C."""
         return int(self.weight.shape[2])
 
     @property
     def num_bytes(self) -> int:
-        """What is kept, the coarser levels left out, which files of measurements do not have either."""
+        """Compressed size, without the coarser levels, which measurements lack, too."""
         bits = np.append(self.bits, np.uint8(cluster_bits(self.mean.shape[1])))
         texel_bytes = packed_bytes(self.size[0] * self.size[1], bits)
         tables = self.mean.nbytes + self.eigen.nbytes + self.step.nbytes
@@ -81,12 +80,12 @@ class LocalPcaBtf:
 
     @property
     def measured_bytes(self) -> int:
-        """The same uncompressed: a byte for each channel of each image, as measurements are published."""
+        """Uncompressed size: one byte for each channel of each image, as measurements are published."""
         directions = self.grid.num_directions
         return self.size[0] * self.size[1] * directions * directions * 3
 
     def with_components(self, num: int) -> LocalPcaBtf:
-        """Use the first of them alone."""
+        """Keep only the first components."""
         num_components = max(0, min(num, self.num_components))
         return replace(
             self,
@@ -97,17 +96,19 @@ class LocalPcaBtf:
             error=self.error[: num_components + 1],
         )
 
-    def tables(self) -> F32:
-        """Means and components for sums over light: (V, K, 1 + C, 3, L) float32."""
+    def tables(self) -> Shaped[F32, "V K 1+C 3 L"]:
+        """Means and components for sums over light directions."""
         components = self.eigen.astype(np.float32) * self.step[..., None, None]
         mean_and_components = np.concatenate([self.mean[:, :, None].astype(np.float32), components], axis=2)
         return np.ascontiguousarray(mean_and_components.swapaxes(-1, -2))
 
-    def evaluate(self, view: int, texels: NDArray[np.int64], texel_weights: F64) -> F64:
-        """Texels seen from one side, summed: the BRDF times cosine. (L, 3)
+    def evaluate(
+        self, view: int, texels: Shaped[NDArray[np.int64], " n"], texel_weights: Shaped[F64, " n"]
+    ) -> Shaped[F64, "L 3"]:
+        """Weighted sum of texels for one view direction: the BRDF times cosine.
 
         Args:
-            view: the side. texels: their numbers. (n,). texel_weights: of each. (n,)
+            view: index of the view direction. texels: indices. texel_weights: of each.
         """
         cluster_index, total = self.cluster[view, texels], np.zeros(self.mean.shape[2:])
         for k in np.unique(cluster_index):
@@ -117,8 +118,8 @@ class LocalPcaBtf:
             total += np.einsum("j,jlc->lc", weight, self.eigen[view, k].astype(np.float64))
         return total
 
-    def texel_brdf(self, texel_index: int) -> F64:
-        """The BRDF times cosine of a texel. (V, L, 3)"""
+    def texel_brdf(self, texel_index: int) -> Shaped[F64, "V L 3"]:
+        """The BRDF times cosine of a texel."""
         all_views = np.arange(self.grid.num_directions)
         k = self.cluster[:, texel_index]
         weight = self.weight[:, texel_index].astype(np.float64) * self.step[all_views, k]

@@ -1,4 +1,4 @@
-"""The mean of all texels of a BTF, as a BRDF: what is seen of it from far away, and what it sends to other surfaces."""
+"""Mean of all texels of a BTF as a BRDF, for distant views and for indirect illumination."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import math
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.btf.direction_rings import DirectionGrid, interpolation_weights
 
 F32 = NDArray[np.float32]
 
-_LEAST_COSINE = 0.02  # of θi, by which values are divided
+_LEAST_COSINE = 0.02  # lower bound of cos θi, the divisor of values
 
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
@@ -37,15 +38,18 @@ def _quotients(grid, average, cosine, sine, wi, wo, out):  # type: ignore[no-unt
 
 
 def mean_brdf(
-    grid: DirectionGrid, average: F32, rotation: float, *directions: NDArray[np.floating]
-) -> NDArray[np.floating]:
-    """The mean BRDF, 1/sr, without the cosine that a BTF's values contain.
+    grid: DirectionGrid,
+    average: Shaped[F32, "n n 3"],
+    rotation: float,
+    *directions: NDArray[np.floating],
+) -> Shaped[NDArray[np.floating], " 3 *batch"]:
+    """The mean BRDF, 1/sr, without the cosine that a BTF's values include.
 
     Args:
         grid: of the directions. average: `LocalPcaBtf.average`. rotation: of the texture, radians.
         directions: x, y, z of wi and of wo, local frame, unit, z = normal; they broadcast. (...) each
     Returns:
-        (3, ...) of the directions' type; zero at and below the horizon.
+        In the type of the directions; zero at and below the horizon.
     """
     broadcast = np.broadcast_arrays(*directions)
     wi, wo = (np.ascontiguousarray([axis.ravel() for axis in broadcast[k : k + 3]]) for k in (0, 3))

@@ -1,4 +1,4 @@
-"""One image of a measured BTF: bounded before it is decoded, linear, of no more texels than can be kept."""
+"""Reading of one image of a measured BTF: checked before decoding, linear, scaled to the allowed number of texels."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import io
 import math
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -21,29 +22,29 @@ F32 = NDArray[np.float32]
 SUFFIXES = (".jpg", ".jpeg", ".png", ".exr")
 _MAX_PIXELS = 2048 * 2048
 _FORMATS = ("JPEG", "PNG")
-_DEEP_MODES = ("I", "F")  # modes that begin so have 16 or 32 bits, which would be cut off at a byte
+_DEEP_MODES = ("I", "F")  # prefixes of modes with 16 or 32 bits, which conversion would truncate to 8
 _BOMB_ERRORS = Image.DecompressionBombError, Image.DecompressionBombWarning
 _READ_ERRORS = OSError, ValueError, SyntaxError, RuntimeError, NotImplementedError
 
 
-def read_photograph(data: bytes, name: str) -> F32:
-    """Decode a JPEG or PNG, which are sRGB of a byte a channel, or an OpenEXR file, which is linear.
+def read_photograph(data: bytes, name: str) -> Shaped[F32, "height width 3"]:
+    """Decode a JPEG or PNG with 8-bit sRGB channels, or an OpenEXR file, which is linear.
 
     Args:
-        data: of the file. name: what it is, in messages.
+        data: of the file. name: in messages.
     Returns:
-        (height, width, 3) float32, finite, from 0 to `relume.assets.btf.value_cache.MAX_VALUE`.
+        Finite values from 0 to `relume.assets.btf.value_cache.MAX_VALUE`.
     Raises:
-        MaterialError: damaged, too large, of more than a byte where it is no OpenEXR, or some values are no numbers.
+        MaterialError: damaged, too large, JPEG or PNG with more than 8 bits, or values that are not finite.
     """
     return _linear(data, name) if data.startswith(EXR_MAGIC) else _srgb(data, name)
 
 
-def limit_texels(image: F32, max_texels: int) -> F32:
-    """The image of at most so many texels, each the mean of as many pixels along both sides as a whole number says.
+def limit_texels(image: Shaped[F32, "height width 3"], max_texels: int) -> Shaped[F32, "rows columns 3"]:
+    """Scale an image down to at most `max_texels`, by means of whole blocks of pixels.
 
     Args:
-        image: linear. (height, width, 3). max_texels: see `relume.assets.btf.compress.max_texels`.
+        image: linear. max_texels: see `relume.assets.btf.compress.max_texels`.
     """
     height, width = image.shape[:2]
     factor = math.ceil(math.sqrt(height * width / max_texels))
@@ -56,7 +57,7 @@ def _linear(data: bytes, name: str) -> F32:
     except SceneError as error:
         raise MaterialError(str(error)) from error
     if not np.isfinite(image).all():
-        raise MaterialError(f"{name} has values that are no numbers; repair it, and pack it again")
+        raise MaterialError(f"{name} has non-finite values; repair it, and pack it again")
     return np.clip(image, 0, MAX_VALUE)
 
 
@@ -66,7 +67,7 @@ def _srgb(data: bytes, name: str) -> F32:
             _check_size(image.width, image.height, name)
             if image.mode.startswith(_DEEP_MODES):
                 raise MaterialError(
-                    f"{name} has more than a byte a channel; write it with one, as sRGB, or as OpenEXR, linear"
+                    f"{name} has more than 8 bits per channel; write it with 8 bits as sRGB, or as linear OpenEXR"
                 )
             pixels = np.asarray(image.convert("RGB"))
     except MaterialError:
@@ -85,5 +86,5 @@ def _check_size(width: int, height: int, name: str) -> None:
 
 def _size_error(name: str) -> MaterialError:
     return MaterialError(
-        f"{name} has more than {_MAX_PIXELS:,} pixels; scale the images down, {MAX_TEXELS:,} texels are kept"
+        f"{name} has more than {_MAX_PIXELS:,} pixels; scale the images down, at most {MAX_TEXELS:,} texels are used"
     )

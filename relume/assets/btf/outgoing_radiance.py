@@ -1,4 +1,4 @@
-"""Outgoing radiance of BTF-textured points, for brute force. The tests have a reference in plain NumPy."""
+"""Outgoing radiance of BTF-textured points, for the reference. Tests compare it with plain NumPy."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.btf.direction_rings import interpolation_weights
@@ -18,12 +19,12 @@ F64 = NDArray[np.float64]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _add_texels(size, u, v, position_weight, cluster, weight, cluster_slot, used_clusters, factors):  # type: ignore[no-untyped-def]
-    """Add the four texels about a place to the factors of their clusters' means and components.
+    """Add the four texels around a position to the factors of their clusters' means and components.
 
     Args:
-        size: height and width. u, v: the place, in texels from the middle of the first. position_weight: of the place.
-        cluster, weight: of the texels. cluster_slot: row of `factors` of each cluster, below 0 where it has none yet.
-        used_clusters: clusters that have one; as many are filled as the last entry says.
+        size: height and width. u, v: the position, in texels from the center of the first. position_weight: its weight.
+        cluster, weight: of the texels. cluster_slot: row of `factors` for each cluster, negative if it has none yet.
+        used_clusters: clusters with a row; the last entry is their number.
     """
     left, upper = math.floor(u), math.floor(v)
     for corner in range(4):
@@ -44,7 +45,7 @@ def _add_texels(size, u, v, position_weight, cluster, weight, cluster_slot, used
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _sample_btf_kernel(grid, shears, height, size, cluster, weight, tables, texel_positions, wo, out):  # type: ignore[no-untyped-def]
-    """Do as `seen` of its arrays. side: slants of the directions. size: height and width in texels."""
+    """Kernel of `sample_btf`. shears: of the directions. size: height and width in texels."""
     lowest, highest = height.min(), height.max()
     view, view_weight = np.empty(4, np.int32), np.empty(4, np.float32)
     cluster_slot, used_clusters = np.full(256, -1, np.int64), np.empty(4 * texel_positions.shape[1] + 1, np.int64)
@@ -94,15 +95,17 @@ def _sample_btf_kernel(grid, shears, height, size, cluster, weight, tables, texe
                 out[p, light, channel] = total[channel, light]
 
 
-def sample_btf(btf: LocalPcaBtf, tables: F32, texel_positions: F64, wo: F64) -> F32:
+def sample_btf(
+    btf: LocalPcaBtf, tables: F32, texel_positions: Shaped[F64, "n texels 2"], wo: Shaped[F64, "n 3"]
+) -> Shaped[F32, "n L 3"]:
     """Reflected radiance toward `wo` for each measured light direction, averaged over the texels of each point.
 
     Args:
         btf: the BTF. tables: from `LocalPcaBtf.tables`.
-        texel_positions: column and row, in texels of the finest level, from the center of the first. (n, texels, 2)
-        wo: view directions in the frame of the texture, above the horizon, unit. (n, 3)
+        texel_positions: column and row, in texels of the finest level, from the center of the first.
+        wo: view directions in the frame of the texture, above the horizon, unit.
     Returns:
-        Radiance for one unit of irradiance across the light direction; the cosine is in it. (n, L, 3) float32
+        Radiance per unit of irradiance perpendicular to the light direction, including the cosine.
     """
     out = np.empty((len(wo), btf.grid.num_directions, 3), np.float32)
     _sample_btf_kernel(
@@ -128,16 +131,20 @@ def _outgoing_radiance_kernel(grid, values_by_light, axes, point_index, wi, out)
 
 
 def outgoing_radiance(
-    btf: LocalPcaBtf, values_by_light: F32, axes: F64, point_index: NDArray[np.int64], wi: F64
-) -> F64:
-    """Reflected radiance of light from any direction, interpolated between the measured light directions.
+    btf: LocalPcaBtf,
+    values_by_light: Shaped[F32, "points L 3"],
+    axes: Shaped[F64, "points 2 2"],
+    point_index: Shaped[NDArray[np.int64], " n"],
+    wi: Shaped[F64, "n 3"],
+) -> Shaped[F64, "n 3"]:
+    """Reflected radiance for any light direction, interpolated between the measured ones.
 
     Args:
-        btf: the BTF. values_by_light: from `sample_btf`. (n, L, 3)
-        axes: of the texture, in the frames of the points. (n, 2, 2)
-        point_index: point of each direction. (m,). wi: in the frames of their points, unit. (m, 3)
+        btf: the BTF. values_by_light: from `sample_btf`.
+        axes: of the texture, in the frames of the points.
+        point_index: point of each direction. wi: in the frames of their points, unit.
     Returns:
-        Radiance for one unit of irradiance across `wi`; the cosine is in it. (m, 3) float64
+        Radiance per unit of irradiance perpendicular to `wi`, including the cosine.
     """
     out = np.empty((len(wi), 3))
     _outgoing_radiance_kernel(btf.grid, values_by_light, axes, point_index, np.ascontiguousarray(wi, np.float64), out)

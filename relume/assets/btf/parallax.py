@@ -1,12 +1,12 @@
-"""Where what is seen at a place of a BTF's plane is seen from another side: the height of the relief tells.
+"""Parallax between view directions of a BTF, from the height of its relief.
 
-A ray towards w, which crosses the plane at x, is at height z over x + z s(w), s(w) = (w_x, w_y) / w_z. Where it meets
-the relief, at height h, a ray towards v meets it too that crosses the plane at
+A ray toward w that crosses the plane at x has at height z the position x + z s(w), s(w) = (w_x, w_y) / w_z. If it
+meets the relief at height h, the ray toward v that meets the same point crosses the plane at
 
     x_v = x + h (s(w) − s(v)) .
 
-So values that are known from v are looked up there, when they are to be seen from w: else a mean of several directions
-would show relief several times.
+Interpolation toward w therefore looks up the values measured from v at x_v. Without it, a mean of several view
+directions would show the relief as ghost images.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.btf.direction_rings import DirectionGrid, directions
@@ -24,19 +25,19 @@ from relume.core.numba_options import UNCOUNTED
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_STEPS_PER_TEXEL = np.float32(2)  # steps, along a ray
+_STEPS_PER_TEXEL = np.float32(2)  # along a ray
 _MAX_STEPS = 256
 
 
-def compute_shears(grid: DirectionGrid) -> F32:
-    """s of every direction: how far its rays go sideways for each unit that they rise. (V, 2) float32"""
+def compute_shears(grid: DirectionGrid) -> Shaped[F32, "n 2"]:
+    """s of every direction: horizontal distance per unit of height."""
     w = directions(grid)
     return np.asarray(w[:, :2] / w[:, 2:], np.float32)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def compute_shear(grid, x, y, z):  # type: ignore[no-untyped-def]
-    """s of a direction; beyond the last ring it is the last ring's.
+    """s of a direction, limited to that of the last ring.
 
     Args:
         grid: the `DirectionGrid`. x, y, z: the direction, unit, above the horizon.
@@ -49,7 +50,7 @@ def compute_shear(grid, x, y, z):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
 def _interpolate_height(height, u, v):  # type: ignore[no-untyped-def]
-    """Interpolate heights between texels, which repeat without end."""
+    """Bilinear interpolation of the heights of texels, periodically repeated."""
     rows, columns = height.shape
     x, y = u * np.float32(columns) - np.float32(0.5), v * np.float32(rows) - np.float32(0.5)
     left, upper = math.floor(x), math.floor(y)
@@ -64,11 +65,11 @@ def _interpolate_height(height, u, v):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def parallax_intersection(height, lowest, highest, u, v, shear):  # type: ignore[no-untyped-def]
-    """Find how high the relief is where a ray meets it first, in steps of half a texel, linear on the last.
+    """Find the height at which a ray first meets the relief, in steps of half a texel and linear in the last.
 
     Args:
-        height: of the relief, sides of the texture. (height, width) float32. lowest, highest: of them.
-        u, v: where the ray crosses the plane, in repeats. shear: s of it.
+        height: of the relief, in side lengths of the texture. (height, width) float32. lowest, highest: its range.
+        u, v: crossing with the plane, in repeats. shear: s of the ray.
     """
     rows, columns = height.shape
     sideways = max(abs(shear[0]) * np.float32(columns), abs(shear[1]) * np.float32(rows)) * (highest - lowest)

@@ -1,7 +1,7 @@
-"""What a compression has found so far, on the disk: one file for each view, so that a killed one goes on.
+"""Partial results of a compression on disk: one file for each view, so that an interrupted one can resume.
 
-<folder>/recipe.json    what is compressed, and how: files of another one do not count
-         <name>.npz     arrays that were found
+<folder>/recipe.json    description of the compression; files of a different one are deleted
+         <name>.npz     arrays of a result
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ Arrays = Mapping[str, NDArray[Any]]
 
 
 class PartialCompression:
-    """Parts of a compression, by name.
+    """Partial results of a compression, by name.
 
     Args:
-        folder: where they are, or will be. recipe: JSON that says what is compressed, and how.
+        folder: of the files; created if missing. recipe: JSON description of the compression.
     """
 
     def __init__(self, folder: Path, recipe: Mapping[str, Any]) -> None:
@@ -40,7 +40,7 @@ class PartialCompression:
             unfinished.write_text(text)
 
     def load(self, name: str) -> Arrays | None:
-        """The arrays of a part; None where it is not there, or damaged."""
+        """Load the arrays of a result; None if missing or damaged."""
         try:
             with (self._folder / f"{name}.npz").open("rb") as file, np.load(file, allow_pickle=False) as archive:
                 return {key: archive[key] for key in archive.files}
@@ -48,6 +48,6 @@ class PartialCompression:
             return None
 
     def save(self, name: str, arrays: Arrays) -> None:
-        """Keep a part."""
+        """Save a result."""
         with atomic_write(self._folder / f"{name}.npz") as unfinished, unfinished.open("wb") as file:
             np.savez(file, allow_pickle=False, **arrays)

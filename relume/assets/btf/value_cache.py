@@ -1,7 +1,7 @@
-"""All values of a BTF on the disk while it is made or read: one side after another, so that a killed run goes on.
+"""All values of a BTF on disk while it is rendered or read: view by view, so that an interrupted run can resume.
 
 <folder>/values.npy     (views, lights, texels, 3) float16
-         done           how many views are written, in decimal digits
+         done           number of complete views, in decimal digits
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.btf.direction_rings import DirectionGrid
@@ -20,14 +21,14 @@ F16 = NDArray[np.float16]
 F32 = NDArray[np.float32]
 
 MAX_VALUE = 60_000.0
-"""That half precision holds; what is brighter is a mirror of the lamp."""
+"""Near the limit of half precision; brighter values are mirror reflections of the light."""
 
 
 class ValueFile:
-    """Values as they are filled in, then read; implements `relume.assets.btf.compress.ViewArrays`.
+    """Values that are filled view by view, then read; implements `relume.assets.btf.compress.ViewArrays`.
 
     Args:
-        folder: where they are, or will be. grid: of the directions. size: height and width in texels.
+        folder: of the files; created if missing. grid: of the directions. size: height and width in texels.
     """
 
     def __init__(self, folder: Path, grid: DirectionGrid, size: tuple[int, int]) -> None:
@@ -41,35 +42,35 @@ class ValueFile:
             (folder / "done").write_text("0")
         values = np.load(path, mmap_mode="r+", allow_pickle=False)
         if values.shape != self._shape or values.dtype != np.float16:
-            raise MaterialError(f"{folder.name} holds another BTF; delete it and start again")
+            raise MaterialError(f"{folder.name} contains another BTF; delete it and start again")
         self._values: F16 = values
 
     @property
     def num_done(self) -> int:
-        """Views that are there."""
+        """Number of complete views."""
         text = (self._folder / "done").read_text()
         return min(int(text), self._shape[0]) if text.isascii() and text.isdigit() else 0
 
     def fill(
         self, images: Callable[[int], F32], progress: Callable[[float], object], is_canceled: Callable[[], bool]
     ) -> None:
-        """Write the views that are not there yet.
+        """Compute and write the missing views.
 
         Args:
-            images: values seen from a view, (lights, texels, 3). progress: called with the share done.
-            is_canceled: asked before each view.
+            images: computes the values of a view, (lights, texels, 3). progress: called with the completed fraction.
+            is_canceled: checked before each view.
         Raises:
-            CancelledError: `is_canceled` said so; what is there stays.
+            CancelledError: `is_canceled` is true; complete views stay.
         """
         for view in range(self.num_done, self._shape[0]):
             if is_canceled():
-                raise CancelledError("it was cancelled; the same again goes on from there")
+                raise CancelledError("canceled; start it again to resume")
             progress(view / self._shape[0])
             self._values[view] = np.minimum(images(view), MAX_VALUE)
             self._values.flush()  # type: ignore[attr-defined]
             with atomic_write(self._folder / "done") as unfinished:
                 unfinished.write_text(str(view + 1))
 
-    def get_view(self, view: int) -> F32:
-        """Every texel's values from one direction. (lights, texels, 3) float32"""
+    def get_view(self, view: int) -> Shaped[F32, "lights texels 3"]:
+        """Values of all texels from one view direction."""
         return np.asarray(self._values[view], np.float32)

@@ -1,4 +1,4 @@
-"""Environment maps that a look may name: "env:<id>" is imported, other names are built in."""
+"""Environment maps of looks: "env:<id>" is imported, other names are built in."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from relume.assets.environments.environment_store import STORE, load_imported
 
 
 def environment_exists(name: str) -> bool:
-    """Whether a look's `map` names an environment that is here."""
+    """True if a look's `map` refers to an available environment."""
     return name in BUILT_IN or STORE.exists(name)
 
 
 def environment_names() -> list[str]:
-    """The names that a look's `map` may have."""
+    """Return the names that a look's `map` can have."""
     return [*BUILT_IN, *STORE.list_names()]
 
 
 def load_environment(name: str) -> Environment:
-    """The environment that a look's `map` names.
+    """Load the environment of a look's `map`.
 
     Raises:
-        NotFoundError: it is not here. SceneError: its files are damaged.
+        NotFoundError: it does not exist. SceneError: its files are damaged.
     """
     return load_built_in(name) if name in BUILT_IN else load_imported(name)

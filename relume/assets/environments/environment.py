@@ -1,10 +1,11 @@
-"""An environment as relume sees it."""
+"""The environment model."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.import_warnings import ImporterWarning
@@ -14,13 +15,13 @@ from relume.core.import_warnings import ImporterWarning
 class Environment:
     """Distant light: equirectangular linear radiance, top row first.
 
-    The direction of texel (u, v), v from the top: u = atan2(z, x)/2π + ½, v = ½ − asin(y)/π.
+    Direction of texel (u, v), v from the top: u = atan2(z, x)/2π + ½, v = ½ − asin(y)/π.
 
     Attributes:
-        radiance: finite, not negative. (height, width, 3) float32
-        warnings: what had to be repaired when it was read, one sentence each.
+        radiance: finite, not negative.
+        warnings: about repairs during import, one sentence each.
     """
 
     name: str
-    radiance: NDArray[np.float32]
+    radiance: Shaped[NDArray[np.float32], "height width 3"]
     warnings: tuple[ImporterWarning, ...] = ()

@@ -1,11 +1,10 @@
-"""Environments that were imported; `relume.assets.asset_store` keeps them.
+"""Store of imported environments, in `relume.assets.asset_store`.
 
-    <folder>/<id>/radiance.npy        as `relume.assets.environments.read_environment` reads the file, at most 2048
-    texels wide
+    <folder>/<id>/radiance.npy        read by `relume.assets.environments.read_environment`, at most 2048 texels wide
                   thumbnail.png
-                  environment.json    name, and what had to be changed
+                  environment.json    name and warnings
 
-Look documents name one as "env:<id>".
+Looks refer to one as "env:<id>".
 """
 
 from __future__ import annotations
@@ -24,16 +23,16 @@ from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, warning_of
 
 STORE = AssetStore("imported environment", "env:", "environment.json", SceneError, max_entries=500)
-MAX_WIDTH = 2048  # a texel of 0.18°: finer than what a bake divides light into, and weighed in seconds
+MAX_WIDTH = 2048  # texels of 0.18°: finer than the environment triangles of a bake, and fast to integrate
 _RADIANCE, _THUMBNAIL = "radiance.npy", "thumbnail.png"
 
 
 @dataclass(frozen=True)
 class EnvironmentRecord:
-    """What lists show of an imported environment.
+    """An imported environment in lists.
 
     Attributes:
-        created: seconds since 1970. warnings: what was changed when it was read, one sentence each.
+        created: seconds since 1970. warnings: about repairs during import, one sentence each.
     """
 
     id: str
@@ -43,23 +42,21 @@ class EnvironmentRecord:
 
     @property
     def map(self) -> str:
-        """The name by which look documents mean this environment."""
+        """Name of the environment in looks."""
         return STORE.prefix + self.id
 
 
 def store_environment(folder: Path, source: Path, name: str) -> EnvironmentRecord:
-    """Import an equirectangular .hdr or .exr file; the same content twice is the same, its newest name wins.
+    """Import an equirectangular .hdr or .exr file; an existing one with this content gets the new name.
 
     Args:
         folder: of the asset store.
         source: the file to import.
-        name: what people call it.
+        name: shown to users.
     Raises:
-        SceneError: the file cannot be used, or the store is full.
+        SceneError: the file is unusable, or the store is full.
     """
-    from relume.assets.environments.thumbnail import (
-        write_thumbnail,  # compiled kernels, which readers of scenes do without
-    )
+    from relume.assets.environments.thumbnail import write_thumbnail  # loads kernels, which other users do not need
 
     environment = read_environment(source, name, MAX_WIDTH)
 
@@ -72,12 +69,12 @@ def store_environment(folder: Path, source: Path, name: str) -> EnvironmentRecor
 
 
 def records(folder: Path) -> list[EnvironmentRecord]:
-    """All environments of a folder, newest first."""
+    """Return all environments of a folder, newest first."""
     return STORE.records(folder, get_record)
 
 
 def get_record(folder: Path, identity: str) -> EnvironmentRecord:
-    """One environment. Raises NotFoundError; SceneError where its files are damaged."""
+    """Return one environment. Raises NotFoundError; SceneError if its files are damaged."""
     path = STORE.path(folder, identity)
     document = STORE.load_record(path)
     warnings = document.get("warnings")
@@ -87,15 +84,15 @@ def get_record(folder: Path, identity: str) -> EnvironmentRecord:
 
 
 def thumbnail_path(folder: Path, identity: str) -> Path:
-    """A small picture of one. Raises NotFoundError."""
+    """Return the path of its thumbnail. Raises NotFoundError."""
     return STORE.path(folder, identity) / _THUMBNAIL
 
 
 def load_imported(name: str) -> Environment:
-    """What a look's `map` names; its texels stay on the disk and are read where they are needed.
+    """Load the environment of a look's `map`; its texels are memory-mapped.
 
     Raises:
-        NotFoundError: it is not here. SceneError: its files are damaged.
+        NotFoundError: it does not exist. SceneError: its files are damaged.
     """
     return _load(STORE.resolve(name))
 

@@ -1,4 +1,4 @@
-"""Headers of Radiance's .hdr: lines of text, an empty one, then `-Y height +X width`."""
+"""Headers of Radiance .hdr files: lines of text, an empty line, then `-Y height +X width`."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
@@ -19,17 +20,17 @@ _PRIMARIES = b"PRIMARIES="
 
 
 class RadianceHeader(NamedTuple):
-    """What counts of it.
+    """The fields of a header that are used.
 
     Attributes:
         width, height: in pixels.
-        to_rec_709: what converts its colours, the matrix (3, 3); None where they are ours, or it does not tell.
-        has_odd_primaries: whether it tells primaries that are none.
+        to_rec_709: matrix that converts its colors; None for Rec. 709 or without primaries.
+        has_odd_primaries: its primaries are invalid.
     """
 
     width: int
     height: int
-    to_rec_709: F64 | None
+    to_rec_709: Shaped[F64, " 3 3"] | None
     has_odd_primaries: bool
 
 
@@ -37,9 +38,9 @@ def read_header(data: bytes, name: str) -> RadianceHeader:
     """Read a header.
 
     Args:
-        data: of the file. name: what people call it.
+        data: of the file. name: of the environment, in messages.
     Raises:
-        SceneError: there is none, or rows are in another order than from the top.
+        SceneError: there is no header, or rows are not ordered from the top.
     """
     lines = data[:_MAX_HEADER_BYTES].split(b"\n")
     try:
@@ -49,16 +50,16 @@ def read_header(data: bytes, name: str) -> RadianceHeader:
         raise SceneError(f"environment {name!r} has no Radiance header; export it again") from None
     match = _RESOLUTION.match(resolution)
     if match is None or max(len(line) for line in lines[:end]) > _MAX_LINE_BYTES:
-        raise SceneError(f"environment {name!r} has an odd Radiance header; save it top row first")
+        raise SceneError(f"environment {name!r} has an unsupported Radiance header; save it with the top row first")
     primaries = [line.removeprefix(_PRIMARIES).split() for line in lines[:end] if line.startswith(_PRIMARIES)]
     matrix, is_odd = _conversion_matrix(primaries[-1]) if primaries else (None, False)
     return RadianceHeader(int(match[2]), int(match[1]), matrix, is_odd)
 
 
 def _conversion_matrix(primaries: list[bytes]) -> tuple[F64 | None, bool]:
-    """What converts colours, and whether nothing can be told: many programs write nonsense, and mean Rec. 709."""
+    """Matrix that converts colors, and True for invalid primaries: many programs write nonsense and mean Rec. 709."""
     try:
         values = [float(number) for number in primaries]
-        return (to_rec_709(values), False) if any(values) else (None, False)  # zeros: not known
+        return (to_rec_709(values), False) if any(values) else (None, False)  # zeros mean unknown
     except ValueError:
         return None, True

@@ -1,4 +1,4 @@
-"""Reading equirectangular .hdr and .exr files, which may be hostile."""
+"""Import of equirectangular .hdr and .exr files from untrusted sources."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from relume.core.import_warnings import ImporterWarning, approximated, unsupport
 from relume.image_io.downsample import downsample
 from relume.image_io.primaries import convert
 from relume.image_io.read_linear import EXR_MAGIC, check_claim, read_strips
+from relume.scene.unique_names import quote
 
 F32 = NDArray[np.float32]
 
 MAX_WIDTH, MAX_HEIGHT = 16_384, 8_192
-SCENE_MAX_WIDTH = 4096  # texels of 0.09°, some hundred bytes each while a bake divides them into light
+SCENE_MAX_WIDTH = 4096  # texels of 0.09°, which take some hundred bytes each during a bake
 MAX_FILE_BYTES = 400_000_000
 MAX_RADIANCE = 1e6
 _STRIP_ROWS = 64
@@ -29,16 +30,15 @@ def read_environment(source: str | Path | bytes, name: str, max_width: int = SCE
 
     Args:
         source: a path or the file's bytes.
-        name: what people call it.
-        max_width: it is kept at most so many texels wide, each the mean of those that it stands for.
+        name: shown to users.
+        max_width: wider maps are averaged down to this width.
 
     Returns:
-        The environment, in linear Rec. 709 whatever the primaries that it tells, with one warning for each thing
-        that was repaired: texels that are not finite become black, negative values 0, and radiance is held below 1e6;
-        and one where it was reduced.
+        The environment, in linear Rec. 709 for any primaries of the file, with one warning for each kind of repair:
+        non-finite texels become black, negative values 0, radiance is clamped to 1e6, and wide maps are scaled down.
 
     Raises:
-        SceneError: no such file, neither format, empty, damaged, too large, not 2:1, or without any light.
+        SceneError: no such file, neither format, empty, damaged, too large, not 2:1, or black.
     """
     data = _read_bytes(source, name)
     if not data:
@@ -54,7 +54,7 @@ def read_environment(source: str | Path | bytes, name: str, max_width: int = SCE
 
 
 class _MapReader:
-    """A map on its way: strip after strip is repaired, and reduced as many times as a whole number says.
+    """Reads a map in strips of rows, and repairs and downsamples each by an integer factor.
 
     Attributes:
         width: of the map in the file.
@@ -75,11 +75,11 @@ class _MapReader:
         check_claim(header.width * header.height * 12, data, f"environment {self._name!r}")
         self.strips(data, ".hdr", header.to_rec_709)
         if header.has_odd_primaries:
-            warning = f"environment {self._name!r} tells primaries that are no colours; it is read as linear Rec. 709"
+            warning = f"HDRI {quote(self._name)} has invalid color primaries; it was read as linear Rec. 709."
             self._warnings.append(approximated(warning))
 
     def strips(self, data: bytes, suffix: str, matrix: NDArray[np.float64] | None = None) -> None:
-        """Read all strips. matrix: what converts their colours, where the reader does not know it"""
+        """Read all strips. matrix: converts their colors if the file's reader does not"""
         for strip in read_strips(data, suffix, f"environment {self._name!r}", self._rows):
             if matrix is not None:
                 convert(strip, matrix)
@@ -104,25 +104,23 @@ class _MapReader:
             pixels = np.where(broken, np.float32(0), pixels)
         self._num_negative += int((pixels < 0).any(axis=-1).sum())
         self._is_bright |= bool((pixels > MAX_RADIANCE).any())
-        np.clip(pixels, 0, MAX_RADIANCE, out=pixels)  # in place: a map that is not reduced may have 1.6 GB
+        np.clip(pixels, 0, MAX_RADIANCE, out=pixels)  # in place: a map that is not downsampled may have 1.6 GB
         return pixels
 
     def environment(self) -> Environment:
-        """What was read, and what is to be said of it."""
-        label, warnings = f"environment {self._name!r}", list(self._warnings)
+        """Return the environment with its warnings."""
+        label, warnings, hdri = f"environment {self._name!r}", list(self._warnings), f"HDRI {quote(self._name)}"
         if self._num_broken == self._num_texels:
             raise SceneError(f"no texel of {label} is a finite number; render or export it again")
         if self._num_broken:
-            warnings.append(unsupported(f"{self._num_broken:,} texels of {label} are not finite; they are black now"))
+            warnings.append(unsupported(f"{self._num_broken:,} NaN or infinite texels of {hdri} were made black."))
         if self._num_negative:
-            warnings.append(
-                approximated(f"{self._num_negative:,} texels of {label} are negative; they are 0 there now")
-            )
+            warnings.append(approximated(f"{self._num_negative:,} negative texels of {hdri} were set to 0."))
         if self._is_bright:
-            warnings.append(approximated(f"{label} is brighter than {MAX_RADIANCE:g} somewhere; it is held to that"))
+            warnings.append(approximated(f"Values of {hdri} above {MAX_RADIANCE:g} were clamped."))
         pixels = self._strip_pixels[0] if len(self._strip_pixels) == 1 else np.concatenate(self._strip_pixels)
         if not pixels.any():
-            raise SceneError(f"{label} is black everywhere; choose one with light in it")
+            raise SceneError(f"{label} is black everywhere; choose one with light")
         return Environment(self._name, pixels, tuple(warnings))
 
 
@@ -135,7 +133,7 @@ def _read_bytes(source: str | Path | bytes, name: str) -> bytes:
         except OSError:
             raise SceneError(f"there is no environment file {Path(source).name!r}; check the path") from None
     if size_bytes > MAX_FILE_BYTES:
-        raise SceneError(f"environment {name!r} has {size_bytes / 1e6:,.0f} MB, 400 MB are allowed; scale it down")
+        raise SceneError(f"environment {name!r} has {size_bytes / 1e6:,.0f} MB, the limit is 400 MB; scale it down")
     try:
         return source if isinstance(source, bytes) else Path(source).read_bytes()
     except OSError as problem:
@@ -145,18 +143,18 @@ def _read_bytes(source: str | Path | bytes, name: str) -> bytes:
 def _check_size(name: str, width: int, height: int) -> None:
     if not (1 <= width <= MAX_WIDTH and 1 <= height <= MAX_HEIGHT):
         raise SceneError(
-            f"environment {name!r} is {width}×{height}; at most {MAX_WIDTH}×{MAX_HEIGHT} pixels are read; scale it"
+            f"environment {name!r} is {width}×{height} pixels, the limit is {MAX_WIDTH}×{MAX_HEIGHT}; scale it down"
         )
     if width != 2 * height:
-        raise SceneError(f"environment {name!r} is {width}×{height}; an equirectangular map is twice as wide as high")
+        raise SceneError(f"environment {name!r} is {width}×{height}, not 2:1; use an equirectangular map")
 
 
 def _limit_width(environment: Environment, width: int, max_width: int) -> Environment:
-    """At most so wide. width: in the file, of which whole parts are reduced already"""
+    """Scale down to `max_width`. width: in the file; the map may be downsampled already"""
     if width <= max_width:
         return environment
     size = max_width, max_width // 2
-    warning = f"environment {environment.name!r} is {width}×{width // 2}; it is kept as {size[0]}×{size[1]}"
+    warning = f"HDRI {quote(environment.name)} was scaled from {width}×{width // 2} to {size[0]}×{size[1]}."
     return Environment(
         environment.name, downsample(environment.radiance, size), (*environment.warnings, approximated(warning))
     )

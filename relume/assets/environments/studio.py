@@ -1,4 +1,4 @@
-"""The demo's light: a dim room, a tall window as key, a strip as rim light, one small lamp for hard shadows."""
+"""The demo's environment: a dim room with a tall window as key light, a strip as rim light and a small light."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FLOOR = np.array([0.05, 0.04, 0.03])
 
 
 def studio() -> Environment:
-    """The studio as an equirectangular map of 512×256 texels; the picture's front is +Z."""
+    """Return an equirectangular map of 512×256 texels; +Z is toward the camera."""
     w = texel_directions(HEIGHT, WIDTH).astype(np.float64)
     radiance = _room(w)
     radiance += _window(w)[..., None] * np.array([13.0, 12.7, 12.3])
@@ -31,7 +31,7 @@ def studio() -> Environment:
 
 
 def _room(w: F64) -> F64:
-    """Ceiling, walls and floor as one smooth gradient over elevation, a little brighter towards the window."""
+    """Ceiling, walls and floor as one smooth gradient over elevation, brighter toward the window."""
     y = w[..., 1:2]
     upper = HORIZON + (CEILING - HORIZON) * np.clip(y, 0, 1) ** 0.6
     lower = HORIZON + (FLOOR - HORIZON) * np.clip(-y, 0, 1) ** 0.4
@@ -40,17 +40,17 @@ def _room(w: F64) -> F64:
 
 
 def _window(w: F64) -> F64:
-    """The key: two by three panes, so that a glossy thing shows what it sees."""
-    panes = np.zeros(w.shape[:2])
+    """Key light: a window with two by three sections, which show in reflections."""
+    window = np.zeros(w.shape[:2])
     for column in (-1, 1):
         for row in (-1, 0, 1):
             right, up = 10.4 * column, 14.4 * row
-            panes += _panel(w, 186.0, 36.0, half_width=9.4, half_height=6.5, softness=0.8, right=right, up=up)
-    return panes * (0.85 + 0.3 * np.clip(w[..., 1], 0, 1))
+            window += _panel(w, 186.0, 36.0, half_width=9.4, half_height=6.5, softness=0.8, right=right, up=up)
+    return window * (0.85 + 0.3 * np.clip(w[..., 1], 0, 1))
 
 
 def _direction(azimuth: float, elevation: float) -> F64:
-    """Azimuth from +X towards +Z (the viewer) and elevation, in degrees."""
+    """Direction from azimuth, from +X toward +Z (the camera), and elevation, in degrees."""
     a, e = np.radians(azimuth), np.radians(elevation)
     return np.array([np.cos(a) * np.cos(e), np.sin(e), np.sin(a) * np.cos(e)])
 
@@ -65,7 +65,7 @@ def _panel(
     right: float = 0.0,
     up: float = 0.0,
 ) -> F64:
-    """1 inside a rectangle on the tangent plane at a direction, 0 outside, smooth between; sizes in degrees there."""
+    """1 inside a rectangle on the tangent plane at a direction, 0 outside, with a smooth edge; sizes in degrees."""
     center = _direction(azimuth, elevation)
     across = np.cross([0.0, 1.0, 0.0], center)
     across /= np.linalg.norm(across)

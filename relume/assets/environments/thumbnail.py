@@ -1,10 +1,11 @@
-"""Small pictures of environments, as a list shows them."""
+"""Thumbnails of environments."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -15,15 +16,11 @@ from relume.image_io.tone_mapping import tone_map
 from relume.image_io.write_image import png_bytes, to_bytes
 
 WIDTH, HEIGHT = 192, 96
-_GRAY = 0.18  # what the geometric mean becomes: a sun does not darken the rest
+_GRAY = 0.18  # display value of the geometric mean, which a sun hardly affects
 
 
-def thumbnail(radiance: NDArray[np.float32]) -> bytes:
-    """A tone-mapped PNG, exposed for what most of the map shows.
-
-    Args:
-        radiance: equirectangular. (height, width, 3) float32
-    """
+def thumbnail(radiance: Shaped[NDArray[np.float32], "height width 3"]) -> bytes:
+    """Return a tone-mapped PNG of an equirectangular map, exposed for its geometric mean."""
     height, width, _ = radiance.shape
     small = downsample(radiance, (min(WIDTH, width), min(HEIGHT, height)))
     light = luminance(small)
@@ -32,7 +29,7 @@ def thumbnail(radiance: NDArray[np.float32]) -> bytes:
     return png_bytes(np.asarray(display.resize((WIDTH, HEIGHT), Image.Resampling.BILINEAR)))
 
 
-def write_thumbnail(path: Path, radiance: NDArray[np.float32]) -> None:
-    """Write the thumbnail as a PNG file, which appears whole or not at all."""
+def write_thumbnail(path: Path, radiance: Shaped[NDArray[np.float32], "height width 3"]) -> None:
+    """Write the thumbnail as a PNG file, atomically."""
     with atomic_write(path) as unfinished:
         unfinished.write_bytes(thumbnail(radiance))

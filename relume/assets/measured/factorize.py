@@ -1,4 +1,4 @@
-"""Curves of a measured BRDF: rank-one factorisations, of which a term's quotient keeps what they do not tell.
+"""Curves of a measured BRDF: rank-one factorizations, whose residual is the quotient of a term.
 
 M ≈ g(θi) g(θo) + f(θh) f'(θd)     eq. 18, Ben-Artzi 2006; non-negative
 M ≈ P(θi) Q(θh) P(θo)              eq. 17; homomorphic, McCool 2001
@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Shaped
 from scipy import sparse
 
 from relume.assets.measured.interpolate import F32, NUM_KNOTS, THETA_D, THETA_H, THETA_I, THETA_O, evaluate_measured
@@ -18,33 +19,31 @@ from relume.assets.measured.merl import CHANNEL_SCALE, F64, grid_angles, grid_di
 FLOOR = 1e-6
 _ROUNDS = 60
 _AZIMUTHS = 36
-_LOW_QUANTILE = (
-    0.1  # of the values around a direction, this share lies below the diffuse-like lobe: no noise of single values
-)
-_SMOOTHNESS_WEIGHT = 1e-5  # in squares of the logarithm: holds curves straight where nothing was measured
+_LOW_QUANTILE = 0.1  # over the azimuth, for the diffuse-like lobe; robust against noise of single values
+_SMOOTHNESS_WEIGHT = 1e-5  # in squared logarithms; extrapolates curves linearly where nothing was measured
 _PHI_STRIDE = 6
 
 
 @dataclass(frozen=True)
 class MeasuredFactors:
-    """The curves of one material at their knots, rows θi, θh, θd, θo. (4, 3, 90) each, above zero
+    """The curves of one material at their knots, rows θi, θh, θd, θo; positive.
 
     Attributes:
         lobes: of `measured_lv` and `measured_hd`. homomorphic: of `measured_hf`; its θd is one.
         lobes_error, homomorphic_error: of the products alone, for R, G, B; see `relative_error`.
     """
 
-    lobes: F64
-    homomorphic: F64
+    lobes: Shaped[F64, "4 3 90"]
+    homomorphic: Shaped[F64, "4 3 90"]
     lobes_error: tuple[float, ...]
     homomorphic_error: tuple[float, ...]
 
 
-def factorize(planes: F64, table: F32) -> MeasuredFactors:
-    """Factorise a measured BRDF.
+def factorize(planes: Shaped[F64, "3 90 90 180"], table: Shaped[F32, "90 90 180 3"]) -> MeasuredFactors:
+    """Factorize a measured BRDF.
 
     Args:
-        planes: of the file. table: of `relume.assets.measured.interpolate.build_table`.
+        planes: of the file. table: from `relume.assets.measured.interpolate.build_table`.
     """
     grid = _Grid(planes)
     lobes, homomorphic = np.ones((4, 3, NUM_KNOTS)), np.ones((4, 3, NUM_KNOTS))
@@ -61,16 +60,18 @@ def factorize(planes: F64, table: F32) -> MeasuredFactors:
     return MeasuredFactors(lobes, homomorphic, grid.relative_error(product), grid.relative_error(homomorphic_product))
 
 
-def factorize_rank_one(matrix: F64, weight: F64) -> tuple[F64, F64]:
-    """Non-negative u and v, v's largest value one, with the least Itakura–Saito divergence of u vᵀ from the matrix.
+def factorize_rank_one(
+    matrix: Shaped[F64, "n m"], weight: Shaped[F64, "n m"]
+) -> tuple[Shaped[F64, " n"], Shaped[F64, " m"]]:
+    """Minimize the Itakura–Saito divergence of u vᵀ from a matrix, with non-negative u and v and max(v) = 1.
 
-    Févotte 2009; of rank one the alternating minimisation is in closed form: each factor is the weighted mean of matrix
-    ÷ other factor. So what a quotient has to keep, matrix ÷ u vᵀ, is one on average at every knot of either curve.
+    Févotte 2009; for rank one, the alternating updates have a closed form: each factor is the weighted mean of matrix ÷
+    other factor. The quotient matrix ÷ u vᵀ is therefore one on average at every knot of either curve.
 
     Args:
-        matrix, weight: (n, m), not negative.
+        matrix, weight: not negative.
     Returns:
-        (n,), (m,), above zero; a row of no weight has its neighbours' value.
+        u and v, positive; rows and columns without weight are interpolated from their neighbors.
     """
     u, v = np.ones(matrix.shape[0]), np.ones(matrix.shape[1])
     for _ in range(_ROUNDS):
@@ -81,7 +82,7 @@ def factorize_rank_one(matrix: F64, weight: F64) -> tuple[F64, F64]:
 
 
 def _mean(ratios: F64, weight: F64, axis: int) -> F64:
-    """Weighted mean along an axis, between neighbours where there is no weight."""
+    """Weighted mean along an axis, interpolated between neighbors if there is no weight."""
     total = weight.sum(axis=axis)
     has_weight = total > FLOOR * total.max() if total.any() else np.zeros(len(total), np.bool_)
     if not has_weight.any():
@@ -93,14 +94,14 @@ def _mean(ratios: F64, weight: F64, axis: int) -> F64:
 
 
 def _clamp_above_zero(curve: F64) -> F64:
-    """A curve that can be divided by: at least `FLOOR` of its peak, and at least `FLOOR` per steradian."""
+    """Clamp a curve to divide by: at least `FLOOR` of its peak, and at least `FLOOR` per steradian."""
     return np.maximum(curve, FLOOR * max(float(curve.max()), 1.0))
 
 
 def _diffuse_curves(table: F32) -> F64:
-    """g at its knots, per channel: what a material reflects whatever the azimuth. (3, 90)
+    """g at its knots, per channel: the part of a material that does not depend on the azimuth. (3, 90)
 
-    g(θi) g(θo) is fitted to a low quantile over the azimuth, which a highlight covers a part of only.
+    g(θi) g(θo) is fitted to a low quantile over the azimuth, since a highlight covers only a part of it.
     """
     theta = np.arange(NUM_KNOTS) * (math.pi / 2 / NUM_KNOTS)
     phi = (np.arange(_AZIMUTHS) + 0.5) * (math.pi / _AZIMUTHS)
@@ -120,7 +121,7 @@ def _diffuse_curves(table: F32) -> F64:
 
 
 class _Grid:
-    """The measured values at the nodes of the file, with the weights of a mean over all pairs of directions."""
+    """The measured values at the nodes of the file, with weights for means over all pairs of directions."""
 
     def __init__(self, planes: F64) -> None:
         measured = is_measured(planes)
@@ -129,23 +130,23 @@ class _Grid:
         cos_i, cos_o = wi[..., 2], wo[..., 2]
         self.theta_i, self.theta_o = (np.arccos(np.clip(cosine, 0.0, 1.0)) for cosine in (cos_i, cos_o))
         theta_h, theta_d, _ = grid_angles()
-        # dωi dωo = 4 cos θd dωh dωd; the nodes of θh are as far apart as its root is long
+        # dωi dωo = 4 cos θd dωh dωd; the spacing of the nodes of θh is proportional to its square root
         solid_angle = np.sin(theta_h) * np.sqrt(theta_h) * np.sin(theta_d) * np.cos(theta_d)
         cosine_weight = np.maximum(cos_i, 0.0) * np.maximum(cos_o, 0.0) * measured
         self._cosine_weight, self._weight = cosine_weight, cosine_weight * solid_angle
 
     def at_theta_i(self, curve: F64) -> F64:
-        """A curve of θi at all nodes. (3, 90) -> (3, 90, 90, 180)"""
+        """Evaluate a curve of θi at all nodes. (3, 90) -> (3, 90, 90, 180)"""
         return _interpolate_curve(self.theta_i, curve)
 
     def at_theta_o(self, curve: F64) -> F64:
-        """A curve of θo at all nodes."""
+        """Evaluate a curve of θo at all nodes."""
         return _interpolate_curve(self.theta_o, curve)
 
     def specular_curves(self, residual: F64) -> tuple[F64, F64]:
-        """f(θh) and f'(θd) of what the diffuse-like lobe leaves, averaged over φd. (3, 90) each
+        """f(θh) and f'(θd) of the residual of the diffuse-like lobe, averaged over φd. (3, 90) each
 
-        It counts by its share of the whole: where the diffuse-like lobe is nearly all, the rest is noise.
+        Weights include its fraction of the whole, since it is noise if the diffuse-like lobe dominates.
         """
         weight = self._cosine_weight.sum(axis=2)
         mean, whole = (
@@ -183,7 +184,7 @@ class _Grid:
         return np.array([_clamp_above_zero(c) for c in np.exp(p)]), np.array([_clamp_above_zero(c) for c in np.exp(q)])
 
     def relative_error(self, product: F64) -> tuple[float, ...]:
-        """√(Σ w (product − M)² / Σ w M²) over all that was measured, w = cos θi cos θo dωi dωo; for R, G, B."""
+        """√(Σ w (product − M)² / Σ w M²) over all measured values, w = cos θi cos θo dωi dωo; for R, G, B."""
         squared_error = (np.square(product - self.values) * self._weight).sum(axis=(1, 2, 3))
         whole = (np.square(self.values) * self._weight).sum(axis=(1, 2, 3))
         return tuple(float(e) for e in np.sqrt(squared_error / np.where(whole > 0, whole, 1.0)))
@@ -195,7 +196,7 @@ def _interpolate_curve(theta: F64, curve: F64) -> F64:
 
 
 def _hat_design(theta: F64) -> sparse.csr_array:
-    """Rows of a design matrix: the two knots about each angle with their shares. (n, 180)"""
+    """Rows of a design matrix: the two knots around each angle with their weights. (n, 180)"""
     position = np.minimum(theta * (NUM_KNOTS / (math.pi / 2)), NUM_KNOTS - 1.0)
     node = np.minimum(position.astype(np.intp), NUM_KNOTS - 2)
     fraction = position - node

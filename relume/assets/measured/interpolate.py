@@ -1,7 +1,7 @@
-"""A measured BRDF at any pair of directions: linear between the nodes of the MERL grid, in its own mapping.
+"""Interpolation of a measured BRDF for any pair of directions, linear between the nodes of the MERL grid.
 
-Also what is left of it when a product of curves is divided out: the quotients of the measured terms
-(docs/direct-light.md#measured-brdfs). All arithmetic is float64; directions and results keep their type.
+Also its quotients by a product of curves, for the measured terms (docs/direct-light.md#measured-brdfs). All arithmetic
+is float64; directions and results keep their type.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from enum import IntEnum
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
@@ -25,7 +26,7 @@ _PER_RADIAN = NUM_KNOTS / (math.pi / 2)
 
 
 class QuotientKind(IntEnum):
-    """What of a measured BRDF a quotient leaves: all of it by `WHOLE`, the lobes of eq. 18, or eq. 17's product."""
+    """Quotients of a measured BRDF: none (the whole BRDF), by the lobes of eq. 18, or by eq. 17's product."""
 
     WHOLE = 0
     DIFFUSE = 1
@@ -37,12 +38,8 @@ THETA_I, THETA_H, THETA_D, THETA_O = range(4)  # rows of a table of curves
 _WHOLE, _DIFFUSE, _SPECULAR = int(QuotientKind.WHOLE), int(QuotientKind.DIFFUSE), int(QuotientKind.SPECULAR)
 
 
-def build_table(planes: F64) -> F32:
-    """Planes of a MERL file as `quotients` reads them: 1/sr, channels last; gaps have the nearest measured value.
-
-    Returns:
-        (90, 90, 180, 3) float32
-    """
+def build_table(planes: Shaped[F64, "3 90 90 180"]) -> Shaped[F32, "90 90 180 3"]:
+    """Convert a MERL file's planes for `measured_over_model`: 1/sr, channels last, gaps filled by nearest values."""
     measured = is_measured(planes)
     nearest = distance_transform_edt(~measured, return_distances=False, return_indices=True)
     filled = planes[:, nearest[0], nearest[1], nearest[2]]
@@ -51,7 +48,7 @@ def build_table(planes: F64) -> F32:
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _knot_and_fraction(position, num):  # type: ignore[no-untyped-def]
-    """Node below a position, and how far it is on the way to the next; constant beyond the last one."""
+    """Node below a position, and its fractional distance to the next; constant beyond the last one."""
     position = min(max(position, 0.0), num - 1.0)
     node = min(int(position), num - 2)
     return node, position - node
@@ -65,7 +62,7 @@ def _on_curve(knots, position):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _interpolate_table(table, h, d, phi, out):  # type: ignore[no-untyped-def]
-    """Trilinear; φd goes round at π. h, d, phi: positions in nodes. out: (3,), written."""
+    """Trilinear interpolation, periodic in φd. h, d, phi: positions in nodes. out: (3,), written."""
     h0, th = _knot_and_fraction(h, _NUM_H)
     d0, td = _knot_and_fraction(d, _NUM_D)
     p0 = int(phi)
@@ -83,7 +80,7 @@ def _interpolate_table(table, h, d, phi, out):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, error_model="numpy")
 def _measured_over_model_kernel(kind, table, curves, wi_x, wi_y, wi_z, wo_x, wo_y, wo_z, out):  # type: ignore[no-untyped-def]
-    """See `quotients`; directions flat, (n,) each. out: (3, n), written."""
+    """See `measured_over_model`; flat directions, (n,) each. out: (3, n), written."""
     value = np.empty(3)
     for n in range(wi_x.shape[0]):
         ix, iy, iz = float(wi_x[n]), float(wi_y[n]), float(wi_z[n])
@@ -95,9 +92,9 @@ def _measured_over_model_kernel(kind, table, curves, wi_x, wi_y, wi_z, wo_x, wo_
         theta_h = math.atan2(math.sqrt(hx * hx + hy * hy), hz)
         difference_length = math.sqrt((ix - ox) ** 2 + (iy - oy) ** 2 + (iz - oz) ** 2)
         theta_d = math.atan2(difference_length, math.sqrt(hx * hx + hy * hy + hz * hz))
-        # sin θh sin θd times cosine and sine of φd, but for a common factor; exchanging wi and wo adds π
+        # sin θh sin θd times cosine and sine of φd, up to a common factor; exchanging wi and wo adds π
         phi_d = math.atan2(iy * ox - ix * oy, 0.5 * (oz - iz) * math.sqrt(hx * hx + hy * hy + hz * hz))
-        if hx * hx + hy * hy < 1e-28:  # the half vector is the normal and has no azimuth; the nodes there say zero
+        if hx * hx + hy * hy < 1e-28:  # the half vector is the normal and has no azimuth; the nodes there use zero
             phi_d = math.atan2(iy, ix)
         if phi_d < 0.0:
             phi_d += math.pi
@@ -122,20 +119,23 @@ def _measured_over_model_kernel(kind, table, curves, wi_x, wi_y, wi_z, wo_x, wo_
 
 
 def measured_over_model(
-    kind: QuotientKind, table: F32, curves: F64, *directions: NDArray[np.floating]
-) -> NDArray[np.floating]:
-    """What is left of a measured BRDF when a product of curves is divided out.
+    kind: QuotientKind,
+    table: Shaped[F32, "90 90 180 3"],
+    curves: Shaped[F64, "4 3 90"],
+    *directions: NDArray[np.floating],
+) -> Shaped[NDArray[np.floating], " 3 *batch"]:
+    """Quotient of a measured BRDF by a product of curves.
 
     With M the measured value, G = g(θi) g'(θo), and the curves' rows being θi, θh, θd, θo: `WHOLE` M; `DIFFUSE`
     min(M, G)/G; `SPECULAR` (M − min(M, G))/(f(θh) f'(θd)); `HOMOMORPHIC` M/(G f(θh)).
 
     Args:
-        kind: which of these.
-        table: the material, as `build_table` returns it. (90, 90, 180, 3)
-        curves: at their knots, above zero. (4, 3, 90)
+        kind: one of these.
+        table: the material, from `build_table`.
+        curves: at their knots, positive.
         directions: x, y, z of wi and of wo, local frame, unit, z = normal; they broadcast. (...) each
     Returns:
-        1/sr, no cosine. (3, ...) of the directions' type; zero at and below the horizon.
+        1/sr for `WHOLE`, without the cosine, in the type of the directions; zero at and below the horizon.
     """
     broadcast = np.broadcast_arrays(*directions)
     ix, iy, iz, ox, oy, oz = (np.ascontiguousarray(axis).ravel() for axis in broadcast)
@@ -144,14 +144,16 @@ def measured_over_model(
     return out.reshape(3, *broadcast[0].shape)
 
 
-def evaluate_measured(table: F32, wi: F64, wo: F64) -> F64:
-    """The measured BRDF, 1/sr, no cosine.
+def evaluate_measured(
+    table: Shaped[F32, "90 90 180 3"], wi: Shaped[F64, "*wi 3"], wo: Shaped[F64, "*wo 3"]
+) -> Shaped[F64, "*batch 3"]:
+    """The measured BRDF, 1/sr, without the cosine.
 
     Args:
-        table: the material, as `build_table` returns it. (90, 90, 180, 3)
-        wi, wo: local frame, unit, z = normal; they broadcast. (..., 3)
+        table: the material, from `build_table`.
+        wi, wo: local frame, unit, z = normal; they broadcast.
     Returns:
-        (..., 3) float64; zero at and below the horizon.
+        Zero at and below the horizon.
     """
     unused_curves = np.empty((4, 3, NUM_KNOTS))
     values = measured_over_model(

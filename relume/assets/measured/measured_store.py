@@ -1,10 +1,10 @@
-"""Measured materials that were imported; `relume.assets.asset_store` keeps them.
+"""Store of imported measured materials, in `relume.assets.asset_store`.
 
-    <folder>/<id>/measured.binary    the file as it came
-                  table.npy          the same as `relume.assets.measured.interpolate` reads it
-                  material.json      name, curves and how well they do without the quotient
+    <folder>/<id>/measured.binary    the imported file
+                  table.npy          its table for `relume.assets.measured.interpolate`
+                  material.json      name, curves and their errors without the quotient
 
-Look documents name one as "merl:<id>".
+Looks refer to one as "merl:<id>".
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 
 from relume.assets.asset_store import AssetStore
 from relume.assets.measured.factorize import factorize
@@ -30,7 +31,7 @@ Rgb = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class MaterialRecord:
-    """What lists show of a measured material.
+    """A measured material in lists.
 
     Attributes:
         created: seconds since 1970.
@@ -45,34 +46,33 @@ class MaterialRecord:
 
     @property
     def data(self) -> str:
-        """The name by which look documents mean this material."""
+        """Name of the material in looks."""
         return STORE.prefix + self.id
 
     def terms(self) -> list[dict[str, Any]]:
-        """The unedited material as terms of a look, without textures: what was measured is the whole colour."""
+        """Its terms in a look, without textures, since the measurement includes the color."""
         return [{"model": model, "data": self.data, "texture": None} for model in ("measured_lv", "measured_hd")]
 
 
 @dataclass(frozen=True)
 class MeasuredBrdf:
-    """What the quotients and curves of a material read. lobes, homomorphic: as in `MeasuredFactors`. (4, 3, 90) each"""
+    """The data of a material's quotients and curves. lobes, homomorphic: as in `MeasuredFactors`."""
 
-    table: F32
-    lobes: F64
-    homomorphic: F64
+    table: Shaped[F32, "90 90 180 3"]
+    lobes: Shaped[F64, "4 3 90"]
+    homomorphic: Shaped[F64, "4 3 90"]
 
 
 def store_material(folder: Path, source: Path, name: str, file_name: str | None = None) -> MaterialRecord:
-    """Import a MERL file; the same content twice is the same material, its newest name wins.
+    """Import a MERL file; takes some seconds and 0.5 GB. An existing one with this content gets the new name.
 
     Args:
         folder: of the asset store.
         source: the file to import.
-        name: what people call it.
-        file_name: what errors call the file; None: its name in the path.
+        name: shown to users.
+        file_name: in errors; None for the name in the path.
     Raises:
-        MaterialError: the file cannot be used, or the store is full.
-    Cost: some seconds, 0.5 GB of memory.
+        MaterialError: the file is unusable, or the store is full.
     """
     planes = read_merl(source, file_name)
 
@@ -86,12 +86,12 @@ def store_material(folder: Path, source: Path, name: str, file_name: str | None 
 
 
 def records(folder: Path) -> list[MaterialRecord]:
-    """All materials of a folder, newest first."""
+    """Return all materials of a folder, newest first."""
     return STORE.records(folder, get_record)
 
 
 def get_record(folder: Path, identity: str) -> MaterialRecord:
-    """One material. Raises NotFoundError; MaterialError where its files are damaged."""
+    """Return one material. Raises NotFoundError; MaterialError if its files are damaged."""
     path = STORE.path(folder, identity)
     document = STORE.load_record(path)
     try:
@@ -102,15 +102,15 @@ def get_record(folder: Path, identity: str) -> MaterialRecord:
 
 
 def source_path(data: str) -> Path:
-    """The file that a material was imported from. Raises NotFoundError."""
+    """Return the path of the imported file. Raises NotFoundError."""
     return STORE.resolve(data) / _SOURCE
 
 
 def load_material(data: str) -> MeasuredBrdf:
-    """What a look's `data` names; its table stays on the disk and is read where it is needed.
+    """Load the measured BRDF of a look's `data`; its table is memory-mapped.
 
     Raises:
-        NotFoundError: it is not here. MaterialError: its files are damaged.
+        NotFoundError: it does not exist. MaterialError: its files are damaged.
     """
     return _load(STORE.resolve(data))
 

@@ -1,7 +1,7 @@
 """Library materials as terms of a look, from the data file that `relume.look.library.merl_fits` writes.
 
-The numbers are the published fits of Ngan 2005 and Low 2012 to the MERL measurements (Matusik 2003), converted. A
-preset has no texture: what was fitted is the whole colour.
+The numbers are converted from the published fits of Ngan 2005 and Low 2012 to the MERL measurements (Matusik 2003). A
+preset has no texture: the fit includes the color.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Preset:
 
     Attributes:
         id: "table/material". model: of the highlight. group: metal, plastic, paint, fabric, wood, stone or rubber.
-        swatch: its colour under even light, "#rrggbb". terms: as they stand in a look.
+        swatch: color under uniform light, "#rrggbb". terms: as in a look.
     """
 
     id: str
@@ -41,7 +41,7 @@ class Preset:
 
 
 def make_preset_terms(model: str, numbers: list[float]) -> list[dict[str, Any]]:
-    """Terms of one row: diffuse RGB, highlight RGB, the model's parameters in their order."""
+    """Return the terms for one row: diffuse RGB, highlight RGB, and the model's parameters in order."""
     names = [parameter.name for parameter in TERMS[model].parameters]
     params = dict(zip(names, numbers[6:], strict=True))
     return [
@@ -52,12 +52,12 @@ def make_preset_terms(model: str, numbers: list[float]) -> list[dict[str, Any]]:
 
 @cache
 def presets() -> tuple[Preset, ...]:
-    """Every material of the library under every model that was fitted to it."""
+    """All library materials under all models that were fitted to them."""
     return read_presets(json.loads(DATA.read_text(encoding="utf-8")))
 
 
 def read_presets(data: dict[str, Any]) -> tuple[Preset, ...]:
-    """The presets of a data file's content."""
+    """Read the presets from a data file's content."""
     return tuple(
         Preset(
             id=f"{table}/{material}",

@@ -1,9 +1,8 @@
 """Convert published fits of MERL materials to terms: `python -m relume.look.library.merl_fits FITS.json`.
 
-FITS.json has the tables of Ngan 2005 and Low 2012, {table: {material: {"Lambertian": {...}, model: {...}}}}; what is
-written beside this file holds the numbers that `relume.look.library.materials` makes terms of. Diffuse is albedo/π in
-both. Ngan's colours want the channel scale of MERL. How each highlight is normalised, with the same D, F, G as ours:
-
+FITS.json has the tables of Ngan 2005 and Low 2012, {table: {material: {"Lambertian": {...}, model: {...}}}}. The output
+file holds the numbers that `relume.look.library.materials` turns into terms. Diffuse is albedo/π in both papers. Ngan's
+colors need MERL's channel scale. Normalization of each highlight, with the same D, F, G as ours:
     NganCookTorrance      albedo · D F G/(π² cos θi cos θo), F by Schlick from f0: 4/π times ours
     LowCookTorrance       albedo · D F G/(π cos θi cos θo), F exact: 4 times ours
     NganAshikhminShirley  nu = nv = sharpness: ours
@@ -33,8 +32,8 @@ Fit = Mapping[str, Any]
 Params = dict[str, float]
 
 MERL_CHANNEL_SCALE = (1.0, 1.15, 1.66)
-_MAX_INDEX = 10.0  # η and k that `cook_torrance` allows
-_MAX_F0 = 0.96  # F head-on at η = 1 and a k just below that
+_MAX_INDEX = 10.0  # allowed η and k of `cook_torrance`
+_MAX_F0 = 0.96  # F at normal incidence for η = 1 and k slightly below the limit
 _DIGITS = 5
 
 GROUPS = {
@@ -48,10 +47,13 @@ GROUPS = {
 
 
 def fit_conductor(f0: float) -> tuple[float, float, float]:
-    """η, k and a gain so that gain · F(η, k) is f0 seen head-on and as near as can be to Schlick's curve up to 80°.
+    """Fit a conductor to a Schlick curve: gain · F(η, k) is f0 at normal incidence and close to Schlick's F up to 80°.
 
-    The exact curve of a strong dielectric dips before it rises, Schlick's does not: a conductor follows it better. What
-    no conductor with k ≤ 10 reflects is gain.
+    The exact curve of a strong dielectric dips before it rises and Schlick's does not, so a conductor fits better. The
+    gain makes up for an f0 that no conductor with k ≤ 10 has.
+
+    Returns:
+        η, k, gain
     """
     clamped_f0 = min(f0, _MAX_F0)
     root = math.sqrt(clamped_f0)
@@ -91,7 +93,7 @@ def _ward(fit: Fit) -> tuple[float, Params]:
     return 1.0, {"alpha": fit["roughness"]}
 
 
-# table -> our model, and what makes its colour's factor and parameters of a fit
+# table -> our model, and the conversion of a fit to a color factor and parameters
 CONVERSIONS: dict[str, tuple[str, Callable[[Fit], tuple[float, Params]]]] = {
     "low_cooktorrance_E2": ("cook_torrance", _low_cook_torrance),
     "ngan_cooktorrance": ("cook_torrance", _ngan_cook_torrance),
@@ -104,10 +106,10 @@ CONVERSIONS: dict[str, tuple[str, Callable[[Fit], tuple[float, Params]]]] = {
 
 
 def convert_row(table: str, fit: Mapping[str, Fit]) -> list[float] | None:
-    """Numbers of one material: diffuse RGB, highlight RGB, parameters in the order of the term's declaration.
+    """Convert one material to numbers: diffuse RGB, highlight RGB, parameters in the order of the term's declaration.
 
     Returns:
-        None where a parameter lies outside what the term allows.
+        None if a parameter is outside the term's range.
     """
     model, convert = CONVERSIONS[table]
     diffuse, highlight = (np.array(lobe["albedo"]) for lobe in fit.values())
@@ -122,21 +124,21 @@ def convert_row(table: str, fit: Mapping[str, Fit]) -> list[float] | None:
 
 
 def material_group(material: str) -> str:
-    """What a material is made of, by its name: a key of `GROUPS`, or metal."""
+    """Group of a material by its name: a key of `GROUPS`, or metal."""
     return next(
         (group for group, keywords in GROUPS.items() if any(keyword in material for keyword in keywords)), "metal"
     )
 
 
 def compute_swatch(terms: list[dict[str, Any]]) -> str:
-    """Colour under even light, seen at 45 degrees, as "#rrggbb"."""
+    """Color under uniform light, viewed at 45 degrees, as "#rrggbb"."""
     edges = np.concatenate([[0.0], np.geomspace(1e-3, np.pi / 2, 120)])
     theta, phi = np.meshgrid(0.5 * (edges[1:] + edges[:-1]), (np.arange(48) + 0.5) * (np.pi / 24), indexing="ij")
     half = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
     wo = np.array([math.sqrt(0.5), 0.0, math.sqrt(0.5)])
     cosine = half @ wo
     wi = 2.0 * cosine[..., None] * half - wo
-    # dωi = 4 (wo·h) dωh: even steps of the half vector follow the highlight
+    # dωi = 4 (wo·h) dωh: uniform steps of the half vector follow the highlight
     weight = 4.0 * np.maximum(cosine, 0.0) * np.maximum(wi[..., 2], 0.0) * np.sin(theta) * np.diff(edges)[:, None]
     weight *= np.pi / 24
     albedo = sum(np.einsum("tp,tpc->c", weight, eval_brdf(term, wi, wo)) for term in terms)
@@ -145,7 +147,7 @@ def compute_swatch(terms: list[dict[str, Any]]) -> str:
 
 
 def convert_all(fits: Mapping[str, Mapping[str, Mapping[str, Fit]]]) -> dict[str, Any]:
-    """The content of the data file."""
+    """Return the content of the data file."""
     tables: dict[str, Any] = {}
     materials: dict[str, Any] = {}
     for table, (model, _) in CONVERSIONS.items():
@@ -163,7 +165,7 @@ def convert_all(fits: Mapping[str, Mapping[str, Mapping[str, Fit]]]) -> dict[str
 def main() -> int:
     """Convert the tables named on the command line."""
     data = convert_all(json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")))
-    # a line for each material, so that a change of one is seen as such
+    # one line per material, for readable diffs
     text = json.dumps(data, separators=(",", ":")).replace('],"', '],\n"').replace('},"', '},\n"')
     DATA.write_text(text + "\n", encoding="utf-8")
     return 0

@@ -1,7 +1,7 @@
 """Sun's navigation map: Cook–Torrance materials in the plane of Fresnel reflectance and roughness (Sun 2007, 4.2).
 
-Any point between them is a material: colours and parameters of its triangle's corners, by barycentric interpolation.
-Roughness is laid out, and interpolated, by its logarithm: fits cluster at the narrow end.
+Every point is a material: the colors and parameters of its triangle's corners, with barycentric interpolation. The
+roughness axis is logarithmic, because most fits have narrow highlights.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
@@ -20,32 +21,32 @@ from relume.look.library.materials import Preset, make_preset_terms, presets
 
 F64 = NDArray[np.float64]
 
-_TABLE = "low_cooktorrance_E2"  # its Fresnel curve is the term's own, and it has all hundred materials
+_TABLE = "low_cooktorrance_E2"  # uses the term's own Fresnel curve and has all hundred materials
 
 
 @dataclass(frozen=True)
 class NavigationMap:
-    """Materials as points of the plane, and the triangles between them.
+    """Materials as points of the plane, and a triangulation.
 
     Attributes:
-        f0: reflectance seen head-on. sigma: roughness of the highlight. (n,) float64
-        triangles: corners as indices of presets, counter-clockwise in (f0, log σ). (m, 3) int64
+        f0: reflectance at normal incidence. sigma: roughness of the highlight.
+        triangles: indices of presets, counter-clockwise in (f0, log σ).
     """
 
     presets: tuple[Preset, ...]
-    f0: F64
-    sigma: F64
-    triangles: NDArray[np.int64]
+    f0: Shaped[F64, " materials"]
+    sigma: Shaped[F64, " materials"]
+    triangles: Shaped[NDArray[np.int64], "triangles 3"]
     _corners: F64 = field(repr=False)
 
     def at(self, f0: float, sigma: float) -> list[dict[str, Any]]:
-        """Terms of any point; one outside the hull is moved to the nearest point of it.
+        """Return the terms at a point; a point outside the convex hull is moved to the nearest one on it.
 
         Raises:
-            ParameterError: a number is not finite, or σ is not above zero.
+            ParameterError: a number is not finite, or σ is not positive.
         """
         if not (math.isfinite(f0) and math.isfinite(sigma) and sigma > 0):
-            raise ParameterError("point", (f0, sigma), "f0 and σ as numbers, σ above zero")
+            raise ParameterError("point", (f0, sigma), "f0 and σ as finite numbers, with σ above zero")
         corners, weights = self._barycentric(np.array([f0, math.log(sigma)]))
         position = weights @ self._corners[corners]
         rows = np.array([_numbers(self.presets[k]) for k in corners])
@@ -55,7 +56,7 @@ class NavigationMap:
         )
 
     def _barycentric(self, point: F64) -> tuple[NDArray[np.int64], F64]:
-        """Corners and weights of the triangle that holds a point, or of the one nearest to it."""
+        """Corners and weights in the triangle that contains a point, or at the nearest point of the hull."""
         corners = self._corners[self.triangles]
         a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
         edges = np.stack([b - a, c - a], axis=2)
@@ -68,7 +69,7 @@ class NavigationMap:
         return self._nearest(point)
 
     def _nearest(self, point: F64) -> tuple[NDArray[np.int64], F64]:
-        """The nearest point of any edge: outside the hull, that is one of the hull's."""
+        """Nearest point on any edge, which is on the hull if the point is outside."""
         pairs = np.concatenate([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
         start, along = self._corners[pairs[:, 0]], self._corners[pairs[:, 1]] - self._corners[pairs[:, 0]]
         fraction = np.clip(np.einsum("ec,ec->e", point - start, along) / np.einsum("ec,ec->e", along, along), 0.0, 1.0)
@@ -77,12 +78,12 @@ class NavigationMap:
 
 
 def reflectance_from_ior(ior: float) -> float:
-    """F0, seen head-on, of a refractive index of at least 1."""
+    """Reflectance at normal incidence for a refractive index of at least 1."""
     return float(((ior - 1) / (ior + 1)) ** 2)
 
 
 def ior_from_reflectance(f0: float) -> float:
-    """The refractive index of a reflectance below 1."""
+    """Refractive index for a reflectance at normal incidence below 1."""
     root = math.sqrt(f0)
     return (1 + root) / (1 - root)
 
@@ -94,13 +95,13 @@ def _numbers(preset: Preset) -> list[float]:
 
 @cache
 def navigation_map() -> NavigationMap:
-    """The map of the library's Cook–Torrance materials."""
+    """Return the map of the library's Cook–Torrance materials."""
     map_presets = tuple(preset for preset in presets() if preset.id.startswith(_TABLE + "/"))
     params = [preset.terms[1]["params"] for preset in map_presets]
     f0 = np.array([reflectance_from_ior(p["ior"]) for p in params])
     sigma = np.array([p["sigma"] for p in params])
     corners = np.column_stack([f0, np.log(sigma)])
-    # triangles as round as they can be where both axes are as long
+    # scaled to equal axes: Delaunay maximizes the smallest angle
     triangles = Delaunay(corners / np.ptp(corners, axis=0)).simplices.astype(np.int64)
     a, b, c = (corners[triangles[:, k]] for k in range(3))
     orientation = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]

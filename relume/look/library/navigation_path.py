@@ -1,4 +1,4 @@
-"""Ways across the navigation map: what a material shows on its way to another, through the fits that lie between."""
+"""Paths across the navigation map: transitions between two materials through the measured fits between them."""
 
 from __future__ import annotations
 
@@ -18,16 +18,15 @@ _MODELS = ["lambert", "cook_torrance"]
 
 
 def path_on_map(start: Terms, end: Terms, interpolated: Terms, weight: float) -> Terms:
-    """Go from a material to another across the map: straight in reflectance and in the logarithm of roughness.
+    """Interpolate two materials along a line on the map, linear in reflectance and in log roughness.
 
-    The colours are those of the map's materials on the way; what the two ends differ by from the map's own there is
-    taken along, less and less of the one and more and more of the other, so that the way begins and ends at them.
+    Colors are those of the map along the line, plus the interpolated difference between each end's colors and the map's
+    colors there, so that the path starts and ends at the given materials.
 
     Args:
-        start, end: terms of complete looks. interpolated: what they are from parameter to parameter.
-        weight: of the way.
+        start, end: terms of complete looks. interpolated: their parameter-wise interpolation. weight: of `end`.
     Returns:
-        Terms like `interpolated`, and those themselves where either end is not a diffuse and a Cook-Torrance term.
+        Terms like `interpolated`; unchanged `interpolated` if an end is not a diffuse plus a Cook–Torrance term.
     """
     if not (_is_on_map(start) and _is_on_map(end) and _is_on_map(interpolated)):
         return interpolated
@@ -49,7 +48,7 @@ def path_on_map(start: Terms, end: Terms, interpolated: Terms, weight: float) ->
 
 
 def _is_on_map(terms: Terms) -> bool:
-    """Whether they are a diffuse and a Cook-Torrance term whose parameters are the same in all channels."""
+    """True for a diffuse plus a Cook–Torrance term with the same parameters in all channels."""
     if [term["model"] for term in terms] != _MODELS:
         return False
     params = terms[1]["params"]
@@ -57,16 +56,16 @@ def _is_on_map(terms: Terms) -> bool:
 
 
 def _map_position(terms: Terms) -> F64:
-    """Where a material lies on the map: (F0, log σ)."""
+    """Position of a material on the map: (F0, log σ)."""
     params = terms[1]["params"]
     return np.array([reflectance_from_ior(params["ior"]), math.log(params["sigma"])])
 
 
 def _colors(terms: Terms) -> F64:
-    """Of both terms. (2, 3)"""
+    """Colors of both terms. (2, 3)"""
     return np.array([term["color"] for term in terms], np.float64)
 
 
 def _map_colors(position: F64) -> F64:
-    """Of both terms of the map's material at a place. (2, 3)"""
+    """Colors of both terms at a position of the map. (2, 3)"""
     return _colors(navigation_map().at(float(position[0]), math.exp(position[1])))

@@ -1,5 +1,4 @@
-"""A Cornell box under the sky: white room, red and green walls, two blocks; sun and sky come in through its roof, or a
-lamp hangs from its ceiling."""
+"""A Cornell box with a white room, red and green walls and two blocks, lit through a skylight or by an area light."""
 
 from __future__ import annotations
 
@@ -8,6 +7,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.environments.environment import Environment
@@ -21,36 +21,40 @@ F64 = NDArray[np.float64]
 
 WHITE, GREEN, RED = (0.73, 0.71, 0.68), (0.12, 0.45, 0.15), (0.63, 0.065, 0.05)
 SKYLIGHT = 0.45  # half the side of the opening in the roof; the room is 2 m wide, high and deep
-# half diffuse, half a highlight whose exponent is to be edited: [3, 300] in Nguyen 2010
+# half diffuse, half a highlight with an editable exponent: [3, 300] in Nguyen 2010
 GLOSSY_FLOOR: tuple[dict[str, Any], ...] = (
     {"model": "lambert", "color": [0.36, 0.35, 0.33]},
     {"model": "blinn_phong", "color": [0.12, 0.12, 0.12], "params": {"exponent": 100.0}},
 )
-LAMP_RADIANCE, LAMP_SIZE, LAMP_GAP = (18.0, 13.5, 8.5), (0.5, 0.4), 2e-3  # radiance; metres, the gap to the ceiling
+CEILING_LIGHT_RADIANCE, CEILING_LIGHT_SIZE, CEILING_LIGHT_GAP = (
+    (18.0, 13.5, 8.5),
+    (0.5, 0.4),
+    2e-3,
+)  # radiance; meters, distance to the ceiling
 SUN_DIRECTION = np.array([0.22, 1.0, 0.12])
 SUN_RADIUS = np.radians(4.0)
 
 
 @cache
 def cornell_box(is_floor_glossy: bool = False) -> Scene:
-    """The room from x, z = −1 to 1 and y = 0 to 2, open towards the viewer; view "front", for square pictures.
+    """Return a room of x, z = −1 to 1 and y = 0 to 2, open toward the camera; view "front", for square images.
 
     Args:
-        is_floor_glossy: its floor has the terms `GLOSSY_FLOOR`.
+        is_floor_glossy: the floor has the terms `GLOSSY_FLOOR`.
     """
     meshes, materials = _room(_roof())
     if is_floor_glossy:
         materials[0] = Material("Floor", GLOSSY_FLOOR)
-    return make_scene("Cornell box", meshes, materials, [_camera()], sunny_sky())
+    return make_scene("Cornell box", meshes, materials, [_camera()], sunny_environment())
 
 
 @cache
 def lamplit_cornell_box() -> Scene:
-    """The same room with a whole ceiling and a lamp in it, by night: the light "Lamp" is that of its material."""
+    """Return the room with a closed ceiling, at night; the light "Lamp" is an emissive mesh."""
     meshes, materials = _room(rectangle((-1, 2, -1), (2, 0, 0), (0, 0, 2)))
-    x, z = LAMP_SIZE[0] / 2, LAMP_SIZE[1] / 2
-    plate = rectangle((-x, 2 - LAMP_GAP, -z), (2 * x, 0, 0), (0, 0, 2 * z))
-    area_light = Light("Lamp", {"kind": "mesh", "material": "Lamp", "emission": list(LAMP_RADIANCE)})
+    x, z = CEILING_LIGHT_SIZE[0] / 2, CEILING_LIGHT_SIZE[1] / 2
+    plate = rectangle((-x, 2 - CEILING_LIGHT_GAP, -z), (2 * x, 0, 0), (0, 0, 2 * z))
+    area_light = Light("Lamp", {"kind": "mesh", "material": "Lamp", "emission": list(CEILING_LIGHT_RADIANCE)})
     return make_scene(
         "Cornell box by lamplight",
         [*meshes, plate.mesh("Lamp", len(materials))],
@@ -79,29 +83,30 @@ def _camera() -> Camera:
     return look_at("front", (0.0, 1.0, 4.9), (0.0, 1.0, 0.0), float(np.radians(30.0)))
 
 
-def sunny_sky(sun_direction: F64 = SUN_DIRECTION, rows: int = 256, radius: float = SUN_RADIUS) -> Environment:
-    """A sun, soft as through haze unless told otherwise, in a blue sky; nothing from below.
+def sunny_environment(
+    sun_direction: Shaped[F64, " 3"] = SUN_DIRECTION, rows: int = 256, radius: float = SUN_RADIUS
+) -> Environment:
+    """Return a blue environment with a sun disk, hazy by default; black below the horizon.
 
     Args:
-        sun_direction: towards it. (3,). rows: of the map, which is twice as wide.
-        radius: of the sun, radians; the smaller, the brighter.
+        sun_direction: toward the sun. rows: of the map, which is twice as wide.
+        radius: of the sun, radians; its radiance grows as the radius shrinks.
     """
     directions = texel_directions(rows, 2 * rows).astype(np.float64)
     cosine = directions @ (sun_direction / np.linalg.norm(sun_direction))
     edge = np.clip((cosine - np.cos(1.2 * radius)) / (np.cos(0.8 * radius) - np.cos(1.2 * radius)), 0, 1)
     height = directions[..., 1:2]
-    sky = np.where(height > 0, 0.25 + 0.55 * height, 0.0) * [0.55, 0.75, 1.0]
+    blue = np.where(height > 0, 0.25 + 0.55 * height, 0.0) * [0.55, 0.75, 1.0]
     disc = np.array([1350.0, 1230.0, 1050.0]) * (SUN_RADIUS / radius) ** 2
-    radiance = sky + (edge**2 * (3 - 2 * edge))[..., None] * disc
+    radiance = blue + (edge**2 * (3 - 2 * edge))[..., None] * disc
     return Environment("sunny sky", radiance.astype(np.float32))
 
 
 def rectangle(corner: Sequence[float], u: Sequence[float], v: Sequence[float]) -> GridSurface:
-    """The rectangle corner + [0, 1] u + [0, 1] v, which faces u × v.
+    """Return the rectangle corner + [0, 1] u + [0, 1] v with normal u × v.
 
     Args:
-        corner: one of its corners, metres. (3,)
-        u, v: its sides from there, metres. (3,)
+        corner: one corner (x, y, z), meters. u, v: edges from there, meters.
     """
     start, along, up = (np.asarray(a, np.float64) for a in (corner, u, v))
     normal = np.cross(along, up)
@@ -115,7 +120,7 @@ def rectangle(corner: Sequence[float], u: Sequence[float], v: Sequence[float]) -
 
 
 def _roof() -> GridSurface:
-    """Four strips round the skylight, facing down."""
+    """Four strips around the skylight, facing down."""
     s, strip = SKYLIGHT, 1 - SKYLIGHT
     return merge_surfaces(
         [
@@ -128,12 +133,10 @@ def _roof() -> GridSurface:
 
 
 def block(half_width: float, height: float, half_depth: float) -> GridSurface:
-    """A block on y = 0 about the y axis, without its underside, which nothing sees.
+    """Return a block on y = 0 around the y axis, without its invisible bottom.
 
     Args:
-        half_width: half of its extent along x, metres.
-        height: its extent along y, metres.
-        half_depth: half of its extent along z, metres.
+        half_width: along x, meters. height: along y, meters. half_depth: along z, meters.
     """
     x, z = half_width, half_depth
     corners = [(-x, z), (x, z), (x, -z), (-x, -z)]

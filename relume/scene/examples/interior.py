@@ -1,4 +1,4 @@
-"""A room that is lit through one window: nearly all its light has been reflected once at least."""
+"""A room lit through one window, almost entirely by indirect illumination."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from relume.scene.examples.cornell import block, rectangle, sunny_sky
+from relume.scene.examples.cornell import block, rectangle, sunny_environment
 from relume.scene.examples.still_life.grids import GridSurface, merge_surfaces, rotation_y, sphere
 from relume.scene.examples.still_life.still_life import look_at
 from relume.scene.model import Material, Scene
 from relume.scene.scene_folder import make_scene
 
 _WIDTH, _HEIGHT, _DEPTH = 5.0, 2.7, 4.0
-_SILL, _LINTEL, _FROM, _TO = 0.8, 2.3, -1.2, 0.6  # of the window, in the wall at the left
+_SILL, _LINTEL, _FROM, _TO = 0.8, 2.3, -1.2, 0.6  # of the window in the left wall
 _SUN_DIRECTION = np.array([-1.0, 0.75, 0.25])
 _PLASTER, _WOOD, _CLOTH = [0.78, 0.76, 0.72], [0.38, 0.24, 0.13], [0.16, 0.28, 0.45]
 
 
 @cache
 def interior() -> Scene:
-    """5 × 2.7 × 4 m; a table with a ball, a bench, a polished floor; view "front", for pictures as wide as high."""
+    """Return a room of 5 × 2.7 × 4 m with a table, ball, bench and polished floor; view "front", for square images."""
     objects: list[tuple[str, GridSurface, tuple[dict[str, Any], ...]]] = [
         ("Floor", rectangle((-2.5, 0, 2), (_WIDTH, 0, 0), (0, 0, -_DEPTH)), (_lambert(_WOOD), _polish(60.0))),
         ("Walls", merge_surfaces([_walls(), _wall_with_window()]), (_lambert(_PLASTER),)),
@@ -36,7 +36,9 @@ def interior() -> Scene:
     meshes = [surface.mesh(name, k) for k, (name, surface, _) in enumerate(objects)]
     materials = [Material(name, terms) for name, _, terms in objects]
     camera = look_at("front", (1.0, 1.5, 1.95), (-0.25, 1.0, -0.6), float(np.radians(62.0)))
-    environment = sunny_sky(_SUN_DIRECTION, rows=512)  # the window's edges draw rows of fewer texels on the floor
+    environment = sunny_environment(
+        _SUN_DIRECTION, rows=512
+    )  # with fewer rows, texels show as stripes of light on the floor
     return make_scene("Interior", meshes, materials, [camera], environment)
 
 
@@ -61,7 +63,7 @@ def _walls() -> GridSurface:
 
 
 def _wall_with_window() -> GridSurface:
-    """Four strips at x = −2.5 round the opening, and its reveals."""
+    """Four strips around the window at x = −2.5, and its reveals."""
     deep, tall = _TO - _FROM, _LINTEL - _SILL
     strips = [(0.0, _SILL, -2.0, 2.0), (_LINTEL, _HEIGHT, -2.0, 2.0), (_SILL, _LINTEL, -2.0, _FROM)]
     strips.append((_SILL, _LINTEL, _TO, 2.0))
@@ -77,7 +79,7 @@ def _wall_with_window() -> GridSurface:
 
 
 def _table() -> GridSurface:
-    """A top with an underside on four legs."""
+    """A tabletop with an underside, on four legs."""
     legs = [block(0.035, 0.7, 0.035).transform(np.eye(3), (x, 0.0, z)) for x in (-0.55, 0.55) for z in (-0.33, 0.33)]
     top = block(0.65, 0.05, 0.42).transform(np.eye(3), (0.0, 0.7, 0.0))
     under = rectangle((-0.65, 0.7, -0.42), (1.3, 0, 0), (0, 0, 0.84))

@@ -1,4 +1,4 @@
-"""Two organic shapes on a polished floor under the sky: what they throw onto each other and onto the floor."""
+"""Two organic shapes on a polished floor, with reflections between them and the floor."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from relume.scene.examples.cornell import rectangle, sunny_sky
+from relume.scene.examples.cornell import rectangle, sunny_environment
 from relume.scene.examples.still_life.grids import GridSurface, closed_grid_surface
 from relume.scene.examples.still_life.still_life import look_at
 from relume.scene.model import Material, Scene
@@ -19,7 +19,7 @@ _ROWS, _COLUMNS = 96, 160
 
 @cache
 def tableau() -> Scene:
-    """A folded pebble and a waisted one, about 1 m high; view "front", for pictures of 4:3."""
+    """Return a folded and a waisted pebble, about 1 m high; view "front", for 4:3 images."""
     polish = {"model": "blinn_phong", "color": [0.1, 0.1, 0.1], "params": {"exponent": 100.0}}
     gloss = {"model": "cook_torrance", "color": [1.0, 1.0, 1.0], "params": {"sigma": 0.2, "ior": 1.5}}
     folded = _shape(0.62, 0.55, 0.16, 5, 0.35).transform(np.eye(3), (-0.62, 0.5, -0.1))
@@ -32,7 +32,7 @@ def tableau() -> Scene:
     meshes = [surface.mesh(name, k) for k, (name, surface, _) in enumerate(objects)]
     materials = [Material(name, terms) for name, _, terms in objects]
     camera = look_at("front", (0.3, 1.7, 4.2), (-0.05, 0.55, 0.0), float(np.radians(30.0)))
-    return make_scene("Tableau", meshes, materials, [camera], sunny_sky(_SUN_DIRECTION))
+    return make_scene("Tableau", meshes, materials, [camera], sunny_environment(_SUN_DIRECTION))
 
 
 def _lambert(color: list[float]) -> dict[str, Any]:
@@ -40,7 +40,7 @@ def _lambert(color: list[float]) -> dict[str, Any]:
 
 
 def _shape(radius: float, half_height: float, depth: float, folds: int, waist: float) -> GridSurface:
-    """An ellipsoid with folds that turn about it, drawn in at the middle; open by a pinhole at both poles."""
+    """An ellipsoid with twisted folds and a narrow waist; a pinhole is open at each pole."""
     theta = np.linspace(0.01, np.pi - 0.01, _ROWS)[:, None]
     phi = -np.linspace(0, 2 * np.pi, _COLUMNS)[None, :]
     folded = 1 + depth * np.sin(theta) ** 2 * np.sin(folds * phi + 2.5 * np.cos(theta))

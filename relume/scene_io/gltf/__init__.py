@@ -1,4 +1,4 @@
-"""Reading glTF 2.0, from files that nobody vouches for."""
+"""Import of glTF 2.0 from untrusted files."""
 
 from relume.scene_io.gltf.importer import import_gltf
 

@@ -1,4 +1,4 @@
-"""Accessors as NumPy arrays; every offset, stride and count is checked against the bytes that are there.
+"""Accessors as NumPy arrays; every offset, stride and count is checked against the available bytes.
 
 glTF 2.0 specification, section 3.6.2.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
@@ -24,13 +25,13 @@ from relume.scene_io.gltf.document import Accessor, BufferView, Primitive, Spars
 
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
-MAX_NUMBERS = 240_000_000  # in all accessors that are read: about what a file of the largest size can hold
+MAX_NUMBERS = 240_000_000  # in all accessors that are read; about the content of the largest allowed file
 
 Array = NDArray[Any]
 
 
 class AccessorReader:
-    """Reads the accessors of one file, each once, within one budget for all of them."""
+    """Reads the accessors of one file, with a cache and a common size limit."""
 
     def __init__(self, container: GltfContainer) -> None:
         self._container = container
@@ -40,17 +41,17 @@ class AccessorReader:
         self._budget = MAX_NUMBERS
 
     def unpack(self, primitive: Primitive, label: str) -> None:
-        """Unpack a primitive's accessors where they have no data of their own.
+        """Decompress a Draco primitive into its accessors if they have no other data.
 
         Raises:
-            SceneError: the packed data is damaged, or is not what the accessors say.
+            SceneError: the compressed data is damaged or does not match the accessors.
         """
         draco = read_draco(primitive.extensions, label)
         position = primitive.attributes.get("POSITION")
         if draco is None or position is None or self._accessor(position, label).bufferView is not None:
             return
         if primitive.indices is None or primitive.mode != 4:
-            raise SceneError(f"{label} is packed by Draco and no list of triangles; export the scene again")
+            raise SceneError(f"{label} has Draco compression but is no indexed triangle list; export it again")
         indices, positions = self._accessor(primitive.indices, label), self._accessor(position, label)
         data = bytes(view_bytes(self._container, draco.bufferView, label))
         corners, values = decompress_draco(data, indices.count, positions.count, label)
@@ -61,8 +62,8 @@ class AccessorReader:
                 accessor = self._accessor(index, label)
                 self._draco[index] = _cast_to_accessor(values[number], accessor, f"{name[:40]} of {label}")
 
-    def integers(self, index: int, label: str) -> Array:
-        """Unsigned scalars, such as vertex indices. (count,)"""
+    def integers(self, index: int, label: str) -> Shaped[Array, " n"]:
+        """Read unsigned scalars, such as vertex indices."""
         accessor = self._accessor(index, label)
         if accessor.type != "SCALAR" or accessor.componentType not in (5121, 5123, 5125):
             raise SceneError(f"{label} are not unsigned scalars; export the scene again")
@@ -70,21 +71,21 @@ class AccessorReader:
             self._integers[index] = self._values(index, accessor, label)[:, 0]
         return self._integers[index]
 
-    def floats(self, index: int, widths: tuple[int, ...], label: str) -> NDArray[np.float32]:
-        """The vectors of an accessor; normalised integers are scaled to [0, 1] or [-1, 1], others taken as they are.
+    def floats(self, index: int, widths: tuple[int, ...], label: str) -> Shaped[NDArray[np.float32], "n width"]:
+        """Read vectors; normalized integers are scaled to [0, 1] or [-1, 1], others only converted.
 
         Args:
             index: of the accessor in the document.
-            widths: the numbers of components that are allowed.
+            widths: allowed numbers of components.
             label: names the data in errors.
-        Returns:
-            (count, width) float32
         Raises:
-            SceneError: an index, offset, stride, type or count does not fit the data.
+            SceneError: an index, offset, stride, type or count does not match the data.
         """
         accessor = self._accessor(index, label)
         if WIDTHS.get(accessor.type) not in widths:
-            raise SceneError(f"{label} are {accessor.type}; give vectors of {' or '.join(map(str, widths))}")
+            raise SceneError(
+                f"{label} are {accessor.type}, not vectors of {' or '.join(map(str, widths))}; export the scene again"
+            )
         if index not in self._floats:
             values = self._values(index, accessor, label)
             if accessor.normalized and values.dtype.kind != "f":
@@ -101,41 +102,42 @@ class AccessorReader:
     def _values(self, index: int, accessor: Accessor, label: str) -> Array:
         self._budget -= accessor.count * WIDTHS[accessor.type]
         if self._budget < 0:
-            raise SceneError(f"the scene's arrays hold more than {MAX_NUMBERS:,} numbers; simplify it")
+            raise SceneError(f"the scene's arrays contain more than {MAX_NUMBERS:,} numbers; simplify it")
         return self._draco[index] if index in self._draco else _read(self._container, accessor, label)
 
 
 def _cast_to_accessor(values: Array, accessor: Accessor, label: str) -> Array:
-    """Unpacked values in the type that their accessor says. (count, width) Raises SceneError where they cannot be."""
+    """Convert decompressed values to the accessor's type. (count, width) Raises SceneError if they do not match."""
     dtype = np.dtype(DTYPES[accessor.componentType])
     is_float = dtype.kind == "f"
     fits = values.shape == (accessor.count, WIDTHS.get(accessor.type)) and (values.dtype.kind == "f") == is_float
     if not fits or not (is_float or np.array_equal(values.astype(dtype), values)):
-        raise SceneError(f"{label} are not what their Draco data holds; export the scene again")
+        raise SceneError(f"{label} do not match their Draco data; export the scene again")
     return values.astype(dtype)
 
 
 def view_bytes(container: GltfContainer, index: int, label: str) -> memoryview:
-    """The bytes of a buffer view.
+    """Return the bytes of a buffer view, decompressed.
 
     Args:
         container: the file's document and buffers.
         index: of the view in the document.
         label: names the data in errors.
     Raises:
-        SceneError: there is no such view, or it reaches out of its buffer.
+        SceneError: there is no such view, it exceeds its buffer, or its compression is unsupported.
     """
     view = _item_at(container.document.bufferViews, index, f"the buffer view of {label}")
     for extension in UNSUPPORTED_COMPRESSION:
         if extension in view.extensions:
-            raise SceneError(f"{label} is packed with {extension}; unpack it: {UNSUPPORTED_COMPRESSION[extension]}")
+            command = UNSUPPORTED_COMPRESSION[extension]
+            raise SceneError(f"{label} uses {extension}, which can't be read; run: {command}")
     compression = read_meshopt(view, label)
     if compression is None:
         return _bytes(container, view, label)
     if index not in container.decompressed_views:
         num_bytes = view.byteLength + sum(len(chunk) for chunk in container.decompressed_views.values())
         if num_bytes > MAX_UNPACKED_BYTES:
-            raise SceneError(f"the scene's arrays unpack to more than {MAX_UNPACKED_BYTES >> 20} MB; simplify it")
+            raise SceneError(f"the scene's arrays decompress to more than {MAX_UNPACKED_BYTES >> 20} MB; simplify it")
         container.decompressed_views[index] = decompress_view(
             compression, bytes(_bytes(container, compression, label)), label
         )
@@ -143,15 +145,15 @@ def view_bytes(container: GltfContainer, index: int, label: str) -> memoryview:
 
 
 def _bytes(container: GltfContainer, view: BufferView | MeshoptBuffer, label: str) -> memoryview:
-    """A stretch of a buffer."""
+    """A slice of a buffer."""
     content: memoryview = _item_at(container.buffers, view.buffer, f"the buffer of {label}")
     if view.byteOffset + view.byteLength > len(content):
-        raise SceneError(f"the buffer view of {label} reaches beyond its buffer; export the scene again")
+        raise SceneError(f"the buffer view of {label} exceeds its buffer; export the scene again")
     return content[view.byteOffset : view.byteOffset + view.byteLength]
 
 
 def _read(container: GltfContainer, accessor: Accessor, label: str) -> Array:
-    """The values as stored, sparse substitutions made. (count, width)"""
+    """Stored values with sparse substitutions. (count, width)"""
     width, dtype = WIDTHS[accessor.type], np.dtype(DTYPES[accessor.componentType])
     if accessor.bufferView is None:
         _check_zeros(container, accessor, width * dtype.itemsize, label)
@@ -172,12 +174,12 @@ def _read_strided(
     if stride < element_bytes:
         raise SceneError(f"{label} have a stride of {stride} for elements of {element_bytes} bytes; export it again")
     if offset + (count - 1) * stride + element_bytes > len(content):
-        raise SceneError(f"{label} have more elements than its buffer view holds; export the scene again")
+        raise SceneError(f"{label} have more elements than their buffer view; export the scene again")
     return np.ndarray((count, width), dtype, content, offset, (stride, dtype.itemsize)).copy()
 
 
 def _substitute(container: GltfContainer, sparse: Sparse, values: Array, label: str) -> None:
-    """Puts the sparse values in their places."""
+    """Apply the sparse substitutions in place."""
     num_elements, width = values.shape
     if sparse.count > num_elements:
         raise SceneError(f"{label} have more sparse elements than elements; export the scene again")
@@ -194,12 +196,12 @@ def _substitute(container: GltfContainer, sparse: Sparse, values: Array, label: 
 
 
 def _check_zeros(container: GltfContainer, accessor: Accessor, element_bytes: int, label: str) -> None:
-    """An accessor without a view is all zeros but for its sparse part: a few bytes that could claim gigabytes."""
+    """Limit accessors without a view, which are zero except for their sparse part and could claim gigabytes."""
     if accessor.sparse is None:
         raise SceneError(f"{label} have no data; export the scene again")
     buffer_bytes = sum(len(buffer) for buffer in container.buffers)
     if accessor.count * element_bytes > 1000 * buffer_bytes:
-        raise SceneError(f"{label} claim {accessor.count:,} elements and hold almost none; export the scene again")
+        raise SceneError(f"{label} claim {accessor.count:,} elements but contain almost none; export the scene again")
 
 
 def _item_at(items: Any, index: int, label: str) -> Any:

@@ -1,8 +1,8 @@
-"""The base layer where images say it: diffuse albedo and reflectance head-on of every texel, some rows at a time.
+"""The base layer of a material with textures: diffuse albedo and f0 of every texel, in batches of rows.
 
     diffuse = b (1 - m),  f0 = mix(s min(c f, 1), b, m),  f90 = mix(s, 1, m)
 
-of base colour b, metallic m, specular s with colour c and reflectance f, as `relume.scene_io.gltf.materials` says.
+for base color b, metallic m, specular s with color c and reflectance f, see `relume.scene_io.gltf.materials`.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 
 from relume.scene.model import Texture, TextureEncoding
 from relume.scene.texture_encoding import F32, F64, ROWS_PER_BATCH, SRGB_TO_LINEAR, U8, encode_rows
@@ -19,26 +20,26 @@ from relume.scene_io.gltf.texture_resampling import Raster
 
 @dataclass(frozen=True)
 class MetallicBlend:
-    """A material's images and factors.
+    """A material's textures and factors.
 
     Attributes:
-        raster: images "base", "packed", "specular", "tint". factor: of the base colour. (3,)
-        dielectric: reflectance head-on with its colour. (3,) metallic, specular: factors.
+        raster: images "base", "packed", "specular", "tint". factor: of the base color.
+        dielectric: f0 times the specular color. metallic, specular: factors.
     """
 
     raster: Raster
-    factor: F64
-    dielectric: F64
+    factor: Shaped[F64, " 3"]
+    dielectric: Shaped[F64, " 3"]
     metallic: float
     specular: float
 
     @property
     def _metallic_image(self) -> U8:
-        """What the factor of metallic multiplies."""
+        """Image that is multiplied by the metallic factor."""
         return self.raster.channel("packed", 2) if self.metallic else np.zeros((1, 1, 1), np.uint8)
 
     def diffuse(self) -> Texture:
-        """What multiplies the diffuse colour."""
+        """Texture that multiplies the diffuse color."""
         base, metallic = self.raster.rgb("base"), self._metallic_image
         if metallic.size == 1 and base.shape[:2] == self.raster.size:
             diffuse_scale = 1 - self.metallic * float(metallic[0, 0, 0]) / 255
@@ -67,8 +68,8 @@ class MetallicBlend:
         )
         return np.asarray(lerp(head_on, self.factor.astype(np.float32) * base, metallic), np.float32)
 
-    def f0_and_f90(self) -> tuple[F64, F64, F64, float]:
-        """Least, highest and mean reflectance head-on, (3,) each, and the mean at the horizon."""
+    def f0_and_f90(self) -> tuple[Shaped[F64, " 3"], Shaped[F64, " 3"], Shaped[F64, " 3"], float]:
+        """Minimum, maximum and mean f0, and the mean reflectance at grazing incidence."""
         height, _ = self.raster.size
         lowest, highest, total = np.full(3, np.inf), np.full(3, -np.inf), np.zeros(3)
         at_horizon = 0.0
@@ -82,8 +83,8 @@ class MetallicBlend:
             at_horizon += row_fraction * float(np.mean(lerp(weight, 1, metallic), dtype=np.float64))
         return lowest, highest, total, at_horizon
 
-    def normalized_f0(self, mean: F64, highest: F64) -> Texture:
-        """Reflectance head-on over its mean: what multiplies the highlight."""
+    def normalized_f0(self, mean: Shaped[F64, " 3"], highest: Shaped[F64, " 3"]) -> Texture:
+        """Texture of f0 over its mean, which multiplies the highlight."""
         base, metallic = self.raster.rgb("base"), self._metallic_image
         if (
             metallic.size == 1
@@ -102,11 +103,7 @@ def lerp(a: Any, b: Any, weight: Any) -> Any:
 
 
 def select_rows(values: U8, rows: slice) -> U8:
-    """Rows of an image, or the one texel that stands for all. (rows or 1, width or 1, channels)
-
-    Args:
-        values: of the image, or of that texel. rows: of the image.
-    """
+    """Select rows of an image, or the single texel of a uniform one. (rows or 1, width or 1, channels)"""
     return values if values.shape[:2] == (1, 1) else values[rows]
 
 

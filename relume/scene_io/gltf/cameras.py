@@ -1,4 +1,4 @@
-"""The file's cameras under URL-safe names, or a view that shows the whole scene.
+"""The file's cameras under URL-safe names, or a camera that frames the whole scene.
 
 glTF 2.0 specification, section 3.10.
 """
@@ -10,6 +10,7 @@ import unicodedata
 from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.scene.model import Camera, Mesh
@@ -22,14 +23,14 @@ FRAMING_MARGIN = 1.08
 
 
 def make_slug(preferred: str, used_names: dict[str, int]) -> str:
-    """A name of [a-z0-9-]{1,40} that is not taken yet; adds it to `used_names`."""
+    """Return an unused name of [a-z0-9-]{1,40} and add it to `used_names`."""
     ascii_name = unicodedata.normalize("NFKD", preferred[:200]).encode("ascii", "ignore").decode().lower()
     plain = re.sub(r"[^a-z0-9]+", "-", ascii_name).strip("-")[:34].strip("-") or "view"
     return append_number(plain, "-", used_names)
 
 
-def rigid_frame(to_world: F64) -> F64 | None:
-    """The frame without scale and shear: position, -Z and the upper side kept; None where nothing is left of it."""
+def rigid_frame(to_world: Shaped[F64, "4 4"]) -> Shaped[F64, "4 4"] | None:
+    """Remove scale and shear; position, -Z and the up side stay. None for a degenerate frame."""
     backward, up = to_world[:3, 2], to_world[:3, 1]
     right = np.cross(up, backward)
     lengths = np.linalg.norm(backward), np.linalg.norm(right)
@@ -42,7 +43,7 @@ def rigid_frame(to_world: F64) -> F64 | None:
 
 
 def framing_camera(meshes: Sequence[Mesh], name: str) -> Camera:
-    """A three-quarter view a little from above that just holds all vertices in a 4:3 picture."""
+    """Return a three-quarter view, slightly from above, that frames all vertices in a 4:3 image."""
     points = np.concatenate([_extremes(mesh.positions) for mesh in meshes]).astype(np.float64)
     lowest, highest = points.min(0), points.max(0)
     center = (lowest + highest) / 2
@@ -61,7 +62,7 @@ def framing_camera(meshes: Sequence[Mesh], name: str) -> Camera:
 
 
 def _extremes(positions: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Few enough points to frame by: the vertices themselves, or the corners of the box of a large mesh."""
+    """Points to frame: the vertices, or for a large mesh the corners of its bounding box."""
     if len(positions) <= 100_000:
         return positions
     low, high = positions.min(0), positions.max(0)

@@ -1,6 +1,6 @@
-"""From bytes to a checked document and its buffers: .glb, or .gltf with data URIs or files beside it.
+"""Container of a glTF file: a validated document and its buffers, from .glb, or .gltf with data URIs or files.
 
-glTF 2.0 specification, section 4. Nothing is opened but what the scene's companions hold.
+glTF 2.0 specification, section 4. Only files in the scene's companions are opened.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from relume.scene_io.referenced_files import Companions
 MAX_JSON_VALUES = 4_000_000
 PACK = "pack everything into one file: npx @gltf-transform/cli copy in.gltf out.glb"
 
-# Required extensions that change what an accessor or image holds and are not read, with what undoes them.
+# Unsupported required extensions that compress accessors or images, with the command that decompresses them.
 UNSUPPORTED_COMPRESSION = {
     "KHR_texture_basisu": "npx @gltf-transform/cli ktxdecompress in.glb out.glb",
 }
@@ -47,7 +47,7 @@ class GltfContainer:
     """A document and the bytes of its buffers, each at least as long as declared.
 
     Attributes:
-        decompressed_views: buffer views that were packed, by number, once they were needed.
+        decompressed_views: cache of decompressed buffer views, by index.
     """
 
     document: Document
@@ -56,15 +56,15 @@ class GltfContainer:
     decompressed_views: dict[int, memoryview] = field(default_factory=dict)
 
     def resolve(self, uri: str, label: str) -> bytes:
-        """The content of a data URI, or of a file beside this one. Raises SceneError."""
+        """Return the content of a data URI or of a companion file. Raises SceneError."""
         return _resolve(uri, self.companions, label)
 
 
 def read_container(data: bytes, companions: Companions) -> GltfContainer:
-    """Splits a file into its document and its buffers, and checks both.
+    """Split a file into its document and its buffers, and validate both.
 
     Raises:
-        SceneError: truncated, not glTF 2, names files that are not beside it, or requires an extension that packs data.
+        SceneError: truncated, not glTF 2, refers to missing files, or requires an unsupported compression.
     """
     if data[:4] == b"glTF":
         json_bytes, binary = _split_glb(data)
@@ -79,8 +79,8 @@ def read_container(data: bytes, companions: Companions) -> GltfContainer:
 
 
 def parse_document(json_bytes: bytes) -> Document:
-    """The JSON chunk as a checked model; says where the first fault is."""
-    if sum(json_bytes.count(mark) for mark in b",[{") > MAX_JSON_VALUES:  # each value has one of these before it
+    """Parse and validate the JSON chunk. The SceneError names the first invalid value."""
+    if sum(json_bytes.count(mark) for mark in b",[{") > MAX_JSON_VALUES:  # each value follows one of these
         raise SceneError(f"the scene's JSON has more than {MAX_JSON_VALUES:,} values; export it as .glb")
     try:
         content = json.loads(json_bytes.decode("utf-8-sig"), parse_constant=_refuse_constant)
@@ -94,7 +94,7 @@ def parse_document(json_bytes: bytes) -> Document:
         if first_error["type"] == "too_long":
             max_length = first_error["ctx"]["max_length"]
             raise SceneError(
-                f"the scene has more than the {max_length:,} {location} that are read; join some or split it"
+                f"the scene has more than {max_length:,} {location}, the limit; merge some or split the scene"
             ) from None
         raise SceneError(
             f"the scene's JSON is not valid glTF 2.0 at {location}: {first_error['msg']}; export it again"
@@ -109,7 +109,7 @@ def _resolve(uri: str, companions: Companions, label: str) -> bytes:
     content = companions.read(uri, label)
     if content is None:
         printable = uri[:60].encode("ascii", "replace").decode()
-        raise SceneError(f"{label} lies outside the file ({printable!r}) and is not beside it; {PACK}")
+        raise SceneError(f"{label} is outside the file, in {printable!r}, which is missing; add it or {PACK}")
     return content
 
 
@@ -164,11 +164,12 @@ def _buffer(i: int, buffer: Buffer, binary: memoryview | None, companions: Compa
 def _check_extensions(document: Document) -> None:
     for name in document.extensionsRequired:
         if name in UNSUPPORTED_COMPRESSION:
-            raise SceneError(f"the file is packed with {name}; unpack it: {UNSUPPORTED_COMPRESSION[name]}")
+            command = UNSUPPORTED_COMPRESSION[name]
+            raise SceneError(f"the file uses KTX2 textures ({name}), which can't be read; run: {command}")
 
 
 def _refuse_constant(constant: str) -> Any:
-    raise ValueError(f"{constant} is no JSON number")
+    raise ValueError(f"{constant} is not a JSON number")
 
 
 def _first_line(problem: BaseException) -> str:

@@ -1,6 +1,6 @@
-"""The JSON of a glTF file as bounded, typed models: whatever passes here has sane counts, offsets and numbers.
+"""The JSON of a glTF file as typed models with limits on counts, offsets and numbers.
 
-Only what relume reads is declared; the rest of a document is ignored. Indices are checked where they are followed.
+Only properties that relume reads are declared; others are ignored. Indices are checked when they are used.
 glTF 2.0 specification, sections 3 and 5.
 """
 
@@ -22,7 +22,7 @@ Extensions = dict[str, Any]
 
 
 class GltfPrimitivePart(BaseModel):
-    """A glTF object; every one may have a name and extensions."""
+    """A glTF object; each may have a name and extensions."""
 
     model_config = ConfigDict(frozen=True, extra="ignore")
     name: Name = ""
@@ -137,7 +137,7 @@ class GltfCamera(GltfPrimitivePart):
 class Node(GltfPrimitivePart):
     children: Indices = ()
     matrix: Annotated[list[Number], Field(min_length=16, max_length=16)] | None = None
-    # tuples: of a hundred thousand nodes, each would copy a list that stands for what it does not say
+    # tuples: pydantic would copy a default list for each of up to 100,000 nodes
     translation: tuple[Number, Number, Number] = (0.0, 0.0, 0.0)
     rotation: tuple[Number, Number, Number, Number] = (0.0, 0.0, 0.0, 1.0)
     scale: tuple[Number, Number, Number] = (1.0, 1.0, 1.0)
@@ -151,7 +151,7 @@ class SceneRoot(GltfPrimitivePart):
 
 
 class Document(GltfPrimitivePart):
-    """The whole file. Lists longer than relume allows are refused before they are looked at."""
+    """The whole file. Lists over the limit are rejected before their items are validated."""
 
     asset: Asset
     extensionsUsed: Names = []  # noqa: N815

@@ -1,4 +1,4 @@
-"""Primitives as triangles: strips and fans unrolled, degenerate ones dropped, normals made where there are none.
+"""Primitives as triangles: unrolls strips and fans, removes degenerate triangles, adds missing normals.
 
 glTF 2.0 specification, section 3.7.2.
 """
@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
@@ -27,18 +28,18 @@ class GltfGeometry:
     """A primitive before its node's transform; arrays as in `relume.scene.model.Mesh`.
 
     Attributes:
-        colors: of vertices, linear RGB and alpha, within [0, 1]; None where there are none. (num_vertices, 4)
+        colors: of vertices, linear RGB and alpha in [0, 1], or None.
     """
 
-    positions: F32
-    normals: F32
-    tangents: F32
-    uvs: tuple[F32, ...]
-    faces: U32
-    colors: F32 | None = None
+    positions: Shaped[F32, "vertices 3"]
+    normals: Shaped[F32, "vertices 3"]
+    tangents: Shaped[F32, "vertices 4"]
+    uvs: tuple[Shaped[F32, "vertices 2"], ...]
+    faces: Shaped[U32, "triangles 3"]
+    colors: Shaped[F32, "vertices 4"] | None = None
 
-    def split_vertices(self, uvs: F32) -> GltfGeometry:
-        """The same with vertices for each triangle alone, and these places in textures. (num_faces, 3, 2)"""
+    def split_vertices(self, uvs: Shaped[F32, "triangles 3 2"]) -> GltfGeometry:
+        """Return a copy with separate vertices for each triangle and new UV coordinates."""
         order = self.faces.reshape(-1)
         split_faces = np.arange(len(order), dtype=np.uint32).reshape(-1, 3)
         arrays = (self.positions[order], self.normals[order], self.tangents[order], (uvs.reshape(-1, 2),), split_faces)
@@ -46,7 +47,7 @@ class GltfGeometry:
 
 
 def count_corners(document: Document, primitive: Primitive) -> int:
-    """How many corners `read_primitive` will have to look at, whether they make triangles or not."""
+    """Number of corners that `read_primitive` has to process."""
     index = primitive.attributes.get("POSITION") if primitive.indices is None else primitive.indices
     return document.accessors[index].count if index is not None and index < len(document.accessors) else 0
 
@@ -54,21 +55,21 @@ def count_corners(document: Document, primitive: Primitive) -> int:
 def read_primitive(
     reader: AccessorReader, primitive: Primitive, label: str, warnings: list[ImporterWarning]
 ) -> GltfGeometry | None:
-    """The primitive's triangles with only the vertices they use; None where it has none (a warning says so).
+    """Read the primitive's triangles with the vertices they use; None if there are none, with a warning.
 
     Args:
         reader: of the file's accessors.
-        primitive: as the document has it.
+        primitive: from the document.
         label: names the mesh in errors and warnings.
-        warnings: gets one sentence for each thing that is left out.
+        warnings: gets one sentence for each omission.
     Raises:
         SceneError: positions are missing or not finite, or indices are out of range.
     """
     if primitive.mode < TRIANGLES:
-        warnings.append(unsupported(f"{label} is made of points or lines; it is left out"))
+        warnings.append(unsupported(f"Skipped {label}: points and lines aren't supported."))
         return None
     if "POSITION" not in primitive.attributes:
-        warnings.append(unsupported(f"{label} has no positions; it is left out"))
+        warnings.append(unsupported(f"Skipped {label}: it has no positions."))
         return None
     positions = reader.floats(primitive.attributes["POSITION"], (3,), f"positions of {label}")
     if primitive.indices is None:
@@ -80,10 +81,10 @@ def read_primitive(
     faces = _unroll(corners, primitive.mode)
     used_vertices, faces = _compact(faces)
     if not is_usable(positions[used_vertices]):
-        raise SceneError(f"{label} has positions that are not finite; repair the mesh and export it again")
+        raise SceneError(f"{label} has positions that are NaN, infinite or huge; repair the mesh and export it again")
     faces = faces[find_nondegenerate(positions[used_vertices], faces, label, warnings)]
     if len(faces) == 0:
-        warnings.append(unsupported(f"{label} has no triangles; it is left out"))
+        warnings.append(unsupported(f"Skipped {label}: it has no triangles with an area."))
         return None
     return _read_attributes(reader, primitive, used_vertices, faces, positions, label, warnings)
 
@@ -102,9 +103,9 @@ def _read_attributes(
             return None
         values = reader.floats(primitive.attributes[name], widths, f"{name} of {label}")
         if len(values) != len(positions):
-            raise SceneError(f"{name} of {label} are not as many as its positions; export the scene again")
+            raise SceneError(f"{label} has different numbers of {name} and positions; export the scene again")
         if not is_usable(values[used_vertices]):
-            warnings.append(unsupported(f"{name} of {label} are not all finite; they are not used"))
+            warnings.append(unsupported(f"Ignored {name} of {label}: some values are NaN, infinite or huge."))
             return None
         return values[used_vertices]
 
@@ -115,24 +116,21 @@ def _read_attributes(
         opaque = np.ones((len(colors), 4 - colors.shape[1]), np.float32)
         colors = np.concatenate([np.clip(colors, 0, 1), opaque], axis=1)
     if primitive.targets:
-        warnings.append(approximated(f"morph targets of {label} are not used; it has its basic shape"))
+        warnings.append(approximated(f"Morph targets of {label} aren't supported; it has its base shape."))
     points = positions[used_vertices]
     if normals is None:
         return _flat_shaded(points, uvs, faces, colors)
     is_missing = np.linalg.norm(normals, axis=1) < 1e-6
     if is_missing.any():
-        warnings.append(
-            approximated(
-                f"{int(is_missing.sum()):,} normals of {label} have no length; they are made from its triangles"
-            )
-        )
+        count = int(is_missing.sum())
+        warnings.append(approximated(f"Recomputed {count:,} zero-length normals of {label} from its triangles."))
         normals = np.where(is_missing[:, None], _smooth_normals(points, faces), normals)
     tangents = np.zeros((len(points), 4), np.float32) if tangents is None else tangents
     return GltfGeometry(points, normals, tangents, uvs, faces.astype(np.uint32), colors)
 
 
 def _unroll(corners: NDArray[Any], mode: int) -> I64:
-    """Triangles (n, 3) of a list, strip or fan; corners left over are dropped."""
+    """Triangles (n, 3) of a list, strip or fan; extra corners are dropped."""
     if mode == TRIANGLES:
         return np.asarray(corners[: len(corners) // 3 * 3].reshape(-1, 3), np.int64)
     if len(corners) < 3:
@@ -146,40 +144,41 @@ def _unroll(corners: NDArray[Any], mode: int) -> I64:
 
 
 def _compact(faces: I64) -> tuple[I64, I64]:
-    """Indices of the vertices that are used, and faces that number those."""
+    """Indices of the used vertices, and faces with new indices into them."""
     used_vertices, inverse = np.unique(faces, return_inverse=True)
     return used_vertices, inverse.reshape(-1, 3)
 
 
-def is_usable(values: NDArray[np.floating]) -> bool:
-    """Whether all values are finite and of a size that leaves room to calculate."""
+def is_usable(values: Shaped[NDArray[np.floating], " ..."]) -> bool:
+    """True if all values are finite and not too large for calculations."""
     return bool(np.isfinite(values).all()) and bool((np.abs(values) <= MAX_COORDINATE).all())
 
 
 def find_nondegenerate(
-    positions: NDArray[np.floating], faces: I64, label: str, warnings: list[ImporterWarning]
-) -> NDArray[np.bool_]:
-    """Which triangles have area, measured against their longest edge.
+    positions: Shaped[NDArray[np.floating], "vertices 3"],
+    faces: Shaped[I64, "triangles 3"],
+    label: str,
+    warnings: list[ImporterWarning],
+) -> Shaped[NDArray[np.bool_], " triangles"]:
+    """Return True for each triangle that has an area, relative to its longest edge.
 
     Args:
-        positions: of the vertices. (num_vertices, 3)
-        faces: the triangles' vertices. (num_faces, 3)
+        positions: of the vertices.
+        faces: indices of the triangles' vertices.
         label: names the mesh in the warning.
-        warnings: gets a sentence where some have none.
-    Returns:
-        (num_faces,) bool
+        warnings: gets a sentence if some have no area.
     """
     a, b, c = (positions[faces[:, k]].astype(np.float64) for k in range(3))
     edge = np.maximum.reduce([((b - a) ** 2).sum(1), ((c - a) ** 2).sum(1), ((c - b) ** 2).sum(1)])
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     has_area = np.asarray((area > 1e-10 * edge) & (edge > 0))
     if not has_area.all():
-        warnings.append(ignored(f"{int((~has_area).sum()):,} triangles of {label} have no area; they are left out"))
+        warnings.append(ignored(f"Removed {int((~has_area).sum()):,} zero-area triangles from {label}."))
     return has_area
 
 
 def _smooth_normals(points: F32, faces: I64) -> F32:
-    """Unit normals averaged over the triangles of each vertex, weighted by area; +Y where they cancel."""
+    """Unit normals averaged over the triangles of each vertex, weighted by area; +Y if they cancel."""
     corners = points[faces].astype(np.float64)
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     cross /= max(float(np.abs(cross).max()), 1e-300)
@@ -189,7 +188,7 @@ def _smooth_normals(points: F32, faces: I64) -> F32:
 
 
 def _flat_shaded(points: F32, uvs: tuple[F32, ...], faces: I64, colors: F32 | None) -> GltfGeometry:
-    """Every triangle with its own corners and its own normal, as glTF asks where normals are missing."""
+    """Separate vertices and a face normal for each triangle, as glTF requires if normals are missing."""
     corners = points[faces]
     cross = np.cross((corners[:, 1] - corners[:, 0]).astype(np.float64), corners[:, 2] - corners[:, 0])
     normals = np.repeat(cross / np.linalg.norm(cross, axis=1, keepdims=True), 3, axis=0).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Images of a file, and how they continue outside.
+"""Decoded images of a file, and the wrap modes of textures.
 
 glTF 2.0 specification, sections 3.8 and 3.9.
 """
@@ -6,6 +6,7 @@ glTF 2.0 specification, sections 3.8 and 3.9.
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
@@ -14,23 +15,23 @@ from relume.scene_io.gltf.accessors import view_bytes
 from relume.scene_io.gltf.container import GltfContainer
 
 U8 = NDArray[np.uint8]
-_CACHE_BYTES = 300_000_000  # of decoded images, for the next material that names them
+_CACHE_BYTES = 300_000_000  # of decoded images, which other materials may use
 WRAPS = {33_071: "clamp", 33_648: "mirror", 10_497: "repeat"}
 
 
 class ImageReader:
-    """Decodes the images of one file, and keeps the last of them."""
+    """Decodes the images of one file, with a cache."""
 
     def __init__(self, container: GltfContainer) -> None:
         self._container = container
         self._decoded: dict[int, U8] = {}
         self._decoder = Decoder()
 
-    def texture(self, index: int, label: str) -> tuple[U8, tuple[str, str]]:
-        """The bytes (height, width, 4), RGBA, of a texture and how it wraps along u and v.
+    def texture(self, index: int, label: str) -> tuple[Shaped[U8, "height width 4"], tuple[str, str]]:
+        """Return the RGBA bytes of a texture and its wrap modes along u and v.
 
         Raises:
-            SceneError: the texture does not exist, lies outside the file, is too large, damaged or of another format.
+            SceneError: the texture or its file is missing, too large, damaged or in an unsupported format.
         """
         document = self._container.document
         if index >= len(document.textures):
@@ -58,7 +59,7 @@ class ImageReader:
         if not 0 <= index < len(images):
             raise SceneError(f"{label} refers to image {index} of {len(images)}; export the scene again")
         if index in self._decoded:
-            self._decoded[index] = self._decoded.pop(index)  # the newest comes last
+            self._decoded[index] = self._decoded.pop(index)  # most recently used last
         else:
             image = images[index]
             if image.bufferView is not None:

@@ -1,4 +1,4 @@
-"""glTF to Scene: what relume understands, and one warning for each thing it does not."""
+"""Conversion of glTF to a scene, with a warning for each unsupported feature."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from relume.scene.collect_lights import LightCollector
 from relume.scene.finalize import finalize
 from relume.scene.merge_meshes import merge_by_material
 from relume.scene.model import F32, Camera, Mesh, Scene
-from relume.scene.unique_names import unique_name
+from relume.scene.unique_names import quote, unique_name
 from relume.scene.validate import MAX_TRIANGLES
 from relume.scene.vertex_colors import MAX_COLORED, draw_color_image, is_uniform
 from relume.scene_io.gltf.accessors import AccessorReader
@@ -43,31 +43,29 @@ from relume.scene_io.gltf.variants import Choices, read_choices, variant_looks, 
 from relume.scene_io.referenced_files import Companions, NoFiles
 
 F64 = NDArray[np.float64]
-Key = tuple[int, int]  # a mesh and a primitive of it
+Key = tuple[int, int]  # index of a mesh and of one of its primitives
 MAX_VERTICES = MAX_CORNERS = 3 * MAX_TRIANGLES
-MAX_INSTANCES = 100_000  # primitives times the nodes and the instances that show them
-_MAX_SEPARATE_MESHES = (
-    2_000  # meshes; more of one material are joined, for each is a handful of arrays in files and in memory
-)
+MAX_INSTANCES = 100_000  # primitives times the nodes and instances that show them
+_MAX_SEPARATE_MESHES = 2_000  # beyond, meshes are merged by material: each has its own arrays in files and memory
 
 
 def import_gltf(
     data: bytes, name: str, environment: Environment | None = None, companions: Companions | None = None
 ) -> Scene:
-    """Reads a .glb file, or a .gltf file.
+    """Import a .glb or .gltf file.
 
     Args:
         data: the file's bytes.
-        name: what people call the scene.
-        environment: the light; the studio of the built-in scene where None.
-        companions: the files that it may name; none where None.
+        name: of the scene, shown to users.
+        environment: None for the built-in studio.
+        companions: files that it may refer to; None for none.
 
     Returns:
-        The scene, nodes applied: one mesh per primitive and node, cameras or one view "front", lights and materials
-        that shine.
+        The scene, with node transforms applied: one mesh per primitive and node, cameras or one view "front", lights
+        and emissive materials.
 
     Raises:
-        SceneError: the file cannot be used; the message says why and what to do.
+        SceneError: the file is unusable; the message says why and what to do.
     """
     builder = _SceneBuilder(read_container(data, companions or NoFiles()))
     materials = [read_material.material for read_material in builder.materials]
@@ -76,7 +74,7 @@ def import_gltf(
 
 
 class _BoundPrimitive(NamedTuple):
-    """A primitive, its places in textures, and the material that it wears."""
+    """A primitive with the UV coordinates and index of its material."""
 
     geometry: GltfGeometry
     uvs: F32
@@ -85,7 +83,7 @@ class _BoundPrimitive(NamedTuple):
 
 
 class _SceneBuilder:
-    """One file on its way to a scene: walks the nodes, reading meshes and materials when they are first met."""
+    """Builds the scene of one file: walks the nodes, and reads meshes and materials on first use."""
 
     def __init__(self, container: GltfContainer) -> None:
         self._document = container.document
@@ -112,7 +110,8 @@ class _SceneBuilder:
             self._add_node(node, to_world)
         if self._flattened:
             num, first = len(self._flattened), self._flattened[0]
-            self.warnings.append(approximated(f"{num:,} meshes are flattened by their nodes, {first!r} among them"))
+            message = f"{num:,} meshes are flattened by the scale of their nodes, for example {quote(first)}."
+            self.warnings.append(approximated(message))
         if len(self.meshes) > _MAX_SEPARATE_MESHES:
             self.meshes = merge_by_material(self.meshes)
         if not self.meshes:
@@ -123,6 +122,7 @@ class _SceneBuilder:
         self.materials = [replace(u, material=material) for u, material in zip(self.materials, lit, strict=True)]
         self.lights = self._collector.lights
         self.variants = self._read_variants()
+        self._material_reader.warn_occlusion_maps()
         if not self.cameras:
             self.cameras.append(framing_camera(self.meshes, make_slug("front", self._camera_names)))
 
@@ -135,12 +135,13 @@ class _SceneBuilder:
         if node.mesh >= len(self._document.meshes):
             raise SceneError(f"mesh {node.mesh} does not exist; export the scene again")
         if node.skin is not None:
-            self.warnings.append(approximated(f"the skin of node {node.name[:80]!r} is not used; it has its rest pose"))
+            name = quote(node.name or self._document.meshes[node.mesh].name or "A mesh")
+            self.warnings.append(approximated(f"{name} is shown in its rest pose (skinning isn't supported)."))
         mesh = self._document.meshes[node.mesh]
         instances = read_instances(node, self._accessors, self._remaining_instances, self.warnings)
         self._remaining_instances -= len(mesh.primitives) * len(instances)
         if self._remaining_instances < 0:
-            raise SceneError(f"the scene shows more than {MAX_INSTANCES:,} meshes; join them (gltf-transform join)")
+            raise SceneError(f"the scene shows more than {MAX_INSTANCES:,} meshes; merge them (gltf-transform join)")
         for instance in instances:
             for i, primitive in enumerate(mesh.primitives):
                 name = unique_name(node.name or mesh.name or "mesh", self._mesh_names)
@@ -150,9 +151,9 @@ class _SceneBuilder:
         if key not in self._geometry:
             self._remaining_corners -= count_corners(self._document, primitive)
             if self._remaining_corners < 0:
-                raise SceneError(f"the file describes more than {MAX_TRIANGLES:,} triangles; simplify it")
-            self._accessors.unpack(primitive, f"mesh {name!r}")
-            self._geometry[key] = read_primitive(self._accessors, primitive, f"mesh {name!r}", self.warnings)
+                raise SceneError(f"the file contains more than {MAX_TRIANGLES:,} triangles; simplify it")
+            self._accessors.unpack(primitive, f"mesh {quote(name)}")
+            self._geometry[key] = read_primitive(self._accessors, primitive, f"mesh {quote(name)}", self.warnings)
         return self._geometry[key]
 
     def _add_primitive(self, key: Key, primitive: Primitive, name: str, to_world: F64) -> None:
@@ -170,12 +171,12 @@ class _SceneBuilder:
         if mesh is not None and num_dimensions == 2:
             self._flattened.append(name)
         if mesh is None:
-            self.warnings.append(unsupported(f"mesh {name!r} is scaled to nothing or out of range; it is left out"))
+            self.warnings.append(unsupported(f"Skipped mesh {quote(name)}: its scale is zero or it is too large."))
         else:
             self.meshes.append(mesh)
 
     def _bind_material(self, key: Key, geometry: GltfGeometry, material_index: int) -> _BoundPrimitive:
-        """A primitive with its material, made once for all the nodes that show it."""
+        """A primitive with its material, cached for all nodes that show it."""
         if (key, material_index) not in self._bound_primitives:
             read_material = self.materials[material_index]
             uvs = read_material.uv_slot.apply(geometry.uvs, len(geometry.positions))
@@ -183,7 +184,7 @@ class _SceneBuilder:
         return self._bound_primitives[key, material_index]
 
     def _find_material_index(self, key: Key, primitive: Primitive) -> int:
-        """Number of the primitive's material; those that variants exchange differently are different ones."""
+        """Index of the primitive's material; one material with different variants counts as several."""
         choices = self._choices[key]
         material_key = (primitive.material, choices)
         if material_key not in self._material_index:
@@ -193,7 +194,7 @@ class _SceneBuilder:
         return self._material_index[material_key]
 
     def _vertex_colors(self, index: int | None, choices: Choices) -> VertexColors:
-        """The colours of all vertices that wear a material; where they become an image, geometries get places in it."""
+        """Vertex colors of a material's primitives; if they need an image, geometries get UV coordinates in it."""
         primitives = self._primitives[index, choices]
         if not any("COLOR_0" in primitive.attributes for _, primitive in primitives):
             return WHITE
@@ -210,14 +211,14 @@ class _SceneBuilder:
             return VertexColors((red, green, blue, alpha))
         num_triangles = sum(len(geometries[key].faces) for key in vertex_colors)
         if has_textures(material) or num_triangles > MAX_COLORED:
-            reason = "has textures" if has_textures(material) else f"colours more than {MAX_COLORED:,} triangles"
-            message = f"vertex colours of material {material.name[:80]!r}, which {reason}, are replaced by their mean"
+            reason = "it has textures" if has_textures(material) else f"it has more than {MAX_COLORED:,} triangles"
+            message = f"Vertex colors of material {quote(material.name)} were replaced by their average: {reason}."
             self.warnings.append(approximated(message))
             return VertexColors((red, green, blue, alpha))
         return VertexColors(image=self._draw_color_image(geometries))
 
     def _draw_color_image(self, geometries: dict[Key, GltfGeometry]) -> NDArray[np.uint8]:
-        """Draw the colours of geometries, and place these in the image."""
+        """Draw the vertex colors of geometries, and set their UV coordinates in the image."""
         colors_by_key = {key: geometry.colors for key, geometry in geometries.items() if geometry.colors is not None}
         corners = [colors[geometries[key].faces] for key, colors in colors_by_key.items()]
         image, uvs, white_uv = draw_color_image(np.concatenate(corners))
@@ -254,9 +255,9 @@ class _SceneBuilder:
         name = camera.name or node.name or "camera"
         frame = rigid_frame(to_world)
         if camera.perspective is None or camera.type != "perspective":
-            self.warnings.append(unsupported(f"camera {name[:80]!r} is not a perspective one; it is left out"))
+            self.warnings.append(unsupported(f"Skipped camera {quote(name)}: only perspective cameras are supported."))
         elif frame is None:
-            self.warnings.append(unsupported(f"camera {name[:80]!r} is scaled to nothing; it is left out"))
+            self.warnings.append(unsupported(f"Skipped camera {quote(name)}: its scale is zero."))
         else:
             yfov, aspect = camera.perspective.yfov, camera.perspective.aspectRatio
             self.cameras.append(Camera(make_slug(name, self._camera_names), frame, yfov, aspect))
@@ -265,17 +266,16 @@ class _SceneBuilder:
         document = self._document
         if document.animations:
             num_animations = len(document.animations)
-            animations = "1 animation is" if num_animations == 1 else f"{num_animations} animations are"
-            self.warnings.append(ignored(f"{animations} not used; everything has its rest pose"))
+            animations = "1 animation was" if num_animations == 1 else f"{num_animations} animations were"
+            self.warnings.append(ignored(f"{animations} ignored: objects are shown in their rest pose."))
         for extension in document.extensionsRequired:
             if extension not in SUPPORTED_EXTENSIONS:
-                self.warnings.append(
-                    unsupported(f"the file requires {extension[:60]!r}, which is not understood; it may look wrong")
-                )
+                message = f"The file requires {quote(extension)}, which isn't supported; it may look wrong."
+                self.warnings.append(unsupported(message))
 
 
 def _read_all_choices(document: Document) -> dict[Key, Choices]:
-    """How the primitives of all meshes exchange their materials."""
+    """The material variants of all primitives."""
     return {
         (m, i): read_choices(primitive)
         for m, mesh in enumerate(document.meshes)
@@ -286,7 +286,7 @@ def _read_all_choices(document: Document) -> dict[Key, Choices]:
 def _primitives_by_material(
     document: Document, all_choices: Mapping[Key, Choices]
 ) -> dict[tuple[int | None, Choices], list[tuple[Key, Primitive]]]:
-    """The primitives that wear each material, and exchange it alike."""
+    """Group primitives by material and its variants."""
     primitives: dict[tuple[int | None, Choices], list[tuple[Key, Primitive]]] = {}
     for (m, i), choices in all_choices.items():
         primitive = document.meshes[m].primitives[i]
@@ -295,7 +295,7 @@ def _primitives_by_material(
 
 
 def _make_world_mesh(bound: _BoundPrimitive, to_world: F64, num_dimensions: int, name: str) -> Mesh | None:
-    """The geometry in world space; None where the transform leaves nothing of it. A mirror turns the faces round."""
+    """Transform geometry to world space; None if the result is degenerate. Mirroring flips the faces."""
     geometry, uvs, read_material, material_index = bound
     linear = to_world[:3, :3]
     positions = geometry.positions @ linear.T + to_world[:3, 3]

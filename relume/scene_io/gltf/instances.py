@@ -1,13 +1,15 @@
-"""EXT_mesh_gpu_instancing: one node that shows its mesh in many places."""
+"""EXT_mesh_gpu_instancing: instances of a node's mesh."""
 
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError
 
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, unsupported
+from relume.scene.unique_names import quote
 from relume.scene_io.gltf.accessors import AccessorReader
 from relume.scene_io.gltf.document import Index, Node
 from relume.scene_io.gltf.nodes import rotations
@@ -21,30 +23,32 @@ _IDENTITY = {"TRANSLATION": [0.0, 0.0, 0.0], "ROTATION": [0.0, 0.0, 0.0, 1.0], "
 
 
 class Instancing(BaseModel, frozen=True):
-    """The extension of a node: accessors by attribute; those that relume does not know are not read."""
+    """The extension of a node: accessors by attribute; unknown attributes are ignored."""
 
     attributes: dict[str, Index] = Field(max_length=64)
 
 
-def read_instances(node: Node, accessors: AccessorReader, max_instances: int, warnings: list[ImporterWarning]) -> F64:
-    """Find where a node shows its mesh, seen from itself.
+def read_instances(
+    node: Node, accessors: AccessorReader, max_instances: int, warnings: list[ImporterWarning]
+) -> Shaped[F64, "n 4 4"]:
+    """Read the transforms of a node's instances, relative to the node.
 
     Args:
-        node: with or without the extension. accessors: of the file. max_instances: instances that are allowed.
-        warnings: gets a sentence where the extension is not valid.
+        node: with or without the extension. accessors: of the file. max_instances: allowed number of instances.
+        warnings: gets a sentence if the extension is invalid.
     Returns:
-        (n, 4, 4); one identity where there is no extension.
+        One identity if there is no extension.
     Raises:
-        SceneError: there are too many instances, or their attributes do not fit each other.
+        SceneError: there are too many instances, or their attributes have different counts.
     """
     if EXTENSION not in node.extensions:
         return np.eye(4)[None]
     try:
         attributes = Instancing.model_validate(node.extensions[EXTENSION]).attributes
     except (ValidationError, RecursionError):
-        warnings.append(unsupported(f"the instances of node {node.name[:80]!r} are not valid; it appears once"))
+        warnings.append(unsupported(f"The instances of {quote(node.name or 'node')} are invalid; it appears once."))
         return np.eye(4)[None]
-    label = f"instances of node {node.name[:80]!r}"
+    label = f"instances of {quote(node.name or 'node')}"
     arrays = {
         name: accessors.floats(attributes[name], (width,), f"{name} of the {label}").astype(np.float64)
         for name, width in _WIDTHS.items()
@@ -55,12 +59,12 @@ def read_instances(node: Node, accessors: AccessorReader, max_instances: int, wa
         return np.eye(4)[None]
     if len(counts) > 1:
         raise SceneError(
-            f"the {label} have attributes of {sorted(counts)[0]} and of {sorted(counts)[-1]}; export again"
+            f"the {label} have {sorted(counts)[0]} and {sorted(counts)[-1]} attribute values; export again"
         )
     (num_instances,) = counts
     if num_instances > max_instances:
         raise SceneError(
-            f"the {label} are {num_instances:,}, {max_instances:,} more are allowed in the scene; show fewer"
+            f"there are {num_instances:,} {label}, only {max_instances:,} more are allowed in the scene; use fewer"
         )
     translations, quaternions, scales = (
         arrays.get(name, np.tile(_IDENTITY[name], (num_instances, 1))) for name in _WIDTHS
@@ -70,7 +74,6 @@ def read_instances(node: Node, accessors: AccessorReader, max_instances: int, wa
     transforms[:, :3, 3] = translations
     is_usable = np.isfinite(transforms).all(axis=(1, 2)) & (np.abs(transforms).max(axis=(1, 2)) < _MAX_COORDINATE)
     if not is_usable.all():
-        warnings.append(
-            unsupported(f"{np.count_nonzero(~is_usable):,} of the {label} are out of range; they are left out")
-        )
+        num_skipped = np.count_nonzero(~is_usable)
+        warnings.append(unsupported(f"Skipped {num_skipped:,} {label}: their positions or scales are out of range."))
     return np.asarray(transforms[is_usable])

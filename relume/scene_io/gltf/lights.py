@@ -1,7 +1,7 @@
 """KHR_lights_punctual as the scene's local lights.
 
-The extension counts light as eyes do: candela and lux. relume's radiance is radiometric, and 683 lumens are a watt (of
-green light; what exporters that think in watts multiply by).
+The extension uses photometric units, candela and lux, and relume radiometric ones. Exporters that think in watts
+multiply by 683 lm/W, the luminous efficacy of green light at 555 nm; this divides by it.
 """
 
 from __future__ import annotations
@@ -9,12 +9,14 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError
 
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated, unsupported
 from relume.scene.collect_lights import LightCollector
+from relume.scene.unique_names import quote
 from relume.scene.validate import MAX_METERS
 from relume.scene_io.gltf.document import Document, Factor, Index, Name, Node, Number
 
@@ -23,9 +25,7 @@ F64 = NDArray[np.float64]
 EXTENSION = "KHR_lights_punctual"
 LUMENS_PER_WATT = 683.0
 _MAX_DEFINITIONS = 10_000
-_UNITS = approximated(
-    f"the file's lights count candela and lux; {LUMENS_PER_WATT:g} of them are one of relume's, watts"
-)
+_UNITS = approximated(f"Light strengths converted from candela/lux to watts ({LUMENS_PER_WATT:g} lm/W).")
 
 
 class _Spot(BaseModel, frozen=True):
@@ -36,7 +36,7 @@ class _Spot(BaseModel, frozen=True):
 
 
 class _Punctual(BaseModel, frozen=True):
-    """One light, shared by the nodes that name it."""
+    """One light, shared by the nodes that refer to it."""
 
     name: Name = ""
     type: Literal["point", "spot", "directional"]
@@ -59,7 +59,7 @@ class _LightReference(BaseModel, frozen=True):
 
 
 class LightReader:
-    """Reads the lamps at the nodes of one file."""
+    """Reads the lights of one file's nodes."""
 
     def __init__(self, document: Document, collector: LightCollector, warnings: list[ImporterWarning]) -> None:
         self._collector = collector
@@ -68,26 +68,27 @@ class LightReader:
             self._definitions = _PunctualLights.model_validate(document.extensions.get(EXTENSION, {})).lights
         except (ValidationError, RecursionError):
             raise SceneError(
-                f"{EXTENSION} of the file is not valid or lists over {_MAX_DEFINITIONS:,} lights; export it again"
+                f"{EXTENSION} of the file is invalid or has over {_MAX_DEFINITIONS:,} lights; export it again"
             ) from None
 
-    def add(self, node: Node, to_world: F64) -> None:
-        """The light of a node, if it has one; it shines along the node's −Z.
+    def add(self, node: Node, to_world: Shaped[F64, "4 4"]) -> None:
+        """Add the light of a node, if there is one; it emits along the node's −Z.
 
         Raises:
-            SceneError: there is no such light, or there are more than a look may have.
+            SceneError: there is no such light, or there are more than a look can have.
         """
         if EXTENSION not in node.extensions:
             return
         try:
             light = self._definitions[_LightReference.model_validate(node.extensions[EXTENSION]).light]
         except (ValidationError, IndexError, RecursionError):
-            raise SceneError(f"node {node.name[:80]!r} names a light that does not exist; export it again") from None
+            raise SceneError(f"node {quote(node.name)} refers to a missing light; export it again") from None
         name = self._collector.name(light.name or node.name or light.type)
         direction, position = -to_world[:3, 2], to_world[:3, 3]
         length = float(np.linalg.norm(direction))
         if np.abs(position).max() > MAX_METERS or (light.type != "point" and length < 1e-12):
-            self._warnings.append(unsupported(f"light {name!r} is scaled to nothing or out of range; it is left out"))
+            message = f"Skipped light {quote(name)}: its scale is zero or its position is out of range."
+            self._warnings.append(unsupported(message))
             return
         fields: dict[str, Any] = {"kind": light.type}
         if light.type != "directional":
@@ -98,6 +99,6 @@ class LightReader:
             outer = min(np.degrees(light.spot.outerConeAngle), 90.0)
             fields["cone"] = [min(float(np.degrees(light.spot.innerConeAngle)), outer), outer]
         if light.range is not None:
-            self._warnings.append(approximated(f"the range of light {name!r} is not used; its light ends nowhere"))
+            self._warnings.append(approximated(f"The range of light {quote(name)} is ignored; it reaches everywhere."))
         self._warnings.extend([] if _UNITS in self._warnings else [_UNITS])
         self._collector.add(name, fields, np.array(light.color) * light.intensity / LUMENS_PER_WATT)

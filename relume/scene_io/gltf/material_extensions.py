@@ -1,4 +1,4 @@
-"""Material extensions as typed models: what the file says beyond metallic-roughness.
+"""Material extensions beyond metallic-roughness as typed models.
 
 Specifications of KHR_materials_ior, _specular, _clearcoat, _sheen, _anisotropy, _emissive_strength,
 _transmission and _volume.
@@ -12,6 +12,7 @@ from typing import Annotated, TypeVar
 from pydantic import BaseModel, Field, ValidationError
 
 from relume.core.import_warnings import ImporterWarning, unsupported
+from relume.scene.unique_names import quote
 from relume.scene_io.gltf.document import Extensions, Factor, Number, TextureInfo
 
 Weight = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1e6)]
@@ -20,13 +21,13 @@ M = TypeVar("M", bound=BaseModel)
 
 
 class Ior(BaseModel, frozen=True):
-    """KHR_materials_ior; 0 stands for a mirror."""
+    """KHR_materials_ior; 0 means a mirror."""
 
     ior: Weight = 1.5
 
 
 class Specular(BaseModel, frozen=True):
-    """KHR_materials_specular: how much a dielectric reflects, and in which colour head-on."""
+    """KHR_materials_specular: reflectance of a dielectric, and its color at normal incidence."""
 
     specularFactor: Factor = 1.0  # noqa: N815  (glTF's own spelling, here and below)
     specularTexture: TextureInfo | None = None  # noqa: N815
@@ -35,7 +36,7 @@ class Specular(BaseModel, frozen=True):
 
 
 class Clearcoat(BaseModel, frozen=True):
-    """KHR_materials_clearcoat: a dielectric film over everything else."""
+    """KHR_materials_clearcoat: a dielectric layer on top of the material."""
 
     clearcoatFactor: Factor = 0.0  # noqa: N815
     clearcoatTexture: TextureInfo | None = None  # noqa: N815
@@ -45,7 +46,7 @@ class Clearcoat(BaseModel, frozen=True):
 
 
 class Sheen(BaseModel, frozen=True):
-    """KHR_materials_sheen: fibres that scatter at grazing angles."""
+    """KHR_materials_sheen: fibers that scatter at grazing angles."""
 
     sheenColorFactor: Annotated[list[Factor], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]  # noqa: N815
     sheenColorTexture: TextureInfo | None = None  # noqa: N815
@@ -54,7 +55,7 @@ class Sheen(BaseModel, frozen=True):
 
 
 class Anisotropy(BaseModel, frozen=True):
-    """KHR_materials_anisotropy: the highlight is stretched along the tangent turned by `anisotropyRotation`."""
+    """KHR_materials_anisotropy: a highlight stretched along the tangent, rotated by `anisotropyRotation`."""
 
     anisotropyStrength: Factor = 0.0  # noqa: N815
     anisotropyRotation: Number = 0.0  # noqa: N815
@@ -62,20 +63,20 @@ class Anisotropy(BaseModel, frozen=True):
 
 
 class EmissiveStrength(BaseModel, frozen=True):
-    """KHR_materials_emissive_strength: multiplies what a material emits."""
+    """KHR_materials_emissive_strength: a factor on a material's emission."""
 
     emissiveStrength: Annotated[Number, Field(ge=0)] = 1.0  # noqa: N815
 
 
 class Transmission(BaseModel, frozen=True):
-    """KHR_materials_transmission: the share of light that passes instead of being scattered."""
+    """KHR_materials_transmission: fraction of the light that is transmitted instead of scattered."""
 
     transmissionFactor: Factor = 0.0  # noqa: N815
     transmissionTexture: TextureInfo | None = None  # noqa: N815
 
 
 class Volume(BaseModel, frozen=True):
-    """KHR_materials_volume: the surface is the rim of a solid, which absorbs; thickness 0 is a pane."""
+    """KHR_materials_volume: the surface bounds an absorbing solid; thickness 0 is a thin pane."""
 
     thicknessFactor: Weight = 0.0  # noqa: N815
     attenuationDistance: Annotated[float, Field(gt=0)] = float("inf")  # noqa: N815
@@ -83,7 +84,7 @@ class Volume(BaseModel, frozen=True):
 
 
 class MaterialExtensions(BaseModel, frozen=True):
-    """All that relume understands of one material's extensions."""
+    """All supported extensions of one material."""
 
     ior: Ior = Ior()
     specular: Specular = Specular()
@@ -99,12 +100,12 @@ MATERIAL_EXTENSIONS = {f"KHR_materials_{name}" for name in MaterialExtensions.mo
 
 
 def read_extensions(extensions: Extensions, label: str, warnings: list[ImporterWarning]) -> MaterialExtensions:
-    """A material's extensions as far as they are understood.
+    """Read the supported extensions of a material.
 
     Args:
-        extensions: as the document has them.
+        extensions: from the document.
         label: names the material in warnings.
-        warnings: gets a sentence for each extension that is not understood, or is not valid.
+        warnings: gets a sentence for each extension that is unsupported or invalid.
     """
 
     def read(model: type[M]) -> M:
@@ -112,11 +113,15 @@ def read_extensions(extensions: Extensions, label: str, warnings: list[ImporterW
         try:
             return model.model_validate(extensions.get(extension, {}))
         except (ValidationError, RecursionError):
-            warnings.append(unsupported(f"extension {extension!r} of {label} is not valid; it is not used"))
+            warnings.append(unsupported(f"Ignored {extension} of {label}: it is invalid."))
             return model()
 
-    unread_names = sorted(extensions.keys() - MATERIAL_EXTENSIONS)
-    warnings.extend(unsupported(f"extension {extension[:60]!r} of {label} is not used") for extension in unread_names)
+    for extension in sorted(extensions.keys() - MATERIAL_EXTENSIONS):
+        feature = extension[:60].removeprefix("KHR_materials_")
+        is_material = feature != extension[:60] and feature.isidentifier()
+        name = feature[0].upper() + feature[1:].replace("_", " ") if is_material else f"Extension {quote(extension)}"
+        effect = "it is lit like any other material" if feature == "unlit" else "it may look different"
+        warnings.append(unsupported(f"{name} on {label} isn't supported; {effect}."))
     return MaterialExtensions(
         ior=read(Ior),
         specular=read(Specular),

@@ -1,8 +1,8 @@
-"""Materials of a glTF file: numbers and textures brought to the base layer that `terms` describes.
+"""Materials of a glTF file: factors and textures of the base layer, which `to_terms` converts.
 
-Base colour b, metallic m, specular s with colour c: lambert takes b (1 - m), the highlight has
+With base color b, metallic m and specular s with color c: lambert has b (1 - m), the highlight has
 f0 = mix(s min(c f, 1), b, m) and f90 = mix(s, 1, m), with f from the index of refraction. glTF 2.0 specification,
-appendix B, and the extensions' own.
+appendix B, and the specifications of the extensions.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
@@ -18,7 +19,7 @@ from relume.core.import_warnings import ImporterWarning, approximated, ignored, 
 from relume.scene.model import Glass, Material, Opacity, Texture, TextureEncoding
 from relume.scene.opacity import make_opacity
 from relume.scene.texture_encoding import mean_value
-from relume.scene.unique_names import unique_name
+from relume.scene.unique_names import quote, unique_name
 from relume.scene.validate import MAX_IOR
 from relume.scene.vertex_colors import WRAP
 from relume.scene_io.gltf.blend import MetallicBlend, lerp
@@ -30,30 +31,30 @@ from relume.scene_io.gltf.texture_resampling import Raster
 from relume.scene_io.gltf.to_terms import CoatLayer, PbrSurface, dielectric_reflectance, make_terms
 from relume.scene_io.gltf.uvs import UvSlot, UvTransforms
 
-_MAX_CLEAR_ROUGHNESS = 0.1  # roughness of glass that blurs nothing to speak of
-MAX_TEXTURE_TEXELS = 700_000_000  # kept for the materials of one scene, 3 bytes each
+_MAX_CLEAR_ROUGHNESS = 0.1  # roughness up to which the blur of glass is negligible
+MAX_TEXTURE_TEXELS = 700_000_000  # of all materials of a scene, 3 bytes each
 
 
 @dataclass(frozen=True)
 class VertexColors:
-    """What colours of vertices are to a material.
+    """Vertex colors of a material.
 
     Attributes:
-        factor: RGB and alpha that multiply the base colour.
-        image: that stands for its texture; None where it has none, or the colours are all alike. (height, width, 4)
+        factor: RGB and alpha that multiply the base color.
+        image: replaces the base color texture; None if there is a texture, or the colors are uniform.
     """
 
     factor: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
-    image: NDArray[np.uint8] | None = None
+    image: Shaped[NDArray[np.uint8], "height width 4"] | None = None
 
 
 @dataclass(frozen=True)
 class ReadMaterial:
-    """A material, which texture coordinates its meshes must carry, and how far their tangents are turned, or None.
+    """A material, with the UV coordinates that its meshes need.
 
     Attributes:
-        tangent_rotation: radians, from the tangent towards the bitangent; None where the material is isotropic.
-        emission: radiance, which the image of that name multiplies.
+        tangent_rotation: radians, from the tangent toward the bitangent; None for an isotropic material.
+        emission: radiance, multiplied by the texture of that name.
     """
 
     material: Material
@@ -66,24 +67,25 @@ WHITE = VertexColors()
 
 
 class MaterialReader:
-    """Turns the materials of one file into relume's, counting the texels it makes."""
+    """Converts the materials of one file, with a limit on their texels."""
 
     def __init__(self, images: ImageReader, warnings: list[ImporterWarning]) -> None:
         self._images = images
         self._warnings = warnings
         self._names: dict[str, int] = {}
         self._remaining_texels = MAX_TEXTURE_TEXELS
+        self._occluded_materials: list[str] = []
 
     def read(self, material: GltfMaterial, colors: VertexColors = WHITE) -> ReadMaterial:
-        """One material under a name of its own.
+        """Convert one material, with a unique name.
 
         Args:
-            material: as the file has it. colors: of the vertices that wear it.
+            material: from the document. colors: vertex colors of its meshes.
         Raises:
-            SceneError: a texture cannot be used or there are too many texels.
+            SceneError: a texture is unusable or there are too many texels.
         """
         name = unique_name(material.name or "material", self._names)
-        label = f"material {name!r}"
+        label = f"material {quote(name)}"
         extensions = read_extensions(material.extensions, label, self._warnings)
         self._warn_unsupported(material, label)
         infos = [info for info in _infos(material, extensions) if info is not None]
@@ -97,7 +99,8 @@ class MaterialReader:
             self._warn_unphysical_ior(extensions, label)
         surface = replace(surface, diffuse=surface.diffuse * (1 - transmission))
         if strength > 0 and "roughness" in surface.textures:
-            self._warnings.append(approximated(f"the roughness texture of {label}, which is anisotropic, is its mean"))
+            message = f"The roughness texture of {label} was replaced by its average because it is anisotropic."
+            self._warnings.append(approximated(message))
         coat_layer = self._coat_layer(extensions, strength, label)
         normal_map = self._normal_map(material.normalTexture, tangent_rotation, label)
         emission_textures = self._emission_textures(material, label)
@@ -124,14 +127,13 @@ class MaterialReader:
         )
 
     def _glass(self, surface: PbrSurface, extensions: MaterialExtensions, transmission: float, label: str) -> Glass:
-        """How light passes: tinted by the base colour, and inside of a solid by what it absorbs."""
+        """Thin or solid glass: tinted by the base color, and absorbing inside a solid."""
         volume, ior = extensions.volume, extensions.ior.ior
         if surface.roughness > _MAX_CLEAR_ROUGHNESS:
-            self._warnings.append(approximated(f"{label} is frosted; what is behind it is seen sharply"))
+            self._warnings.append(approximated(f"Frosted glass on {label} shows what's behind it sharp."))
         if not 1 <= ior <= MAX_IOR:
-            self._warnings.append(
-                unsupported(f"{label} has an index of refraction of {ior:g}; it bends as if it had 1.5")
-            )
+            message = f"The index of refraction {ior:g} of {label} is out of range; 1.5 is used."
+            self._warnings.append(unsupported(message))
             ior = 1.5
         tint = surface.diffuse * transmission
         if "diffuse" in surface.textures:
@@ -142,34 +144,31 @@ class MaterialReader:
         return Glass((red, green, blue), ior, volume.thicknessFactor, (r, g, b))
 
     def _warn_coat_normals(self, coat: Clearcoat, label: str, *, has_normal_map: bool) -> None:
-        """Tell of bumps that a coat has not in common with what it covers; a sample has one normal for both."""
+        """Warn if the coat has other normals than the base layer; a view sample has one normal for both."""
         has_coat_normals = coat.clearcoatNormalTexture is not None
         if has_normal_map or has_coat_normals:
-            appearance = "as bumpy as what it covers" if has_normal_map else "smooth, as what it covers"
-            reason = "its own normal texture is not used" if has_coat_normals else "in the file it is smooth"
-            self._warnings.append(approximated(f"the coat of {label} is shown {appearance}; {reason}"))
+            appearance = "follows the base normal map" if has_normal_map else "is smooth"
+            original = "it has its own normal map" if has_coat_normals else "it is smooth"
+            self._warnings.append(approximated(f"Clearcoat on {label} {appearance}; in the file {original}."))
 
     def _warn_unphysical_ior(self, extensions: MaterialExtensions, label: str) -> None:
-        """Tell of an index of refraction that no opaque matter has; what stands for a mirror is tinted or weak."""
+        """Warn about an index of refraction that no opaque material has, unless it means a mirror."""
         ior, specular = extensions.ior.ior, extensions.specular
         reflectance = min(1.0, _f0(ior) * max(specular.specularColorFactor)) * specular.specularFactor
         if 0 < ior < 1 or reflectance > _f0(MAX_IOR):
-            message = f"{label} has an index of refraction of {ior:g}; where it is no metal, {reflectance:.0%} of"
-            self._warnings.append(
-                unsupported(f"{message} the light that falls straight on it is reflected (1.5 is usual)")
-            )
+            message = f"Unusual index of refraction {ior:g} on {label} (default 1.5): non-metallic parts reflect"
+            self._warnings.append(unsupported(f"{message} {reflectance:.0%} of the light at normal incidence."))
 
     def _opacity(self, material: GltfMaterial, colors: NDArray[np.uint8] | None, label: str) -> Opacity | None:
-        """Where the material has holes; alpha that is not asked for is not looked at."""
+        """Opacity of a material; alpha is ignored in other alpha modes."""
         if material.alphaMode not in ("MASK", "BLEND"):
             if material.alphaMode != "OPAQUE":
-                self._warnings.append(
-                    unsupported(f"{label} has the alpha mode {material.alphaMode[:20]!r}; it is opaque here")
-                )
+                message = f"The alpha mode {quote(material.alphaMode)} of {label} isn't supported; it is shown opaque."
+                self._warnings.append(unsupported(message))
             return None
         pbr, alpha, wrap = material.pbrMetallicRoughness, None, ("repeat", "repeat")
         if pbr.baseColorTexture is not None:
-            pixels, wrap = self._load_image(pbr.baseColorTexture, f"the base colour texture of {label}")
+            pixels, wrap = self._load_image(pbr.baseColorTexture, f"the base color texture of {label}")
             alpha = pixels[..., 3]
         elif colors is not None:
             alpha, wrap = colors[..., 3], WRAP
@@ -184,7 +183,7 @@ class MaterialReader:
         return red, green, blue
 
     def _emission_textures(self, material: GltfMaterial, label: str) -> dict[str, Texture]:
-        """The image of what surfaces shine, as it is in the file."""
+        """The emission texture as it is in the file."""
         if material.emissiveTexture is None or max(material.emissiveFactor) <= 0:
             return {}
         pixels, wrap = self._load_image(material.emissiveTexture, f"the emission texture of {label}")
@@ -195,7 +194,7 @@ class MaterialReader:
         }
 
     def _surface(self, material: GltfMaterial, extensions: MaterialExtensions, raster: Raster) -> PbrSurface:
-        """The base layer; images only where a texture says more than one value."""
+        """The base layer, with textures only if their values vary."""
         pbr, specular = material.pbrMetallicRoughness, extensions.specular
         factor = np.array(pbr.baseColorFactor[:3])
         dielectric = _f0(extensions.ior.ior) * np.array(specular.specularColorFactor)
@@ -221,15 +220,15 @@ class MaterialReader:
     def _raster(
         self, material: GltfMaterial, extensions: MaterialExtensions, colors: NDArray[np.uint8] | None, label: str
     ) -> Raster:
-        """The images that the base layer is made of, all in the size of the first."""
+        """The textures of the base layer, resampled to the size of the first."""
         if colors is not None:
             return Raster({"base": (colors, WRAP)})
         pbr = material.pbrMetallicRoughness
         infos = {
-            "base": (pbr.baseColorTexture, "base colour"),
+            "base": (pbr.baseColorTexture, "base color"),
             "packed": (pbr.metallicRoughnessTexture, "metallic-roughness"),
             "specular": (extensions.specular.specularTexture, "specular"),
-            "tint": (extensions.specular.specularColorTexture, "specular colour"),
+            "tint": (extensions.specular.specularColorTexture, "specular color"),
         }
         images = {
             key: self._load_image(info, f"the {texture_name} texture of {label}")
@@ -245,23 +244,21 @@ class MaterialReader:
 
     def _coat_layer(self, extensions: MaterialExtensions, anisotropy: float, label: str) -> CoatLayer:
         coat, sheen = extensions.clearcoat, extensions.sheen
-        weight = coat.clearcoatFactor * self._mean(coat.clearcoatTexture, 0, f"coat texture of {label}")
+        weight = coat.clearcoatFactor * self._mean(coat.clearcoatTexture, 0, f"clearcoat texture of {label}")
         coat_roughness = coat.clearcoatRoughnessFactor
         if coat.clearcoatRoughnessTexture is not None:
-            coat_roughness *= self._mean(coat.clearcoatRoughnessTexture, 1, f"coat roughness texture of {label}")
+            coat_roughness *= self._mean(coat.clearcoatRoughnessTexture, 1, f"clearcoat roughness texture of {label}")
         sheen_roughness = sheen.sheenRoughnessFactor
         if sheen.sheenRoughnessTexture is not None:
             sheen_roughness *= self._mean(sheen.sheenRoughnessTexture, 3, f"sheen roughness texture of {label}")
         tint = np.array(sheen.sheenColorFactor) * self._mean_color(sheen.sheenColorTexture, f"sheen texture of {label}")
         r, g, b = (round(float(value), 6) for value in tint)
         if r + g + b > 0:
-            self._warnings.append(
-                approximated(f"what lies under the sheen of {label} is dimmed by two curves' product")
-            )
+            self._warnings.append(approximated(f"Energy loss under the sheen of {label} is approximated."))
         return CoatLayer(anisotropy, round(weight, 6), coat_roughness, (r, g, b), sheen_roughness)
 
     def _anisotropy(self, extensions: MaterialExtensions, label: str) -> tuple[float, float]:
-        """Strength, and radians from the tangent to the direction of it; (0, 0) where the material is isotropic."""
+        """Strength, and angle from the tangent to the anisotropy direction in radians; (0, 0) if isotropic."""
         anisotropy = extensions.anisotropy
         strength, rotation = anisotropy.anisotropyStrength, anisotropy.anisotropyRotation
         if anisotropy.anisotropyTexture is not None and strength > 0:
@@ -270,21 +267,19 @@ class MaterialReader:
             strength *= float(pixels[..., 2].mean()) / 255
             rotation += float(np.arctan2(y, x))
             if np.hypot(x, y) < 0.5:
-                self._warnings.append(
-                    approximated(f"the anisotropy of {label} runs in all directions; its highlight is round")
-                )
+                message = f"The anisotropy texture of {label} has no main direction; its highlight is round."
+                self._warnings.append(approximated(message))
                 return 0.0, 0.0
             if np.ptp(pixels[..., :3].reshape(-1, 3), axis=0).max() > 2:
-                self._warnings.append(approximated(f"the anisotropy texture of {label} is replaced by its mean"))
+                self._warnings.append(approximated(f"The anisotropy texture of {label} was replaced by its average."))
         if strength == 0:
             return 0.0, 0.0
-        self._warnings.append(
-            approximated(f"{label} is anisotropic; its highlight is Ashikhmin-Shirley's, of about the same width")
-        )
+        message = f"The anisotropic highlight of {label} is approximated (Ashikhmin-Shirley, similar width)."
+        self._warnings.append(approximated(message))
         return strength, float(np.remainder(rotation, 2 * np.pi))
 
     def _normal_map(self, info: TextureInfo | None, tangent_rotation: float, label: str) -> Texture | None:
-        """Unit normals, in the frame of tangents turned by `tangent_rotation`."""
+        """The normal map as a texture, in tangent frames that are rotated by `tangent_rotation`."""
         if info is None:
             return None
         pixels, wrap = self._load_image(info, f"the normal texture of {label}")
@@ -293,17 +288,17 @@ class MaterialReader:
         return self._count_texels(Texture(np.ascontiguousarray(pixels[..., :3]), wrap, encoding))
 
     def _load_image(self, info: TextureInfo, label: str) -> tuple[NDArray[np.uint8], tuple[str, str]]:
-        """An image, placed as the meshes' coordinates want it, and how it wraps."""
+        """Load a texture, tiled for the UV coordinates of the meshes, with its wrap modes."""
         pixels, wrap = self._images.texture(info.index, label)
         return self._uv_transforms.tile_image(info, pixels, wrap), wrap
 
     def _mean(self, info: TextureInfo | None, channel: int, label: str) -> float:
-        """Mean of one channel, in [0, 1]; 1 without a texture, and a warning where it varies."""
+        """Mean of one channel in [0, 1], with a warning if it varies; 1 without a texture."""
         if info is None:
             return 1.0
         pixels, _ = self._images.texture(info.index, f"the {label}")
         if np.ptp(pixels[..., channel]) > 2:
-            self._warnings.append(approximated(f"the {label} is replaced by its mean"))
+            self._warnings.append(approximated(f"The {label} was replaced by its average."))
         return float(pixels[..., channel].mean()) / 255
 
     def _mean_color(self, info: TextureInfo | None, label: str) -> Any:
@@ -311,29 +306,36 @@ class MaterialReader:
             return np.ones(3)
         pixels, _ = self._images.texture(info.index, f"the {label}")
         if np.ptp(pixels[..., :3].reshape(-1, 3), axis=0).max() > 2:
-            self._warnings.append(approximated(f"the {label} is replaced by its mean"))
+            self._warnings.append(approximated(f"The {label} was replaced by its average."))
         return mean_value(Texture(pixels[..., :3], encoding=TextureEncoding("srgb")))
 
     def _count_texels(self, texture: Texture) -> Texture:
         self._remaining_texels -= texture.pixels.size // 3
         if self._remaining_texels < 0:
-            raise SceneError(f"the scene needs more than {MAX_TEXTURE_TEXELS:,} texels; scale its textures down")
+            raise SceneError(f"the scene's textures have more than {MAX_TEXTURE_TEXELS:,} texels; scale them down")
         return texture
 
     def _warn_unsupported(self, material: GltfMaterial, label: str) -> None:
         if material.occlusionTexture is not None:
-            self._warnings.append(ignored(f"the occlusion texture of {label} is not used; relume traces occlusion"))
+            self._occluded_materials.append(label)
+
+    def warn_occlusion_maps(self) -> None:
+        """Add one warning for the occlusion textures of all materials that were read."""
+        num_materials = len(self._occluded_materials)
+        if num_materials:
+            materials = self._occluded_materials[0] if num_materials == 1 else f"{num_materials} materials"
+            self._warnings.append(ignored(f"AO maps ignored on {materials}: occlusion is ray-traced."))
 
 
 def _infos(material: GltfMaterial, extensions: MaterialExtensions) -> list[TextureInfo | None]:
-    """The textures that are kept as images, first those that the others should follow."""
+    """Textures that are used as images, the most important first."""
     pbr, specular = material.pbrMetallicRoughness, extensions.specular
     images = [pbr.baseColorTexture, pbr.metallicRoughnessTexture, material.normalTexture]
     return [*images, specular.specularTexture, specular.specularColorTexture, material.emissiveTexture]
 
 
 def has_textures(material: GltfMaterial) -> bool:
-    """Whether a material names any image."""
+    """True if a material uses any texture."""
     pbr = material.pbrMetallicRoughness
     texture_infos = [
         pbr.baseColorTexture,
@@ -348,19 +350,19 @@ def has_textures(material: GltfMaterial) -> bool:
 
 
 def _scale_base_color(material: GltfMaterial, factor: tuple[float, float, float, float]) -> GltfMaterial:
-    """A material whose base colour is multiplied."""
+    """Multiply the base color of a material."""
     pbr = material.pbrMetallicRoughness
     scaled = [component * scale for component, scale in zip(pbr.baseColorFactor, factor, strict=True)]
     return material.model_copy(update={"pbrMetallicRoughness": pbr.model_copy(update={"baseColorFactor": scaled})})
 
 
 def _normalize_roughness(raster: Raster) -> Texture:
-    """Roughness over its mean, texel by texel."""
+    """Roughness texture over its mean."""
     scale = 1 / raster.mean("packed", 1)
     pixels = np.ascontiguousarray(raster.channel("packed", 1))
     return Texture(pixels, raster.wrap, TextureEncoding("share", (scale, scale, scale)))
 
 
 def _f0(ior: float) -> float:
-    """Reflectance of a dielectric head-on; the extension's 0 stands for a mirror."""
+    """Reflectance of a dielectric at normal incidence; an index of 0 means a mirror, as in the extension."""
     return 1.0 if ior == 0 else ((ior - 1) / (ior + 1)) ** 2

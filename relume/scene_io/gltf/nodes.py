@@ -1,4 +1,4 @@
-"""The node tree as a flat list of (node, world transform).
+"""Traversal of the node tree, yielding (node, world transform).
 
 glTF 2.0 specification, section 3.5.
 """
@@ -8,28 +8,30 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, unsupported
+from relume.scene.unique_names import quote
 from relume.scene_io.gltf.document import Document, Node
 
 F64 = NDArray[np.float64]
 MAX_DEPTH = 64
 MAX_NODES = 100_000
-_MAX_WARNINGS = 20  # nodes that a warning is given for
+_MAX_WARNINGS = 20  # largest number of nodes with a warning
 
 
-def walk_nodes(document: Document, warnings: list[ImporterWarning]) -> Iterator[tuple[Node, F64]]:
-    """Every node of the default scene (of all root nodes where no scene is given) with its transform to world (4, 4).
+def walk_nodes(document: Document, warnings: list[ImporterWarning]) -> Iterator[tuple[Node, Shaped[F64, "4 4"]]]:
+    """Yield every node of the default scene, or of all root nodes, with its transform to world space.
 
-    A node that is reached again, by another parent or as its own ancestor, is shown at the first place alone.
+    A node that is reached again, through another parent or as its own ancestor, is yielded only once.
 
     Args:
         document: of the file. warnings: gets a sentence for each such node.
 
     Raises:
-        SceneError: a node does not exist, lies too deep, or is out of range.
+        SceneError: a node does not exist, is nested too deeply, or is out of range.
     """
     visited, warned, local = set[int](), set[int](), local_transforms(document.nodes)
     stack = [(index, np.eye(4), 1) for index in reversed(_roots(document))]
@@ -39,14 +41,13 @@ def walk_nodes(document: Document, warnings: list[ImporterWarning]) -> Iterator[
             raise SceneError(f"node {index} does not exist, there are {len(document.nodes)}; export the scene again")
         if index in visited:
             if index not in warned and len(warned) < _MAX_WARNINGS:
-                name = document.nodes[index].name[:60]
-                warnings.append(
-                    unsupported(f"node {index} ({name!r}) is reached twice, which no tree has; it appears once")
-                )
+                name = f" {quote(document.nodes[index].name)}" if document.nodes[index].name else ""
+                message = f"Node {index}{name} has several parents, which glTF doesn't allow; it appears once."
+                warnings.append(unsupported(message))
             warned.add(index)
             continue
         if depth > MAX_DEPTH:
-            raise SceneError(f"nodes are nested more than {MAX_DEPTH} deep; flatten the scene")
+            raise SceneError(f"nodes are nested more than {MAX_DEPTH} levels deep; flatten the scene")
         visited.add(index)
         node = document.nodes[index]
         to_world = parent @ local[index]
@@ -56,8 +57,8 @@ def walk_nodes(document: Document, warnings: list[ImporterWarning]) -> Iterator[
         stack.extend((child, to_world, depth + 1) for child in reversed(node.children[: MAX_NODES + 1]))
 
 
-def local_transforms(nodes: Sequence[Node]) -> F64:
-    """The matrix of each node, or its translation · rotation · scale. (n, 4, 4)"""
+def local_transforms(nodes: Sequence[Node]) -> Shaped[F64, "n 4 4"]:
+    """Matrix of each node, or its translation · rotation · scale."""
     transforms = np.tile(np.eye(4), (len(nodes), 1, 1))
     quaternions, scales, translations = (
         np.array([getattr(node, name) for node in nodes], np.float64).reshape(-1, size)
@@ -71,8 +72,8 @@ def local_transforms(nodes: Sequence[Node]) -> F64:
     return transforms
 
 
-def rotations(quaternions: F64) -> F64:
-    """Rotations of quaternions x, y, z, w, (n, 4), normalised first; one of no length turns nothing. (n, 3, 3)"""
+def rotations(quaternions: Shaped[F64, "n 4"]) -> Shaped[F64, "n 3 3"]:
+    """Rotation matrices of quaternions x, y, z, w, normalized first; a zero quaternion gives the identity."""
     length = np.linalg.norm(quaternions, axis=1, keepdims=True)
     is_valid = (length > 1e-12) & (length < 1e12)
     x, y, z, w = np.where(is_valid, quaternions / np.where(is_valid, length, 1), [0.0, 0.0, 0.0, 1.0]).T

@@ -1,8 +1,8 @@
-"""glTF's sheen: the term `sheen`, and how what lies below it is dimmed.
+"""glTF's sheen: the term `sheen`, and the attenuation of the layers below.
 
-KHR_materials_sheen: what lies below keeps min(1 − c E(θi), 1 − c E(θo)) of its light, with the albedo E of a white
-sheen and c the largest channel of its colour. Layers have curves of both angles: the minimum becomes a product g(θi)
-k(θo), the nearest one in g, and with k such that of even light as much is kept towards each θo as by the formula.
+KHR_materials_sheen scales the layers below by min(1 − c E(θi), 1 − c E(θo)), with the albedo E of a white sheen and its
+largest color channel c. Terms have separate curves of both angles, so the minimum is approximated by a product g(θi)
+k(θo): g is the best rank-one fit, and k conserves the reflected energy toward each θo under uniform light.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
@@ -19,26 +20,26 @@ from relume.brdf.terms.sheen import MIN_ROUGHNESS
 
 F64 = NDArray[np.float64]
 Attenuation = Callable[[F64], F64]
-_NUM_ANGLES, _NUM_AZIMUTHS = 90, 64  # angles and azimuths of integrals
+_NUM_ANGLES, _NUM_AZIMUTHS = 90, 64  # of numerical integrals
 
 
 def sheen_term(color: Sequence[float], roughness: float) -> dict[str, Any]:
-    """The term of a sheen of this colour."""
+    """The sheen term with this color."""
     params = {"roughness": round(max(roughness, MIN_ROUGHNESS), 6)}
     return {"model": "sheen", "color": list(color), "texture": None, "params": params}
 
 
-def sheen_albedo(theta_o: F64, roughness: float) -> F64:
-    """Share of the light of all directions together that a white sheen reflects towards one. (...)"""
+def sheen_albedo(theta_o: Shaped[F64, "*angles"], roughness: float) -> Shaped[F64, "*angles"]:
+    """Albedo of a white sheen for outgoing angles θo."""
     return np.asarray(np.interp(theta_o, _bin_centers(), _albedo(max(roughness, MIN_ROUGHNESS))))
 
 
 def sheen_attenuation(max_sheen: float, roughness: float, *, by_light: bool) -> tuple[Attenuation, Attenuation]:
-    """Shares of light that what lies below a sheen keeps, by θi and by θo.
+    """Attenuation of the layers below a sheen, as functions of θi and of θo.
 
     Args:
-        max_sheen: the largest channel of the sheen's colour. roughness: of the sheen.
-        by_light: whether the first may be other than one.
+        max_sheen: largest channel of the sheen's color. roughness: of the sheen.
+        by_light: False if the layer has no curve of θi, so that the first function is one.
     """
     theta = _bin_centers()
     attenuation = np.maximum(1 - max_sheen * sheen_albedo(theta, roughness), 0)
@@ -54,7 +55,7 @@ def sheen_attenuation(max_sheen: float, roughness: float, *, by_light: bool) -> 
 
 @lru_cache(maxsize=64)
 def _albedo(roughness: float) -> F64:
-    """∫ f cos θi dωi at the middles of `_NUM_ANGLES` bands of θo. (_FINE,)"""
+    """∫ f cos θi dωi at the centers of `_NUM_ANGLES` bands of θo. (_NUM_ANGLES,)"""
     theta, phi = _bin_centers()[:, None], 2 * _bin_centers(_NUM_AZIMUTHS)
     cosine, sine = np.broadcast_to(np.cos(theta), (_NUM_ANGLES, _NUM_AZIMUTHS)), np.sin(theta)
     wi = np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], axis=-1)

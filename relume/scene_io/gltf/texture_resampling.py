@@ -1,4 +1,4 @@
-"""Several images of one material brought to one size, so that they can be combined texel by texel."""
+"""Resampling of a material's textures to a common size, for operations per texel."""
 
 from __future__ import annotations
 
@@ -6,18 +6,19 @@ from collections.abc import Mapping
 
 import numpy as np
 import PIL.Image
+from jaxtyping import Shaped
 
 from relume.scene_io.gltf.images import U8
 
 Wrap = tuple[str, str]
-NOISE = 2  # that lossy coding makes of one value
+NOISE = 2  # variation that lossy compression adds to a uniform image
 
 
 class Raster:
-    """Images by name, all in the size and with the wrap of the first; those that are missing are white and opaque.
+    """Images by name, with the size and wrap mode of the first; missing ones are white and opaque.
 
     Args:
-        images: pixels and wrap of each. min_size: height and width of those that need more than the first has.
+        images: pixels and wrap modes. min_size: height and width that tiled images need.
     """
 
     def __init__(self, images: Mapping[str, tuple[U8, Wrap]], min_size: tuple[int, int] = (0, 0)) -> None:
@@ -31,15 +32,15 @@ class Raster:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Height and width of all images."""
+        """Common height and width."""
         return self._height, self._width
 
-    def rgb(self, key: str) -> U8:
-        """(height, width, 3); (1, 1, 3) white where there is no such image."""
+    def rgb(self, key: str) -> Shaped[U8, "height width 3"]:
+        """Colors of an image; one white texel if it is missing."""
         return self.pixels(key)[..., :3]
 
-    def channel(self, key: str, channel: int) -> U8:
-        """One channel; white where there is no image. (height, width, 1); (1, 1, 1) where it varies by noise alone"""
+    def channel(self, key: str, channel: int) -> Shaped[U8, "height width 1"]:
+        """One channel of an image; one texel if it is uniform or missing."""
         if (key, channel) not in self._channels:
             values = self.pixels(key)[..., channel, None]
             uniform = np.full((1, 1, 1), round(float(values.mean())), np.uint8)
@@ -47,20 +48,20 @@ class Raster:
         return self._channels[key, channel]
 
     def mean(self, key: str, channel: int) -> float:
-        """Mean of a channel in [0, 1]; 1 where there is no such image."""
+        """Mean of a channel in [0, 1]; 1 if the image is missing."""
         return float(self._images[key][..., channel].mean()) / 255 if key in self._images else 1.0
 
     def varies(self, key: str, channel: int) -> bool:
-        """Whether a channel differs from texel to texel by more than the noise of its coding."""
+        """True if a channel varies by more than compression noise."""
         return key in self._images and bool(np.ptp(self._images[key][..., channel]) > NOISE)
 
-    def pixels(self, key: str) -> U8:
-        """(height, width, 4); (1, 1, 4) white where there is no such image."""
+    def pixels(self, key: str) -> Shaped[U8, "height width 4"]:
+        """RGBA of an image; one white texel if it is missing."""
         if key not in self._images:
             return np.full((1, 1, 4), 255, np.uint8)
         pixels = self._images[key]
         if pixels.shape[:2] != self.size:
-            # Channel by channel: Pillow would multiply colours by alpha
+            # channel by channel: Pillow would multiply colors by alpha
             channels = [PIL.Image.fromarray(np.ascontiguousarray(pixels[..., k])) for k in range(4)]
             scaled = [c.resize(self.size[::-1], PIL.Image.Resampling.BILINEAR) for c in channels]
             self._images[key] = np.stack([np.asarray(c) for c in scaled], axis=-1)

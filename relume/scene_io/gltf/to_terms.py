@@ -1,9 +1,9 @@
-"""A glTF material in numbers, and the terms that stand for it.
+"""Conversion of a glTF material to terms.
 
-Base: lambert times the mean of (1 - F) of what is not metal, and ggx, F = f90 · schlick(f0 / f90). Anisotropic:
-ashikhmin_shirley instead of ggx, its exponents from the widths of the facet distribution, n = 2/α² - 2 (Walter 2007,
-section 5.2). Clearcoat: a second ggx. What lies under a coat is dimmed by what that reflects towards the viewer, by a
-factor on its curve of θo; what lies under a sheen on that of θi, too.
+Base: lambert times the mean of (1 - F) of the dielectric, and ggx, F = f90 · schlick(f0 / f90). Anisotropic:
+ashikhmin_shirley instead of ggx, with exponents from the widths of the microfacet distribution, n = 2/α² - 2 (Walter
+2007, section 5.2). Clearcoat: a second ggx. The curves of θo of the layers below are attenuated by the reflectance of
+the coat toward the viewer; below a sheen, also the curves of θi.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.fresnel import schlick
@@ -26,24 +27,24 @@ from relume.scene_io.gltf.sheen import sheen_attenuation, sheen_term
 
 F64 = NDArray[np.float64]
 COAT_F0 = 0.04
-_MEAN_RISE = 0.0036845  # of (1 - cos θd)^5 over both hemispheres, each weighted by its cosine
+_MEAN_RISE = 0.0036845  # mean of (1 - cos θd)^5 over both hemispheres, cosine-weighted
 Terms = tuple[dict[str, Any], ...]
 
 
 @dataclass(frozen=True)
 class PbrSurface:
-    """What lies under coat and sheen.
+    """The base layer, below coat and sheen.
 
     Attributes:
-        diffuse: albedo. f0, f90: reflectance head-on and at the horizon. (3,), (3,), one
-        roughness: as artists know it.
-        specular_reflectance: mean share that what is not metal reflects before light comes to what scatters it.
+        diffuse: albedo. f0, f90: reflectance at normal and at grazing incidence.
+        roughness: perceptual, α = roughness².
+        specular_reflectance: mean specular reflectance of the dielectric, which reduces its diffuse reflection.
         textures: multipliers of the two terms, and of the roughness.
-        has_normal_map: which makes it rougher where it is seen from far, see `relume.scene.roughness_levels`.
+        has_normal_map: minification increases the roughness, see `relume.scene.roughness_levels`.
     """
 
-    diffuse: F64
-    f0: F64
+    diffuse: Shaped[F64, " 3"]
+    f0: Shaped[F64, " 3"]
     f90: float
     roughness: float
     specular_reflectance: float = 0.0
@@ -53,7 +54,7 @@ class PbrSurface:
 
 @dataclass(frozen=True)
 class CoatLayer:
-    """What changes or covers the surface: strength of anisotropy; weight and roughness of the coat; the sheen's."""
+    """Modifications of the base layer: strength of anisotropy; weight and roughness of the coat; the sheen's."""
 
     anisotropy: float = 0.0
     coat: float = 0.0
@@ -63,7 +64,7 @@ class CoatLayer:
 
 
 def make_terms(surface: PbrSurface, coat_layer: CoatLayer) -> Terms:
-    """The terms of a look, bottom up: diffuse, highlight, sheen, coat."""
+    """Return the terms of a material from bottom to top: diffuse, highlight, sheen, coat."""
     textures = {channel: channel if channel in surface.textures else None for channel in ("diffuse", "specular")}
     layers = [
         {
@@ -87,7 +88,7 @@ def make_terms(surface: PbrSurface, coat_layer: CoatLayer) -> Terms:
 
 
 def dielectric_reflectance(f0: float, f90: float) -> float:
-    """Mean reflectance of a dielectric by Schlick's F(θd) from f0 head-on to f90 at the horizon."""
+    """Mean reflectance of a dielectric with Schlick's F(θd) from f0 to f90."""
     return f0 + (f90 - f0) * _MEAN_RISE
 
 
@@ -96,7 +97,7 @@ def _highlight(surface: PbrSurface, anisotropy: float) -> dict[str, Any]:
     f0 = surface.f0 / surface.f90 if surface.f90 > 0 else surface.f0
     if anisotropy == 0:
         params = _clamp_params(TERMS["ggx"], roughness=surface.roughness, f0=f0)
-        # mirrors are pictures, which nothing widens
+        # mirrors are traced, and normals do not widen their reflections
         needs_roughness_map = surface.has_normal_map and surface.roughness >= SOFT
         roughness_map = {"roughness_map": ROUGHNESS} if "roughness" in surface.textures or needs_roughness_map else {}
         return {"model": "ggx", "color": color, "params": params, **roughness_map}
@@ -107,7 +108,7 @@ def _highlight(surface: PbrSurface, anisotropy: float) -> dict[str, Any]:
 
 
 def _clamp_params(term: Term, **values: Any) -> dict[str, Any]:
-    """Parameters held to their ranges."""
+    """Clamp parameters to their ranges."""
     params = {}
     for name, value in values.items():
         parameter = term.parameter(name)
@@ -117,7 +118,7 @@ def _clamp_params(term: Term, **values: Any) -> dict[str, Any]:
 
 
 def _attenuate_below_sheen(layer: dict[str, Any], coat_layer: CoatLayer) -> dict[str, Any]:
-    """What a layer sends through a sheen."""
+    """Attenuate a layer below a sheen."""
     by_light = any(curve.name == "theta_i" for curve in TERMS[layer["model"]].curves)
     light, view = sheen_attenuation(max(coat_layer.sheen), coat_layer.sheen_roughness, by_light=by_light)
     layer = _attenuate(layer, "theta_i", light) if by_light else layer
@@ -125,7 +126,7 @@ def _attenuate_below_sheen(layer: dict[str, Any], coat_layer: CoatLayer) -> dict
 
 
 def _attenuate(layer: dict[str, Any], name: str, attenuation: Callable[[F64], F64]) -> dict[str, Any]:
-    """A layer with a curve of which this share is kept."""
+    """Multiply a curve of a layer by an attenuation."""
     num_bands = TERMS[layer["model"]].curve(name).num_bands
     factors = band_averages(lambda theta: np.clip(attenuation(theta), 0, 1), num_bands)
     curves = layer.get("curves", {})

@@ -1,4 +1,4 @@
-"""Which texture coordinates a material uses, moved as KHR_texture_transform says, and tangents made from them."""
+"""UV coordinates of a material, with KHR_texture_transform, and tangents computed from them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
@@ -17,7 +18,7 @@ U8 = NDArray[np.uint8]
 Wrap = tuple[str, str]
 Tiling = tuple[tuple[int, int], tuple[float, float]]
 _NO_TILING: Tiling = ((1, 1), (0.0, 0.0))
-_MAX_TILED = 8192  # texels a side
+_MAX_TILED = 8192  # texels per side
 _MAX_REPEAT_ERROR = 1e-4
 
 
@@ -32,13 +33,13 @@ class UvTransform(BaseModel, frozen=True):
 
 @dataclass(frozen=True)
 class UvSlot:
-    """A set of texture coordinates and how they are moved; the same for all textures of a material."""
+    """A set of UV coordinates with a transform, common to all textures of a material."""
 
     uv_set: int = 0
     transform: UvTransform = field(default_factory=UvTransform)
 
-    def apply(self, sets: Sequence[F32], num_vertices: int) -> F32:
-        """Coordinates (num_vertices, 2): scaled, turned counter-clockwise with v down, shifted; zeros without a set."""
+    def apply(self, sets: Sequence[Shaped[F32, "vertices 2"]], num_vertices: int) -> Shaped[F32, "vertices 2"]:
+        """Scale, rotate (counter-clockwise with v down) and translate UV coordinates; zero if the set is missing."""
         if self.uv_set >= len(sets):
             return np.zeros((num_vertices, 2), np.float32)
         p = self.transform
@@ -49,18 +50,18 @@ class UvSlot:
 
 
 class UvTransforms:
-    """How all images of a material are brought to one placement: those that repeat more often are tiled.
+    """Brings all textures of a material to common UV coordinates; textures that repeat more often are tiled.
 
     Attributes:
-        candidate: what the meshes carry.
+        slot: UV coordinates for the meshes.
     """
 
     def __init__(self, textures: Sequence[TextureInfo], label: str, warnings: list[ImporterWarning]) -> None:
-        """Choose the placement.
+        """Choose the common UV coordinates.
 
         Args:
-            textures: of the material; the first one decides where none is a whole part of all others.
-            label: names the material in warnings. warnings: gets a sentence where an image cannot be placed.
+            textures: of the material; the first decides if no common transform exists.
+            label: names the material in warnings. warnings: gets a sentence if a texture has another transform.
         """
         self._label, self._warnings = label, warnings
         slots = [_read_slot(texture, label, warnings) for texture in textures]
@@ -70,15 +71,15 @@ class UvTransforms:
         self._has_warned = False
 
     def is_tiled(self, info: TextureInfo) -> bool:
-        """Whether `placed` tiles an image. info: one of the material's textures"""
+        """True if `tile_image` tiles this texture of the material."""
         layout = tiling(self._slots[id(info)], self.slot)
         return layout is not None and layout[0] != (1, 1)
 
-    def tile_image(self, info: TextureInfo, pixels: U8, wrap: Wrap) -> U8:
-        """An image as it is to be sampled at the meshes' coordinates.
+    def tile_image(self, info: TextureInfo, pixels: Shaped[U8, "height width channels"], wrap: Wrap) -> U8:
+        """Tile an image to be sampled at the meshes' UV coordinates.
 
         Args:
-            info: one of the material's textures. pixels: top row first. (height, width, channels). wrap: its own
+            info: one of the material's textures. pixels: top row first. wrap: of the texture.
         """
         layout = tiling(self._slots[id(info)], self.slot)
         if layout == _NO_TILING or pixels.shape[:2] == (1, 1):
@@ -90,17 +91,17 @@ class UvTransforms:
                 shift = round(-below * height) % height, round(-right * width) % width
                 return np.tile(np.roll(pixels, shift, axis=(0, 1)), (down, across, 1))
         if not self._has_warned:
-            message = f"the textures of {self._label} are placed differently, one no whole number of times as often as"
-            self._warnings.append(unsupported(f"{message} another, or not repeated; all are placed alike"))
+            message = f"The textures of {self._label} have different UV transforms, which can't be combined; all use"
+            self._warnings.append(unsupported(f"{message} the same one."))
         self._has_warned = True
         return pixels
 
 
 def tiling(slot: UvSlot, base_slot: UvSlot) -> Tiling | None:
-    """How often an image stands in another's along u and v, and where (0, 0) of that lies in it.
+    """Find how often an image repeats within another's UV range along u and v, and its offset there.
 
     Returns:
-        None where that is no whole number of times, or one is turned.
+        None if the number is not whole, or the rotations differ.
     """
     transform, base_transform = slot.transform, base_slot.transform
     if slot == base_slot:
@@ -127,29 +128,32 @@ def _read_slot(texture: TextureInfo, label: str, warnings: list[ImporterWarning]
     try:
         transform = UvTransform.model_validate(extension)
     except ValidationError:
-        warnings.append(unsupported(f"a texture transform of {label} is not valid; it is not used"))
+        warnings.append(unsupported(f"Ignored a texture transform of {label}: it is invalid."))
         return UvSlot(texture.texCoord)
     uv_set = texture.texCoord if transform.texCoord is None else transform.texCoord
     return UvSlot(uv_set, transform.model_copy(update={"texCoord": None}))
 
 
-def compute_tangents(positions: F32, normals: F32, uvs: F32, faces: U32) -> F32:
-    """Tangents along u with handedness, averaged over the triangles of a vertex.
+def compute_tangents(
+    positions: Shaped[F32, "vertices 3"],
+    normals: Shaped[F32, "vertices 3"],
+    uvs: Shaped[F32, "vertices 2"],
+    faces: Shaped[U32, "triangles 3"],
+) -> Shaped[F32, "vertices 4"]:
+    """Compute unit tangents along u, averaged over the triangles of a vertex, with the handedness ±1 in w.
 
-    The bitangent cross(normal, tangent)·w points against v, which runs down: up, as the green of a normal map means.
+    The bitangent cross(normal, tangent)·w points toward −v, which is up, as the green channel of normal maps expects.
 
     Args:
-        positions, normals: of the vertices; normals unit. (num_vertices, 3)
-        uvs: texture coordinates, v from the top. (num_vertices, 2)
-        faces: the triangles' vertices. (num_faces, 3)
-    Returns:
-        (num_vertices, 4) float32, unit, the handedness ±1 in w
+        positions: of the vertices. normals: unit.
+        uvs: UV coordinates, v from the top.
+        faces: indices of the triangles' vertices.
     """
     p, uv = positions[faces].astype(np.float64), uvs[faces].astype(np.float64)
     e1, e2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
     (du1, dv1), (du2, dv2) = (uv[:, 1] - uv[:, 0]).T, (uv[:, 2] - uv[:, 0]).T
     orientation = np.sign(du1 * dv2 - du2 * dv1)
-    # Divided by the determinant these are dP/du and dP/dv; left undivided, large triangles count more.
+    # Divided by the determinant these would be dP/du and dP/dv; without the division, large triangles count more.
     along = (e1 * dv2[:, None] - e2 * dv1[:, None]) * orientation[:, None]
     down = (e2 * du1[:, None] - e1 * du2[:, None]) * orientation[:, None]
     tangents, bitangents = np.zeros(positions.shape), np.zeros(positions.shape)
@@ -163,15 +167,15 @@ def compute_tangents(positions: F32, normals: F32, uvs: F32, faces: U32) -> F32:
     return np.column_stack([tangents, np.where(is_mirrored, -1.0, 1.0)]).astype(np.float32)
 
 
-def rotate_tangents(tangents: F32, normals: F32, angle: float) -> F32:
-    """Tangents turned towards the bitangent cross(normal, tangent)·w.
+def rotate_tangents(
+    tangents: Shaped[F32, "vertices 4"], normals: Shaped[F32, "vertices 3"], angle: float
+) -> Shaped[F32, "vertices 4"]:
+    """Rotate tangents toward the bitangent cross(normal, tangent)·w.
 
     Args:
-        tangents: unit, the handedness ±1 in w. (num_vertices, 4)
-        normals: unit. (num_vertices, 3)
+        tangents: unit, with the handedness ±1 in w.
+        normals: unit.
         angle: radians.
-    Returns:
-        (num_vertices, 4) float32
     """
     along, handedness = tangents[:, :3], tangents[:, 3:]
     rotated = np.cos(angle) * along + np.sin(angle) * np.cross(normals, along) * handedness

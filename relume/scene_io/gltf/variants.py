@@ -1,7 +1,7 @@
-"""KHR_materials_variants as looks: each variant says which material's terms a mesh takes instead of its own.
+"""KHR_materials_variants as looks: each variant replaces the terms of materials.
 
-What a bake has fixed stays: a look cannot bring images, normals or texture placement. A term keeps its texture where
-the variant's image is the same up to a colour, and has that image's mean otherwise.
+A look cannot replace the textures, normals or UV coordinates of a bake. A term keeps its texture if the variant's image
+is the same up to a color, and otherwise gets that image's mean.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from relume.core.errors import SceneError
 from relume.core.import_warnings import ImporterWarning, approximated
 from relume.scene.model import F32, Texture
 from relume.scene.texture_encoding import F64, decode_rows, mean_value
-from relume.scene.unique_names import unique_name
+from relume.scene.unique_names import quote, unique_name
 from relume.scene_io.gltf.document import Document, Index, Name, Primitive
 from relume.scene_io.gltf.materials import ReadMaterial
 
 EXTENSION = "KHR_materials_variants"
-SAME_IMAGE = 0.01  # relative RMS; two codings of one image differ by less
+SAME_IMAGE = 0.01  # relative RMS; different compressions of an image differ by less
 Choices = tuple[tuple[int, int], ...]
 
 
 class Variant(BaseModel, frozen=True):
-    """One way to dress the scene."""
+    """One variant of the scene."""
 
     name: Name = ""
 
@@ -39,7 +39,7 @@ class Variants(BaseModel, frozen=True):
 
 
 class VariantMaterial(BaseModel, frozen=True):
-    """Which variants show a material."""
+    """A material and the variants that use it."""
 
     material: Index
     variants: Annotated[list[Index], Field(max_length=100, fail_fast=True)] = []
@@ -52,29 +52,29 @@ class VariantMap(BaseModel, frozen=True):
 
 
 def variant_names(document: Document) -> list[str]:
-    """The names of the variants, each its own.
+    """Return unique names of the variants.
 
     Raises:
-        SceneError: the extension is there and not valid.
+        SceneError: the extension is invalid.
     """
     used_names: dict[str, int] = {}
     try:
         extension = Variants.model_validate(document.extensions.get(EXTENSION, {}))
     except ValidationError:
-        raise SceneError(f"{EXTENSION} of the file is not valid or lists over 100 variants; export it again") from None
+        raise SceneError(f"{EXTENSION} of the file is invalid or has over 100 variants; export it again") from None
     return [unique_name(variant.name or "variant", used_names) for variant in extension.variants]
 
 
 def read_choices(primitive: Primitive) -> Choices:
-    """(variant, material) pairs of a primitive that wears another material than its own.
+    """Return (variant, material) pairs for the variants that replace a primitive's material.
 
     Raises:
-        SceneError: the extension is there and not valid.
+        SceneError: the extension is invalid.
     """
     try:
         extension = VariantMap.model_validate(primitive.extensions.get(EXTENSION, {}))
     except ValidationError:
-        raise SceneError(f"{EXTENSION} of a mesh is not valid; export the scene again") from None
+        raise SceneError(f"{EXTENSION} of a mesh is invalid; export the scene again") from None
     pairs = {variant: mapping.material for mapping in extension.mappings for variant in mapping.variants}
     return tuple(sorted((variant, index) for variant, index in pairs.items() if index != primitive.material))
 
@@ -85,13 +85,13 @@ def variant_looks(
     variant_materials: Mapping[int, ReadMaterial],
     warnings: list[ImporterWarning],
 ) -> dict[str, dict[str, Any]]:
-    """A partial look for each variant, the terms in it complete.
+    """Return a partial look for each variant, with complete terms.
 
     Args:
-        names: of the variants, in the order of the file.
-        scene_materials: the scene's materials, and what each is exchanged for.
-        variant_materials: the materials that are exchanged for, by their number in the file.
-        warnings: gets one sentence for each thing that a look cannot bring.
+        names: of the variants, in file order.
+        scene_materials: the scene's materials, with their replacements.
+        variant_materials: the replacement materials by their index in the file.
+        warnings: gets one sentence for each feature that a look cannot replace.
     """
     looks: dict[str, dict[str, Any]] = {name: {"materials": {}} for name in names}
     for target, choices in scene_materials:
@@ -105,10 +105,10 @@ def variant_looks(
 def _variant_terms(
     target: ReadMaterial, source: ReadMaterial, variant: str, warnings: list[ImporterWarning]
 ) -> list[dict[str, Any]]:
-    """The other material's terms, their textures looked for among those that the own material has baked."""
-    label = f"variant {variant!r} of material {target.material.name!r}"
+    """Terms of the replacement material; its textures are matched with those of the scene's material."""
+    label = f"variant {quote(variant)} of material {quote(target.material.name)}"
     if not _has_same_normals(target, source):
-        warnings.append(approximated(f"{label} keeps the normal map it was baked with"))
+        warnings.append(approximated(f"The normal map of {label} isn't supported; it keeps the original one."))
     terms = []
     for source_term in source.material.terms:
         term = _drop_unmatched_roughness(target, source, source_term, label, warnings)
@@ -119,7 +119,7 @@ def _variant_terms(
         image = source.material.textures[channel]
         matching_channel, tint = _find_matching_channel(target, source, image)
         if matching_channel is None and np.ptp(image.pixels, axis=(0, 1)).max() > 0:
-            warnings.append(approximated(f"{label} has a texture of its own; its mean colour stands for it"))
+            warnings.append(approximated(f"The texture of {label} isn't supported; it has its average color."))
         color = np.array(term["color"]) * tint
         terms.append(term | {"color": [round(float(value), 6) for value in color], "texture": matching_channel})
     pointer = ("materials", target.material.name, "terms")
@@ -129,7 +129,7 @@ def _variant_terms(
 def _drop_unmatched_roughness(
     target: ReadMaterial, source: ReadMaterial, term: dict[str, Any], label: str, warnings: list[ImporterWarning]
 ) -> dict[str, Any]:
-    """A term that follows a map of roughness follows none where the own material has not the same."""
+    """Remove the roughness map of a term if the scene's material has a different one."""
     target_has_map, source_has_map = (
         "roughness" in read_material.material.textures for read_material in (target, source)
     )
@@ -140,7 +140,7 @@ def _drop_unmatched_roughness(
     ):
         return term
     if source_has_map:
-        warnings.append(approximated(f"{label} has a roughness texture of its own; its mean stands for it"))
+        warnings.append(approximated(f"The roughness texture of {label} isn't supported; it has its average."))
     return {name: value for name, value in term.items() if name != "roughness_map"}
 
 
@@ -154,7 +154,7 @@ def _has_same_image(target: ReadMaterial, source: ReadMaterial, channel: str) ->
 
 
 def _find_matching_channel(target: ReadMaterial, source: ReadMaterial, image: Texture) -> tuple[str | None, F32]:
-    """The channel that holds the image up to a colour, and that colour; or None and the image's mean."""
+    """The channel with the same image up to a color, and that color; or None and the image's mean."""
     mean = _mean(image)
     if target.uv_slot == source.uv_slot:
         for channel, target_texture in target.material.textures.items():
@@ -167,7 +167,7 @@ def _find_matching_channel(target: ReadMaterial, source: ReadMaterial, image: Te
 
 
 def _rms_difference(target_texture: Texture, image: Texture, tint: F32) -> F64:
-    """Root of the mean square between an image and another times a colour. (3,)"""
+    """RMS difference between an image and another one times a color. (3,)"""
     pairs = zip(decode_rows(target_texture), decode_rows(image), strict=True)
     total = sum(
         np.square(baked_rows * tint - image_rows).sum((0, 1), dtype=np.float64) for baked_rows, image_rows in pairs

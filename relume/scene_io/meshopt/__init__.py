@@ -1,7 +1,7 @@
-"""Decodes what meshoptimizer packs for glTF, extensions EXT_meshopt_compression and KHR_meshopt_compression.
+"""Decoder of meshoptimizer's glTF compression, EXT_meshopt_compression and KHR_meshopt_compression.
 
-Written after the specification of the extensions, appendix A (bit streams) and B (filters). Nothing here reads beyond
-what it is given, or makes more than was asked for.
+Follows appendices A (bit streams) and B (filters) of the specification. Reads stay within the input, and output within
+the requested size.
 """
 
 from relume.scene_io.meshopt.errors import MeshoptError

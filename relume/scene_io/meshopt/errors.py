@@ -1,5 +1,5 @@
-"""What is wrong with packed data."""
+"""Errors of the meshopt decoder."""
 
 
 class MeshoptError(ValueError):
-    """The data ends early, goes on too long, or is not of this kind."""
+    """The data is truncated, too long, or invalid."""

@@ -1,4 +1,4 @@
-"""What unpacked vertices go through before they are what an accessor means."""
+"""Filters that convert decoded vertices to the content of an accessor."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ U8 = NDArray[np.uint8]
 
 
 def _octahedral(elements: U8) -> U8:
-    """Unit vectors from their places on an octahedron; the fourth component stays. (n, 4 or 8 bytes)"""
+    """Decode octahedral unit vectors; the fourth component is unchanged. (n, 4 or 8 bytes)"""
     stride = elements.shape[1]
     if stride not in (4, 8):
-        raise MeshoptError("octahedral data has elements of 4 or 8 bytes")
+        raise MeshoptError("octahedral data does not have elements of 4 or 8 bytes")
     dtype = np.dtype("i1" if stride == 4 else "<i2")
     stored = elements.view(dtype)
     unit = np.maximum(stored[:, 2:3].astype(np.float64), 1)
@@ -30,7 +30,7 @@ def _octahedral(elements: U8) -> U8:
 
 
 def _exponential(elements: U8) -> U8:
-    """Floats from 24 bits of mantissa and 8 of exponent each. (n, a multiple of 4 bytes)"""
+    """Decode floats with 24 bits of mantissa and 8 of exponent. (n, a multiple of 4 bytes)"""
     encoded = elements.view("<i4")
     with np.errstate(over="ignore"):
         floats = np.ldexp(((encoded << 8) >> 8).astype(np.float32), encoded >> 24)

@@ -1,40 +1,41 @@
-"""Triangles, whose edges and corners are mostly those of a few triangles before; and plain sequences of indices."""
+"""Decoders of triangle lists, which mostly reuse edges and corners of recent triangles, and of index sequences."""
 
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.scene_io.meshopt.errors import MeshoptError
 
-TAIL_BYTES = 16  # of common pairs of corners, after the triangles
+TAIL_BYTES = 16  # table of common corner pairs, after the triangles
 SEQUENCE_TAIL_BYTES = 4
 UINT32_MASK = 0xFFFFFFFF
-RING_MASK = 15  # the newest sixteen edges and corners are known by how long ago they were
+RING_MASK = 15  # ring buffers hold the latest sixteen edges and corners
 
 
-def decode_triangles(source: bytes, count: int) -> NDArray[np.uint32]:
-    """Corner indices of triangles. (count,), count a multiple of 3
+def decode_triangles(source: bytes, count: int) -> Shaped[NDArray[np.uint32], " n"]:
+    """Decode the corner indices of triangles; `count` is a multiple of 3.
 
     Raises:
-        MeshoptError: the data is damaged, or holds another number of triangles.
+        MeshoptError: the data is damaged, or contains another number of triangles.
     """
     num_triangles = count // 3
     if count % 3 or not source or source[0] != 0xE1 or len(source) < 1 + num_triangles + TAIL_BYTES:
-        raise MeshoptError("these are not so many packed triangles")
+        raise MeshoptError("the data is not a triangle list of this length")
     reader = _Triangles(source, 1 + num_triangles)
     corners: list[int] = []
     for code in source[1 : 1 + num_triangles]:
         corners += reader.along_edge(code >> 4, code & 15) if code < 0xF0 else reader.lone_triangle(code & 15)
     if reader.offset != len(source) - TAIL_BYTES:
-        raise MeshoptError("the data is damaged, or holds another number of triangles")
+        raise MeshoptError("the data is damaged, or contains another number of triangles")
     return np.array(corners, np.int64).astype(np.uint32)
 
 
-def decode_sequence(source: bytes, count: int) -> NDArray[np.uint32]:
-    """Indices in any order. (count,) Raises MeshoptError where the data is damaged, or holds another number of them."""
+def decode_sequence(source: bytes, count: int) -> Shaped[NDArray[np.uint32], " n"]:
+    """Decode indices in any order. Raises MeshoptError if the data is damaged, or contains another number."""
     if not source or source[0] != 0xD1 or len(source) < 1 + count + SEQUENCE_TAIL_BYTES:
-        raise MeshoptError("these are not so many packed indices")
+        raise MeshoptError("the data is not an index sequence of this length")
     reader = _Numbers(source, 1)
     last = [0, 0]
     indices = []
@@ -43,7 +44,7 @@ def decode_sequence(source: bytes, count: int) -> NDArray[np.uint32]:
         last[step & 1] = (last[step & 1] + _decode_zigzag(step >> 1)) & UINT32_MASK
         indices.append(last[step & 1])
     if reader.offset != len(source) - SEQUENCE_TAIL_BYTES:
-        raise MeshoptError("the data is damaged, or holds another number of indices")
+        raise MeshoptError("the data is damaged, or contains another number of indices")
     return np.array(indices, np.int64).astype(np.uint32)
 
 
@@ -52,7 +53,7 @@ def _decode_zigzag(step: int) -> int:
 
 
 class _Numbers:
-    """Reads numbers of seven bits a byte."""
+    """Reads numbers with seven bits per byte."""
 
     def __init__(self, source: bytes, offset: int) -> None:
         self._source, self.offset = source, offset
@@ -74,7 +75,7 @@ class _Numbers:
 
 
 class _Triangles(_Numbers):
-    """What the codes of triangles refer to: the newest edges and corners, the next new corner, the last odd one."""
+    """State of the decoder: the latest edges and corners, the next new corner, the last explicit one."""
 
     def __init__(self, source: bytes, offset: int) -> None:
         super().__init__(source, offset)
@@ -84,7 +85,7 @@ class _Triangles(_Numbers):
         self._next = self._last = 0
 
     def along_edge(self, edge: int, code: int) -> tuple[int, int, int]:
-        """A triangle at an edge of one before."""
+        """Decode a triangle that shares an edge with a recent one."""
         a, b = self._edges[(self._num_edges - 1 - edge) & RING_MASK]
         if code == 0:
             c = self._new()
@@ -96,12 +97,12 @@ class _Triangles(_Numbers):
         return a, b, c
 
     def lone_triangle(self, code: int) -> tuple[int, int, int]:
-        """A triangle of its own; `code` says whether its corners stand in the table of common pairs."""
+        """Decode a triangle without a shared edge; `code` selects an entry of the table of corner pairs."""
         is_odd = code >= 14
         pair = self.byte() if is_odd else self._pairs[code]
         if is_odd and pair == 0:
             self._next = 0
-        # All corners are found before any is remembered: those that a code points back to are older.
+        # All corners are decoded before any is remembered: codes refer to earlier ones.
         a = self._far() if code == 15 else self._next_index()
         b, is_new_b = self._corner(pair >> 4, is_odd)
         c, is_new_c = self._corner(pair & 15, is_odd)
@@ -112,7 +113,7 @@ class _Triangles(_Numbers):
         return a, b, c
 
     def _corner(self, code: int, can_be_far: bool) -> tuple[int, bool]:
-        """A corner, and whether it is a new one."""
+        """Decode a corner; also return True if it is new."""
         if code == 0:
             return self._next_index(), True
         if code == 15 and can_be_far:

@@ -1,12 +1,13 @@
-"""Vertex attributes: each byte of an element as a difference to the element before, in groups of sixteen.
+"""Decoder of vertex attributes: each byte of an element is stored as a difference to the previous element, in groups.
 
-A first pass walks over the groups, whose lengths depend on what they hold; then all groups of one kind are decoded at
-once.
+A first pass walks over the groups of sixteen, whose lengths depend on their content; then all groups with the same
+number of bits are decoded at once.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.scene_io.meshopt.errors import MeshoptError
@@ -16,13 +17,13 @@ GROUP = 16
 MAX_BLOCK, BLOCK_BYTES = 256, 8192
 GROUPS_PER_BATCH = 1 << 16
 
-# Bits of a difference by the mode that a header says: version 0, and version 1 by its control mode.
+# Bits of a difference by the mode in the header: version 0, and version 1 by its control mode.
 WIDTHS = {None: (0, 2, 4, 8), 0: (0, 1, 2, 4), 1: (1, 2, 4, 8)}
 ZEROS, RAW = 2, 3  # the other control modes
 
 
 def _full_fields(byte: int, bits: int) -> int:
-    """How many fields of a byte have all bits set, and so say that the difference follows as a byte of its own."""
+    """Number of fields in a byte with all bits set, which mark differences that follow as whole bytes."""
     top = (1 << bits) - 1
     return sum((byte >> shift) & top == top for shift in range(0, 8, bits))
 
@@ -31,20 +32,18 @@ _FULL_FIELDS = {bits: bytes(_full_fields(byte, bits) for byte in range(256)) for
 _SHIFTS = {1: np.arange(8), 2: np.array([6, 4, 2, 0]), 4: np.array([4, 0])}
 
 
-def decode_vertices(source: bytes, count: int, stride: int) -> U8:
-    """The elements of a vertex stream.
+def decode_vertices(source: bytes, count: int, stride: int) -> Shaped[U8, "n stride"]:
+    """Decode the elements of a vertex stream.
 
     Args:
-        source: the packed bytes.
-        count: how many elements they hold.
+        source: the compressed bytes.
+        count: number of elements.
         stride: bytes of an element, a multiple of 4, at most 256.
-    Returns:
-        (count, stride) uint8
     Raises:
-        MeshoptError: the data is damaged, or holds another number of elements.
+        MeshoptError: the data is damaged, or contains another number of elements.
     """
     if not source or source[0] not in (0xA0, 0xA1):
-        raise MeshoptError("these are no packed vertices")
+        raise MeshoptError("the data is not a vertex stream")
     version = source[0] & 0x0F
     tail = stride + (stride // 4 if version else 0)
     end = len(source) - max(tail, 24 if version else 32)
@@ -61,7 +60,7 @@ def decode_vertices(source: bytes, count: int, stride: int) -> U8:
 
 
 def _deltas(source: bytes, end: int, count: int, stride: int, version: int) -> U8:
-    """Differences as they are stored. (stride, count rounded up to whole groups)"""
+    """Stored differences. (stride, count rounded up to whole groups)"""
     padded = -(-count // GROUP) * GROUP
     deltas = np.zeros((stride, padded), np.uint8)
     groups_by_width: dict[int, tuple[list[int], list[int]]] = {bits: ([], []) for bits in (1, 2, 4, 8)}
@@ -87,7 +86,7 @@ def _deltas(source: bytes, end: int, count: int, stride: int, version: int) -> U
                     source, offset, end, num_groups, WIDTHS[control], byte * padded + start, groups_by_width
                 )
     if offset != end:
-        raise MeshoptError("the data is damaged, or holds another number of elements")
+        raise MeshoptError("the data is damaged, or contains another number of elements")
     for bits, (starts, targets) in groups_by_width.items():
         _unpack_groups(data, bits, np.array(starts, np.int64), np.array(targets, np.int64), deltas.reshape(-1))
     return deltas
@@ -102,7 +101,7 @@ def _index_groups(
     target: int,
     groups_by_width: dict[int, tuple[list[int], list[int]]],
 ) -> int:
-    """Note where the groups of one byte of a block lie and belong; returns where they end."""
+    """Record start and target of the groups for one byte of a block; return the offset of their end."""
     header = source[offset : offset + (num_groups + 3) // 4]
     offset += (num_groups + 3) // 4
     for group in range(num_groups):
@@ -126,7 +125,7 @@ def _index_groups(
 
 
 def _unpack_groups(data: U8, bits: int, starts: NDArray[np.int64], targets: NDArray[np.int64], deltas: U8) -> None:
-    """Put the differences of all groups of one width in their places."""
+    """Decode the differences of all groups with one number of bits."""
     for batch_start in range(0, len(starts), GROUPS_PER_BATCH):
         start, target = (
             starts[batch_start : batch_start + GROUPS_PER_BATCH, None],
@@ -144,7 +143,7 @@ def _unpack_groups(data: U8, bits: int, starts: NDArray[np.int64], targets: NDAr
 
 
 def _integrate(deltas: U8, first: U8, channel: int) -> U8:
-    """Differences of four bytes, added up from the first element's. (count, 4)"""
+    """Elements of four bytes from their differences and the first element. (count, 4)"""
     kind = channel & 3
     if kind == 2:
         values, rotation = deltas.view("<u4")[:, 0], channel >> 4
@@ -152,7 +151,7 @@ def _integrate(deltas: U8, first: U8, channel: int) -> U8:
         total = np.bitwise_xor.accumulate(rotated) ^ first.view("<u4")[0]
         return np.ascontiguousarray(total, "<u4")[:, None].view(np.uint8)
     if kind == 3:
-        raise MeshoptError("the data is of an unknown kind")
+        raise MeshoptError("the data has an unknown channel mode")
     dtype = np.dtype("<u2" if kind == 1 else "u1")
     steps = deltas.view(dtype)
     signed = (steps >> 1) ^ (np.zeros_like(steps) - (steps & 1))

@@ -1,4 +1,4 @@
-"""Reading Wavefront OBJ and Stanford PLY, from files that nobody vouches for."""
+"""Import of Wavefront OBJ and Stanford PLY from untrusted files."""
 
 from relume.scene_io.obj_ply.importer import import_obj, import_ply
 

@@ -1,4 +1,4 @@
-"""OBJ and PLY to Scene: +Y up and metres, as everywhere; one mesh per object and material."""
+"""Conversion of OBJ and PLY to a scene with +Y up and meters; one mesh per object and material."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from relume.core.import_warnings import ImporterWarning, approximated, ignored, 
 from relume.scene.collect_lights import F64, LightCollector
 from relume.scene.finalize import finalize
 from relume.scene.model import F32, Light, Material, Mesh, Scene, Texture, TextureEncoding
-from relume.scene.unique_names import unique_name
+from relume.scene.unique_names import quote, unique_name
 from relume.scene.vertex_colors import MAX_COLORED, WRAP, draw_color_image, is_uniform
 from relume.scene_io.gltf.cameras import framing_camera
 from relume.scene_io.obj_ply.mtl import MaterialMaker, read_library
@@ -29,21 +29,23 @@ MAX_LIBRARIES = 100
 
 
 def import_obj(data: bytes, name: str, environment: Environment | None, companions: Companions) -> Scene:
-    """Reads a Wavefront .obj file, and the .mtl files and images that it names.
+    """Import a Wavefront .obj file, with the .mtl files and images that it refers to.
 
     Args:
         data: the file.
         name: of the scene.
-        environment: the light to show it in; None for the studio.
-        companions: the files beside it.
+        environment: None for the built-in studio.
+        companions: further files.
     Raises:
         SceneError: it is damaged, too large, or has no triangles.
     """
     warnings: list[ImporterWarning] = []
     obj = read_obj(data)
     library = _library(obj, companions, warnings)
+    kinds = {"p": "points", "l": "lines"}
     warnings.extend(
-        ignored(f"lines of kind {kind!r} are not used; only faces are") for kind in sorted(obj.ignored_keywords)
+        ignored(f"The file's {kinds.get(keyword, f'“{keyword}” elements')} aren't supported; only faces are shown.")
+        for keyword in sorted(obj.ignored_keywords)
     )
     maker = MaterialMaker(companions, warnings)
     material_indices: dict[str, int] = {}
@@ -55,17 +57,18 @@ def import_obj(data: bytes, name: str, environment: Environment | None, companio
     if (colors := obj.vertex_colors()) is not None:
         if len(groups) == 1 and not obj.libraries:
             return _scan(next(iter(groups.values())), colors, name, environment, warnings)
-        warnings.append(approximated("vertex colours are not used beside materials and objects of the .obj file"))
+        warnings.append(approximated("Vertex colors were ignored because the .obj file has materials or objects."))
     for (object_name, material), corners in groups.items():
         if material not in material_indices:
             material_indices[material] = len(materials)
             if material and obj.libraries and material not in library:
-                warnings.append(unsupported(f"material {material[:80]!r} is not described; it is grey"))
+                warnings.append(unsupported(f"Material {quote(material)} is missing from the .mtl file; it is gray."))
             materials.append(maker.make(material, library.get(material)))
             emissions.append(maker.emission(materials[-1], library.get(material)))
         mesh_name = unique_name(object_name or material or "mesh", used_names)
         material_index = material_indices[material]
-        mesh = make_mesh(corners, mesh_name, material_index, materials[material_index], f"mesh {mesh_name!r}", warnings)
+        label = f"mesh {quote(mesh_name)}"
+        mesh = make_mesh(corners, mesh_name, material_index, materials[material_index], label, warnings)
         meshes.extend([] if mesh is None else [mesh])
     maker.warn_gloss()
     collector = LightCollector(warnings)
@@ -74,12 +77,12 @@ def import_obj(data: bytes, name: str, environment: Environment | None, companio
 
 
 def import_ply(data: bytes, name: str, environment: Environment | None) -> Scene:
-    """Reads a Stanford .ply file, text or binary.
+    """Import a Stanford .ply file, text or binary.
 
     Args:
         data: the file.
         name: of the scene.
-        environment: the light to show it in; None for the studio.
+        environment: None for the built-in studio.
     Raises:
         SceneError: it is damaged, too large, or has no triangles.
     """
@@ -89,7 +92,7 @@ def import_ply(data: bytes, name: str, environment: Environment | None) -> Scene
 def _scan(
     corners: Corners, colors: F32 | None, name: str, environment: Environment | None, warnings: list[ImporterWarning]
 ) -> Scene:
-    """A mesh of one material, with the colours of its vertices."""
+    """A scene with one mesh and one material, with vertex colors."""
     corners, material = _apply_vertex_colors(corners, colors, MaterialMaker(NoFiles(), warnings), warnings)
     mesh = make_mesh(corners, "mesh", 0, material, "the mesh", warnings)
     return _scene(name, [] if mesh is None else [mesh], [material], environment, warnings)
@@ -98,8 +101,7 @@ def _scan(
 def _apply_vertex_colors(
     corners: Corners, colors: F32 | None, maker: MaterialMaker, warnings: list[ImporterWarning]
 ) -> tuple[Corners, Material]:
-    """A material with the colours of vertices (num_positions, 3), in an image where they differ; corners with places
-    in it."""
+    """A material with vertex colors (num_positions, 3), drawn into an image if they vary; corners with UVs for it."""
     if colors is None:
         return corners, maker.make("material", None)
     opaque = np.concatenate([colors, np.ones((len(colors), 1), np.float32)], axis=1)
@@ -108,9 +110,8 @@ def _apply_vertex_colors(
         not is_uniform(opaque) and 0 < len(vertex_indices) <= MAX_COLORED and vertex_indices.max() < len(colors)
     )
     if not has_color_image and not is_uniform(opaque):
-        warnings.append(
-            approximated(f"vertex colours of more than {MAX_COLORED:,} triangles are replaced by their mean")
-        )
+        message = f"Vertex colors were replaced by their average: there are more than {MAX_COLORED:,} triangles."
+        warnings.append(approximated(message))
     base = np.ones(3) if has_color_image else colors.mean(axis=0, dtype=np.float64)
     mtl_material = MtlMaterial()
     mtl_material.numbers = {"Kd": [round(float(value), 6) for value in base], "Pr": [0.5]}
@@ -130,17 +131,16 @@ def _apply_vertex_colors(
 
 
 def _library(obj: Obj, companions: Companions, warnings: list[ImporterWarning]) -> dict[str, MtlMaterial]:
-    """All materials of all libraries; the first of a name wins."""
+    """All materials of all libraries; the first of each name wins."""
     if len(obj.libraries) > MAX_LIBRARIES:
-        raise SceneError(f"the .obj file names more than {MAX_LIBRARIES} material files; join them")
+        raise SceneError(f"the .obj file refers to more than {MAX_LIBRARIES} material files; merge them")
     library: dict[str, MtlMaterial] = {}
     for name in dict.fromkeys(obj.libraries):
         data = companions.read(name, "the material file")
         if data is None:
             printable = name[:60].encode("ascii", "replace").decode()
-            warnings.append(
-                unsupported(f"the material file {printable!r} is not beside the scene; import both together")
-            )
+            message = f"Missing material file “{printable}”: import it together with the scene."
+            warnings.append(unsupported(message))
         else:
             library = read_library(data, posixpath.dirname(name.replace("\\", "/"))) | library
     return library

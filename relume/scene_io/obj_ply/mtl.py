@@ -1,6 +1,6 @@
-"""Material libraries of OBJ files: numbers and images by keyword, and materials made from them.
+"""Material libraries of OBJ files: numbers and images by keyword, and their conversion to materials.
 
-Wavefront's Material Library File format, and the common PBR extension of it.
+Wavefront's Material Library File format, and its common PBR extension.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import posixpath
 from contextlib import suppress
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
@@ -16,7 +17,7 @@ from relume.core.import_warnings import ImporterWarning, approximated, ignored, 
 from relume.image_io.decode import U8, Decoder
 from relume.scene.model import Material, Opacity, Texture, TextureEncoding
 from relume.scene.opacity import make_opacity
-from relume.scene.unique_names import unique_name
+from relume.scene.unique_names import quote, unique_name
 from relume.scene_io.gltf.texture_resampling import NOISE
 from relume.scene_io.obj_ply.mtl_dialects import Gloss, MtlMaterial, detect_dialect, gray_terms, make_mtl_terms
 from relume.scene_io.referenced_files import Companions
@@ -25,22 +26,22 @@ F64 = NDArray[np.float64]
 MAX_LIBRARY_BYTES = 8 << 20
 MAX_MATERIALS = 1_000
 NUMBERS = {"Kd": 3, "Ks": 3, "Ke": 3, "Ns": 1, "Pr": 1, "Pm": 1, "d": 1, "Tr": 1}
-MINOR_NUMBERS = {"Ka": 3, "illum": 1, "Pc": 1, "Pcr": 1, "Ps": 1, "aniso": 1}  # nothing is refused for these
+MINOR_NUMBERS = {"Ka": 3, "illum": 1, "Pc": 1, "Pcr": 1, "Ps": 1, "aniso": 1}  # invalid values are ignored
 OPTIONS = {"-blendu": 1, "-blendv": 1, "-boost": 1, "-mm": 2, "-o": 3, "-s": 3, "-t": 3, "-texres": 1, "-clamp": 1}
 OPTIONS |= {"-bm": 1, "-imfchan": 1, "-type": 1, "-cc": 1}
 NORMAL_MAP_KEYWORDS = ("norm", "map_Bump", "map_bump", "bump")
 MAX_STRENGTH = 100.0
 USED_MAPS = {"map_Kd", "map_Ks", "map_Ke", "map_d", "map_Pr", *NORMAL_MAP_KEYWORDS}
-HARMLESS_MAPS = {"map_Ka", "map_aat"}  # of ambient light, and how to smooth the edges of images
+HARMLESS_MAPS = {"map_Ka", "map_aat"}  # ambient light, and antialiasing of textures
 
 
 def read_library(data: bytes, folder: str = "") -> dict[str, MtlMaterial]:
-    """The materials of a library by name.
+    """Read the materials of a library by name.
 
     Args:
-        folder: that the library lies in, seen from the scene.
+        folder: of the library, relative to the scene.
     Raises:
-        SceneError: too large, too many, or a line is not what its first word says.
+        SceneError: too large, too many materials, or a line is invalid.
     """
     if len(data) > MAX_LIBRARY_BYTES:
         raise SceneError(f"the material file is larger than {MAX_LIBRARY_BYTES >> 20} MB; export it again")
@@ -68,11 +69,11 @@ def read_library(data: bytes, folder: str = "") -> dict[str, MtlMaterial]:
 
 
 def _numbers(tokens: list[str], count: int, keyword: str) -> list[float]:
-    """`count` numbers; one stands for three."""
+    """Parse `count` numbers; one is repeated."""
     try:
         values = [float(token) for token in tokens[:count]]
     except ValueError:
-        raise SceneError(f"{keyword} of the material file is not made of numbers; export it again") from None
+        raise SceneError(f"{keyword} of the material file has values that are not numbers; export it again") from None
     if len(values) == 1:
         values *= count
     if len(values) != count or not np.isfinite(values).all() or not 0 <= min(values) <= max(values) <= 1e6:
@@ -81,14 +82,14 @@ def _numbers(tokens: list[str], count: int, keyword: str) -> list[float]:
 
 
 def _image_name(tokens: list[str]) -> str:
-    """The file name after the options; it may have spaces in it."""
+    """File name after the options; it may contain spaces."""
     while tokens and tokens[0] in OPTIONS:
         tokens = tokens[1 + OPTIONS[tokens[0]] :]
     return " ".join(tokens)[:1_000]
 
 
 class MaterialMaker:
-    """Turns described materials into relume's, each image decoded once."""
+    """Converts materials of a library; each image is decoded once."""
 
     def __init__(self, companions: Companions, warnings: list[ImporterWarning]) -> None:
         self._companions = companions
@@ -99,9 +100,9 @@ class MaterialMaker:
         self._glosses: dict[str, Gloss] = {}
 
     def make(self, name: str, mtl_material: MtlMaterial | None) -> Material:
-        """One material under a name of its own; grey where nothing is known of it. Raises SceneError."""
+        """Make a material with a unique name; gray if the library lacks it. Raises SceneError."""
         material_name = unique_name(name or "material", self._names)
-        label = f"material {material_name!r}"
+        label = f"material {quote(material_name)}"
         if mtl_material is None:
             return Material(material_name, gray_terms())
         textures = self._textures(mtl_material, label)
@@ -115,7 +116,7 @@ class MaterialMaker:
         return Material(material_name, terms, textures, normal_map, opacity=opacity)
 
     def _roughness(self, mtl_material: MtlMaterial, textures: dict[str, Texture], label: str) -> float | None:
-        """Pr times the mean of map_Pr, which becomes a texture where it says more; None where there are neither."""
+        """Pr times the mean of map_Pr, which becomes a texture if it varies; None if there are neither."""
         factor = mtl_material.numbers.get("Pr", [None])[0]
         pixels = self._decode(mtl_material, "map_Pr", f"map_Pr of {label}")
         if pixels is None:
@@ -124,25 +125,25 @@ class MaterialMaker:
         if mean > 0 and np.ptp(pixels[..., 0]) > NOISE:
             encoding = TextureEncoding("share", (1 / mean, 1 / mean, 1 / mean))
             textures["roughness"] = Texture(np.ascontiguousarray(pixels[..., :1]), encoding=encoding)
-        return (factor or 1.0) * mean  # exporters write zeros where they mean the image
+        return (factor or 1.0) * mean  # exporters write zero if there is an image
 
     def _opacity(self, mtl_material: MtlMaterial, label: str) -> Opacity | None:
-        """Where the material has holes: d, or 1 − Tr, times map_d."""
+        """Opacity: d, or 1 − Tr, times map_d."""
         numbers = mtl_material.numbers
         alpha_factor = min(1.0, numbers["d"][0] if "d" in numbers else 1 - min(1.0, numbers.get("Tr", [0.0])[0]))
         if alpha_factor == 0 and "map_d" in mtl_material.maps:
-            alpha_factor = 1.0  # exporters write zeros where they mean the image
+            alpha_factor = 1.0  # exporters write zero if there is an image
         pixels = self._decode(mtl_material, "map_d", f"map_d of {label}")
-        # grey, or the picture that map_Kd names as well, with the holes in its alpha
+        # a gray image, or the image of map_Kd with opacity in its alpha channel
         alpha = None if pixels is None else pixels[..., 3 if np.ptp(pixels[..., 3]) else 0]
         return make_opacity(alpha, ("repeat", "repeat"), alpha_factor, None, label, self._warnings)
 
-    def emission(self, material: Material, mtl_material: MtlMaterial | None) -> F64:
-        """Radiance of the surfaces of a material that was made, which its image multiplies: Ke. (3,)"""
+    def emission(self, material: Material, mtl_material: MtlMaterial | None) -> Shaped[F64, " 3"]:
+        """Radiance of a material's surfaces, multiplied by its emission texture: Ke."""
         if mtl_material is None:
             return np.zeros(3)
         factor = np.array(mtl_material.numbers.get("Ke", [0.0, 0.0, 0.0]))
-        # exporters write zeros where they mean the image
+        # exporters write zero if there is an image
         return np.ones(3) if "emission" in material.textures and not factor.any() else factor
 
     def _textures(self, mtl_material: MtlMaterial, label: str) -> dict[str, Texture]:
@@ -158,7 +159,7 @@ class MaterialMaker:
         return None if pixels is None else Texture(np.ascontiguousarray(pixels[..., :3]), encoding=encoding)
 
     def _decode(self, mtl_material: MtlMaterial, keyword: str, label: str) -> U8 | None:
-        """The bytes of an image, RGBA. (height, width, 4)"""
+        """Decoded RGBA image. (height, width, 4)"""
         name = mtl_material.maps.get(keyword)
         if not name:
             return None
@@ -166,16 +167,14 @@ class MaterialMaker:
         if path not in self._pixels:
             data = self._companions.read(path, label)
             if data is None and mtl_material.folder and not name.startswith(".."):
-                data = self._companions.read(name, label)  # some exporters name it as the scene sees it
+                data = self._companions.read(name, label)  # some exporters write paths relative to the scene
             self._pixels[path] = None if data is None else self._decoder.decode(data, label)
         if self._pixels[path] is None:
-            self._warnings.append(
-                unsupported(f"{label} ({_printable(name)!r}) is not beside the scene; it is left out")
-            )
+            self._warnings.append(unsupported(f"Missing image “{_printable(name)}” ({label})."))
         return self._pixels[path]
 
     def _normal_map(self, mtl_material: MtlMaterial, label: str) -> Texture | None:
-        """That of `norm`, or of a bump map whose image is one; heights are said to be lost."""
+        """The normal map of `norm`, or of a bump map if its image is a normal map; warns about height maps."""
         for keyword in (keyword for keyword in NORMAL_MAP_KEYWORDS if mtl_material.maps.get(keyword)):
             map_label = f"the normal map of {label}" if keyword == "norm" else f"{keyword} of {label}"
             strength = min(mtl_material.strengths.get(keyword, 1.0), MAX_STRENGTH)
@@ -186,42 +185,41 @@ class MaterialMaker:
             except SceneError as error:
                 if keyword == "norm":
                     raise
-                self._warnings.append(unsupported(f"{error}; until then it is left out"))
+                self._warnings.append(unsupported(f"Skipped a normal map: {error}."))
                 continue
             if texture is None or keyword == "norm" or is_normal_map(texture.pixels):
                 return texture
             name = _printable(mtl_material.maps[keyword])
-            self._warnings.append(
-                unsupported(f"{map_label} ({name!r}) is a map of heights; it is left out, give a normal map")
-            )
+            message = f"“{name}” ({map_label}) is a height map, which isn't supported; use a normal map instead."
+            self._warnings.append(unsupported(message))
         return None
 
     def _warn_unsupported(self, mtl_material: MtlMaterial, label: str) -> None:
         for keyword in sorted(mtl_material.maps.keys() - USED_MAPS):
             make_warning = ignored if keyword in HARMLESS_MAPS else unsupported
             name = _printable(mtl_material.maps[keyword])
-            self._warnings.append(make_warning(f"{keyword[:40]} of {label} ({name!r}) is not used"))
+            self._warnings.append(make_warning(f"Ignored “{name}” ({keyword[:40]} of {label}): not supported."))
         unused_keywords = [
             number_keyword
             for number_keyword in ("Ps", "aniso")
             if mtl_material.numbers.get(number_keyword, [0.0])[0] > 0
         ]
         self._warnings.extend(
-            approximated(f"{number_keyword} of {label} is not used") for number_keyword in unused_keywords
+            approximated(f"Ignored {number_keyword} of {label}: not supported.") for number_keyword in unused_keywords
         )
 
     def warn_gloss(self) -> None:
-        """Say once for all materials that were made how Ks was read, where it was not read as it stands."""
+        """Warn once for all materials about each interpretation of Ks."""
         for gloss in Gloss:
             names = [name for name, material_gloss in self._glosses.items() if material_gloss is gloss]
             if names:
                 suffix = f" and {len(names) - 1} more" if len(names) > 1 else ""
-                self._warnings.append(approximated(f"Ks of material {names[0]!r}{suffix} {gloss.value}"))
+                self._warnings.append(approximated(f"Ks of material {quote(names[0])}{suffix} {gloss.value}"))
 
 
-def is_normal_map(pixels: U8) -> bool:
-    """Whether an image, (height, width, 3 or 4), holds unit vectors about +z, as normal maps do and heights do not."""
-    step = 1 + max(pixels.shape[:2]) // 512  # these tell it as well as all
+def is_normal_map(pixels: Shaped[U8, "height width channels"]) -> bool:
+    """True if an image with 3 or 4 channels contains unit vectors about +z, unlike a height map."""
+    step = 1 + max(pixels.shape[:2]) // 512  # a subset is enough
     vectors = pixels[::step, ::step, :3].reshape(-1, 3) / np.float32(127.5) - 1
     x, y, z = vectors.mean(axis=0)
     length = np.abs(np.linalg.norm(vectors, axis=1) - 1).mean()
@@ -229,5 +227,5 @@ def is_normal_map(pixels: U8) -> bool:
 
 
 def _printable(name: str) -> str:
-    """The end of a file's name, which tells more than its beginning, in ASCII."""
+    """The end of a file name, which says more than its start, in ASCII."""
     return ("…" if len(name) > 60 else "") + name[-60:].encode("ascii", "replace").decode()

@@ -1,15 +1,15 @@
-"""What the numbers of a .mtl file mean, by who wrote it.
+"""Interpretation of the numbers in a .mtl file, depending on the program that wrote it.
 
-Wavefront's illumination model 2 is Kd (n·l) + Ks (n·h)^Ns, for lights without size and no surroundings. So Ks is how
-bright a highlight is, not which share of all light is reflected: programs write 0.33, 0.5 or 1 for plastic and wood.
-Read as a reflectance it makes metal of everything. Hence, in this order:
+Wavefront's illumination model 2 is Kd (n·l) + Ks (n·h)^Ns, for lights without size and no environment. Ks is therefore
+the brightness of a highlight, not a reflectance: programs write 0.33, 0.5 or 1 for plastic and wood. As a reflectance,
+it would turn everything into metal. Hence, in this order:
 
-1. Pr or Pm: the PBR extension. A dielectric of F0 0.04, or a metal, or between; Pc and Pcr are a clear coat.
-2. Blender without them: the inverse of its exporter. F0 = 0.08 Ks, metallic = Ka where illum is 3 or 6, and
-   roughness = 1 - sqrt(Ns / 1000), 900 before its exporter named its version.
-3. A gray Ks over a Kd that is not black, without mirror (illum 3 or 8): a dielectric, F0 = min(Ks, 0.04), and a facet
-   distribution as wide as the highlight, α² = 2 / (Ns + 2) (Walter 2007).
-4. All else is meant as it stands, as metals in this format are: blinn_phong with the color Ks.
+1. Pr or Pm: the PBR extension. A dielectric of F0 0.04, a metal, or a blend; Pc and Pcr are a clearcoat.
+2. Blender without them: the inverse of its exporter. F0 = 0.08 Ks, metallic = Ka if illum is 3 or 6, and
+   roughness = 1 - sqrt(Ns / 1000), or 900 in old exporters, which do not write their version.
+3. A gray Ks with a Kd that is not black, without mirror (illum 3 or 8): a dielectric, F0 = min(Ks, 0.04), and a
+   microfacet distribution as wide as the highlight, α² = 2 / (Ns + 2) (Walter 2007).
+4. Everything else literally, as metals in this format are: blinn_phong with the color Ks.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from relume.scene_io.gltf.to_terms import CoatLayer, PbrSurface, Terms, dielectr
 F64 = NDArray[np.float64]
 GRAY = [0.6, 0.6, 0.6]
 PLASTIC_F0 = 0.04
-BLENDER_F0 = 0.08  # of a specular level of 1
+BLENDER_F0 = 0.08  # at a specular level of 1
 GRAY_SPREAD = 0.05  # between the channels of a gray, relative to the largest
 MIRROR_MODELS = (3, 8)  # illumination models with reflection and without Fresnel
 BLENDER_METAL_MODELS = (3, 6)
 
 
 class Dialect(Enum):
-    """Who wrote a library: the largest Ns of Blender's exporters, 0 for all others."""
+    """Program that wrote a library: the largest Ns of Blender's exporters, 0 for all others."""
 
     COMMON = 0
     OLD_BLENDER = 900
@@ -46,19 +46,18 @@ class Dialect(Enum):
 
 
 class Gloss(Enum):
-    """How a Ks was read that was not read as it stands; stands behind "Ks of material …" in a sentence."""
+    """Interpretation of a Ks that is not used literally, as the end of the sentence "Ks of material …"."""
 
-    BLENDER = "is read as the specular level of Blender, which wrote the file: 0.5 is a reflectance of 4 % (F0 0.04)"
+    BLENDER = "was read as Blender's specular level, because Blender wrote the file: 0.5 reflects 4 % (F0 0.04)."
     DIELECTRIC = (
-        "is read as the gloss of plastic, a reflectance of 4 % (F0 0.04): a gray Ks over a Kd that is not black is "
-        "taken for no metal; for a metal write Pm 1, a colored Ks, or Kd 0"
+        "was read as the gloss of plastic, which reflects 4 % (F0 0.04), because it is gray and Kd isn't black. For "
+        "metal, write Pm 1, a colored Ks, or Kd 0."
     )
 
 
 @dataclass
 class MtlMaterial:
-    """One `newmtl`: its numbers, and the names of its images by keyword, as the file in `folder` gives them; and how
-    strong its bump maps are, where that is said."""
+    """One `newmtl`: its numbers; image names by keyword, relative to `folder`; and strengths of its bump maps."""
 
     folder: str = ""
     dialect: Dialect = Dialect.COMMON
@@ -68,7 +67,7 @@ class MtlMaterial:
 
 
 def detect_dialect(lines: Sequence[str]) -> Dialect:
-    """Who wrote a library, by the comments that it begins with."""
+    """Detect the program that wrote a library from the comments at its start."""
     header = takewhile(lambda line: not line or line.startswith("#"), (line.strip() for line in lines))
     for line in header:
         if re.match(r"#\s*Blender\b", line, re.IGNORECASE):
@@ -77,19 +76,19 @@ def detect_dialect(lines: Sequence[str]) -> Dialect:
 
 
 def gray_terms() -> Terms:
-    """What stands for a material of which nothing is known."""
+    """Terms of a material without a definition."""
     return make_terms(_surface(np.array(GRAY), PLASTIC_F0, 0.0, 0.5, {}), CoatLayer())
 
 
 def make_mtl_terms(
     mtl_material: MtlMaterial, textures: Mapping[str, Texture], roughness: float | None, *, has_normal_map: bool
 ) -> tuple[Terms, Gloss | None]:
-    """The terms of a material, and how its Ks was read where that is to be said.
+    """Convert a material to terms; also return the interpretation of Ks if users should know it.
 
     Args:
-        mtl_material: its numbers. textures: its images by channel.
-        roughness: of the PBR extension, its map counted in; None where there is none.
-        has_normal_map: which widens its highlights where they are seen from far.
+        mtl_material: its numbers. textures: by channel.
+        roughness: of the PBR extension, including its map; None without it.
+        has_normal_map: minification widens its highlights.
     """
     numbers = mtl_material.numbers
     base = np.array(_color(numbers, "Kd", GRAY, textures.get("diffuse")))
@@ -116,19 +115,19 @@ def make_mtl_terms(
 def _color(
     numbers: Mapping[str, list[float]], keyword: str, default: list[float], image: Texture | None
 ) -> list[float]:
-    """A color that an image multiplies; where exporters write zeros, or nothing, they mean the image."""
+    """A color that multiplies an image; exporters that write zero or nothing mean white."""
     color = numbers.get(keyword, [0.0, 0.0, 0.0] if image is not None else default)
     return color if any(color) or image is None else [1.0, 1.0, 1.0]
 
 
 def _metallic(numbers: Mapping[str, list[float]]) -> float:
-    """What Blender writes as Ka of a material that reflects."""
+    """Metallic value, which Blender writes as Ka of a reflective material."""
     is_metal = numbers.get("illum", [2.0])[0] in BLENDER_METAL_MODELS
     return min(float(np.mean(numbers.get("Ka", [0.0]))), 1.0) if is_metal else 0.0
 
 
 def _blender_roughness(mtl_material: MtlMaterial) -> float:
-    """The inverse of Blender's Ns; one half where that is an image."""
+    """The inverse of Blender's Ns; one half if Ns is missing, as with a texture."""
     largest = float(mtl_material.dialect.value)
     return 1 - sqrt(min(mtl_material.numbers.get("Ns", [largest / 4])[0] / largest, 1.0))
 
@@ -159,7 +158,7 @@ def _highlight(tint: F64, numbers: Mapping[str, list[float]], textures: Mapping[
 
 
 def _surface(base: F64, f0: float, metallic: float, roughness: float, textures: Mapping[str, Texture]) -> PbrSurface:
-    """A dielectric that reflects `f0` head-on, or a metal, or between. base: (3,)"""
+    """A dielectric with reflectance `f0`, a metal, or a blend. base: (3,)"""
     specular_reflectance = dielectric_reflectance(f0, 1.0)
     return PbrSurface(
         base * (1 - metallic), f0 + (base - f0) * metallic, 1.0, roughness, specular_reflectance, dict(textures)

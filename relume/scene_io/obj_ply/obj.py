@@ -1,7 +1,7 @@
-"""Wavefront OBJ: the lines that describe triangles, in the order of the file.
+"""Wavefront OBJ: the lines that describe triangles, in file order.
 
-Object Files, appendix B1 of Wavefront's Advanced Visualizer manual. Polygons become fans; curves and surfaces, points
-and lines are left out. Numbers below zero count back from the line they stand in.
+Object Files, appendix B1 of Wavefront's Advanced Visualizer manual. Polygons become fans; curves, surfaces, points and
+lines are ignored. Negative indices count back from the current line.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import srgb_decode
@@ -22,19 +23,19 @@ from relume.scene_io.obj_ply.weld import Corners
 
 MAX_LINE_BYTES = 1 << 20
 MAX_GROUPS = 10_000
-_NUM_COLORED_TOKENS = 7  # words of a vertex that has a colour
+_NUM_COLORED_TOKENS = 7  # tokens of a vertex with a color
 IGNORED_KEYWORDS = {b"p", b"l", b"curv", b"curv2", b"surf"}
 
 
 @dataclass
 class Obj:
-    """The triangles of an OBJ file and what it names beside them.
+    """The triangles of an OBJ file and its references.
 
     Attributes:
-        colors: of positions, as scanners and sculptors write them behind the coordinates; none where some lack them.
-        libraries: the material files it names.
-        groups: triangles, nine numbers each, by object and material.
-        ignored_keywords: kinds of lines that were not used.
+        colors: of positions, as scanners and sculpting programs write them after the coordinates; unused if incomplete.
+        libraries: names of material files.
+        groups: triangles, nine indices each, by object and material.
+        ignored_keywords: kinds of unsupported lines.
     """
 
     positions: array[float] = field(default_factory=lambda: array("d"))
@@ -45,15 +46,15 @@ class Obj:
     groups: dict[tuple[str, str], array[int]] = field(default_factory=dict)
     ignored_keywords: set[str] = field(default_factory=set)
 
-    def vertex_colors(self) -> NDArray[np.float32] | None:
-        """Linear colours of all positions, None where there are none. (num_positions, 3)"""
+    def vertex_colors(self) -> Shaped[NDArray[np.float32], "positions 3"] | None:
+        """Linear colors of all positions, or None."""
         colors = _rows(self.colors, 3)
         if len(colors) == 0 or len(self.colors) != len(self.positions) or not np.isfinite(colors).all():
             return None
         return srgb_decode(np.clip(colors, 0, 1).astype(np.float32))
 
     def corners(self) -> dict[tuple[str, str], Corners]:
-        """The triangles of each group, v turned to run from the top."""
+        """The triangles of each group, with v from the top."""
         positions, uvs, normals = _rows(self.positions, 3), _rows(self.uvs, 2), _rows(self.normals, 3)
         uvs[:, 1] = 1 - uvs[:, 1]
         return {
@@ -63,10 +64,10 @@ class Obj:
 
 
 def read_obj(data: bytes) -> Obj:
-    """Reads the lines of a file.
+    """Read the lines of a file.
 
     Raises:
-        SceneError: a line is not what its first word says, or there are too many lines of a kind.
+        SceneError: a line is invalid, or there are too many triangles or objects.
     """
     obj = Obj()
     object_name, material = "", ""
@@ -108,7 +109,7 @@ def read_obj(data: bytes) -> Obj:
 
 
 def _lines(data: bytes) -> io.BytesIO | list[bytes]:
-    """Lines, those that end in a backslash joined with the next."""
+    """Lines, with continuations after a backslash joined."""
     if max(map(len, io.BytesIO(data)), default=0) > MAX_LINE_BYTES:
         raise SceneError(f"a line of the .obj file is longer than {MAX_LINE_BYTES:,} bytes; export it again")
     return io.BytesIO(data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ") if b"\\" in data else data)
@@ -118,17 +119,17 @@ def _group(obj: Obj, object_name: str, material: str) -> array[int]:
     group = obj.groups.get((object_name, material))
     if group is None:
         if len(obj.groups) >= MAX_GROUPS:
-            raise SceneError(f"the .obj file has more than {MAX_GROUPS:,} objects; join them")
+            raise SceneError(f"the .obj file has more than {MAX_GROUPS:,} objects; merge them")
         group = obj.groups[object_name, material] = array("q")
     return group
 
 
 def _add_face(obj: Obj, group: array[int], tokens: Sequence[bytes]) -> int:
-    """Appends a polygon as a fan; returns the number of its triangles."""
+    """Append a polygon as a fan; return the number of its triangles."""
     counts = (len(obj.positions) // 3, len(obj.uvs) // 2, len(obj.normals) // 3)
     corners = [_corner(token, counts) for token in tokens]
     if len(corners) < 3:
-        raise ValueError("a face has at least three corners")
+        raise ValueError("a face has fewer than three corners")
     hub = corners[0]
     for second, third in pairwise(corners[1:]):
         group.extend((*hub, *second, *third))
@@ -136,10 +137,10 @@ def _add_face(obj: Obj, group: array[int], tokens: Sequence[bytes]) -> int:
 
 
 def _corner(token: bytes, counts: tuple[int, int, int]) -> tuple[int, int, int]:
-    """Position, uv and normal of `v/vt/vn`, from zero; -1 where one is left out."""
+    """Zero-based position, UV and normal of `v/vt/vn`; -1 if missing."""
     index_texts = token.split(b"/")
     if len(index_texts) > 3 or not index_texts[0]:
-        raise ValueError("a corner is v, v/vt, v//vn or v/vt/vn")
+        raise ValueError("a corner is not v, v/vt, v//vn or v/vt/vn")
     index_texts += [b""] * (3 - len(index_texts))
     v, vt, vn = (
         _index(index_text, count) if index_text else -1 for index_text, count in zip(index_texts, counts, strict=True)

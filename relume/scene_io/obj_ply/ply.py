@@ -1,6 +1,6 @@
-"""Stanford PLY, text and binary: vertices with normals, texture coordinates and colours, and faces as fans.
+"""Stanford PLY, text and binary: vertices with normals, UV coordinates and colors, and faces as fans.
 
-The format of Turk 1994 (The PLY Polygon File Format). Counts are checked against the bytes that are there.
+The format of Turk 1994 (The PLY Polygon File Format). Counts are checked against the available bytes.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import srgb_decode
@@ -28,11 +29,11 @@ UVS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 COLORS = ("red", "green", "blue")
 
 
-def read_ply(data: bytes) -> tuple[Corners, F32 | None]:
-    """The triangles of a file, and the colours of its vertices, linear, where it has them. (num_positions, 3)
+def read_ply(data: bytes) -> tuple[Corners, Shaped[F32, "positions 3"] | None]:
+    """Read the triangles of a file, and the linear colors of its vertices if there are any.
 
     Raises:
-        SceneError: the header is odd, the file has fewer rows than it claims, or it has no faces.
+        SceneError: the header is invalid, the file is truncated, or it has no faces.
     """
     order, elements, start = read_header(data)
     body = memoryview(data)[start:]
@@ -54,10 +55,10 @@ def read_ply(data: bytes) -> tuple[Corners, F32 | None]:
 
 
 def read_header(data: bytes) -> tuple[str, list[Element], int]:
-    """Byte order ("" for text), elements, and where the rows begin. Raises SceneError."""
+    """Read the byte order ("" for text), the elements, and the offset of the rows. Raises SceneError."""
     end = re.search(rb"\nend_header[ \t]*\r?\n", data[:MAX_HEADER_BYTES])
     if end is None:
-        raise SceneError("the .ply file has no end to its header; export it again")
+        raise SceneError("the .ply file has no end_header; export it again")
     lines = data[: end.start()].decode("ascii", "replace").splitlines()
     order: str | None = None
     elements: list[tuple[str, int, list[Property]]] = []
@@ -71,11 +72,11 @@ def read_header(data: bytes) -> tuple[str, list[Element], int]:
             elif tokens[:1] == ["property"]:
                 elements[-1][2].append(_property(tokens[1:]))
         except (KeyError, IndexError, ValueError):
-            raise SceneError(f"the .ply header has an odd line ({line[:40]!r}); export it again") from None
+            raise SceneError(f"the .ply header has an invalid line ({line[:40]!r}); export it again") from None
     if any(len(properties) > MAX_PROPERTIES for _, _, properties in elements):
-        raise SceneError(f"the .ply file has more than {MAX_PROPERTIES} properties of one kind; remove some")
+        raise SceneError(f"an element of the .ply file has more than {MAX_PROPERTIES} properties; remove some")
     if order is None:
-        raise SceneError("the .ply file does not say its format; export it again")
+        raise SceneError("the .ply header has no format; export it again")
     return order, [Element(name, rows, tuple(properties)) for name, rows, properties in elements], end.end()
 
 
@@ -88,13 +89,13 @@ def _count(token: str) -> int:
 def _property(tokens: list[str]) -> Property:
     if tokens[0] == "list":
         if TYPES[tokens[1]].startswith("f"):
-            raise ValueError("a length is a whole number")
+            raise ValueError("the length of a list is not an integer")
         return Property(tokens[3], TYPES[tokens[2]], TYPES[tokens[1]])
     return Property(tokens[1], TYPES[tokens[0]])
 
 
 def _columns(vertex: Columns, names: tuple[str, ...]) -> F64:
-    """Some columns of the vertices; no rows where one is missing. (rows, len(names))"""
+    """Columns of the vertices; no rows if one is missing. (rows, len(names))"""
     columns = [vertex[name] for name in names if name in vertex]
     if len(columns) < len(names) or any(isinstance(column, tuple) for column in columns):
         return np.zeros((0, len(names)))
@@ -102,7 +103,7 @@ def _columns(vertex: Columns, names: tuple[str, ...]) -> F64:
 
 
 def _fans(lengths: NDArray[np.int64], values: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Triangles (n, 3) of polygons that stand one after another; those of fewer than three corners are none."""
+    """Triangles (n, 3) of concatenated polygons; those with fewer than three corners are skipped."""
     num_triangles = np.maximum(lengths - 2, 0)
     if int(num_triangles.sum()) > MAX_TRIANGLES:
         raise SceneError(f"the .ply file has more than {MAX_TRIANGLES:,} triangles; simplify it")
@@ -113,7 +114,7 @@ def _fans(lengths: NDArray[np.int64], values: NDArray[np.int64]) -> NDArray[np.i
 
 
 def _colors(vertex: Columns, elements: list[Element]) -> F32 | None:
-    """The vertex colours, linear; sRGB bytes or numbers in [0, 1]. (rows, 3)"""
+    """Linear vertex colors from sRGB bytes or numbers in [0, 1]. (rows, 3)"""
     colors = _columns(vertex, COLORS)
     if len(colors) == 0 or not np.isfinite(colors).all():
         return None

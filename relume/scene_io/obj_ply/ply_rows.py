@@ -1,4 +1,4 @@
-"""The rows of a PLY file as columns; a list column is the lengths of its lists and all their values."""
+"""The rows of a PLY file as columns; a list column has the lengths of its lists and their concatenated values."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from relume.core.errors import SceneError
 
 Lists = tuple[NDArray[np.int64], NDArray[np.int64]]
 Columns = dict[str, NDArray[Any] | Lists]
-Layout = list[tuple[str, int]]  # NumPy type and how many of it, for each part of a row
+Layout = list[tuple[str, int]]  # NumPy type and count of each field in a row
 SHORT = "the .ply file has fewer rows than its header says; export or download it again"
 
 
@@ -30,7 +30,7 @@ class Property:
 
 @dataclass(frozen=True)
 class Element:
-    """So many rows of the same properties."""
+    """A number of rows with the same properties."""
 
     name: str
     rows: int
@@ -38,48 +38,48 @@ class Element:
 
 
 class PlyRows(Protocol):
-    """What is left of the rows, in numbers or in bytes."""
+    """The unread rows of a file, as numbers or as bytes."""
 
     @property
     def remaining(self) -> int:
-        """How much there is; a row takes at least one for each property."""
+        """Amount of unread data; a row takes at least one for each property."""
 
     def take(self, kind: str, count: int) -> NDArray[Any]:
-        """The next values, all of one type. Raises SceneError where there are fewer."""
+        """Read the next values of one type. Raises SceneError if there are fewer."""
 
     def table(self, layout: Layout, rows: int) -> list[NDArray[Any]] | None:
-        """The next rows without moving on, (rows, count) for each part; None where there are fewer."""
+        """Peek at the next rows, (rows, count) for each field; None if there are fewer."""
 
     def skip(self, layout: Layout, rows: int) -> None:
-        """Move on by so many rows."""
+        """Skip rows."""
 
 
 class TextRows:
-    """Rows of a text file: numbers one after another."""
+    """Rows of a text file as a sequence of numbers."""
 
     def __init__(self, body: memoryview) -> None:
         try:
-            with warnings.catch_warnings():  # by which alone NumPy before 2.3 says that it stopped at a word
+            with warnings.catch_warnings():  # NumPy before 2.3 only warns if it stops at text
                 warnings.simplefilter("error", DeprecationWarning)
                 self._numbers = np.fromstring(bytes(body).decode("ascii"), np.float64, sep=" ")
         except (ValueError, DeprecationWarning):
-            raise SceneError("the .ply file has words where numbers should be; export it again") from None
+            raise SceneError("the .ply file has text instead of numbers; export it again") from None
         self._offset = 0
 
     @property
     def remaining(self) -> int:
-        """How many numbers there still are."""
+        """Number of unread numbers."""
         return len(self._numbers) - self._offset
 
     def take(self, kind: str, count: int) -> NDArray[Any]:
-        """The next values, as `Rows.take` says."""
+        """Read the next values, as in `PlyRows`."""
         if count > self.remaining:
             raise SceneError(SHORT)
         self._offset += count
         return self._numbers[self._offset - count : self._offset]
 
     def table(self, layout: Layout, rows: int) -> list[NDArray[Any]] | None:
-        """The next rows, as `Rows.table` says."""
+        """Peek at the next rows, as in `PlyRows`."""
         width = sum(count for _, count in layout)
         if rows * width > self.remaining:
             return None
@@ -87,7 +87,7 @@ class TextRows:
         return np.split(values, np.cumsum([count for _, count in layout])[:-1], axis=1)
 
     def skip(self, layout: Layout, rows: int) -> None:
-        """Move on by so many rows, as `Rows.skip` says."""
+        """Skip rows, as in `PlyRows`."""
         self._offset += rows * sum(count for _, count in layout)
 
 
@@ -99,11 +99,11 @@ class BinaryRows:
 
     @property
     def remaining(self) -> int:
-        """How many bytes there still are."""
+        """Number of unread bytes."""
         return len(self._body) - self._offset
 
     def take(self, kind: str, count: int) -> NDArray[Any]:
-        """The next values, as `Rows.take` says."""
+        """Read the next values, as in `PlyRows`."""
         dtype = np.dtype(self._order + kind)
         if count * dtype.itemsize > self.remaining:
             raise SceneError(SHORT)
@@ -112,7 +112,7 @@ class BinaryRows:
         return values
 
     def table(self, layout: Layout, rows: int) -> list[NDArray[Any]] | None:
-        """The next rows, as `Rows.table` says."""
+        """Peek at the next rows, as in `PlyRows`."""
         row_bytes = sum(np.dtype(kind).itemsize * count for kind, count in layout)
         if rows * row_bytes > self.remaining:
             return None
@@ -121,12 +121,12 @@ class BinaryRows:
         return [values[str(k)] for k in range(len(layout))]
 
     def skip(self, layout: Layout, rows: int) -> None:
-        """Move on by so many rows, as `Rows.skip` says."""
+        """Skip rows, as in `PlyRows`."""
         self._offset += rows * sum(np.dtype(kind).itemsize * count for kind, count in layout)
 
 
 def read_element(rows: PlyRows, element: Element) -> Columns:
-    """The columns of the next element. Raises SceneError where there are fewer rows than the header says."""
+    """Read the columns of the next element. Raises SceneError if there are fewer rows than in the header."""
     if element.rows == 0 or not element.properties:
         return {}
     if element.rows > rows.remaining // len(element.properties):
@@ -135,7 +135,7 @@ def read_element(rows: PlyRows, element: Element) -> Columns:
 
 
 def _uniform(rows: PlyRows, element: Element) -> Columns | None:
-    """All rows at once, where every list of a property is as long as its first; None where they are not."""
+    """Read all rows at once if the lists of each property have equal lengths; otherwise return None."""
     layout: Layout = []
     for p in element.properties:
         if p.count is not None:
@@ -181,21 +181,21 @@ def _row_by_row(rows: PlyRows, element: Element) -> Columns:
 
 def _length(value: float) -> int:
     if not 0 <= value < 2**31:
-        raise SceneError("a list of the .ply file has an odd length; export it again")
+        raise SceneError("a list of the .ply file has an invalid length; export it again")
     return int(value)
 
 
 def _whole(values: NDArray[Any]) -> NDArray[np.int64]:
-    """Indices; what is no whole number of a sane size becomes -2, which no vertex has."""
+    """Indices; a value that is no integer or too large becomes -2, which is always out of range."""
     is_whole = np.abs(values) < 2**40 if values.dtype.kind == "f" else np.ones(values.shape, np.bool_)
     return np.where(is_whole, values, -2).astype(np.int64)
 
 
 def read_body(rows: PlyRows, elements: Sequence[Element]) -> dict[str, Columns]:
-    """The columns of all elements by name, up to the faces; what follows them is not looked at. Raises SceneError."""
+    """Read the columns of all elements by name, up to the faces; later elements are ignored. Raises SceneError."""
     names = [element.name for element in elements]
     if any(a == b for a, b in pairwise(sorted(names))):
-        raise SceneError("the .ply file has two elements of one name; export it again")
+        raise SceneError("the .ply file has two elements with the same name; export it again")
     read: dict[str, Columns] = {}
     for element in elements:
         read[element.name] = read_element(rows, element)

@@ -86,22 +86,22 @@ SHORT = random_factors(99)
     ("changes", "message"),
     [
         ({"signature": b"!BDIF06R2!"}, "!BDIF06R2!.*zip"),
-        ({"signature": b"!FMF12FCER"}, "no decorrelated"),
+        ({"signature": b"!FMF12FCER"}, "not a decorrelated"),
         ({"model": 2}, "model 2"),
         ({"size": (2**31, 2)}, "rows of texels"),
-        ({"size": (100_000, 100_000)}, "can be kept"),
+        ({"size": (100_000, 100_000)}, "the limit is"),
         ({"size": (0, 5)}, "0 rows of texels"),
         ({"size": (7, 5)}, "damaged"),
         ({"channels": SHORT}, "99 × 30 values"),
-        (with_invalid_number(np.nan), "no numbers"),
-        (with_invalid_number(np.inf), "no numbers"),
-        (with_invalid_number(6e4) | {"model": 12}, "no numbers"),
-        (rotated(9, 90.0, 0.0), "below the horizon"),
-        (rotated(9, np.nan, 0.0), "below the horizon"),
-        (rotated(9, 70.5, np.inf), "below the horizon"),
-        (rotated(9, 70.5, 200.0), "evenly on rings"),
+        (with_invalid_number(np.nan), "not finite"),
+        (with_invalid_number(np.inf), "not finite"),
+        (with_invalid_number(6e4) | {"model": 12}, "not finite"),
+        (rotated(9, 90.0, 0.0), "not above the horizon"),
+        (rotated(9, np.nan, 0.0), "not above the horizon"),
+        (rotated(9, 70.5, np.inf), "not above the horizon"),
+        (rotated(9, 70.5, 200.0), "uniformly spaced on rings"),
         (rotated(9, 60.0, 288.0), "rings"),
-        ({"lights": np.concatenate([ANGLES[:5], ANGLES[5:] * [1.05, 1]])}, "not the same"),
+        ({"lights": np.concatenate([ANGLES[:5], ANGLES[5:] * [1.05, 1]])}, "are different"),
         ({"views": np.tile(ANGLES, (50, 1))}, "view directions"),
     ],
 )
@@ -119,7 +119,7 @@ def test_every_truncated_file_is_rejected(tmp_path):
         with pytest.raises(MaterialError):
             images(path)
     path.write_bytes(whole + b"\0")
-    with pytest.raises(MaterialError, match="should end"):
+    with pytest.raises(MaterialError, match="follow its end"):
         images(path)
 
 

@@ -65,13 +65,13 @@ def whole(path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda files: files.pop(FIRST), r"\(40, 90\) and seen from \(40, 0\).* is missing; put it"),
+        (lambda files: files.pop(FIRST), r"\(40, 90\) and view from \(40, 0\).* is missing; add it"),
         (lambda files: [files.pop(FIRST), files.pop(SECOND)], "is missing, the first of 2;"),
         (lambda files: [files.pop(n) for n in list(files) if "tl070" in n], "is missing, the first of 50;"),
         (lambda files: files.update({FIRST: declared_as(60_000, files[FIRST])}), "scale the images down"),
         (lambda files: files.update({FIRST: declared_as(11_000, files[FIRST])}), "scale the images down"),
-        (lambda files: files.update({FIRST: of_16_bits()}), "more than a byte a channel"),
-        (renamed(FIRST, FIRST.replace("tv040 pv000", "tv040 pv999")), "nowhere"),
+        (lambda files: files.update({FIRST: of_16_bits()}), "more than 8 bits per channel"),
+        (renamed(FIRST, FIRST.replace("tv040 pv000", "tv040 pv999")), "not above the horizon"),
         (lambda files: files.update({FIRST.replace("tv040/", "again/"): files[FIRST]}), "two images"),
         (lambda files: files.update({FIRST: files[FIRST][:60]}), "cannot be read"),
         (
@@ -82,10 +82,10 @@ def whole(path):
             lambda files: files.update({FIRST: make_image(DIRECTIONS[1], DIRECTIONS[2], kind="GIF")[0]}),
             "cannot be read",
         ),
-        (renamed(FIRST, FIRST.replace("tv040 pv000", "tv095 pv000")), "below the horizon"),
+        (renamed(FIRST, FIRST.replace("tv040 pv000", "tv095 pv000")), "not above the horizon"),
         (lambda files: files.clear(), "named by their directions"),
         (lambda files: files.update({"\x1b[2J\n" + FIRST.rpartition("/")[2]: b""}), r"of \?\[2J\?00000 tl040"),
-        (lambda files: files.update({FIRST: of_exr(np.full((6, 5, 3), np.nan))}), "no numbers"),
+        (lambda files: files.update({FIRST: of_exr(np.full((6, 5, 3), np.nan))}), "non-finite"),
     ],
 )
 def test_invalid_zips_are_rejected_with_the_reason(tmp_path, change, message):
@@ -100,7 +100,7 @@ def test_directions_that_are_not_on_uniform_rings_are_rejected(tmp_path):
             new = name.replace(" pl090 ", " pl100 ").replace("pv090.png", "pv100.png")
             files[new] = files.pop(name)
 
-    with pytest.raises(MaterialError, match="evenly on rings"):
+    with pytest.raises(MaterialError, match="uniformly spaced on rings"):
         ZippedBtf(zipped(tmp_path / "crooked.zip", crooked))
 
 
@@ -129,7 +129,12 @@ def test_large_images_are_downsampled_in_linear_values(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     ("content", "message"),
-    [(b"", "not a zip"), (b"hello", "not a zip"), (b"PK\x03\x04 and nothing", "cut off"), (b"PK" * 9999, "cut off")],
+    [
+        (b"", "not a zip"),
+        (b"hello", "not a zip"),
+        (b"PK\x03\x04 and nothing", "truncated"),
+        (b"PK" * 9999, "truncated"),
+    ],
 )
 def test_files_that_are_not_zips_are_rejected(tmp_path, content, message):
     (tmp_path / "no.zip").write_bytes(content)

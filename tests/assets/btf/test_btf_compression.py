@@ -109,7 +109,7 @@ def test_a_resumed_compression_gives_the_same_result(tmp_path):
     assert len(read) == 5 + 81  # results for another bound are not reused
 
 
-@pytest.mark.parametrize(("value", "message"), [(np.nan, "no numbers"), (-1.0, "negative"), (np.inf, "no numbers")])
+@pytest.mark.parametrize(("value", "message"), [(np.nan, "non-finite"), (-1.0, "negative"), (np.inf, "non-finite")])
 def test_invalid_values_are_rejected(value, message):
     images = Facets(kinds=3)
     good = images.get_view

@@ -36,7 +36,7 @@ def test_the_sandbox_returns_the_images_of_the_file(tmp_path: Path, kind: str) -
 
 def test_the_error_of_a_file_is_reported(tmp_path: Path) -> None:
     (tmp_path / "a.zip").write_bytes(b"PK, and no more")
-    with pytest.raises(MaterialError, match="cut off or damaged"):
+    with pytest.raises(MaterialError, match="truncated or damaged"):
         SandboxedViewArrays(tmp_path / "a.zip", *LIMITS)
 
 

@@ -93,7 +93,7 @@ def test_invalid_rings_are_rejected(described):
 
 @pytest.mark.parametrize("shift", [(0.0,), (0.0, 1.0), (0.0, -0.1), (0.0, np.nan)])
 def test_rotations_that_are_no_fraction_of_a_step_are_rejected(shift):
-    with pytest.raises(MaterialError, match="turned"):
+    with pytest.raises(MaterialError, match="ring shifts"):
         make_direction_grid(((0.0, 1), (30.0, 6)), shift)
 
 

@@ -68,7 +68,7 @@ def test_a_mesh_file_gives_the_same_tile(tmp_path):
 @pytest.mark.parametrize(
     ("text", "period", "error", "message"),
     [
-        (quad(1, 0, 2, 1, "x") + quad(5, 2, 3, 1, "x"), None, ParameterError, "3 × 2 metres"),
+        (quad(1, 0, 2, 1, "x") + quad(5, 2, 3, 1, "x"), None, ParameterError, "3 × 2 meters"),
         (quad(1, 0, 2, 1, "x"), 0.5, ParameterError, "half its width, 1"),
         (quad(1, 0, 2, 1, "x"), float("nan"), ParameterError, "period"),
         ("v 0 0 0\nv 1 0 0\nv 0 5 1\nf 1 2 3\n", None, ParameterError, "height of the mesh, 5"),

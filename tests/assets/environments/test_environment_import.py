@@ -73,7 +73,7 @@ def test_rest_lists_built_in_environments_first_and_shows_each(client, imported)
     ("content", "message"),
     [
         (b"\x89PNG\r\n\x1a\n" + b"0" * 100, "neither Radiance .hdr nor OpenEXR"),
-        (b"#?RADIANCE\n\n-Y 100000 +X 200000\n", "at most 16384×8192"),
+        (b"#?RADIANCE\n\n-Y 100000 +X 200000\n", "the limit is 16384×8192"),
         (b"#?RADIANCE\n\n-Y 4096 +X 8192\n", "claims 403 MB"),
         (b"", "empty: 0 bytes"),
     ],

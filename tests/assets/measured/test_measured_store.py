@@ -54,7 +54,9 @@ def test_another_file_with_the_same_id_is_detected(copied, planes, tmp_path):
     write_merl(tmp_path / "a.binary", planes)
     assert document["sha256"][:16] == identity
     record.write_text(json.dumps({**document, "sha256": identity + "0" * 48}))
-    with pytest.raises(MaterialError, match=f"another file is the measured material {identity}; delete that one first"):
+    with pytest.raises(
+        MaterialError, match=f"another file has the id of the measured material {identity}; delete that one first"
+    ):
         store_material(folder, tmp_path / "a.binary", "Mine")
     assert get_record(folder, identity).name == document["name"]
     del document["sha256"]  # as older stores have it

@@ -77,16 +77,16 @@ def put(at, form, *values):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda content: content.clear(), "does not begin"),
-        (lambda content: content.__delitem__(slice(7, None)), "does not begin"),
+        (lambda content: content.clear(), "does not start"),
+        (lambda content: content.__delitem__(slice(7, None)), "does not start"),
         (lambda content: content.__delitem__(slice(12, None)), "12 bytes"),
         (lambda content: content.__delitem__(slice(-1, None)), "34,992,011 bytes"),
         (lambda content: content.extend(b"\0"), "34,992,013 bytes"),
-        (put(0, "<3i", 90, 90, 360), "does not begin"),
-        (put(0, "<3i", 1_000_000_000, 1_000_000_000, 1_000_000_000), "does not begin"),
-        (put(0, "<3i", -90, -90, 180), "does not begin"),
-        (put(12 + 8 * 12345, "<d", math.nan), "not finite"),
-        (put(12 + 8 * 12345, "<d", -math.inf), "not finite"),
+        (put(0, "<3i", 90, 90, 360), "does not start"),
+        (put(0, "<3i", 1_000_000_000, 1_000_000_000, 1_000_000_000), "does not start"),
+        (put(0, "<3i", -90, -90, 180), "does not start"),
+        (put(12 + 8 * 12345, "<d", math.nan), "non-finite"),
+        (put(12 + 8 * 12345, "<d", -math.inf), "non-finite"),
         (put(12 + 8 * 12345, "<d", 1e300), "above 1e"),
     ],
 )

@@ -1,4 +1,4 @@
-"""How the still life looks before anybody edits it."""
+"""Materials of the unedited still life."""
 
 from __future__ import annotations
 
@@ -39,6 +39,6 @@ TERMS: dict[str, tuple[dict[str, Any], ...]] = {
 
 
 def materials() -> tuple[Material, ...]:
-    """The demo's materials, in the order the meshes number them."""
+    """Return the demo's materials, in the order of the meshes' material indices."""
     textures = {"Tray": {"diffuse": wood()}}
     return tuple(Material(name, terms, textures.get(name, {})) for name, terms in TERMS.items())

@@ -1,10 +1,11 @@
-"""Pearls that lie on what is under them: a graduated string, a heap in the bowl, and a few on the cloth."""
+"""Pearls resting on the surfaces below: a graduated string, a heap in the bowl, and a few on the cloth."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.scene.examples.still_life.grids import GridSurface, merge_surfaces, normalize, revolve, sphere
@@ -12,16 +13,16 @@ from relume.scene.examples.still_life.grids import GridSurface, merge_surfaces, 
 F64 = NDArray[np.float64]
 Height = Callable[[F64, F64], F64]
 
-GAP = 2e-5  # between things that touch, so that no ray starts inside the neighbour
+GAP = 2e-5  # between touching objects, so that no ray starts inside a neighbor
 
 
 def contact_height(height: Height, x: float, z: float, radius: float) -> float:
-    """Height of the centre of a sphere lowered at (x, z) until it touches the ground, metres.
+    """Height of a sphere's center after it is lowered at (x, z) until it touches the ground, meters.
 
     Args:
-        height: of the ground at any (x, z), metres.
-        x, z: where the sphere is lowered, metres.
-        radius: of the sphere, metres.
+        height: of the ground at any (x, z), meters.
+        x, z: of the center, meters.
+        radius: of the sphere, meters.
     """
     r = radius * np.sqrt(np.linspace(0, 1, 24))[:, None]
     phi = np.linspace(0, 2 * np.pi, 33)[None, :-1]
@@ -29,15 +30,17 @@ def contact_height(height: Height, x: float, z: float, radius: float) -> float:
     return float((ground + np.sqrt(np.maximum(radius**2 - r**2, 0))).max()) + GAP
 
 
-def place_along_path(height: Height, path: F64, radii: F64) -> F64:
-    """Centres of touching pearls that are threaded along a path, each lying on the ground.
+def place_along_path(
+    height: Height, path: Shaped[F64, "points 2"], radii: Shaped[F64, " pearls"]
+) -> Shaped[F64, "placed 3"]:
+    """Centers of touching pearls on a string along a path, each resting on the ground.
 
     Args:
-        height: of the ground at any (x, z), metres.
-        path: points in (x, z), metres. (n, 2)
-        radii: of the pearls in their order, metres. (num_pearls,)
+        height: of the ground at any (x, z), meters.
+        path: points in (x, z), meters.
+        radii: of the pearls in order, meters.
     Returns:
-        (num_pearls, 3), metres
+        In meters, only for the pearls that fit on the path.
     """
     steps = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
     centers: list[F64] = []
@@ -53,17 +56,19 @@ def place_along_path(height: Height, path: F64, radii: F64) -> F64:
     return np.array(centers)
 
 
-def pour_heap(height: Height, center: tuple[float, float], spread: float, radii: F64, seed: int) -> F64:
-    """Centres of pearls poured at one place: each takes the lowest of many spots that is free.
+def pour_heap(
+    height: Height, center: tuple[float, float], spread: float, radii: Shaped[F64, " pearls"], seed: int
+) -> Shaped[F64, "pearls 3"]:
+    """Centers of pearls poured into a heap: each takes the lowest free position among random candidates.
 
     Args:
-        height: of the ground at any (x, z), metres.
-        center: of the place in (x, z), metres.
-        spread: how far from there the spots lie, metres.
-        radii: of the pearls in the order of their fall, metres. (num_pearls,)
-        seed: of the spots.
+        height: of the ground at any (x, z), meters.
+        center: of the heap in (x, z), meters.
+        spread: largest distance of candidates from the center, meters.
+        radii: of the pearls in the order in which they fall, meters.
+        seed: of the candidates.
     Returns:
-        (num_pearls, 3), metres
+        In meters.
     """
     rng = np.random.default_rng(seed)
     centers = np.zeros((0, 3))
@@ -81,8 +86,8 @@ def pour_heap(height: Height, center: tuple[float, float], spread: float, radii:
     return centers
 
 
-def pearls(centers: F64, radii: F64) -> GridSurface:
-    """Spheres at centres (n, 3), each turned a little so that no two show the same facets."""
+def pearls(centers: Shaped[F64, "pearls 3"], radii: Shaped[F64, " pearls"]) -> GridSurface:
+    """Return spheres with random rotations, so that no two show the same facets."""
     rng = np.random.default_rng(7)
     spheres = []
     for center, radius in zip(centers, radii, strict=True):
@@ -93,8 +98,8 @@ def pearls(centers: F64, radii: F64) -> GridSurface:
     return merge_surfaces(spheres)
 
 
-def bowl_profile() -> F64:
-    """(radius, height) of the bowl's section: from the middle inside over the lip down to the foot. (n, 2)"""
+def bowl_profile() -> Shaped[F64, "rows 2"]:
+    """(radius, height) along the bowl's section, from the inner center over the lip to the foot."""
     inside = np.array(
         [[0.0, 0.0075], [0.012, 0.0078], [0.024, 0.0115], [0.034, 0.020], [0.0405, 0.032], [0.0440, 0.0445]]
     )
@@ -106,22 +111,22 @@ def bowl_profile() -> F64:
 
 
 def bowl() -> GridSurface:
-    """A small bowl, its foot at y = 0."""
+    """Return a small bowl with its foot at y = 0."""
     profile = bowl_profile()
     slope = np.gradient(profile, axis=0)
     normals = normalize(np.column_stack([-slope[:, 1], slope[:, 0]]))
     return revolve(np.column_stack([profile, normals]), 56)
 
 
-def bowl_height(x: F64, z: F64) -> F64:
-    """Height of the bowl's upper side above its foot; -1 beside it."""
+def bowl_height(x: Shaped[F64, "*points"], z: Shaped[F64, "*points"]) -> Shaped[F64, "*points"]:
+    """Height of the bowl's upper side above its foot; -1 outside the bowl."""
     profile = bowl_profile()
     upper = profile[: int(profile[:, 0].argmax()) + 1]
     return np.interp(np.hypot(x, z), upper[:, 0], upper[:, 1], right=-1.0)
 
 
 def _chaikin(points: F64, rounds: int) -> F64:
-    """Corner cutting: the curve a polygon suggests, ends kept."""
+    """Chaikin's corner cutting with fixed ends."""
     for _ in range(rounds):
         cut = np.stack([0.75 * points[:-1] + 0.25 * points[1:], 0.25 * points[:-1] + 0.75 * points[1:]], 1)
         points = np.concatenate([points[:1], cut.reshape(-1, 2)[1:-1], points[-1:]])

@@ -1,10 +1,11 @@
-"""The demo's arrangement: who stands where, and from where it is seen."""
+"""Arrangement of the objects and cameras in the demo scene."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.scene.examples.still_life import cloth, pearls, tray
@@ -21,7 +22,7 @@ BOWL_POSITION = (0.143, 0.050)
 
 
 def meshes() -> tuple[Mesh, ...]:
-    """All objects in world space, materials numbered as in `relume.scene.examples.still_life.palette`."""
+    """Return all objects in world space; material indices as in `relume.scene.examples.still_life.palette`."""
     pot = teapot(14, TEAPOT_HEIGHT).transform(
         rotation_y(TEAPOT_ANGLE_DEG), (TEAPOT_POSITION[0], FLOOR_Y, TEAPOT_POSITION[1])
     )
@@ -39,7 +40,7 @@ def meshes() -> tuple[Mesh, ...]:
 
 
 def cameras() -> tuple[Camera, ...]:
-    """Two views at 4:3, about 55 mm on a full-frame sensor."""
+    """Return two cameras for 4:3 images, with a focal length of about 55 mm on a full-frame sensor."""
     yfov = float(np.radians(24.0))
     return (
         look_at("front", (0.09, 0.350, 0.91), (0.008, 0.050, 0.030), yfov),
@@ -48,11 +49,11 @@ def cameras() -> tuple[Camera, ...]:
 
 
 def look_at(name: str, position: tuple[float, float, float], target: tuple[float, float, float], yfov: float) -> Camera:
-    """A level camera at `position` that has `target` in the middle of its picture.
+    """Return a level camera at `position` with `target` in the center of its image.
 
     Args:
         name: of the view.
-        position, target: world space, metres; neither right above the other.
+        position, target: world space, meters; the view direction must not be vertical.
         yfov: vertical field of view, radians.
     """
     backward = np.subtract(position, target)
@@ -64,8 +65,8 @@ def look_at(name: str, position: tuple[float, float, float], target: tuple[float
     return Camera(name, to_world, yfov)
 
 
-def ground_height(x: F64, z: F64) -> F64:
-    """Height of tray, cloth and table together."""
+def ground_height(x: Shaped[F64, "*points"], z: Shaped[F64, "*points"]) -> Shaped[F64, "*points"]:
+    """Height of the tray, cloth and table combined."""
     return np.maximum(cloth.cloth_height(x, z), tray.tray_height(x, z) + TRAY_Y)
 
 
@@ -75,7 +76,7 @@ def _pearls() -> GridSurface:
 
 
 def _string() -> tuple[F64, F64]:
-    """A graduated string: from behind the bowl, round the pot's foot, over the rim and onto the cloth."""
+    """A graduated string: from behind the bowl, around the teapot's foot, over the tray's rim and onto the cloth."""
     corners = np.array(
         [
             [0.178, -0.045], [0.120, -0.035], [0.082, 0.020], [0.070, 0.078], [0.018, 0.092], [-0.040, 0.118],
@@ -97,7 +98,7 @@ def _heap() -> tuple[F64, F64]:
 
 
 def _loose() -> tuple[F64, F64]:
-    """Three large ones that rolled away."""
+    """Three large, scattered pearls."""
     radii = np.array([0.0135, 0.0105, 0.0085])
     positions = ((0.150, 0.205), (0.182, 0.193), (-0.168, 0.090))
     centers = [
@@ -112,8 +113,8 @@ def _shift_height(
     return lambda x, z: height(x - position[0], z - position[1]) + lift
 
 
-def smooth_path(corners: F64) -> F64:
-    """A curve (n, 2) through corners (m, 2) without sharp turns: a Catmull–Rom spline."""
+def smooth_path(corners: Shaped[F64, "corners 2"]) -> Shaped[F64, "points 2"]:
+    """Interpolate corners by a Catmull–Rom spline."""
     padded = np.concatenate([2 * corners[:1] - corners[1:2], corners, 2 * corners[-1:] - corners[-2:-1]])
     t = np.linspace(0, 1, 24, endpoint=False)[:, None]
     spans = []

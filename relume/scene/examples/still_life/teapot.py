@@ -1,8 +1,8 @@
 """Martin Newell's teapot (1975): 32 bicubic Bézier patches from his control points.
 
-Rim, body, lid and bottom are quarter turns of a profile: the four control points of a ring of radius r stand at
+Rim, body, lid and bottom are quarter turns of a profile: the four control points of a ring with radius r are
 r·(1, 0), r·(1, 0.56), r·(0.56, 1), r·(0, 1). Handle and spout are two patches each and their mirror images.
-His axes: +Z up, spout towards +X, unit roughly two inches.
+Newell's axes: +Z up, spout toward +X, unit roughly two inches.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.scene.examples.still_life.grids import GridSurface, grid_faces, merge_surfaces
@@ -17,9 +18,9 @@ from relume.scene.examples.still_life.grids import GridSurface, grid_faces, merg
 F64 = NDArray[np.float64]
 
 RING = np.array([[1.0, 0.0], [1.0, 0.56], [0.56, 1.0], [0.0, 1.0]])
-LID_FIT = 1.077  # the lid as digitised is narrower than the rim by this factor and would hang in the air
+LID_FIT = 1.077  # the original lid is narrower than the rim by this factor and would float
 
-# (radius, height) of the control rings, four to a patch, top to bottom.
+# (radius, height) of the control rings, four per patch, top to bottom.
 PROFILES: dict[str, tuple[tuple[tuple[float, float], ...], ...]] = {
     "rim": (((1.4, 2.4), (1.3375, 2.53125), (1.4375, 2.53125), (1.5, 2.4)),),
     "body": (
@@ -33,7 +34,7 @@ PROFILES: dict[str, tuple[tuple[tuple[float, float], ...], ...]] = {
     "bottom": (((1.5, 0.15), (1.5, 0.075), (1.425, 0.0), (0.0, 0.0)),),
 }
 
-# Half sections at y <= 0: rows run across (y = 0, -w, -w, 0), one section per row of the table below.
+# Half sections at y <= 0: rows are (y = 0, -w, -w, 0), one section per row of the tables below.
 HANDLE = (
     (((-1.6, 0, 2.025), (-1.6, -0.3, 2.025), (-1.5, -0.3, 2.25), (-1.5, 0, 2.25)),
      ((-2.3, 0, 2.025), (-2.3, -0.3, 2.025), (-2.5, -0.3, 2.25), (-2.5, 0, 2.25)),
@@ -56,12 +57,12 @@ SPOUT = (
 )  # fmt: skip
 
 
-def patches() -> Iterator[tuple[str, F64]]:
-    """The 32 patches: name of the part and control points (4, 4, 3), the first axis down, the second round."""
+def patches() -> Iterator[tuple[str, Shaped[F64, "4 4 3"]]]:
+    """Yield the 32 patches: name of the object part and control points, first axis downward, second around."""
     for name, profiles in PROFILES.items():
         for profile in profiles:
             control = np.array([[(r * x, r * y, z) for x, y in RING] for r, z in profile])
-            if profile[1] == (0.8, 3.15):  # the knob: Newell wrote 0.45 for 0.8 × 0.56
+            if profile[1] == (0.8, 3.15):  # the knob: Newell's table has 0.45 for 0.8 × 0.56
                 control[1, 1, 1] = control[1, 2, 0] = 0.45
             for quarter in range(4):
                 c, s = round(np.cos(quarter * np.pi / 2)), round(np.sin(quarter * np.pi / 2))
@@ -73,18 +74,18 @@ def patches() -> Iterator[tuple[str, F64]]:
             yield name, half_patch * (1.0, -1.0, 1.0)
 
 
-def bernstein(t: F64) -> tuple[F64, F64]:
-    """The four cubic Bernstein polynomials and their derivatives. (n, 4) each"""
+def bernstein(t: Shaped[F64, " n"]) -> tuple[Shaped[F64, "n 4"], Shaped[F64, "n 4"]]:
+    """Return the four cubic Bernstein polynomials and their derivatives."""
     s = 1 - t
     value = np.stack([s**3, 3 * t * s**2, 3 * t**2 * s, t**3], -1)
     slope = np.stack([-3 * s**2, 3 * s * (s - 2 * t), 3 * t * (2 * s - t), 3 * t**2], -1)
     return value, slope
 
 
-def tessellate(control: F64, num_segments: int) -> GridSurface:
-    """One patch as a grid of num_cells² cells with the patch's own normals, tangents along the second axis.
+def tessellate(control: Shaped[F64, "4 4 3"], num_segments: int) -> GridSurface:
+    """Tessellate a patch into num_segments² cells with analytic normals and tangents along the second axis.
 
-    Where a patch closes to a point its derivative vanishes; frames are taken a hair inside the edge.
+    Derivatives vanish where a patch degenerates to a point, so frames are evaluated slightly inside the edge.
     """
     t = np.linspace(0, 1, num_segments + 1)
     value, _ = bernstein(t)
@@ -99,7 +100,7 @@ def tessellate(control: F64, num_segments: int) -> GridSurface:
 
 
 def teapot(num_segments: int, height: float) -> GridSurface:
-    """The whole teapot, +Y up, spout towards +X, standing at the origin; `height` in metres."""
+    """Return the complete teapot, +Y up, spout toward +X, standing at the origin; `height` in meters."""
     scale = height / 3.15
     surfaces = []
     for name, control in patches():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.scene.examples.still_life.grids import (
@@ -24,8 +25,8 @@ FILLET, SLOPE, WALL_LENGTH = 0.010, np.radians(66.0), 0.014
 TUBE = 0.0042
 
 
-def rim_profile() -> F64:
-    """(distance outside the floor, height) from the floor's edge over the lip down to the underside. (n, 2)"""
+def rim_profile() -> Shaped[F64, "rows 2"]:
+    """(distance from the floor's outline, height) from the floor's edge over the lip down to the underside."""
     a = np.linspace(0, SLOPE, 9)
     fillet = np.column_stack([FILLET * np.sin(a), FLOOR + FILLET * (1 - np.cos(a))])
     up = np.array([np.cos(SLOPE), np.sin(SLOPE)])
@@ -38,8 +39,8 @@ def rim_profile() -> F64:
     return np.concatenate([fillet, wall, lip, down])
 
 
-def floor_outline(num_per_corner: int = 12) -> tuple[F64, F64]:
-    """The floor's boundary and its outward normals, closed (last = first), in (x, z)."""
+def floor_outline(num_per_corner: int = 12) -> tuple[Shaped[F64, "points 2"], Shaped[F64, "points 2"]]:
+    """Return the floor's boundary and its outward normals, closed (last = first), in (x, z)."""
     points, normals = [], []
     for corner, (sx, sz) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
         phi = (corner + np.linspace(0, 1, num_per_corner)) * np.pi / 2
@@ -50,21 +51,21 @@ def floor_outline(num_per_corner: int = 12) -> tuple[F64, F64]:
     return np.concatenate([outline, outline[:1]]), np.concatenate([outward, outward[:1]])
 
 
-def distance_outside(x: F64, z: F64) -> F64:
+def distance_outside(x: Shaped[F64, "*points"], z: Shaped[F64, "*points"]) -> Shaped[F64, "*points"]:
     """Signed distance from the floor's outline, negative inside."""
     q = np.abs(np.stack([x, z], -1)) - (HALF_SIZE - CORNER)
     return np.asarray(np.linalg.norm(np.maximum(q, 0), axis=-1) + np.minimum(q.max(-1), 0) - CORNER)
 
 
-def tray_height(x: F64, z: F64) -> F64:
-    """Height of the tray's upper side above its underside; -1 beside it."""
+def tray_height(x: Shaped[F64, "*points"], z: Shaped[F64, "*points"]) -> Shaped[F64, "*points"]:
+    """Height of the tray's upper side above its underside; -1 outside the tray."""
     profile = rim_profile()
     upper = profile[: int(profile[:, 0].argmax()) + 1]
     return np.interp(distance_outside(x, z), upper[:, 0], upper[:, 1], right=-1.0)
 
 
 def tray() -> GridSurface:
-    """The tray, its underside at y = 0, centred at the origin; texture coordinates from above, grain along x."""
+    """Return the tray, its underside at y = 0, centered at the origin; UV coordinates from above, grain along x."""
     outline, outward = floor_outline()
     profile = rim_profile()
     ring = outline[None] + profile[:, None, :1] * outward[None]
@@ -80,7 +81,7 @@ def _top_view_uvs(points: F64) -> F64:
 
 
 def _disc(boundary: F64, upward: bool) -> GridSurface:
-    """A flat fan inside a convex boundary that runs from +X towards +Z."""
+    """A flat fan inside a convex boundary that runs from +X toward +Z."""
     center = boundary.mean(0, keepdims=True)
     points = np.concatenate([boundary, center])
     index = np.arange(len(boundary))
@@ -93,7 +94,7 @@ def _disc(boundary: F64, upward: bool) -> GridSurface:
 
 
 def handles() -> GridSurface:
-    """Two bows of round rod at the short ends, fixed to the rim with a knob at each foot."""
+    """Return two curved handles at the short ends, with a knob at each foot."""
     t = np.linspace(0, np.pi, 41)
     flat = np.sign(np.cos(t)) * np.abs(np.cos(t)) ** 0.7
     bow = np.column_stack([0.034 * np.sin(t) ** 0.8, 0.020 * np.sin(t), 0.052 * flat])
@@ -105,13 +106,13 @@ def handles() -> GridSurface:
     return merge_surfaces([handle, handle.transform(half_turn, (0.0, 0.0, 0.0))])
 
 
-def tube(path: F64, radius: float, num_sides: int) -> GridSurface:
-    """A round rod along a path that never runs straight up, open at both ends.
+def tube(path: Shaped[F64, "points 3"], radius: float, num_sides: int) -> GridSurface:
+    """Return a tube along a path without vertical segments, open at both ends.
 
     Args:
-        path: its middle, metres. (n, 3)
-        radius: metres.
-        num_sides: of the polygon that stands for its circle.
+        path: center line, meters.
+        radius: meters.
+        num_sides: of the polygon that approximates its circle.
     """
     forward = normalize(np.gradient(path, axis=0))
     right = normalize(np.cross(forward, [0.0, 1.0, 0.0]))

@@ -1,4 +1,4 @@
-"""Wood grain as an image: growth rings cut lengthwise, with fine pores, from seeded noise."""
+"""Wood grain as a texture: growth rings cut lengthwise, with fine pores, from seeded noise."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DARK = np.array([0.085, 0.029, 0.010])
 
 
 def wood() -> Texture:
-    """Linear RGB reflectance, grain along u. (512, 512, 3)"""
+    """Return linear RGB reflectance with the grain along u, 512 × 512 texels."""
     rng = np.random.default_rng(1975)
     v = np.linspace(0, 1, SIZE)[:, None]
     wander = 0.16 * _noise(rng, 5, 2) + 0.035 * _noise(rng, 14, 5)
@@ -30,7 +30,7 @@ def wood() -> Texture:
 
 
 def _noise(rng: np.random.Generator, rows: int, columns: int) -> F64:
-    """Smooth noise in about [-1, 1] with so many features down and along. (SIZE, SIZE)"""
+    """Smooth noise in about [-1, 1] with `rows` features vertically and `columns` horizontally. (SIZE, SIZE)"""
     coarse = rng.uniform(-1, 1, (rows + 1, columns + 1))
     fine = zoom(coarse, (SIZE / (rows + 1), SIZE / (columns + 1)), order=3, grid_mode=True, mode="nearest")
     return np.asarray(fine[:SIZE, :SIZE], np.float64)
