@@ -1,5 +1,4 @@
-/** What the server and the editor say to each other: the generated messages, and the look document they carry, with the
- * names that the editor has for what is in them. */
+/** Types of the protocol: the generated messages and look document, with the editor's type names. */
 import type * as doc from "./look.gen";
 import type * as gen from "./protocol.gen";
 
@@ -66,7 +65,7 @@ export type PatchOp = gen.PatchOperation;
 
 export type Fidelity = gen.FrameHeader["fidelity"];
 
-/** A partial term: omitted fields are as its model says. */
+/** A partial term: omitted fields have their model's defaults. */
 export type Term = Pick<doc.TermLook, "model" | "color"> & Partial<doc.TermLook>;
 export type ParamValue = doc.TermLook["params"][string];
 export type CurveEdits = doc.TermLook["curves"][string];
@@ -84,7 +83,7 @@ export type MetalnessBody = Omit<gen.MetalnessBody, "terms"> & { terms: Term[] }
 export type BtfBody = Omit<gen.BtfBody, "terms"> & { terms: Term[] };
 export type MaterialBody = Omit<gen.MaterialBody, "terms"> & { terms: Term[] };
 
-/** What a link carries; its look is complete. */
+/** A shared state; its look is complete. */
 export type ShareBody = Omit<gen.ShareBody, "look"> & { look: Look };
 
 /** A scene, its default terms in look-document form. */

@@ -58,7 +58,7 @@ describe("History", () => {
   test("undone steps can be kept: nothing that comes takes them away", async () => {
     [1, 2, 3].forEach((v) => change(v));
     const saved = { name: "Look 1", look: LOOK };
-    history.record({ kind: "shelf", label: "Save Look 1", before: null, after: saved });
+    history.record({ kind: "savedLook", label: "Save Look 1", before: null, after: saved });
     await goTo(1);
     expect(history.commitUndone()).toBe(true);
     expect(history.canRedo).toBe(false);
@@ -73,7 +73,7 @@ describe("History", () => {
       "Back to “to 1”",
       "to 7",
     ]);
-    expect(history.steps.value[4]).toMatchObject({ kind: "shelf", before: saved, after: null });
+    expect(history.steps.value[4]).toMatchObject({ kind: "savedLook", before: saved, after: null });
     await undo();
     expect(value).toBe(1);
     await undo();
@@ -128,7 +128,7 @@ describe("History", () => {
   });
 
   test("an operation that fails to undo leaves the cursor where it was", async () => {
-    history.record({ kind: "shelf", label: "delete look", before: { name: "Look", look: {} }, after: null });
+    history.record({ kind: "savedLook", label: "delete look", before: { name: "Look", look: {} }, after: null });
     await expect(history.goTo(0, () => Promise.reject(new Error("offline")))).rejects.toThrow("offline");
     expect(history.cursor.value).toBe(1);
     expect(history.canUndo).toBe(true);

@@ -38,7 +38,7 @@ describe("the kept history", () => {
 
   test("keeps what can be redone, and steps of saved looks", () => {
     const { snapshot, looks } = historyOf(EDITS.slice(0, 3));
-    const saved: Step = { kind: "shelf", label: "Save Look", before: null, after: { name: "Look", look: LOOK } };
+    const saved: Step = { kind: "savedLook", label: "Save Look", before: null, after: { name: "Look", look: LOOK } };
     const mixed = { steps: [...snapshot.steps.slice(0, 1), saved, ...snapshot.steps.slice(1)], cursor: 2 };
     expect(read(serializeHistory(mixed, LONG, none), looks[1] as Look)).toEqual(mixed);
   });

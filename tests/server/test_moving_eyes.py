@@ -330,13 +330,13 @@ def test_a_browser_that_draws_itself_gets_what_has_changed_and_no_frame_for_an_e
     first = arrays_in(tables)
     if tables.header["fidelity"] == "preview":
         until_fine(session, 0)
-    assert {"even", "materials", "vectors/0", "sky"} <= set(first)
+    assert {"isotropic", "materials", "vectors/0", "environment"} <= set(first)
     session.send_message(**eye(view, 2, 0.4), refine="none")
     assert arrays_in(tables_of(session)) == {}
     session.edit(1, f"/materials/{material}/terms/0/color", [0.1, 0.2, 0.9])
     recoloured = tables_of(session)
     assert recoloured.header["revision"] == 1
-    assert not np.array_equal(arrays_in(recoloured)["even"], first["even"])
+    assert not np.array_equal(arrays_in(recoloured)["isotropic"], first["isotropic"])
 
 
 def test_what_a_shader_keeps_is_there_once_for_all(client: TestClient, bake: str) -> None:
@@ -346,8 +346,8 @@ def test_what_a_shader_keeps_is_there_once_for_all(client: TestClient, bake: str
     assert found["num_basis"] == len(found["recurrence"]["order"]) + sum(m > 0 for m in found["recurrence"]["order"])
     arrays = {name: client.get(f"/api/bakes/{bake}/probes/{name}") for name in found["arrays"]}
     assert all("immutable" in each.headers["cache-control"] for each in arrays.values())
-    num_points = len(arrays["places"].content) // 16
-    assert len(arrays["seen_lights"].content) == num_points * 16  # bits of at most 128 lights
+    num_points = len(arrays["probe_positions"].content) // 16
+    assert len(arrays["visible_lights"].content) == num_points * 16  # bits of at most 128 lights
     corners = np.frombuffer(arrays["corners"].content, np.uint32).reshape(-1, 4)
     assert corners[:, :3].max() < len(arrays["positions"].content) // 16
     sides = np.frombuffer(arrays["sides"].content, np.uint32).reshape(-1, 4)

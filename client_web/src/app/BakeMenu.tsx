@@ -1,4 +1,4 @@
-/** What light the open bake has and how large it is; bake the scene again with other light, finer or coarser. */
+/** The open bake's method and size; bakes the scene again with another method, size or quality. */
 import { useState } from "preact/hooks";
 import type { CameraPose } from "../viewport/cameras/orbit";
 import { methodLabelsOf } from "../session/scene/bakeMethods";
@@ -26,15 +26,15 @@ export function BakeMenu() {
       <button
         aria-expanded={open}
         disabled={current === null}
-        title={size === null ? "Bake" : `${methodLabels.label}. Bake again, with other light or another size`}
+        title={size === null ? "Bake" : `${methodLabels.label}. Bake again with another method or size`}
         onClick={() => setOpen(!open)}
       >
         {size === null ? "Bake" : `${size.width}×${size.height}, ${methodLabels.short}`} ▾
       </button>
       {open && current !== null && (
         <div class="menu-body">
-          <p>Bake this scene again. The picture stays; the new bake takes its place when it is ready.</p>
-          {isOutdatedBake && <p>Another version of relume made the one you see. It is as good as it was; this one may differ.</p>}
+          <p>Bake this scene again. The picture stays; the new bake replaces it when ready and keeps your edits.</p>
+          {isOutdatedBake && <p>This bake was made by another version of relume. It still works; a new bake may look slightly different.</p>}
           <Presets
             scene={current}
             method={methodLabels.name}

@@ -1,4 +1,4 @@
-/** While files are held over the page: what becomes of which. */
+/** Shown while files are dragged over the page: where each type goes. */
 import { hoveredMaterial } from "../state/selection";
 
 export function DropHint() {
@@ -7,11 +7,11 @@ export function DropHint() {
     <div class="drop-hint">
       <dl>
         <dt>Images, texture folders</dt>
-        <dd>{material === null ? "drop them on an object" : `onto “${material}”`}</dd>
+        <dd>{material === null ? "drop on an object" : `apply to “${material}”`}</dd>
         <dt>HDRI (.hdr, .exr)</dt>
-        <dd>lights the scene</dd>
-        <dt>Measured (.binary, .btf)</dt>
-        <dd>into the Library</dd>
+        <dd>light the scene</dd>
+        <dt>Measured materials (.binary, .btf)</dt>
+        <dd>add to the Library</dd>
       </dl>
     </div>
   );

@@ -1,4 +1,4 @@
-/** The editor's layout: what stands where. Everything but the image collapses. */
+/** The editor's layout. Everything but the image collapses. */
 import { ReadOnly } from "./account/Account";
 import { CommentsPanel } from "../panels/collaboration/CommentsPanel";
 import { Inspector } from "../panels/inspector/Inspector";
@@ -22,8 +22,8 @@ import { useKeyboard } from "./keyboard";
 
 export function Editor() {
   useKeyboard();
-  const { outline, library, truth: comparison, comments } = panelWidths.value;
-  const widths = { outline, library, truth: comparison, comments, inspector: inspectorShownWidth.value };
+  const { outline, library, comparison, comments } = panelWidths.value;
+  const widths = { outline, library, comparison, comments, inspector: inspectorShownWidth.value };
   const style = Object.fromEntries(Object.entries(widths).map(([name, width]) => [`--${name}`, `${width}px`]));
   const isPanelShown = (name: SidePanel) => shownPanels.value.includes(name);
   const isDropTarget = useFileDrop(handleDrop);
@@ -35,7 +35,7 @@ export function Editor() {
         <Viewport />
         {isDropTarget && <DropHint />}
         {isPanelShown("library") && mayEdit.value && <LibraryPanel />}
-        {isPanelShown("truth") && <ComparisonPanel />}
+        {isPanelShown("comparison") && <ComparisonPanel />}
         {isPanelShown("comments") && <CommentsPanel />}
         {isPanelShown("inspector") && (
           <aside class="side" aria-label="Inspector">

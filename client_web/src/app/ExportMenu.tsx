@@ -1,4 +1,4 @@
-/** Images to take away: PNG and EXR with one click each; EXR without its layers, and turntables of views that move. */
+/** Export: PNG and EXR with one click each; more EXR variants, and turntables of free-camera views. */
 import { useState } from "preact/hooks";
 import { exportExr, exportPng, exportTurntable, TURNTABLE_FRAMES, turntableRotation, type TurntableRotation } from "../panels/looks/exportImage";
 import { exporting } from "../panels/looks/renderJob";
@@ -9,9 +9,9 @@ import { displayedFrames } from "../state/display";
 import { look } from "../state/look";
 import { hasFreeCamera, sideBySide, activeViewName } from "../state/views";
 
-/** What an export is of: with several views shown it must be said. */
+/** The exported view, named when several views are shown. */
 function exportTargetLabel(): string {
-  return sideBySide.value ? `the view “${activeViewName.value}”` : "the picture";
+  return sideBySide.value ? `view “${activeViewName.value}”` : "the picture";
 }
 
 interface ExportOption {
@@ -23,38 +23,38 @@ interface ExportOption {
 const IMAGE_EXPORTS: ExportOption[] = [
   {
     label: "EXR with layers",
-    help: "One for each light and each kind of light path, beside the picture",
+    help: "Beauty plus one layer per light and per light path",
     run: () => exportExr(true),
   },
   {
     label: "EXR with light groups",
-    help: "Direct and reflected light of each light; together they are the picture",
+    help: "Direct and indirect light of each light; they add up to the beauty layer",
     run: () => exportExr("light_groups"),
   },
-  { label: "EXR, the picture alone", help: "Quicker, and a smaller file", run: () => exportExr(false) },
+  { label: "EXR, beauty only", help: "Faster, smaller", run: () => exportExr(false) },
 ];
 
 const TURNTABLE_EXPORTS: ExportOption[] = [
   {
-    label: "Turntable, quick",
-    help: `${TURNTABLE_FRAMES} frames once around, as the view looks while it moves; PNG in a ZIP`,
+    label: "Turntable, fast",
+    help: `${TURNTABLE_FRAMES} frames, approximate as while the camera moves; PNG sequence in a ZIP`,
     run: () => exportTurntable("png", "interactive"),
   },
   {
-    label: "Turntable, exact",
-    help: `Each of ${TURNTABLE_FRAMES} frames as where the eye rests; takes as long for each`,
+    label: "Turntable, full quality",
+    help: `${TURNTABLE_FRAMES} frames at full quality (slow)`,
     run: () => exportTurntable("png", "exact"),
   },
-  { label: "Turntable as a video", help: "The quick one as MP4", run: () => exportTurntable("mp4", "interactive") },
+  { label: "Turntable video", help: "The fast turntable as MP4", run: () => exportTurntable("mp4", "interactive") },
 ];
 
 const TURNTABLE_LABELS: Record<TurntableRotation, string> = {
-  camera: "the eye goes around",
-  object: "the object turns, under light that stays",
-  environment: "the environment turns alone",
+  camera: "Rotate camera",
+  object: "Rotate object, fixed lights",
+  environment: "Rotate environment",
 };
 
-/** What the turntables turn. */
+/** Chooses what rotates in a turntable. */
 function TurntableSelect() {
   return (
     <li>
@@ -72,14 +72,14 @@ function TurntableSelect() {
   );
 }
 
-/** Which color space EXR files are in, where the server has a config. */
+/** Chooses the color space of EXR files, if the server has an OpenColorIO config. */
 function ColorSpaceSelect() {
   return (
     <li>
       <label>
-        EXR in
+        EXR color space
         <select value={availableExrSpace.value ?? ""} onChange={(event) => (exrSpace.value = event.currentTarget.value)}>
-          <option value="">linear Rec. 709</option>
+          <option value="">Linear Rec. 709</option>
           {exrSpaces.value.map((name) => (
             <option key={name} value={name}>
               {name}
@@ -98,7 +98,7 @@ export function ExportMenu() {
   const busy = isUnavailable || exporting.value !== null;
   const onEscape = (event: KeyboardEvent) => {
     if (event.key !== "Escape" || !open) return;
-    event.stopPropagation(); // a menu that the buttons are in stays
+    event.stopPropagation(); // keeps an enclosing menu open
     setOpen(false);
   };
   return (
@@ -112,13 +112,13 @@ export function ExportMenu() {
           PNG
         </button>
         <button
-          title={`Export the linear radiance of ${exportTargetLabel()}${availableExrSpace.value === null ? "" : ` in ${availableExrSpace.value}`}, with a layer for each light${lightFilterText()}`}
+          title={`Export the linear radiance of ${exportTargetLabel()}${availableExrSpace.value === null ? "" : ` in ${availableExrSpace.value}`}, with one layer per light${lightFilterText()}`}
           disabled={busy}
           onClick={() => void exportExr(true)}
         >
           EXR
         </button>
-        <button aria-label="More ways to export" title="More ways to export" aria-expanded={open} onClick={() => setOpen(!open)}>
+        <button aria-label="More export formats" title="More export formats" aria-expanded={open} onClick={() => setOpen(!open)}>
           ▾
         </button>
       </div>

@@ -1,4 +1,4 @@
-/** The keyboard map. Lies over a corner of the image, never in its way for long: Escape or ? closes it. */
+/** The list of keyboard shortcuts, over a corner of the image; Escape or ? closes it. */
 import { useEffect, useRef } from "preact/hooks";
 import { helpOpen } from "../state/panels";
 import { IconButton } from "../ui/IconButton";
@@ -13,9 +13,9 @@ export function Help() {
   useReturnFocus(panel, true);
   useEffect(() => panel.current?.focus(), []);
   return (
-    <div class="help" ref={panel} tabIndex={-1} role="dialog" aria-label="Keyboard map">
+    <div class="help" ref={panel} tabIndex={-1} role="dialog" aria-label="Keyboard shortcuts">
       <header class="panel-head">
-        <h2>Keyboard</h2>
+        <h2>Keyboard shortcuts</h2>
         <IconButton icon="close" label="Close" keys="Esc" onClick={() => (helpOpen.value = false)} />
       </header>
       <div class="help-groups">
@@ -35,7 +35,7 @@ export function Help() {
           </dl>
         ))}
         <dl>
-          <h3>With the focus</h3>
+          <h3>When focused</h3>
           {FOCUS_KEYS.map(([label, keys]) => (
             <div key={label}>
               <dt>{label}</dt>

@@ -1,4 +1,4 @@
-/** A mark by the scene's name where its import had something to say, and the list of it. */
+/** A button beside the scene's name that opens its import warnings. */
 import { useState } from "preact/hooks";
 import { warningCounts, ImportWarnings } from "../start/ImportWarnings";
 import { scene } from "../state/scene";
@@ -7,11 +7,11 @@ export function ImportWarningsMenu() {
   const [open, setOpen] = useState(false);
   const warnings = scene.value?.warnings ?? [];
   if (warnings.length === 0) return null;
-  const label = `What the import says: ${warningCounts(warnings)}`;
+  const label = `Import warnings: ${warningCounts(warnings)}`;
   return (
     <div class="menu" onKeyDown={(event) => event.key === "Escape" && setOpen(false)}>
       <button
-        class={warnings.some(({ severity }) => severity === "unsupported") ? "remark-mark is-wrong" : "remark-mark"}
+        class={warnings.some(({ severity }) => severity === "unsupported") ? "warnings-button has-differences" : "warnings-button"}
         aria-expanded={open}
         aria-label={label}
         title={label}
@@ -20,7 +20,7 @@ export function ImportWarningsMenu() {
         ! {warnings.length}
       </button>
       {open && (
-        <div class="menu-body remarks-menu">
+        <div class="menu-body warnings-menu">
           <ImportWarnings warnings={warnings} />
         </div>
       )}

@@ -1,4 +1,4 @@
-/** A row of controls; those that it has no room for are in a menu at its end. */
+/** A row of controls; those that do not fit are in a menu at its end. */
 import type { ComponentType } from "preact";
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { IconButton } from "../ui/IconButton";
@@ -14,7 +14,7 @@ interface OverflowControl {
 const GAP = 8;
 const BUTTON_WIDTH = 26;
 
-/** The names of the controls that have no room, measured anew whenever the row or one of them has another size. */
+/** Names of the controls that do not fit, measured again when the row or a control changes size. */
 function useOverflow(controls: readonly OverflowControl[]) {
   const row = useRef<HTMLDivElement>(null);
   const widths = useRef(new Map<string, number>());

@@ -1,4 +1,4 @@
-/** Makes a link that carries the look, and copies it; where the browser forbids that, the link is there to be copied. */
+/** Creates a link that carries the look and copies it; if the browser forbids copying, the link is shown. */
 import { useEffect, useRef } from "preact/hooks";
 import { linkToCopy, copyShareLink } from "../panels/looks/shareLink";
 import { IconButton } from "../ui/IconButton";
@@ -13,17 +13,17 @@ export function ShareButton() {
   };
   const onEscape = (event: KeyboardEvent) => {
     if (event.key !== "Escape" || link === null) return;
-    event.stopPropagation(); // a menu that the button is in stays
+    event.stopPropagation(); // keeps an enclosing menu open
     close();
   };
   useEffect(() => field.current?.select(), [link]);
   return (
     <div class="share-link" ref={menu} onKeyDown={onEscape}>
-      <IconButton icon="share" label="Share: copy a link to this picture" onClick={() => void copyShareLink()} />
+      <IconButton icon="share" label="Share: copy a link to this look" onClick={() => void copyShareLink()} />
       {link !== null && (
-        <div class="menu-body" role="dialog" aria-label="Link to this picture">
+        <div class="menu-body" role="dialog" aria-label="Link to this look">
           <label>
-            This browser does not let the editor copy. Copy the link yourself (Ctrl+C):
+            The browser blocked copying. Copy this link (Ctrl+C):
             <input ref={field} type="text" readOnly value={link} />
           </label>
           <button onClick={close}>Close</button>

@@ -1,4 +1,4 @@
-/** The status bar: connection, latency, exactness, precomputing, bakes, cache. */
+/** The status bar: connection, latency, exactness, precomputation, bakes, cache. */
 import { useComputed } from "@preact/signals";
 import { reconnectNow } from "../session/connections";
 import { exporting, exportText } from "../panels/looks/renderJob";
@@ -21,18 +21,18 @@ import { connectionMessage } from "./connectionMessages";
 import { useCacheGauge } from "./useCacheGauge";
 
 function imageStatusText(): string {
-  if (freezeStatus.value?.state === "shading") return `Shading ${freezeStatus.value.label}`;
-  if (freezeStatus.value !== null) return `Preparing ${freezeStatus.value.label}`;
+  if (freezeStatus.value?.state === "shading") return `Updating ${freezeStatus.value.label}…`;
+  if (freezeStatus.value !== null) return `Preparing ${freezeStatus.value.label}…`;
   if (look.value === null || connection.value !== "open") return "";
-  if (!isConverged.value && isPlaying.value) return "playing";
-  if (!isConverged.value) return hasFreeCamera.value ? "approximate until the eye rests" : "refining…";
-  return usesBakedEnvironment.value && method.value !== "direct" ? "exact ✓" : "exact for this bake ✓";
+  if (!isConverged.value && isPlaying.value) return "Playing";
+  if (!isConverged.value) return hasFreeCamera.value ? "Approximate while the camera moves" : "Refining…";
+  return usesBakedEnvironment.value && method.value !== "direct" ? "Exact ✓" : "Exact (this bake) ✓";
 }
 
 function bakeStatusText(elapsed: number): string {
   const next = pendingBake.value;
   if (next === null) return "";
-  if (next.state === "ready") return "Bake ready, opening";
+  if (next.state === "ready") return "Bake done, loading";
   if (next.state !== "running" && next.state !== "queued") return `Bake ${next.state}`;
   return `Bake: ${bakeProgressText(next, elapsed)}`;
 }
@@ -40,7 +40,7 @@ function bakeStatusText(elapsed: number): string {
 export function StatusBar() {
   const cacheBytes = useCacheGauge();
   const elapsed = useElapsedSeconds(pendingBake.value);
-  // announced: only what changes seldom, without the numbers that run
+  // announced to screen readers: only what changes rarely, without running numbers
   const announced = useComputed(() =>
     [
       connection.value === "open" ? "Connected" : connectionMessage(),
@@ -56,21 +56,21 @@ export function StatusBar() {
   return (
     <footer class="status">
       <span class={`state ${connection.value}`}>
-        <i class="lamp" aria-hidden="true" />
+        <i class="light" aria-hidden="true" />
         {connectionMessage()}
-        {canTryNow && <button onClick={reconnectNow}>Now</button>}
+        {canTryNow && <button onClick={reconnectNow}>Retry now</button>}
       </span>
-      <span class="latency" title="From the hand to the drawn frame">
-        edit → picture {latencyMs.value === null ? "–" : `${latencyMs.value.toFixed(0)} ms`}
+      <span class="latency" title="From input to the drawn frame">
+        Latency {latencyMs.value === null ? "–" : `${latencyMs.value.toFixed(0)} ms`}
       </span>
       <span class={`exactness ${isConverged.value ? "is-exact" : ""}`}>{imageStatusText()}</span>
       <button 
-        aria-pressed={shownPanels.value.includes("truth")}
-        title="Compare this picture with brute force"
+        aria-pressed={shownPanels.value.includes("comparison")}
+        title="Compare with a path-traced reference"
         disabled={look.value === null}
         onClick={toggleComparison}
       >
-        How true is this?
+        Accuracy check…
       </button>
       {freezeStatus.value !== null && <progress max={1} value={freezeStatus.value.progress} aria-label={imageStatusText()} />}
       <span class="spacer" />
@@ -97,7 +97,7 @@ export function StatusBar() {
         </span>
       )}
       {cacheBytes !== null && cacheBytes > 0 && (
-        <span title="Frozen transport that the server holds in memory">frozen {formatBytes(cacheBytes)}</span>
+        <span title="Precomputed light transport in the server's memory">Cache {formatBytes(cacheBytes)}</span>
       )}
       <span class="announce" role="status" aria-live="polite">
         {announced.value}

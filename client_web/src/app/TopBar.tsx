@@ -1,4 +1,4 @@
-/** Scene, views, undo, comparison, display, export. */
+/** The top bar: scene, views, undo, comparison, display, export. */
 import { Account } from "./account/Account";
 import { TONE_MAPS } from "../render/color/tonemap";
 import { editValue } from "../edit/edit";
@@ -34,7 +34,7 @@ function ViewButtons() {
         <button
           key={view.name}
           aria-pressed={!sideBySide.value && view.name === activeViewName.value}
-          title={`Show “${view.name}” alone`}
+          title={`Show only “${view.name}”`}
           onClick={() => showSingleView(view.name)}
         >
           {view.name}
@@ -57,22 +57,22 @@ function CompareButtons() {
     begin: (event) => (isReferenceShown.value = event.button === 0),
     end: () => (isReferenceShown.value = false),
   });
-  const label = hasNoReference ? "nothing yet" : (sideA.value?.label ?? "");
+  const label = hasNoReference ? "empty" : (sideA.value?.label ?? "");
   return (
     <div class="group" role="group" aria-label="Compare">
-      <button class="letter" title={`Keep this picture as A (A). A is: ${label}`} onClick={storeA}>
+      <button class="letter" title={`Store as A (A). Now: ${label}`} onClick={storeA}>
         A
       </button>
       <IconButton
         icon="wipe"
-        label="Wipe between A and B, the live picture"
+        label="Wipe between A and B (live)"
         keys="W"
         pressed={wipe.value.isOn}
         disabled={hasNoReference}
         onClick={toggleWipe}
       />
       <button
-        title="Show A while held (C)"
+        title="Hold to show A (C)"
         aria-pressed={isReferenceShown.value}
         disabled={hasNoReference}
         {...dragHandlers}
@@ -82,7 +82,7 @@ function CompareButtons() {
       >
         Show A
       </button>
-      <button title="Swap A and B: the live look becomes A, and A becomes live (X)" disabled={hasNoReference} onClick={swapWithA}>
+      <button title="Swap A and B (X)" disabled={hasNoReference} onClick={swapWithA}>
         Swap
       </button>
     </div>
@@ -92,7 +92,7 @@ function CompareButtons() {
 function DisplayControls() {
   const display = look.value?.display ?? { exposure: 0, tone_map: "agx" };
   return (
-    <div class="display-controls" title="Exposure and tone map">
+    <div class="display-controls" title="Exposure and tone mapping">
       <span class="label">Exposure</span>
       <Slider
         label="Exposure"
@@ -109,24 +109,24 @@ function DisplayControls() {
   );
 }
 
-/** Tone maps of our own, and the views of the server's OpenColorIO config by their displays. */
+/** Built-in tone maps, and the views of the server's OpenColorIO config grouped by display. */
 function ToneMapSelect({ toneMap }: { toneMap: Look["display"]["tone_map"] }) {
   const isMissing = typeof toneMap !== "string" && colorConfig.value !== null && !hasOcioView(toneMap);
-  const tooltip = typeof toneMap === "string" ? "Tone map" : `${toneMap.view}, for the display ${toneMap.display}`;
+  const tooltip = typeof toneMap === "string" ? "Tone mapping" : `${toneMap.view} (display ${toneMap.display})`;
   return (
     <select
       class="tone-map"
-      aria-label="Tone map"
-      title={isMissing ? `${tooltip}: this server has no such view, so AgX is shown` : tooltip}
+      aria-label="Tone mapping"
+      title={isMissing ? `${tooltip}: not in this server's OpenColorIO config, so AgX is used` : tooltip}
       value={toneMapKey(toneMap)}
-      onChange={(event) => editValue("Tone map", "/display/tone_map", parseToneMapKey(event.currentTarget.value))}
+      onChange={(event) => editValue("Tone mapping", "/display/tone_map", parseToneMapKey(event.currentTarget.value))}
     >
       {TONE_MAPS.map(({ name, label }) => (
         <option key={name} value={name}>
           {label}
         </option>
       ))}
-      {isMissing && <option value={toneMapKey(toneMap)}>{`AgX, not here: ${toneMap.view}`}</option>}
+      {isMissing && <option value={toneMapKey(toneMap)}>{`AgX (missing: ${toneMap.view})`}</option>}
       {colorConfig.value?.displays.map(({ name, views }) => (
         <optgroup key={name} label={name}>
           {views.map((view) => (
@@ -164,7 +164,7 @@ function PanelButtons() {
   );
 }
 
-/** What a narrow window puts into a menu; the lowest rank goes first. */
+/** Controls that a narrow window moves into a menu, lowest rank first. */
 const CONTROLS = [
   { name: "views", rank: 4, Content: ViewButtons },
   { name: "steps", rank: 5, Content: HistoryButtons },
@@ -174,7 +174,7 @@ const CONTROLS = [
   { name: "share", rank: 0, Content: ShareButton },
 ];
 
-/** What is of no use to one who only looks. */
+/** Controls hidden from a read-only user. */
 const EDITOR_CONTROLS = new Set(["steps", "share"]);
 
 export function TopBar() {
@@ -191,7 +191,7 @@ export function TopBar() {
       <Account />
       <IconButton
         icon="help"
-        label="Keyboard map"
+        label="Keyboard shortcuts"
         keys="?"
         pressed={helpOpen.value}
         onClick={() => (helpOpen.value = !helpOpen.value)}

@@ -4,8 +4,8 @@ import { connection, isOffline, rejectionMessage, retryInMs } from "../state/con
 import { formatSeconds } from "../ui/scale";
 
 function lostConnectionMessage(): string {
-  if (rejectionMessage.value !== null) return `Not let in: ${rejectionMessage.value}`;
-  return `${isOffline.value ? "Offline" : "Connection lost"}. Edits are kept`;
+  if (rejectionMessage.value !== null) return `Server busy: ${rejectionMessage.value}`;
+  return `${isOffline.value ? "Offline" : "Connection lost"}. Your edits are safe`;
 }
 
 export function connectionMessage(): string {
@@ -13,13 +13,13 @@ export function connectionMessage(): string {
     case "open":
       return "Connected";
     case "connecting":
-      // where nothing was baked yet there is nothing to connect to
+      // without a bake there is no session to connect to
       return bake.value === null && pendingBake.value !== null ? "Waiting for the bake" : "Connecting…";
     case "silent":
-      return `${isOffline.value ? "Offline" : "No answer from the server"}. Edits are kept`;
+      return `${isOffline.value ? "Offline" : "The server does not respond"}. Your edits are safe`;
     case "reconnecting":
       return retryInMs.value > 0
-        ? `${lostConnectionMessage()}; trying again in ${formatSeconds(retryInMs.value / 1000)}`
+        ? `${lostConnectionMessage()}; retrying in ${formatSeconds(retryInMs.value / 1000)}`
         : "Reconnecting…";
     case "closed":
       return "Not connected";

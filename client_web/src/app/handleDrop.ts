@@ -8,7 +8,7 @@ import { importEnvironmentFile } from "../panels/scene/environments";
 import { clearErrors, showError } from "../ui/toasts";
 
 export function handleDrop(dropped: readonly DroppedFile[]): void {
-  clearErrors("files"); // what was wrong with those before
+  clearErrors("files"); // of earlier drops
   const targetMaterial = consumeDropTarget();
   const files = dropped.map(({ file }) => file);
   const environments = files.filter((file) => isEnvironment(file) && !isTextureFile(file));
@@ -18,8 +18,8 @@ export function handleDrop(dropped: readonly DroppedFile[]): void {
   if (measured.length > 0) void importMaterials(measured);
   if (images.some(isTextureFile)) void applyImageFiles(images, targetMaterial);
   const accepted = new Set([...environments, ...measured, ...(images.some(isTextureFile) ? images : [])]);
-  // a folder may hold anything beside what is of use
+  // a folder may also hold unrelated files
   const rejected = dropped.filter(({ path, file }) => !accepted.has(file) && (accepted.size === 0 || !path.includes("/")));
   if (rejected.length > 0) showError(editorRejection(rejected), "files");
-  else if (dropped.length === 0) showError("The folder is empty. Nothing was changed.", "files");
+  else if (dropped.length === 0) showError("This folder is empty. Nothing changed.", "files");
 }

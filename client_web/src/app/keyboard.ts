@@ -1,4 +1,4 @@
-/** Keys of the whole page; controls that have the focus take theirs first. */
+/** Keyboard shortcuts of the page; a focused control handles its own keys first. */
 import { useEffect } from "preact/hooks";
 import { stopPlacement } from "../panels/lights/placement";
 import { helpOpen } from "../state/panels";
@@ -15,7 +15,7 @@ function shortcutOf(event: KeyboardEvent): Shortcut | undefined {
   return SHORTCUTS.find((action) => action.keys.includes(formatShortcut(event)));
 }
 
-/** Whether the pointer was used last. */
+/** True if the last input came from the pointer. */
 let isPointerInput = false;
 
 function onPointerDown(): void {
@@ -31,7 +31,7 @@ function onKeyDown(event: KeyboardEvent): void {
   }
   const action = shortcutOf(event);
   if (action === undefined || (isTyping(event.target) && !event.ctrlKey && !event.metaKey)) return;
-  // in a field, undo is the field's own
+  // a text field has its own undo
   if (isTyping(event.target) && /z|y/.test(event.key)) return;
   event.preventDefault();
   if (event.key === "[" || event.key === "]") handleWipeKey(event.key);
@@ -42,7 +42,7 @@ function onKeyUp(event: KeyboardEvent): void {
   for (const action of SHORTCUTS) if (action.keys.includes(event.key.toLowerCase())) action.release?.();
 }
 
-/** A list that the pointer chose from gives the keys back: else the next letter would choose again. */
+/** Return the keys to the page after a pointer selection in a list: else the next letter would select again. */
 function onSelectChange({ target }: Event): void {
   if (target instanceof HTMLSelectElement && isPointerInput) target.blur();
 }

@@ -39,11 +39,11 @@ import "../panels/collaboration/collaboration.css";
 import "../panels/collaboration/comments.css";
 import "./layout.css";
 import "./bars.css";
-import "../ui/responsive.css"; // after all that it adapts
+import "../ui/responsive.css"; // after the styles that it overrides
 
 function App() {
   const isLoggedIn = sessionUser.value.role !== "anyone";
-  const inEditor = isLoggedIn && page.value === "editor"; // which has its own place for messages
+  const inEditor = isLoggedIn && page.value === "editor"; // the editor shows messages itself
   return (
     <>
       {inEditor ? <Editor /> : isLoggedIn && <StartPage />}
@@ -54,7 +54,7 @@ function App() {
 }
 
 async function startApp(): Promise<void> {
-  const isLoggedIn = await initializeUser().catch(() => true); // where the server cannot be reached all else says so
+  const isLoggedIn = await initializeUser().catch(() => true); // if the server is unreachable, other requests report it
   if (isLoggedIn) initialize();
   render(<App />, document.getElementById("app") as HTMLElement);
 }
@@ -74,7 +74,7 @@ function initialize(): void {
   trackThumbnails();
   void resumeRendering();
   void loadComparison(urlState.bake);
-  // one drag is one step, however long it rests on the way; once the pointer has left the control, the next is another
+  // one drag is one step, even if it pauses; after the pointer leaves the control, the next drag is another step
   window.addEventListener("pointermove", (event) => event.buttons !== 0 && history.extendGesture(), { capture: true });
   for (const event of ["pointerup", "pointercancel"]) window.addEventListener(event, () => history.endGesture());
   window.addEventListener("popstate", () => location.reload());

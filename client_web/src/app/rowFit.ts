@@ -1,14 +1,14 @@
-/** What has room in a row. */
+/** Which items fit into a row. */
 
 export interface RowItem {
   name: string;
-  /** CSS pixels; 0 where there is nothing to show. */
+  /** CSS pixels; 0 if the item is empty. */
   width: number;
-  /** What has the lowest rank makes room first. */
+  /** Items of the lowest rank overflow first. */
   rank: number;
 }
 
-/** Names of the items that do not fit a row of `rowWidth` CSS pixels, which then also holds a button for them. */
+/** Names of the items that do not fit into a row of `rowWidth` CSS pixels, which then also holds the menu button. */
 export function overflowingItems(items: readonly RowItem[], rowWidth: number, gap: number, button: number): string[] {
   const visibleItems = items.filter(({ width }) => width > 0).sort((a, b) => b.rank - a.rank);
   const widthOfFirst = (count: number) => visibleItems.slice(0, count).reduce((sum, { width }) => sum + width + gap, 0);

@@ -1,4 +1,4 @@
-/** Everything that has a key: the keyboard and the help page read the same list. */
+/** All keyboard shortcuts: the key handler and the help panel read the same list. */
 import { beginComment } from "../panels/collaboration/commentActions";
 import { logarithmic, curveTool } from "../curve/curveView";
 import { editValue } from "../edit/edit";
@@ -16,10 +16,10 @@ import { toggleSideBySide } from "../state/views";
 export interface Shortcut {
   group: "Picture" | "Look" | "Compare" | "Curve" | "Panels";
   label: string;
-  /** `KeyboardEvent.key`, with "Ctrl+" and "Shift+" in front where they matter. */
+  /** `KeyboardEvent.key`, prefixed with "Ctrl+" and "Shift+" if they matter. */
   keys: string[];
   run(): void;
-  /** For keys that act while they are held. */
+  /** For keys that act while held. */
   release?(): void;
 }
 
@@ -42,68 +42,68 @@ function toggleAllPanels(): void {
 export const SHORTCUTS: readonly Shortcut[] = [
   { group: "Picture", label: "Zoom in", keys: ["+", "="], run: () => zoomBy(1.25) },
   { group: "Picture", label: "Zoom out", keys: ["-"], run: () => zoomBy(1 / 1.25) },
-  { group: "Picture", label: "Fit", keys: ["f"], run: zoomFit },
-  { group: "Picture", label: "One to one", keys: ["1"], run: zoomActual },
+  { group: "Picture", label: "Fit to window", keys: ["f"], run: zoomFit },
+  { group: "Picture", label: "Actual size", keys: ["1"], run: zoomActual },
   { group: "Picture", label: "Views side by side", keys: ["v"], run: toggleSideBySide },
-  { group: "Picture", label: "False colour", keys: ["e"], run: () => (falseColor.value = !falseColor.value) },
+  { group: "Picture", label: "Exposure heat map", keys: ["e"], run: () => (falseColor.value = !falseColor.value) },
   { group: "Picture", label: "Histogram", keys: ["h"], run: () => (histogramOpen.value = !histogramOpen.value) },
-  { group: "Picture", label: "Selected material or light alone", keys: ["s"], run: toggleSolo },
-  { group: "Picture", label: "Handles of lights", keys: ["g"], run: () => (handlesOpen.value = !handlesOpen.value) },
-  { group: "Picture", label: "Darker by ⅓ stop", keys: [","], run: () => changeExposure(-THIRD_STOP) },
-  { group: "Picture", label: "Brighter by ⅓ stop", keys: ["."], run: () => changeExposure(THIRD_STOP) },
+  { group: "Picture", label: "Solo selection", keys: ["s"], run: toggleSolo },
+  { group: "Picture", label: "Light handles", keys: ["g"], run: () => (handlesOpen.value = !handlesOpen.value) },
+  { group: "Picture", label: "Exposure −⅓ stop", keys: [","], run: () => changeExposure(-THIRD_STOP) },
+  { group: "Picture", label: "Exposure +⅓ stop", keys: ["."], run: () => changeExposure(THIRD_STOP) },
   { group: "Look", label: "Undo", keys: ["Ctrl+z"], run: undo },
   { group: "Look", label: "Redo", keys: ["Ctrl+Shift+z", "Ctrl+y"], run: redo },
-  { group: "Look", label: "Save the look", keys: ["Ctrl+s"], run: () => void saveLook() },
+  { group: "Look", label: "Save look", keys: ["Ctrl+s"], run: () => void saveLook() },
   { group: "Look", label: "Export PNG", keys: ["Ctrl+Shift+s"], run: () => void exportPng() },
-  { group: "Look", label: "Time line", keys: ["m"], run: () => (timelineOpen.value = !timelineOpen.value) },
-  { group: "Look", label: "Play or pause the time line", keys: ["k"], run: togglePlay },
-  { group: "Compare", label: "Keep this picture as A", keys: ["a"], run: storeA },
+  { group: "Look", label: "Timeline", keys: ["m"], run: () => (timelineOpen.value = !timelineOpen.value) },
+  { group: "Look", label: "Play or pause timeline", keys: ["k"], run: togglePlay },
+  { group: "Compare", label: "Store as A", keys: ["a"], run: storeA },
   { group: "Compare", label: "Swap A and B", keys: ["x"], run: swapWithA },
-  { group: "Compare", label: "Wipe between A and B, the live picture", keys: ["w"], run: toggleWipe },
-  { group: "Compare", label: "Move the wipe", keys: ["[", "]"], run: () => undefined },
+  { group: "Compare", label: "Wipe between A and B", keys: ["w"], run: toggleWipe },
+  { group: "Compare", label: "Move wipe", keys: ["[", "]"], run: () => undefined },
   {
     group: "Compare",
-    label: "Show A while held",
+    label: "Hold to show A",
     keys: ["c"],
     run: () => (isReferenceShown.value = true),
     release: () => (isReferenceShown.value = false),
   },
   { group: "Curve", label: "Points", keys: ["p"], run: () => (curveTool.value = "points") },
   { group: "Curve", label: "Draw", keys: ["d"], run: () => (curveTool.value = "draw") },
-  { group: "Curve", label: "Scale and shift a stretch", keys: ["t"], run: () => (curveTool.value = "stretch") },
-  { group: "Curve", label: "Logarithmic values", keys: ["l"], run: () => (logarithmic.value = !logarithmic.value) },
-  { group: "Picture", label: "Comment on the pixel under the pointer", keys: ["n"], run: beginComment },
-  { group: "Panels", label: "Only the picture", keys: ["\\"], run: toggleAllPanels },
-  { group: "Panels", label: "These keys", keys: ["?"], run: () => (helpOpen.value = !helpOpen.value) },
+  { group: "Curve", label: "Scale and move a range", keys: ["t"], run: () => (curveTool.value = "stretch") },
+  { group: "Curve", label: "Logarithmic scale", keys: ["l"], run: () => (logarithmic.value = !logarithmic.value) },
+  { group: "Picture", label: "Comment at pointer", keys: ["n"], run: beginComment },
+  { group: "Panels", label: "Hide panels", keys: ["\\"], run: toggleAllPanels },
+  { group: "Panels", label: "Keyboard shortcuts", keys: ["?"], run: () => (helpOpen.value = !helpOpen.value) },
 ];
 
-/** Keys of controls that have the focus; listed, handled where they belong. */
+/** Keys of focused controls: listed here, handled by the controls. */
 export const FOCUS_KEYS: readonly (readonly [label: string, keys: readonly string[]])[] = [
   ["Slider: step", ["←", "→"]],
   ["Slider: large step", ["Page Up", "Page Down"]],
-  ["Slider: ends", ["Home", "End"]],
+  ["Slider: minimum, maximum", ["Home", "End"]],
   ["Slider: fine steps", ["Shift+←", "Shift+→"]],
-  ["Slider: type a number", ["Enter", "0–9"]],
+  ["Slider: type a value", ["Enter", "0–9"]],
   ["Slider: reset", ["Delete"]],
   ["Curve point: angle", ["←", "→"]],
   ["Curve point: value by 2 %", ["↑", "↓"]],
   ["Curve point: value by 25 %", ["Page Up", "Page Down"]],
   ["Curve point: fine steps", ["Shift+arrow"]],
-  ["Curve point: pick up, put down", ["Enter"]],
+  ["Curve point: pick up, drop", ["Enter"]],
   ["Curve point: delete", ["Delete"]],
   ["Curve point: reset", ["R"]],
-  ["Stretch: scale", ["↑", "↓"]],
-  ["Stretch: shift", ["←", "→"]],
-  ["Handle of a light: select", ["Enter", "Space"]],
-  ["Handle of a light: move", ["←", "→", "↑", "↓"]],
-  ["Handle of a light: away, near", ["Shift+↑", "Shift+↓"]],
-  ["Pin of a new comment: move", ["←", "→", "↑", "↓"]],
-  ["Pin of a new comment: by ten", ["Shift+arrow"]],
-  ["Picture: pan, or turn its eye", ["←", "→", "↑", "↓"]],
-  ["Eye: slide", ["Shift+arrow"]],
-  ["Eye: nearer, farther", ["+", "−"]],
-  ["Eye: back", ["Home"]],
-  ["One of several views: show it alone", ["Enter"]],
+  ["Curve range: scale", ["↑", "↓"]],
+  ["Curve range: move", ["←", "→"]],
+  ["Light handle: select", ["Enter", "Space"]],
+  ["Light handle: move", ["←", "→", "↑", "↓"]],
+  ["Light handle: farther, nearer", ["Shift+↑", "Shift+↓"]],
+  ["Comment pin: move", ["←", "→", "↑", "↓"]],
+  ["Comment pin: move by 10 px", ["Shift+arrow"]],
+  ["Picture: pan, or orbit camera", ["←", "→", "↑", "↓"]],
+  ["Camera: pan", ["Shift+arrow"]],
+  ["Camera: dolly in, out", ["+", "−"]],
+  ["Camera: reset view", ["Home"]],
+  ["Side-by-side view: show alone", ["Enter"]],
 ];
 
 export function handleWipeKey(key: string): void {

@@ -1,4 +1,4 @@
-/** How much frozen transport the server holds, read now and then from its metrics. */
+/** Bytes of precomputed transport in the server's cache, polled from its metrics. */
 import { useEffect, useState } from "preact/hooks";
 import { parseGauge } from "./parseMetrics";
 

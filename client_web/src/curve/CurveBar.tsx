@@ -1,4 +1,4 @@
-/** The curve editor's switches: tools and channels above the plot, axes and resets below it. */
+/** Controls of the curve editor: tools and channels above the plot, axes and reset below it. */
 import { inspectorWidth } from "../state/panels";
 import { IconButton } from "../ui/IconButton";
 import type { IconName } from "../ui/Icon";
@@ -11,7 +11,7 @@ import type { CurveContext } from "./curveTools";
 const TOOLS: { name: Tool; icon: IconName; label: string; keys: string }[] = [
   { name: "points", icon: "points", label: "Points", keys: "P" },
   { name: "draw", icon: "draw", label: "Draw", keys: "D" },
-  { name: "stretch", icon: "stretch", label: "Scale and shift a stretch", keys: "T" },
+  { name: "stretch", icon: "stretch", label: "Scale and move a range", keys: "T" },
 ];
 const ACTIVE: ActiveChannels[] = ["rgb", ...CHANNELS];
 const WIDE_TITLE = 560;
@@ -46,10 +46,10 @@ export function CurveTools({ context }: { context: CurveContext }) {
       </div>
       {!context.model.areJoined && activeChannels.value === "rgb" && (
         <button
-          onClick={() => applyChannels(context.model, "Join channels", () => copyCurve(context.model, 1, context.axes), [0, 1, 2])}
-          title="Give all three channels the green curve"
+          onClick={() => applyChannels(context.model, "Link channels", () => copyCurve(context.model, 1, context.axes), [0, 1, 2])}
+          title="Use the green curve for all channels"
         >
-          Join
+        Link
         </button>
       )}
       <span class="spacer" />
@@ -71,22 +71,22 @@ export function CurveBar({ context }: { context: CurveContext }) {
     <div class="bar">
       <button
         aria-pressed={isStretchedAxis}
-        title="Stretch the angles near 0°, where highlights live"
+        title="Zoom highlights: more room for angles near 0°"
         onClick={() => (stretchedCurves.value = { ...stretchedCurves.value, [info.name]: !isStretchedAxis })}
       >
         0°↔
       </button>
       <button
         aria-pressed={logarithmic.value}
-        title="Logarithmic values (L)"
+        title="Logarithmic scale (L)"
         onClick={() => (logarithmic.value = !logarithmic.value)}
       >
         log
       </button>
-      <ToggleButton icon="eye" label="Pointing at the curve tints the pixels it lights" state={isIntervalLit} />
+      <ToggleButton icon="view" label="Tint pixels lit by the curve under the pointer" state={isIntervalLit} />
       <IconButton
         icon="table"
-        label="Points as numbers"
+        label="Point table"
         pressed={tableOpen.value}
         onClick={() => {
           tableOpen.value = !tableOpen.value;
@@ -96,7 +96,7 @@ export function CurveBar({ context }: { context: CurveContext }) {
       <span class="spacer" />
       <IconButton
         icon="reset"
-        label="Back to the model's own curve"
+        label="Reset to the model's curve"
         disabled={!drawn}
         onClick={() => applyChannels(context.model, "Reset curve", () => null, context.channels)}
       >

@@ -18,7 +18,7 @@ import { activeChannels, tableOpen, curveTool } from "./curveView";
 import { pickedPoint, selectedInterval } from "./curveTools";
 import { onIntervalKey, usePlot } from "./usePlot";
 
-/** Width of an element, followed. */
+/** Width of an element, updated when it changes. */
 function useElementWidth(): [(element: HTMLElement | null) => void, number] {
   const [element, setElement] = useState<HTMLElement | null>(null);
   const [width, setWidth] = useState(288);
@@ -33,14 +33,14 @@ function useElementWidth(): [(element: HTMLElement | null) => void, number] {
   return [setElement, width];
 }
 
-/** A pixel's contributions, where they are of this curve. */
+/** A pixel's contributions if they belong to this curve. */
 function loadContributions(path: string): Contributions | null {
   const answer = pixelProbe.value?.answer;
   if (answer?.curve !== path || answer.bands === null) return null;
   return { bands: answer.bands, fraction: outputShares(answer.bands, answer.radiance) };
 }
 
-/** `edits` are the look's edits of this curve, undefined if the model's parameters make it. */
+/** `edits`: the look's edits of this curve; undefined if the model generates it. */
 export function CurveEditor({ info, edits }: { info: CurveBody; edits: CurveEdits | undefined }) {
   const [measure, width] = useElementWidth();
   const path = curvePath.value ?? "";

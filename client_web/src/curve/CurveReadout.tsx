@@ -1,4 +1,4 @@
-/** One line under the plot: where the pointer is, where a pixel's light comes from, or what to do. */
+/** The line under the plot: pointer position, the curve's contribution to a pixel, or a hint. */
 import { formatNumber } from "../ui/scale";
 import { valueAt, type CurveAxes } from "./model/axes";
 import type { CurveModel } from "./model/model";
@@ -7,9 +7,9 @@ import { curveTool } from "./curveView";
 import { pickedPoint, selectedInterval, type PlotSpot } from "./curveTools";
 
 const HINTS = {
-  draw: "Draw over the curve. By keys: use points.",
+  draw: "Draw over the curve. With the keyboard, use points.",
   points: "Click to add a point, drag to move it. Delete removes, R resets.",
-  stretch: "Drag across to select a stretch, then drag it up or along.",
+  stretch: "Drag to select a range, then drag it up or sideways.",
 };
 
 export interface Contributions {
@@ -29,20 +29,20 @@ interface Props {
 }
 
 function readoutText({ axes, spot, ready, blocked, contributions }: Props): string {
-  if (!ready) return "Waiting for the curve from the server…";
+  if (!ready) return "Loading curve…";
   if (spot !== null && !blocked) {
     const value = formatNumber(valueAt(axes, Math.max(0, spot.height)));
     return `${spot.degrees.toFixed(2)}°  ·  ${value}`;
   }
   if (contributions !== null) {
     const main = contributions.fraction === 0 ? null : mainInterval(contributions.bands);
-    if (main === null) return "Next to none of this pixel's light comes through this curve.";
+    if (main === null) return "This curve barely affects this pixel.";
     const percent = Math.max(1, Math.round(100 * contributions.fraction));
-    return `${percent} % of this pixel comes through here, most from ${main[0].toFixed(1)}° to ${main[1].toFixed(1)}°`;
+    return `This curve makes ${percent} % of the pixel, mostly ${main[0].toFixed(1)}°–${main[1].toFixed(1)}°`;
   }
-  if (blocked) return "Red, green and blue differ: choose one of them, or join them.";
-  if (curveTool.value === "points" && pickedPoint.value?.carried) return "Now click where this point goes. Escape leaves it.";
-  if (curveTool.value === "stretch" && selectedInterval.value !== null) return "↑ ↓ scale, ← → shift, Shift for fine steps.";
+  if (blocked) return "R, G and B differ: pick one or Link them.";
+  if (curveTool.value === "points" && pickedPoint.value?.carried) return "Click to place the point. Escape cancels.";
+  if (curveTool.value === "stretch" && selectedInterval.value !== null) return "↑ ↓ scale, ← → move, Shift for fine steps.";
   return HINTS[curveTool.value];
 }
 

@@ -1,4 +1,4 @@
-/** The selected interval by numbers and buttons: the click way to what dragging does. */
+/** Numeric fields and buttons for the selected interval, as an alternative to dragging. */
 import { NumberField } from "../ui/NumberField";
 import { applyScale, applyShift, selectedInterval, type CurveContext } from "./curveTools";
 
@@ -10,7 +10,7 @@ export function IntervalBar({ context }: { context: CurveContext }) {
       <label>
         from{" "}
         <NumberField
-          label="Stretch from, degrees"
+          label="Range start, degrees"
           value={from}
           minimum={0}
           maximum={to}
@@ -21,7 +21,7 @@ export function IntervalBar({ context }: { context: CurveContext }) {
       <label>
         to
         <NumberField
-          label="Stretch to, degrees"
+          label="Range end, degrees"
           value={to}
           minimum={from}
           maximum={90}
@@ -30,10 +30,10 @@ export function IntervalBar({ context }: { context: CurveContext }) {
         />
       </label>
       <span class="spacer" />
-      <button title="Shift by −1°" onClick={() => shift(-1)}>
+      <button title="Move by −1°" onClick={() => shift(-1)}>
         ◂
       </button>
-      <button title="Shift by +1°" onClick={() => shift(1)}>
+      <button title="Move by +1°" onClick={() => shift(1)}>
         ▸
       </button>
       <button title="Scale by 0.9" onClick={() => applyScale(context, [from, to], 0.9)}>

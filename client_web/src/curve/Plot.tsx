@@ -1,4 +1,4 @@
-/** The plot without interaction: one canvas, painted when its content changes. */
+/** The plot without interaction: one canvas, repainted when its content changes. */
 import { useLayoutEffect, useRef } from "preact/hooks";
 import { paintPlot, type PlotContent } from "./plotPainter";
 import type { PlotFrame } from "./plotScale";

@@ -1,4 +1,4 @@
-/** The curve's points: each a slider for keyboard and screen reader. */
+/** The curve's points; each is a slider for keyboards and screen readers. */
 import type { Point } from "../protocol";
 import { formatNumber } from "../ui/scale";
 import { sampleBands } from "./model/edits";
@@ -14,22 +14,22 @@ interface Props {
 }
 
 const FINE = 0.1;
-/** What keys multiply a point's value by. */
+/** Factors by which keys multiply a point's value. */
 const STEP = 1.02;
 const LARGE_STEP = 1.25;
-/** Of the top of the plot: what a point at zero begins with, and what is as good as zero. */
+/** Fractions of the plot's maximum: the first step from zero, and the threshold below which a value is zero. */
 const FIRST_VALUE = 1e-3;
 const MIN_VALUE = 1e-9;
 const DIGITS = 6;
 
-/** A value after key steps, as a fraction of itself: a point in the tail of a highlight moves as far as one at its peak. */
+/** A value after relative key steps: a point in the tail of a highlight moves as far as one at its peak. */
 export function steppedValue(value: number, factor: number, top: number): number {
   if (value <= 0) return factor > 1 ? FIRST_VALUE * top : 0;
   const next = Number((value * factor).toPrecision(DIGITS));
   return next < MIN_VALUE * top ? 0 : next;
 }
 
-/** The generator's value at a point's angle. */
+/** The generated curve's value at a point's angle. */
 function generatedValueAt(context: CurveContext, degrees: number): number | null {
   const generated = context.model.generated?.[context.channels[0] ?? 0];
   return generated === undefined ? null : sampleBands(generated, degrees);
@@ -54,7 +54,7 @@ export function movePointTo(
   label = "Move point",
 ): void {
   const moved = movePoint(points, index, degrees, value, bandOf(context));
-  if (String(moved[index]) === String(points[index])) return; // where it was already: not a step of the history
+  if (String(moved[index]) === String(points[index])) return; // unchanged: no step of the history
   applyPoints(context.model, label, points, moved, context.channels);
 }
 

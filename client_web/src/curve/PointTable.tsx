@@ -1,4 +1,4 @@
-/** The points as numbers. */
+/** The curve's points as an editable table. */
 import { MAX_CURVE_VALUE } from "../look.gen";
 import type { Point } from "../protocol";
 import { IconButton } from "../ui/IconButton";
@@ -9,7 +9,7 @@ import { applyPoints } from "./model/model";
 import { addPoint } from "./model/points";
 import { bandOf, pickedPoint, type CurveContext } from "./curveTools";
 
-/** Half-way along the widest gap, degrees. */
+/** The middle of the widest gap, degrees. */
 function findWidestGap(points: Point[]): number {
   let [best, midpoint] = [-1, 45];
   points.forEach(([x], i) => {
@@ -37,7 +37,7 @@ export function PointTable({ context, points }: { context: CurveContext; points:
             <th scope="col">
               <IconButton
                 icon="plus"
-                label="Add a point in the widest gap"
+                label="Add point in the widest gap"
                 onClick={add}
               />
             </th>
@@ -69,7 +69,7 @@ export function PointTable({ context, points }: { context: CurveContext; points:
               <td class="row-actions">
                 <IconButton
                   icon="reset"
-                  label={`Point ${index + 1}: back to the model's curve`}
+                  label={`Reset point ${index + 1}`}
                   onClick={() => resetPoint(context, points, index)}
                 />
                 <IconButton

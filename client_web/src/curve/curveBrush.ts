@@ -1,4 +1,4 @@
-/** Curve → pixels: pointing at an interval asks the server which pixels it lights. */
+/** Curve → pixels: pointing at an interval requests the pixels that it lights. */
 import { sendToShown } from "../session/connections";
 import { stage } from "../render/renderStage";
 import { freezeStatus } from "../state/connection";
@@ -20,14 +20,14 @@ export function clearBrush(): void {
   if (brushedRange.peek() !== null) stage.clearBrush();
 }
 
-/** Whether the image is of surface probes, for which no curve is precomputed: another replaces it when the camera stops. */
+/** True while the image is interpolated from surface probes, which have no precomputed curves. */
 const isPointBrush = () => hasFreeCamera.peek() && (fidelity.peek() === "approximate" || fidelity.peek() === "preview");
 
-/** Whether the operator of the open curve is being precomputed. */
+/** True while the operator of the open curve is being precomputed. */
 const isPending = () => freezeStatus.peek()?.state === "precomputing" || isPointBrush();
 
-/** Request the pixels of an interval; at first only when the pointer stops, then at most every `EVERY_MS`; when the curve is
- * precomputed, and in a free-camera view when the camera has stopped. */
+/** Request the pixels of an interval: first when the pointer stops, then at most every `EVERY_MS`. Waits until the curve
+ * is precomputed, and in a free-camera view until the camera has stopped. */
 export function requestBrush(from: number, to: number): void {
   const curve = curvePath.peek();
   if (!isIntervalLit.peek() || curve === null) return;

@@ -1,4 +1,4 @@
-/** What the pointer does in the plot: draw, move points, or scale and shift an interval. */
+/** Pointer tools of the plot: draw, move points, or scale and move an interval. */
 import { signal } from "@preact/signals";
 import type { Point } from "../protocol";
 import { MAX_DEGREES, valueAt, yFraction, type CurveAxes } from "./model/axes";
@@ -10,19 +10,19 @@ import { drawInterval, scaleInterval, shiftInterval, type EditBase } from "./mod
 /** A point in the plot. */
 export interface PlotSpot {
   degrees: number;
-  /** Fraction of the plot's height; may leave 0…1. */
+  /** Fraction of the plot's height; may lie outside 0…1. */
   height: number;
   /** Screen pixels. */
   x: number;
   y: number;
 }
 
-/** The selected point, and whether it waits for the click that says where it goes. */
+/** The selected point; `carried`: the next click places it. */
 export const pickedPoint = signal<{ index: number; carried: boolean } | null>(null);
 /** The selected interval, degrees. */
 export const selectedInterval = signal<[from: number, to: number] | null>(null);
 
-/** A gesture under way; `model` is always the newest. */
+/** The gesture in progress; `model` is always the newest. */
 export interface PlotGesture {
   move(spot: PlotSpot): void;
   up(spot: PlotSpot): void;
@@ -36,7 +36,7 @@ export interface CurveContext {
 
 const CLICK_PX = 3;
 
-/** Width of a band, degrees: nothing finer is resolved. */
+/** Width of a band in degrees, the resolution of a curve. */
 export function bandOf(context: CurveContext): number {
   return MAX_DEGREES / context.model.info.bands;
 }
@@ -61,7 +61,7 @@ function valueOf(context: CurveContext, spot: PlotSpot): number {
   return valueAt(context.axes, Math.max(0, spot.height));
 }
 
-/** Drag the point that was hit; or put the carried point here; or add one here. */
+/** Drag the point under the pointer, place the carried point, or add a point. */
 export function pointsGesture(context: CurveContext, start: PlotSpot, hit: number): PlotGesture {
   const first = context.channels[0] ?? 0;
   const draggedPoints = pickedPoint.value?.carried ? pickedPoint.value.index : -1;
@@ -86,7 +86,7 @@ export function pointsGesture(context: CurveContext, start: PlotSpot, hit: numbe
     move(spot) {
       if (index < 0 || (!moved && Math.hypot(spot.x - start.x, spot.y - start.y) < CLICK_PX)) return;
       moved = true;
-      // a hit point keeps its distance to the pointer, so taking hold of it does not move it
+      // a dragged point keeps its offset from the pointer, so pressing does not move it
       const [ox, oy] = hit >= 0 ? [dx, dy] : [0, 0];
       const value = valueAt(context.axes, Math.max(0, spot.height + oy));
       write(movePoint(base, index, spot.degrees + ox, value, band), "Move point");
@@ -101,16 +101,16 @@ export function pointsGesture(context: CurveContext, start: PlotSpot, hit: numbe
 }
 
 export function applyScale(context: CurveContext, [from, to]: [number, number], factor: number): void {
-  applyChannels(context.model, "Scale stretch", (c) => scaleInterval(editBaseOf(context, c), from, to, factor), context.channels);
+  applyChannels(context.model, "Scale range", (c) => scaleInterval(editBaseOf(context, c), from, to, factor), context.channels);
 }
 
 export function applyShift(context: CurveContext, [from, to]: [number, number], degrees: number): [number, number] {
   const shift = Math.min(MAX_DEGREES - to, Math.max(-from, degrees));
-  applyChannels(context.model, "Shift stretch", (c) => shiftInterval(editBaseOf(context, c), from, to, shift), context.channels);
+  applyChannels(context.model, "Move range", (c) => shiftInterval(editBaseOf(context, c), from, to, shift), context.channels);
   return [from + shift, to + shift];
 }
 
-/** Outside the selection: select. Inside: up and down scale, left and right shift, whichever the drag begins with. */
+/** Outside the selection: select. Inside: a vertical drag scales, a horizontal one moves; its start decides. */
 export function intervalGesture(context: CurveContext, start: PlotSpot): PlotGesture {
   const interval = selectedInterval.value;
   if (interval === null || start.degrees < interval[0] || start.degrees > interval[1]) return selectGesture(start);

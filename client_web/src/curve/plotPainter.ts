@@ -1,5 +1,5 @@
-/** Painting of the plot: grid, contributions of a pixel, generated curves, edited curves, marks. One small canvas is painted much sooner
- * than a drawing of many elements, and what stands around it is left alone. */
+/** Paints the plot: grid, contributions of a pixel, generated curves, edited curves, marks. One small canvas paints much
+ * faster than many elements, and does not repaint its surroundings. */
 import type { Point } from "../protocol";
 import { tickLabel } from "../ui/scale";
 import { MAX_DEGREES, xTicks, yTicks } from "./model/axes";
@@ -10,15 +10,15 @@ export interface PlotContent {
   generatedLines: Point[][] | null;
   /** Channels whose curve differs from the generated one. */
   drawn: boolean[];
-  /** Whether red, green and blue are one curve. */
+  /** True if red, green and blue share one curve. */
   areJoined: boolean;
   active: number[];
-  /** Per channel and band, of the pixel under the pointer. */
+  /** Contributions per channel and band to the pixel under the pointer. */
   contributions: number[][] | null;
   interval: [number, number] | null;
   /** Angle under the pointer. */
   cursor: number | null;
-  /** Points that can be taken hold of; `offered` ones are not part of the look yet. */
+  /** Draggable points; `offered` ones are not part of the look yet. */
   points: Point[] | null;
   offered: boolean;
 }
@@ -32,7 +32,7 @@ interface Palette {
 
 let palette: Palette | null = null;
 
-/** The page's colors, asked for once. */
+/** The page's colors, read once. */
 function readPalette(): Palette {
   if (palette !== null) return palette;
   const style = getComputedStyle(document.documentElement);
@@ -53,7 +53,7 @@ function traceLine(ctx: CanvasRenderingContext2D, frame: PlotFrame, line: readon
 
 function drawRule(ctx: CanvasRenderingContext2D, x1: number, y1: number, x2: number, y2: number): void {
   ctx.beginPath();
-  // on the middle of a pixel a line is one pixel wide
+  // at a pixel center a line is one pixel wide
   ctx.moveTo(Math.round(x1) + 0.5, Math.round(y1) + 0.5);
   ctx.lineTo(Math.round(x2) + 0.5, Math.round(y2) + 0.5);
   ctx.stroke();
@@ -80,7 +80,7 @@ function paintGrid(ctx: CanvasRenderingContext2D, frame: PlotFrame): void {
   drawRule(ctx, left, base, right, base);
 }
 
-/** How much each angle contributes to the pixel under the pointer, relative to its largest band. */
+/** The contribution of each angle to the pixel under the pointer, relative to its largest band. */
 function paintContributions(ctx: CanvasRenderingContext2D, frame: PlotFrame, bands: number[][]): void {
   const largest = Math.max(1e-12, ...bands.flat());
   const { left, top, base } = innerRect(frame);

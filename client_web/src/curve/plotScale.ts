@@ -1,4 +1,4 @@
-/** The plot's scale: from angles and values to CSS pixels, and back. */
+/** The plot's scale: from angles and values to CSS pixels and back. */
 import { degreesAt, xFraction, yFraction, type CurveAxes } from "./model/axes";
 
 export interface PlotFrame {
@@ -29,7 +29,7 @@ export function plotY(frame: PlotFrame, value: number): number {
   return top + (1 - Math.min(1.02, yFraction(frame.axes, value))) * (base - top);
 }
 
-/** Angle, and fraction of the plot's height (may leave 0…1), at a place in the plot. */
+/** Angle, and fraction of the plot's height (may lie outside 0…1), at a position in the plot. */
 export function degreesAndValueAt(frame: PlotFrame, x: number, y: number): { degrees: number; height: number } {
   const { left, right, top, base } = innerRect(frame);
   return { degrees: degreesAt(frame.axes, (x - left) / (right - left)), height: 1 - (y - top) / (base - top) };

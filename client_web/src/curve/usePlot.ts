@@ -1,4 +1,4 @@
-/** Pointer and keys in the plot: where they are, what they take hold of, which gesture is under way. */
+/** Pointer and keyboard input of the plot: position, dragged point, current gesture. */
 import { useRef, useState } from "preact/hooks";
 import { history } from "../edit/history";
 import { useDrag } from "../ui/drag";
@@ -39,7 +39,7 @@ function hitPoint(frame: PlotFrame, context: CurveContext, spot: PlotSpot): numb
   return hitIndex;
 }
 
-/** Keys on a selected interval: arrows scale and shift it. */
+/** Keys of a selected interval: arrows scale and move it. */
 export function onIntervalKey(event: KeyboardEvent, context: CurveContext): void {
   const interval = selectedInterval.value;
   if (curveTool.value !== "stretch" || interval === null) return;
@@ -102,7 +102,7 @@ export function usePlot(model: CurveModel, width: number, ready: boolean) {
     if (released) gesture.current?.up(spotOf(frame, svg, event));
     gesture.current = null;
     setFrozenAxes(null);
-    // the keys go on where the drag ended
+    // keys continue from the end of the drag
     const index = curveTool.value === "points" ? pickedPoint.value?.index : undefined;
     if (index === undefined) svg.focus();
     else requestAnimationFrame(() => svg.querySelector<SVGGElement>(`[data-index="${index}"]`)?.focus());

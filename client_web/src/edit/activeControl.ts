@@ -1,9 +1,9 @@
-/** The active control: sent with every edit, so that the server need not guess it from what the edit changed. */
+/** The active control: sent with every edit, so that the server need not infer it from the changed values. */
 import { signal } from "@preact/signals";
 import { jsonPointer, pointerTokens } from "../state/document/pointer";
 import type { Look } from "../protocol";
 
-/** JSON pointer to the look's value that the active control edits; null if no image can be prepared for it. */
+/** JSON pointer to the look's value that the active control edits; null if nothing can be prepared for it. */
 export const activeControl = signal<string | null>(null);
 
 /** The active control of an edit at a JSON pointer: a curve, a parameter, a color or texture of a term, a light, a

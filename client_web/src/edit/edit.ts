@@ -1,5 +1,5 @@
-/** The one way to change the look: an undoable step, and its patch to the server. A preview, as while looks
- * play, is no step until the user commits or edits it. */
+/** All changes of the look go through here: an undoable step, and its patch to the server. A previewed look, as during
+ * playback, becomes a step when the user commits or edits it. */
 import { signal } from "@preact/signals";
 import { changeValue, changeToLook, type LookChange } from "../state/document/jsonPatch";
 import { isViewSetting } from "../state/document/pointer";
@@ -14,28 +14,28 @@ import { stepLabel } from "./stepLabel";
 type ChangeListener = (change: LookChange, inputTime: number) => void;
 let changeListener: ChangeListener = () => undefined;
 
-/** Who takes changes of the look to the server. */
+/** Sends changes of the look to the server. */
 export function onLookChange(callback: ChangeListener): void {
   changeListener = callback;
 }
 
-/** Time of the input, on the clock of performance.now; inside an event handler the event's own time. */
+/** Time of the input on the clock of performance.now; inside an event handler, the event's own time. */
 function currentInputTime(): number {
   const event = window.event;
   return event !== undefined && event.timeStamp > 0 ? event.timeStamp : performance.now();
 }
 
-/** Apply a change without a step of the history; `controlPath` is the active control. */
+/** Apply a change without a history step; `controlPath` is the active control. */
 export function applyChange(change: LookChange, controlPath: string | null = null): void {
   activeControl.value = controlPath;
   look.value = change.after;
   changeListener(change, currentInputTime());
 }
 
-/** What was there before something was shown in passing, and what a step of it is called; null where nothing is. */
+/** The look before the preview, and the label of the preview's step; null without a preview. */
 export const previewedStep = signal<{ before: Look; label: string } | null>(null);
 
-/** Show a look in passing. */
+/** Preview a look. */
 export function previewStep(label: string, next: Look): void {
   if (rejectIfReadOnly()) return;
   const current = look.peek();
@@ -44,17 +44,17 @@ export function previewStep(label: string, next: Look): void {
   const change = changeToLook(current, next);
   const [first, second] = change.patch;
   if (first === undefined) return;
-  applyChange(change, second === undefined ? activePath(first.path, next) : null); // a single changed value is followed as during a drag
+  applyChange(change, second === undefined ? activePath(first.path, next) : null); // a single changed value updates incrementally, as during a drag
 }
 
-/** Go back to what was there before. */
+/** End the preview and return to the look before it. */
 export function cancelPreview(): void {
   const [preview, current] = [previewedStep.peek(), look.peek()];
   previewedStep.value = null;
   if (preview !== null && current !== null && current !== preview.before) applyChange(changeToLook(current, preview.before));
 }
 
-/** Make what is shown in passing a step. */
+/** Make the previewed look a step. */
 export function commitPreview(): void {
   const [preview, current] = [previewedStep.peek(), look.peek()];
   previewedStep.value = null;

@@ -1,5 +1,4 @@
-/** Undo for everything: steps from a state to another, those of one drag as one. They are data, so that they can be
- * stored over a reload. */
+/** The undo history: steps between states; a drag is one step. Steps are plain data, so that they survive a reload. */
 import { signal } from "@preact/signals";
 import { changeToLook, joinChanges, type LookChange } from "../state/document/jsonPatch";
 import type { Look } from "../protocol";
@@ -7,31 +6,31 @@ import type { Look } from "../protocol";
 export interface LookStep extends LookChange {
   kind: "look";
   label: string;
-  /** Steps in a row with the same key, within one gesture, are one. */
+  /** Consecutive steps of a gesture with the same key are merged. */
   key?: string;
 }
 
-/** A saved look; `created`: when it was saved first, which orders the saved looks. */
+/** A saved look; `created`: time of its first save, by which saved looks are sorted. */
 export interface NamedLook {
   name: string;
   look: Partial<Look>;
   created?: string | undefined;
 }
 
-/** One on the timeline; `camera`: its pose on a camera path from key to key. Angles in degrees. */
+/** A keyframe of the timeline; `camera`: its pose on a camera path through the keyframes. Angles in degrees. */
 export interface Keyframe extends NamedLook {
   camera?: { to_world: number[]; yfov: number } | null;
 }
 
-/** What became of a saved look; null where there is none. */
+/** Change of a saved look; null: none before or after. */
 export interface SavedLookStep {
-  kind: "shelf";
+  kind: "savedLook";
   label: string;
   before: NamedLook | null;
   after: NamedLook | null;
 }
 
-/** What became of the looks on the timeline. */
+/** Change of the timeline's keyframes. */
 export interface TimelineStep {
   kind: "timeline";
   label: string;
@@ -41,13 +40,13 @@ export interface TimelineStep {
 
 export type Step = LookStep | SavedLookStep | TimelineStep;
 
-/** Makes a step happen again, or undoes it. */
+/** Redoes or undoes a step. */
 export type PerformStep = (step: Step, isUndo: boolean) => void | Promise<void>;
 
 const MAX_STEPS = 200;
 const IDLE_MS = 800;
 
-/** Steps that reverse some steps; all their look changes are reversed in one. */
+/** Steps that reverse the given ones; their look changes are merged into one. */
 function reverseSteps(steps: readonly Step[], label: string): Step[] {
   const lookSteps = steps.filter((step) => step.kind === "look");
   const otherSteps = steps.filter((step) => step.kind !== "look").reverse();
@@ -59,11 +58,11 @@ function reverseSteps(steps: readonly Step[], label: string): Step[] {
 
 export class History {
   readonly steps = signal<readonly Step[]>([]);
-  /** Number of steps that are done; the ones after it can be redone. */
+  /** Number of done steps; the later ones can be redone. */
   readonly cursor = signal(0);
   private isGestureEnded = true;
   private lastTime = 0;
-  /** While steps are being undone or redone: how many shall be done in the end. */
+  /** Target of a running undo or redo: number of done steps at its end. */
   private target: number | null = null;
 
   constructor(private readonly now: () => number = () => performance.now()) {}
@@ -76,7 +75,7 @@ export class History {
     return this.cursor.value < this.steps.value.length;
   }
 
-  /** Remember a step that has been done. */
+  /** Record a step that has been done. */
   record(step: Step): void {
     const done = this.steps.value.slice(0, this.cursor.value);
     const last = done.at(-1);
@@ -90,23 +89,23 @@ export class History {
     this.isGestureEnded = false;
   }
 
-  /** The gesture is over: what follows is another step. */
+  /** End the gesture: the next change is another step. */
   endGesture(): void {
     this.isGestureEnded = true;
   }
 
-  /** While a drag is held still, it stays one step. */
+  /** Keep the gesture open while a drag pauses. */
   extendGesture(): void {
     this.lastTime = this.now();
   }
 
-  /** Where undoing and redoing will end: the next press counts from there. */
+  /** The cursor at the end of a running undo or redo: the next key press counts from there. */
   get targetCursor(): number {
     return this.target ?? this.cursor.value;
   }
 
-  /** Undo or redo until `count` steps are done; the cursor moves only after each has succeeded. Where that is going on
-   * already, it goes on to `count`. */
+  /** Undo or redo until `count` steps are done; the cursor moves after each success. A running call continues to the new
+   * `count`. */
   async goTo(count: number, perform: PerformStep): Promise<void> {
     const isRunning = this.target !== null;
     this.target = Math.min(Math.max(count, 0), this.steps.value.length);
@@ -124,8 +123,8 @@ export class History {
     this.cursor.value += isUndo ? -1 : 1;
   }
 
-  /** Make what was undone part of what was done, with the way back as its last step, so that the next step discards
-   * nothing. Whether there was anything. */
+  /** Turn undone steps into done ones, followed by a step that reverses them, so that the next step discards nothing.
+   * True if there were any. */
   commitUndone(): boolean {
     const undone = this.steps.value.slice(this.cursor.value);
     if (undone.length === 0) return false;
@@ -137,7 +136,7 @@ export class History {
     return true;
   }
 
-  /** The last step turned out impossible: forget it. */
+  /** Remove the last step, which has failed. */
   dropLastStep(): void {
     this.steps.value = this.steps.value.slice(0, Math.max(0, this.cursor.value - 1));
     this.cursor.value = this.steps.value.length;

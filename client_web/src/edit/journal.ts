@@ -1,5 +1,4 @@
-/** The history as text that a reload finds again: a look, then from one to the next what changed. The images of its
- * looks go with it. */
+/** The history as text for a reload: the first look, then the changes between looks, with their thumbnails. */
 import { changeByPatch } from "../state/document/jsonPatch";
 import { diffLooks, isDeepEqual } from "../state/document/difference";
 import type { Look, PatchOp } from "../protocol";
@@ -10,13 +9,13 @@ export interface HistorySnapshot {
   cursor: number;
 }
 
-/** An image of a look, null where there is none. */
+/** The thumbnail of a look, or null. */
 export type ThumbnailOf = (look: Look) => string | null;
 
 interface StoredLookStep {
   label: string;
   key?: string | undefined;
-  /** From the look that the step before led to; it is the same but for steps that were refused. */
+  /** Change from the previous step's look; they differ only if a step was rejected. */
   gap?: PatchOp[];
   change: readonly PatchOp[];
   thumbnail: string | null;
@@ -48,7 +47,7 @@ function stringifyHistory({ steps, cursor }: HistorySnapshot, thumbnailOf: Thumb
   return JSON.stringify(stored);
 }
 
-/** Without a tenth of its steps: the oldest that are done, else the farthest that are not. */
+/** The history without a tenth of its steps: the oldest done ones, else the last undone ones. */
 function truncateHistory({ steps, cursor }: HistorySnapshot): HistorySnapshot {
   const numDropped = Math.ceil(steps.length / 10);
   const first = Math.min(numDropped, cursor);
@@ -66,13 +65,13 @@ export function serializeHistory(history: HistorySnapshot, maxLength: number, th
   return text;
 }
 
-/** The current look of a history; null if none of its steps has it. */
+/** The current look of a history; null if no step has it. */
 function currentLookOf({ steps, cursor }: HistorySnapshot): Look | null {
   return steps.slice(0, cursor).findLast(isLookStep)?.after ?? steps.slice(cursor).find(isLookStep)?.before ?? null;
 }
 
-/** Parse a history; null if it does not lead to `look`. If that is null, others edit it as well, and the history is
- * of this user's edits. `addThumbnail` takes the thumbnails of its looks. */
+/** Parse a history; null if it does not lead to `look`. In a room `look` is null: the history then has only this user's
+ * edits. `addThumbnail` receives the thumbnails of its looks. */
 export function parseHistory(text: string, look: Look | null, addThumbnail: (snapshotLook: Look, thumbnail: string) => void): HistorySnapshot | null {
   const stored = JSON.parse(text) as StoredHistory;
   const thumbnails: [Look, string | null][] = [];

@@ -1,4 +1,4 @@
-/** What a step of the history is called: what was changed, then what was done to it. */
+/** Labels of history steps: the changed object, then the action. */
 import { pointerTokens } from "../state/document/pointer";
 import type { Look, ModelBody } from "../protocol";
 
@@ -16,7 +16,7 @@ export function stepLabel(path: string, action: string, look: Look, models: read
   return [subject, label, action.charAt(0).toLowerCase() + action.slice(1)].join(SEPARATOR);
 }
 
-/** A label's material or light, null where it has none, and what was done with it. */
+/** Split a label into its material or light (null without one) and the action. */
 export function splitStepLabel(label: string): { subject: string | null; action: string } {
   const end = label.indexOf(SEPARATOR);
   return end < 0 ? { subject: null, action: label } : { subject: label.slice(0, end), action: label.slice(end + SEPARATOR.length) };

@@ -1,5 +1,5 @@
-/** A canvas that shows one image, as the view's settings say. Each has a graphics context of its own: a frame of one
- * view then draws that view alone, where a shared canvas would have to draw all of them again. */
+/** A canvas that shows one image with the view's settings. Each has its own graphics context, so that a frame redraws
+ * only its view. */
 import { effect, signal } from "@preact/signals";
 import { soloMaterial } from "../state/visibility/soloSources";
 import { toneMap } from "../state/color";
@@ -20,10 +20,10 @@ const SURROUND: [number, number, number] = [0.078, 0.078, 0.078];
 
 export class ImageCanvas implements ImagePresenter {
   readonly renderer: DisplayRenderer;
-  /** The browser took the graphics memory away, and has not given it back yet. */
+  /** True while the graphics context is lost. */
   readonly isLost = signal(false);
   private box: [width: number, height: number] = [1, 1];
-  /** Nothing has been drawn since the canvas was made or got another size. */
+  /** True until something is drawn after creating or resizing the canvas. */
   private blank = true;
   private hasDrawnThisFrame = false;
   private queued = false;
@@ -31,14 +31,14 @@ export class ImageCanvas implements ImagePresenter {
   private waiting: (() => void)[] = [];
   private readonly stop: () => void;
 
-  /** Throws where the browser has no WebGL2. */
+  /** Throws if the browser has no WebGL2. */
   constructor(
     readonly canvas: HTMLCanvasElement,
     private current: ViewImage,
   ) {
     this.renderer = new DisplayRenderer(canvas);
     canvas.addEventListener("webglcontextlost", (event) => {
-      event.preventDefault(); // else it would never come back
+      event.preventDefault(); // otherwise the context is never restored
       this.isLost.value = true;
     });
     canvas.addEventListener("webglcontextrestored", () => {
@@ -65,7 +65,7 @@ export class ImageCanvas implements ImagePresenter {
     this.upload();
   }
 
-  /** The canvas goes away. */
+  /** The canvas is removed. */
   close(): void {
     this.closed = true;
     this.stop();
@@ -86,15 +86,15 @@ export class ImageCanvas implements ImagePresenter {
     this.redraw();
   }
 
-  /** Draw a new frame at once; a second one in the same animation frame waits for the next. Resolves when it is drawn,
-   * so that acknowledgements keep the server at the screen's pace. */
+  /** Draw a new frame immediately; a second one in the same animation frame waits for the next. Resolves when drawn, so
+   * that acknowledgments keep the server at the screen's pace. */
   present(): Promise<void> {
     if (!this.hasDrawnThisFrame || document.hidden) {
       this.draw();
       return Promise.resolve();
     }
     this.redraw();
-    // a tab that is hidden meanwhile gets no animation frames
+    // hidden tabs get no animation frames
     return new Promise((done) => {
       this.waiting.push(done);
       window.setTimeout(done, MAX_WAIT_MS);
@@ -111,7 +111,7 @@ export class ImageCanvas implements ImagePresenter {
     });
   }
 
-  /** The canvas has another size, in CSS pixels: remembered, because asking makes the browser lay out the page. */
+  /** The canvas was resized, in CSS pixels: stored, because querying the size forces a layout. */
   resize(width: number, height: number): void {
     this.box = [Math.max(1, width), Math.max(1, height)];
     this.blank = true;
@@ -129,7 +129,7 @@ export class ImageCanvas implements ImagePresenter {
     const hovered = hoveredMaterial.value;
     const soloName = soloMaterial.value;
     const { isOn, position } = wipe.value;
-    const displaysA = isReferenceShown.value; // read also while there is no A yet: a redraw follows what was read
+    const displaysA = isReferenceShown.value; // read even without an A: the redraw effect depends on signals that were read
     return {
       held: isDisplayFrozen.value,
       transform: transformOf(view),
@@ -146,7 +146,7 @@ export class ImageCanvas implements ImagePresenter {
   private draw(): void {
     const { renderer, current } = this;
     const { held: isDisplayFrozen, transform, ...settings } = this.settings();
-    // what was there stays until there is something else
+    // the previous content stays until there is a new image
     if (this.closed || isDisplayFrozen || (!current.hasPixels && !this.blank)) return;
     const size = this.size();
     const ratio = renderer.canvas.width / size.width;

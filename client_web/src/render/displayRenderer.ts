@@ -1,4 +1,4 @@
-/** The WebGL2 side of the image. Everything it shows is also held on the CPU, so a lost context is only a redraw. */
+/** WebGL2 rendering of the image. All its data is also on the CPU, so a lost context only costs a redraw. */
 import type { LutTable } from "./color/lutTable";
 import type { DisplayedToneMap } from "./color/tonemap";
 import { LUT_SIZE, type Tile } from "../protocol";
@@ -8,7 +8,7 @@ import { fragmentShader, VERTEX, type DisplayFeatures } from "./displayShaders";
 
 const UNITS = ["uPicture", "uReference", "uDisplay", "uBrush", "uAlpha", "uReferenceAlpha", "uIds"] as const;
 type TextureUnit = (typeof UNITS)[number];
-/** Screen pixels per image pixel from which the pixels themselves are shown. */
+/** Screen pixels per image pixel from which on pixels are drawn without filtering. */
 const NEAREST_FROM = 6;
 
 export interface DisplayState {
@@ -19,7 +19,7 @@ export interface DisplayState {
   falseColor: boolean;
   wipe: number;
   hover: number;
-  /** Id of the material that is shown alone, -1 for none. */
+  /** Id of the solo material, -1 for none. */
   solo: number;
   brush: boolean;
   displayReferred: boolean;
@@ -33,7 +33,7 @@ export class DisplayRenderer {
   private programs = new Map<string, Program>();
   private textures!: Record<TextureUnit, WebGLTexture>;
   private size: [number, number] = [1, 1];
-  /** The view's table, and what of it the context holds. */
+  /** The view's table and its texture. */
   private tableTexture!: WebGLTexture;
   private table: LutTable | null = null;
 
@@ -41,13 +41,13 @@ export class DisplayRenderer {
     const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false });
     if (gl === null)
       throw new Error(
-        "This browser offers no WebGL2, which the picture needs. Turn on graphics acceleration or try another browser.",
+        "This browser has no WebGL2, which the editor needs. Turn on hardware acceleration or use another browser.",
       );
     this.gl = gl;
     this.restore();
   }
 
-  /** Build everything anew, at the start and after the context was lost. */
+  /** Create all GPU resources, at the start and after a lost context. */
   restore(): void {
     const { gl } = this;
     this.programs.clear();
@@ -65,7 +65,7 @@ export class DisplayRenderer {
     this.table = null;
   }
 
-  /** Give the context back: a browser has few of them. */
+  /** Release the context: browsers limit their number. */
   release(): void {
     this.gl.getExtension("WEBGL_lose_context")?.loseContext();
   }
@@ -87,7 +87,7 @@ export class DisplayRenderer {
     allocate(this.gl, this.textures.uPicture, pixels.width, pixels.height, pixels.encoded);
   }
 
-  /** The same image, all pixels anew. */
+  /** Upload all pixels of the image again. */
   updateImage(pixels: PixelBuffer): void {
     this.uploadTiles([{ tile: [0, 0, pixels.width, pixels.height], encoded: pixels.encoded }]);
   }

@@ -1,22 +1,22 @@
-/** One pass: find the image's pixel, expose, tone-map, then what is laid over it (brush, outline, wipe).
+/** One pass: fetch the image's pixel, expose, tone-map, then draw the overlays (brush, outline, wipe).
  *
- * What is not in use is not compiled in: a software rasteriser pays for branches that it does not take, and the plain
- * image is three times as quick without them. */
+ * Unused features are not compiled in: a software rasterizer pays for branches not taken, and the plain image is three
+ * times as fast without them. */
 
 import { LUT_GAIN, LUT_SIZE } from "../protocol";
 
-/** What a variant of the shader does; the renderer compiles each when it is first needed. */
+/** Features of a shader variant, compiled when first needed. */
 export interface DisplayFeatures {
   toneMap: "none" | "agx" | "filmic" | "table";
   falseColor: boolean;
-  /** The image is shown smaller than it is. */
+  /** The image is minified. */
   isMinified: boolean;
   /** The server has tone-mapped the image already. */
   displayReferred: boolean;
-  /** There is nothing behind some of it: squares show. */
+  /** The image has transparent parts, shown over a checkerboard. */
   transparent: boolean;
   compare: boolean;
-  /** The same of the A side. */
+  /** The same for the A side. */
   transparentReference: boolean;
   brush: boolean;
   outline: boolean;
@@ -41,7 +41,7 @@ export function fragmentShader(features: DisplayFeatures): string {
           : features.toneMap === "table"
             ? "TABLE"
             : "PLAIN",
-    features.isMinified && "SHRUNK",
+    features.isMinified && "MINIFIED",
     features.displayReferred && "DISPLAY_REFERRED",
     features.transparent && "TRANSPARENT",
     features.compare && "COMPARE",
@@ -58,20 +58,20 @@ export function fragmentShader(features: DisplayFeatures): string {
 const FRAGMENT_BODY = `precision highp float;
 precision highp usampler2D;
 
-uniform sampler2D uPicture;    // linear radiance
+uniform sampler2D uImage;    // linear radiance
 uniform sampler2D uReference;  // the A side of a comparison, linear radiance
 uniform sampler2D uDisplay;    // an image that the server has tone-mapped already
-uniform sampler2D uBrush;      // 0..1: share of each pixel that a stretch of the curve lights
-uniform sampler2D uAlpha;      // how much of what is behind each pixel it hides; its light is multiplied by that
-uniform sampler2D uReferenceAlpha;  // the same of the A side
+uniform sampler2D uBrush;      // 0..1: fraction of each pixel's light from an interval of the curve
+uniform sampler2D uAlpha;      // coverage of each pixel; radiance is premultiplied
+uniform sampler2D uReferenceAlpha;  // the same for the A side
 uniform usampler2D uIds;       // material of each pixel, 65535 = background
 uniform vec2 uCanvas;          // device pixels
-uniform vec4 uPlace;           // left, top, width, height of the picture, device pixels from the top left
-uniform vec2 uSize;            // pixels of the picture
+uniform vec4 uImageRect;           // left, top, width, height of the image, device pixels from the top left
+uniform vec2 uSize;            // size of the image in pixels
 uniform float uGain;           // 2^exposure
-uniform float uWipe;           // picture fraction left of which the reference shows
+uniform float uWipe;           // fraction of the image left of which the A side shows
 uniform int uHover;            // material to outline
-uniform int uSolo;             // material that is shown alone
+uniform int uSolo;             // solo material
 uniform vec3 uSurround;
 out vec4 outColor;
 
@@ -104,21 +104,21 @@ vec3 node(vec3 at) {
   return texelFetch(uTable, ivec3(at.bgr), 0).rgb;
 }
 
-// a view's table between its nodes: the tetrahedron of the corners at 0, along the longest part, but the shortest, at 1
+// tetrahedral interpolation: corners at 0, plus the largest fraction's axis, minus the smallest's, at 1
 vec3 table(vec3 x) {
   const vec3 R = vec3(1.0, 0.0, 0.0), G = vec3(0.0, 1.0, 0.0), B = vec3(0.0, 0.0, 1.0);
-  vec3 place = min(log2(1.0 + GAIN * sqrt(max(x, 0.0))) / (2.0 * log2(1.0 + GAIN)), 1.0) * LAST;
-  vec3 at = min(floor(place), LAST - 1.0);
-  vec3 part = place - at;
-  vec3 longest = part.r >= part.g ? (part.r >= part.b ? R : B) : (part.g >= part.b ? G : B);
-  vec3 shortest = part.r < part.g ? (part.r < part.b ? R : B) : (part.g < part.b ? G : B);
-  float most = dot(part, longest), least = dot(part, shortest), between = part.r + part.g + part.b - most - least;
-  return (1.0 - most) * node(at) + (most - between) * node(at + longest)
-    + (between - least) * node(at + 1.0 - shortest) + least * node(at + 1.0);
+  vec3 coordinate = min(log2(1.0 + GAIN * sqrt(max(x, 0.0))) / (2.0 * log2(1.0 + GAIN)), 1.0) * LAST;
+  vec3 at = min(floor(coordinate), LAST - 1.0);
+  vec3 fraction = coordinate - at;
+  vec3 longest = fraction.r >= fraction.g ? (fraction.r >= fraction.b ? R : B) : (fraction.g >= fraction.b ? G : B);
+  vec3 shortest = fraction.r < fraction.g ? (fraction.r < fraction.b ? R : B) : (fraction.g < fraction.b ? G : B);
+  float largest = dot(fraction, longest), smallest = dot(fraction, shortest), middle = fraction.r + fraction.g + fraction.b - largest - smallest;
+  return (1.0 - largest) * node(at) + (largest - middle) * node(at + longest)
+    + (middle - smallest) * node(at + 1.0 - shortest) + smallest * node(at + 1.0);
 }
 #endif
 
-// luminance in stops about middle gray, one color for every two stops, black and white at the ends
+// luminance in stops relative to middle gray, one color per two stops, black and white at the ends
 vec3 falseColor(vec3 x) {
   float stops = log2(max(dot(x, vec3(0.2126, 0.7152, 0.0722)), 1e-6) / 0.18);
   if (stops < -6.0) return vec3(0.02);
@@ -151,7 +151,7 @@ vec3 radiance(vec2 uv, bool reference) {
 #ifdef COMPARE
   if (reference) return texture(uReference, uv).rgb;
 #endif
-  return texture(uPicture, uv).rgb;
+  return texture(uImage, uv).rgb;
 }
 
 float alpha(vec2 uv, bool reference) {
@@ -164,15 +164,15 @@ float alpha(vec2 uv, bool reference) {
   return 1.0;
 }
 
-// light, and how much it hides of what is behind it
+// premultiplied radiance and coverage
 vec4 sampled(vec2 uv, bool reference) {
   return vec4(radiance(uv, reference), alpha(uv, reference));
 }
 
-// the same where the picture is shown: shared exponents cannot be mipmapped, so four taps across the footprint
+// filtered: shared exponents cannot be mipmapped, so four taps across the pixel footprint
 vec4 filtered(vec2 uv, bool reference) {
 #ifdef SHRUNK
-  vec2 d = (uSize / uPlace.zw - 1.0) * 0.25 / uSize;
+  vec2 d = (uSize / uImageRect.zw - 1.0) * 0.25 / uSize;
   return 0.25 * (sampled(uv + d, reference) + sampled(uv - d, reference)
     + sampled(uv + vec2(d.x, -d.y), reference) + sampled(uv + vec2(-d.x, d.y), reference));
 #else
@@ -180,15 +180,15 @@ vec4 filtered(vec2 uv, bool reference) {
 #endif
 }
 
-vec3 squares() {
+vec3 checkerboard() {
   vec2 at = floor(gl_FragCoord.xy / 10.0);
   return vec3(mod(at.x + at.y, 2.0) < 0.5 ? 0.27 : 0.36);
 }
 
-vec3 shown(vec2 uv, bool reference) {
+vec3 displayed(vec2 uv, bool reference) {
   vec4 light = filtered(uv, reference);
 #if defined(TRANSPARENT) || defined(TRANSPARENT_REFERENCE)
-  return mix(squares(), display(light.rgb / max(light.a, 1.0 / 512.0)), light.a);
+  return mix(checkerboard(), display(light.rgb / max(light.a, 1.0 / 512.0)), light.a);
 #else
   return display(light.rgb);
 #endif
@@ -201,7 +201,7 @@ int idAt(vec2 uv) {
 
 bool outlined(vec2 uv) {
   bool inside = idAt(uv) == uHover;
-  vec2 d = 1.5 / uPlace.zw;
+  vec2 d = 1.5 / uImageRect.zw;
   for (int i = 0; i < 4; i++) {
     vec2 o = i < 2 ? vec2(float(i) * 2.0 - 1.0, 0.0) : vec2(0.0, float(i - 2) * 2.0 - 1.0);
     if ((idAt(uv + o * d) == uHover) != inside) return true;
@@ -211,7 +211,7 @@ bool outlined(vec2 uv) {
 
 void main() {
   vec2 screen = vec2(gl_FragCoord.x, uCanvas.y - gl_FragCoord.y);
-  vec2 uv = (screen - uPlace.xy) / uPlace.zw;
+  vec2 uv = (screen - uImageRect.xy) / uImageRect.zw;
   if (any(lessThan(uv, vec2(0.0))) || any(greaterThanEqual(uv, vec2(1.0)))) {
     outColor = vec4(uSurround, 1.0);
     return;
@@ -221,18 +221,18 @@ void main() {
   reference = uv.x < uWipe;
 #endif
 #ifdef DISPLAY_REFERRED
-  vec3 color = reference ? shown(uv, true) : texture(uDisplay, uv).rgb;
+  vec3 color = reference ? displayed(uv, true) : texture(uDisplay, uv).rgb;
 #ifdef TRANSPARENT
-  if (!reference) color += (1.0 - filtered(uv, false).a) * squares();
+  if (!reference) color += (1.0 - filtered(uv, false).a) * checkerboard();
 #endif
 #else
-  vec3 color = shown(uv, reference);
+  vec3 color = displayed(uv, reference);
 #endif
 #ifdef BRUSH
   if (!reference) {
-    float share = texture(uBrush, uv).r;
+    float fraction = texture(uBrush, uv).r;
     float gray = dot(color, vec3(0.2126, 0.7152, 0.0722));
-    color = mix(vec3(gray * 0.6), ACCENT, sqrt(share) * 0.9);
+    color = mix(vec3(gray * 0.6), ACCENT, sqrt(fraction) * 0.9);
   }
 #endif
 #ifdef SOLO

@@ -1,5 +1,5 @@
-/** The pending first image of a view, of a new bake or after a view was opened: held back until something of
- * every material is there, so that no partial image replaces a complete one. */
+/** The pending first image of a view, after a new bake or opening the view: held back until every material has some
+ * pixels, so that no partial image replaces a complete one. */
 import type { Frame } from "../session/net/binaryFrame";
 import type { FrameHeader } from "../protocol";
 import { applyFrame, emptyPixels, readAlpha, type PixelBuffer } from "./pixels";
@@ -7,11 +7,11 @@ import type { MaterialIds } from "./png16";
 
 export class PendingFrame {
   pixels: PixelBuffer | null = null;
-  /** How much each pixel hides of what is behind it; null: all. */
+  /** Coverage of each pixel; null: opaque. */
   alpha: Uint8Array | null = null;
-  /** What came last, where that was tone-mapped by the server. */
+  /** The newest frame, if it was tone-mapped by the server. */
   jpeg: Frame | null = null;
-  /** Of the newest frame. */
+  /** Header of the newest frame. */
   header: FrameHeader;
   ids: MaterialIds | null = null;
 
@@ -20,7 +20,7 @@ export class PendingFrame {
     this.addFrame(first);
   }
 
-  /** Something of every material has come. */
+  /** True once every material has some pixels. */
   get isComplete(): boolean {
     return this.header.complete;
   }
@@ -38,12 +38,12 @@ export class PendingFrame {
   }
 }
 
-/** Of one connection: the views whose first image is pending. */
+/** The views of one connection whose first image is pending. */
 export class PendingFrames {
   private readonly pending = new Map<string, PendingFrame>();
   private readonly displayedViews = new Set<string>();
 
-  /** Frames of this view go to its image. */
+  /** True if frames of this view go directly to its image. */
   isDisplayed(view: string): boolean {
     return this.displayedViews.has(view);
   }
@@ -52,7 +52,7 @@ export class PendingFrames {
     return this.pending.get(view);
   }
 
-  /** Add a frame of a view that is not shown yet. */
+  /** Add a frame of a view whose image is not shown yet. */
   addFrame(frame: Frame): PendingFrame {
     const { view } = frame.header;
     let pendingFrame = this.pending.get(view);
@@ -61,13 +61,13 @@ export class PendingFrames {
     return pendingFrame;
   }
 
-  /** A view's image is shown from now on. */
+  /** Mark a view's image as shown. */
   markDisplayed(view: string): void {
     this.pending.delete(view);
     this.displayedViews.add(view);
   }
 
-  /** The server has forgotten all views but these. */
+  /** Drop all views but these, as the server does. */
   retain(views: readonly string[]): void {
     for (const view of [...this.pending.keys(), ...this.displayedViews]) {
       if (views.includes(view)) continue;

@@ -1,4 +1,4 @@
-/** How often each brightness occurs in an image: luminance, red, green and blue in stops about middle gray. */
+/** Histogram of an image: luminance, red, green and blue in stops relative to middle gray. */
 import { decodeRgb9e5 } from "./color/rgb9e5";
 import { luminance } from "./color/tonemap";
 
@@ -7,7 +7,7 @@ export const MIN_STOP = -10;
 export const MAX_STOP = 8;
 export const BINS_PER_STOP = 6;
 export const NUM_BINS = (MAX_STOP - MIN_STOP) * BINS_PER_STOP;
-/** More samples than this change no bar by a pixel. */
+/** More samples than this change no bar visibly. */
 const MAX_SAMPLES = 60_000;
 
 export interface Histogram {
@@ -17,7 +17,7 @@ export interface Histogram {
   samples: number;
 }
 
-/** The bin of a radiance; what is darker or brighter than the ends counts at the ends. */
+/** The bin of a radiance, clamped to the first and the last. */
 export function binIndex(value: number): number {
   const stop = Math.log2(Math.max(value, 1e-12) / MIDDLE_GRAY);
   return Math.min(NUM_BINS - 1, Math.max(0, Math.floor((stop - MIN_STOP) * BINS_PER_STOP)));
@@ -32,7 +32,7 @@ export function computeHistogram(encoded: Uint32Array, exposure: number): Histog
     bins[bin] = (bins[bin] as number) + 1;
   };
   const gain = 2 ** exposure;
-  // an odd step does not fall in with the image's columns
+  // an odd step avoids aliasing with the image's columns
   const step = Math.ceil(encoded.length / MAX_SAMPLES) | 1;
   for (let i = 0; i < encoded.length; i += step) {
     const rgb = decodeRgb9e5(encoded[i] as number);
@@ -43,7 +43,7 @@ export function computeHistogram(encoded: Uint32Array, exposure: number): Histog
   return result;
 }
 
-/** The stop below which a fraction of the luminances lies, to a bin. */
+/** Quantile of the luminances in stops, to a bin's precision. */
 export function percentile(histogram: Histogram, fraction: number): number {
   let sum = 0;
   const bin = histogram.luminance.findIndex((n) => (sum += n) >= fraction * histogram.samples);

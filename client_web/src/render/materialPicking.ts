@@ -1,13 +1,13 @@
-/** What lies under the pointer. */
+/** Finds the image pixel and the material under the pointer. */
 import type { ImageCanvas } from "./canvas";
 import { toImagePoint } from "./zoomTransform";
 import { transformOf } from "./viewTransforms";
 
 export interface PixelHit {
-  /** In the canvas, CSS pixels. */
+  /** Position in the canvas, CSS pixels. */
   x: number;
   y: number;
-  /** In the image, its own pixels; may lie outside. */
+  /** Position in the image, image pixels; may lie outside. */
   px: number;
   py: number;
   material: string | null;

@@ -1,5 +1,5 @@
-/** The image as the client holds it: RGB9_E5 pixels, kept so that probes, export, thumbnails and a lost GPU context
- * need no round trip. */
+/** The client's copy of an image: RGB9_E5 pixels, so that pixel probe, export, thumbnails and a lost GPU context need no
+ * round trip. */
 import { encodeRgb9e5 } from "./color/rgb9e5";
 import type { Frame } from "../session/net/binaryFrame";
 import type { Tile } from "../protocol";
@@ -54,16 +54,16 @@ export function applyFrame(target: PixelBuffer, frame: Frame): { tile: Tile; enc
   });
 }
 
-/** Below this fraction even the brightest pixel is not tinted fully: there is next to nothing to show. */
+/** Minimum scale of the brush: weaker contributions do not reach the full tint. */
 const MIN_WEIGHT = 5;
 
-/** Stretch an image so that its largest value is 255. */
+/** Scale an image so that its largest value is 255. */
 export function normalizeWeights(values: Uint8Array): Uint8Array {
   const largest = values.reduce((a, b) => Math.max(a, b), MIN_WEIGHT);
   return values.map((value) => (value * 255) / largest);
 }
 
-/** Write the bytes of tiles, one tile after another, into an image. */
+/** Write the bytes of consecutive tiles into an image. */
 export function copyTiles(target: Uint8Array, width: number, tiles: readonly Tile[], bytes: Uint8Array): void {
   let offset = 0;
   for (const [x, y, w, h] of tiles) {
@@ -74,7 +74,7 @@ export function copyTiles(target: Uint8Array, width: number, tiles: readonly Til
   }
 }
 
-/** Coverage of a whole image once a frame has come: null if it is opaque everywhere. `previous` may be overwritten. */
+/** Coverage of the whole image after a frame; null if opaque everywhere. `previous` may be overwritten. */
 export function readAlpha(previous: Uint8Array | null, { header, alpha }: Frame): Uint8Array | null {
   if (alpha === null) return header.tiles.length > 0 ? null : previous;
   const size = header.width * header.height;
@@ -83,7 +83,7 @@ export function readAlpha(previous: Uint8Array | null, { header, alpha }: Frame)
   return all;
 }
 
-/** A brush frame (how much of each pixel comes from an interval of the curve) as one image, 255 = all of it. */
+/** A brush frame, the fraction of each pixel's light from an interval of the curve, as one image; 255 is the maximum. */
 export function brushImage(frame: Frame): Uint8Array {
   const { width, height, tiles } = frame.header;
   const values = new Uint8Array(width * height);

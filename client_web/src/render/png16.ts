@@ -1,4 +1,4 @@
-/** 16-bit gray PNG by a library: browsers round such images to 8 bits, and material ids need all of them. */
+/** Decodes 16-bit gray PNGs: browsers reduce them to 8 bits, too few for material ids. */
 
 import { decode } from "fast-png";
 
@@ -14,22 +14,22 @@ export interface MaterialIds {
   values: Uint16Array;
 }
 
-/** Refuses what is no 16-bit gray PNG, or claims too many pixels, before anything is unpacked. */
+/** Reject anything but a 16-bit gray PNG of acceptable size, before decompressing it. */
 function checkHeader(buffer: ArrayBuffer): void {
   const bytes = new Uint8Array(buffer);
   if (bytes.length < HEADER_BYTES || SIGNATURE.some((byte, i) => bytes[i] !== byte)) {
     throw new Error("the material image is not a PNG");
   }
-  if (bytes[DEPTH_AT] !== 16 || bytes[COLOR_TYPE_AT] !== 0) throw new Error("the material image is not 16-bit grey");
+  if (bytes[DEPTH_AT] !== 16 || bytes[COLOR_TYPE_AT] !== 0) throw new Error("the material image is not 16-bit gray");
   const view = new DataView(buffer);
   const pixels = view.getUint32(WIDTH_AT) * view.getUint32(HEIGHT_AT);
   if (pixels === 0 || pixels > MAX_PIXELS) throw new Error("the material image has no usable size");
 }
 
-/** The ids in an image. Throws where it is no 16-bit gray PNG, too large or damaged. */
+/** Decode the ids of an image. Throws if it is not a 16-bit gray PNG, too large or damaged. */
 export function decodeIds(buffer: ArrayBuffer): MaterialIds {
   checkHeader(buffer);
   const { width, height, data } = decode(buffer, { checkCrc: true });
-  if (!(data instanceof Uint16Array)) throw new Error("the material image is not 16-bit grey");
+  if (!(data instanceof Uint16Array)) throw new Error("the material image is not 16-bit gray");
   return { width, height, values: data };
 }

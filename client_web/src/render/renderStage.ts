@@ -1,4 +1,4 @@
-/** The images of all views of the open scene that were shown; which of them are shown is the store's to say. */
+/** The images of the open scene's views; the view state decides which are shown. */
 import { brushedRange } from "../state/curvePreview";
 import { shownViews, activeViewName } from "../state/views";
 import { ViewImage } from "./viewImage";
@@ -12,7 +12,7 @@ class RenderStage {
     return image;
   }
 
-  /** Of the view that buttons and keys mean. */
+  /** The image of the active view. */
   get active(): ViewImage {
     return this.imageOf(activeViewName.value);
   }
@@ -21,7 +21,7 @@ class RenderStage {
     return shownViews.value.map((view) => this.imageOf(view));
   }
 
-  /** Keep what is shown as A; what A was in other views is another image. */
+  /** Store the shown images as A, and drop A's images of other views. */
   storeReference(): void {
     for (const image of this.images.values()) image.clearReference();
     for (const image of this.displayed) image.storeReference();
@@ -32,7 +32,7 @@ class RenderStage {
     brushedRange.value = null;
   }
 
-  /** Forget everything that belongs to a scene. */
+  /** Drop everything that belongs to a scene. */
   clear(): void {
     this.images.clear();
   }

@@ -1,5 +1,5 @@
-/** One view's image: receives the frames of a session, stores them, and answers lookups. The canvas it is on draws
- * it; an image on no canvas keeps its content. */
+/** One view's image: receives and stores the frames of a session, and answers lookups. Its canvas draws it; without one
+ * it keeps its content. */
 import { decodeRgb9e5 } from "./color/rgb9e5";
 import type { Frame } from "../session/net/binaryFrame";
 import type { Fidelity, Rgb } from "../protocol";
@@ -13,7 +13,7 @@ import type { CanvasGeometry } from "./zoomTransform";
 
 const BACKGROUND = 65535;
 
-/** What an image may be shown on. */
+/** A screen that can show an image. */
 export interface ImagePresenter {
   readonly renderer: DisplayRenderer;
   present(): Promise<void>;
@@ -25,28 +25,28 @@ export class ViewImage {
   pixels = emptyPixels(1, 1);
   /** The A side of a comparison. */
   reference: PixelBuffer | null = null;
-  /** The same as `alpha`, of the A side. */
+  /** The same as `alpha`, for the A side. */
   referenceAlpha: Uint8Array | null = null;
   ids: MaterialIds | null = null;
-  /** The bake that the ids are of, or will be when they have come. */
+  /** The bake of the ids, also while they are loading. */
   idsOf: string | null = null;
-  /** Fraction of each pixel that an interval of the curve lights, 255 = the most of all. */
+  /** Fraction of each pixel's light from an interval of the curve; 255 is the maximum. */
   brush: Uint8Array | null = null;
-  /** Coverage of each pixel, by which its radiance has been multiplied; null: opaque. */
+  /** Coverage of each pixel, premultiplied into its radiance; null: opaque. */
   alpha: Uint8Array | null = null;
-  /** What the server has tone-mapped already, where that is what was sent last. */
+  /** The newest frame, if it was tone-mapped by the server. */
   display: ImageBitmap | null = null;
   revision = 0;
-  /** The revision for which it is exact; −1 while it is not. */
+  /** The revision for which the image is exact; −1 while it is not. */
   exactRevision = -1;
-  /** The same of what a room's look has become. */
+  /** The same for the room's version of the look. */
   exactShared = -1;
   fidelity: Fidelity = "preview";
   screen: ImagePresenter | null = null;
 
   constructor(readonly view: string) {}
 
-  /** Take a frame and draw it; an image of another size replaces what was there. Resolves when it is drawn. */
+  /** Store and draw a frame; a frame of another size replaces the image. Resolves when drawn. */
   async show(frame: Frame): Promise<void> {
     const { width, height, kind, format, revision } = frame.header;
     if (kind === "highlight") return this.showBrush(frame);
@@ -80,7 +80,7 @@ export class ViewImage {
   private addTiles(frame: Frame): void {
     const tiles = applyFrame(this.pixels, frame);
     this.setAlpha(readAlpha(this.alpha, frame));
-    // one big upload is quicker than many small ones of the same size
+    // one large upload is faster than many small ones
     const area = tiles.reduce((sum, { encoded }) => sum + encoded.length, 0);
     if (area > this.pixels.encoded.length / 2) this.screen?.renderer.updateImage(this.pixels);
     else this.screen?.renderer.uploadTiles(tiles);
@@ -120,7 +120,7 @@ export class ViewImage {
     this.screen?.redraw();
   }
 
-  /** Keep it as it is now as the A side of comparisons. */
+  /** Store the current image as the A side. */
   storeReference(): void {
     this.reference = copyPixels(this.pixels);
     this.referenceAlpha = this.alpha?.slice() ?? null;
@@ -133,7 +133,7 @@ export class ViewImage {
     this.screen?.redraw();
   }
 
-  /** Give the A side to the screen. */
+  /** Upload the A side to the screen. */
   showReference(): void {
     const { reference, referenceAlpha, screen } = this;
     if (reference === null) return;
@@ -142,7 +142,7 @@ export class ViewImage {
       screen?.renderer.setReferenceAlpha(reference.width, reference.height, referenceAlpha);
   }
 
-  /** Linear radiance of a pixel; null outside. */
+  /** Linear radiance of a pixel; null outside the image. */
   radiance(x: number, y: number): Rgb | null {
     if (x < 0 || y < 0 || x >= this.pixels.width || y >= this.pixels.height) return null;
     return decodeRgb9e5(this.pixels.encoded[y * this.pixels.width + x] ?? 0);

@@ -1,9 +1,9 @@
-/** Zoom transforms of views: each view has one for the single view, and one for the grid. */
+/** Zoom transforms: each view has one for showing it alone and one for the grid. */
 import { signal } from "@preact/signals";
 import { sideBySide } from "../state/views";
 import { FIT, type ZoomTransform } from "./zoomTransform";
 
-/** Transforms in the single view, and in the grid; fitted by default. */
+/** Transforms alone and in the grid; fitted by default. */
 export const singleTransforms = signal<ReadonlyMap<string, ZoomTransform>>(new Map());
 export const gridTransforms = signal<ReadonlyMap<string, ZoomTransform>>(new Map());
 

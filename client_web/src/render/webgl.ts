@@ -12,7 +12,7 @@ export function makeTexture(gl: Gl, filter: number): WebGLTexture {
   return texture;
 }
 
-/** A texture that is read node by node. */
+/** A texture without filtering. */
 export function makeVolume(gl: Gl): WebGLTexture {
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_3D, texture);
@@ -28,7 +28,7 @@ export function allocate(gl: Gl, texture: WebGLTexture, width: number, height: n
 
 function compile(gl: Gl, type: number, source: string): WebGLShader {
   const shader = gl.createShader(type);
-  if (shader === null) throw new Error("the graphics context is lost");
+  if (shader === null) throw new Error("The graphics context is lost");
   gl.shaderSource(shader, source);
   gl.compileShader(shader);
   return shader;
@@ -50,11 +50,11 @@ export class Program {
     gl.attachShader(this.handle, compiled);
     gl.linkProgram(this.handle);
     if (!gl.getProgramParameter(this.handle, gl.LINK_STATUS) && !gl.isContextLost()) {
-      throw new Error(`the picture's shader does not link: ${gl.getShaderInfoLog(compiled) ?? ""}`);
+      throw new Error(`A shader failed to link: ${gl.getShaderInfoLog(compiled) ?? ""}`);
     }
   }
 
-  /** Null where the variant does not use it; setting such a uniform does nothing. */
+  /** Null if the variant does not use it; setting such a uniform does nothing. */
   uniform(name: string): WebGLUniformLocation | null {
     if (!this.uniforms.has(name)) this.uniforms.set(name, this.gl.getUniformLocation(this.handle, name));
     return this.uniforms.get(name) ?? null;

@@ -1,11 +1,11 @@
-/** Zoom of the active view, as buttons and keys know it. */
+/** Zoom of the active view, for buttons and keys. */
 import { stage } from "./renderStage";
 import { FIT, displayedWidth, zoomAt, type CanvasGeometry } from "./zoomTransform";
 import { setTransform, transformOf } from "./viewTransforms";
 
 const EMPTY_CANVAS: CanvasGeometry = { width: 1, height: 1, aspect: 1, margin: 0 };
 
-/** The canvas of the view that keys mean. */
+/** The canvas of the active view. */
 const canvasGeometry = () => stage.active.screen?.size() ?? EMPTY_CANVAS;
 
 export function zoomBy(factor: number): void {
@@ -24,7 +24,7 @@ export function zoomFactor(): number {
   return (displayedWidth(transformOf(view), canvasGeometry()) * (window.devicePixelRatio || 1)) / pixels.width;
 }
 
-/** One pixel of the image on one pixel of the screen. */
+/** Zoom to one screen pixel per image pixel. */
 export function zoomActual(): void {
   zoomBy(1 / zoomFactor());
 }

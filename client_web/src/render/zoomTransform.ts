@@ -1,5 +1,5 @@
-/** Where the image lies on the canvas. Positions in the image are fractions of its sides, so that a finer bake of
- * the same view takes the same area. Screen lengths are CSS pixels. */
+/** The image's position on the canvas. Image positions are fractions of its sides, so that a finer bake of the same view
+ * covers the same area. Screen lengths are CSS pixels. */
 
 export interface ZoomTransform {
   /** Width of the whole image on the screen; null fits it into the canvas. */
@@ -12,7 +12,7 @@ export interface CanvasGeometry {
   height: number;
   /** Width ÷ height of the image. */
   aspect: number;
-  /** Left free around a fitted image. */
+  /** Margin around a fitted image. */
   margin: number;
 }
 
@@ -32,7 +32,7 @@ export function displayedWidth(transform: ZoomTransform, canvas: CanvasGeometry)
   return transform.width ?? fitWidth(canvas);
 }
 
-/** Fractions of the image under a point of the canvas; outside [0, 1] beside the image. */
+/** The image position under a canvas point; outside [0, 1] beside the image. */
 export function toImagePoint(transform: ZoomTransform, canvas: CanvasGeometry, x: number, y: number): [u: number, v: number] {
   const width = displayedWidth(transform, canvas);
   const [cu, cv] = transform.center;
@@ -45,7 +45,7 @@ export function toScreenPoint(transform: ZoomTransform, canvas: CanvasGeometry, 
   return [canvas.width / 2 + (u - cu) * width, canvas.height / 2 + ((v - cv) * width) / canvas.aspect];
 }
 
-/** The pixels of an image that are on the canvas: x, y, width, height; null where that is all of them, or none. */
+/** The visible pixels of an image: x, y, width, height; null if all or none are visible. */
 export function visibleRegion(
   transform: ZoomTransform,
   canvas: CanvasGeometry,
@@ -60,7 +60,7 @@ export function visibleRegion(
   return isAll || across < 1 || down < 1 ? null : [x, y, across, down];
 }
 
-/** Zoom by `factor`, keeping what is under (x, y) where it is. */
+/** Zoom by `factor` around the canvas point (x, y). */
 export function zoomAt(transform: ZoomTransform, canvas: CanvasGeometry, factor: number, x: number, y: number): ZoomTransform {
   const previousWidth = displayedWidth(transform, canvas);
   const width = Math.min(MAX_WIDTH, Math.max(MIN_WIDTH, previousWidth * factor));
@@ -77,7 +77,7 @@ export function panTransform(transform: ZoomTransform, canvas: CanvasGeometry, d
   return clampTransform({ width, center: [u - dx / width, v - (dy * canvas.aspect) / width] });
 }
 
-/** The image's own middle stays reachable: it cannot be thrown off the canvas. */
+/** Keeps the image's center reachable: it cannot leave the canvas. */
 function clampTransform(transform: ZoomTransform): ZoomTransform {
   const [u, v] = transform.center;
   return { ...transform, center: [Math.min(1, Math.max(0, u)), Math.min(1, Math.max(0, v))] };

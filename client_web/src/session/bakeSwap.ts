@@ -1,5 +1,5 @@
-/** Frames to images: the first of a view is held back until it is complete; a finer bake takes over when the focused view
- * is complete. */
+/** Routes frames to images: a view's first image is held back until it is complete; a new bake replaces the shown one
+ * when the active view is complete. */
 import { batch } from "@preact/signals";
 import { request } from "./net/api";
 import type { Frame } from "./net/binaryFrame";
@@ -35,12 +35,12 @@ export async function showFrame(source: BakeConnection, frame: Frame): Promise<v
   if (kind === "picture" && source === connections.shown) recordShownFrame(source, frame.header);
 }
 
-/** Add a frame of a view whose first image is pending: the displayed image stays until that is complete. */
+/** Add a frame of a view whose first image is pending: the displayed image stays until it is complete. */
 async function receiveFirstFrames(source: BakeConnection, frame: Frame): Promise<void> {
   const { view } = frame.header;
   const isNew = source.pendingFrames.get(view) === undefined;
   const pendingFrame = source.pendingFrames.addFrame(frame);
-  const isFixed = source.hello?.views.find(({ name }) => name === view)?.camera_mode !== "free"; // else its pixels are of no place
+  const isFixed = source.hello?.views.find(({ name }) => name === view)?.camera_mode !== "free"; // material ids only fit a fixed camera
   if (isNew && isFixed && stage.imageOf(view).idsOf !== source.bake) void loadMaterialIds(source.bake, view, pendingFrame);
   if (!pendingFrame.isComplete) return;
   if (source === connections.shown) return showCompleteView(source, view);
@@ -60,7 +60,7 @@ async function showCompleteView(bakeConnection: BakeConnection, view: string): P
   if (bakeConnection === connections.shown) recordShownFrame(bakeConnection, pendingFrame.header);
 }
 
-/** Follow a connection from now on: its bake and views. */
+/** Switch to a connection: its bake and views. */
 export function applyBake(bakeConnection: BakeConnection): void {
   if (bakeConnection.hello === null) return;
   const { views: baked, method: light, axes: changeable, free_camera_error: error } = bakeConnection.hello;
@@ -68,7 +68,7 @@ export function applyBake(bakeConnection: BakeConnection): void {
   batch(() => {
     views.value = baked;
     shownViews.value = shownBake;
-    if (bake.peek() !== bakeConnection.bake) freeCameraError.value = null; // of another
+    if (bake.peek() !== bakeConnection.bake) freeCameraError.value = null; // belongs to the previous bake
     bakedFreeCameraError.value = error;
     if (!shownBake.includes(activeViewName.peek())) activeViewName.value = shownBake[0] as string;
     bake.value = bakeConnection.bake;
@@ -77,7 +77,7 @@ export function applyBake(bakeConnection: BakeConnection): void {
   });
 }
 
-/** The new bake takes over once the focused view is complete; the other views follow as they come. */
+/** The new bake replaces the shown one once the active view is complete; the other views follow. */
 export async function swapWhenComplete(): Promise<void> {
   const { incoming } = connections;
   const active = incoming?.hello ? activeViewOf(incoming.hello) : null;
@@ -99,5 +99,5 @@ async function swapConnection(to: BakeConnection): Promise<void> {
   resetExactness(shownConnection);
   const complete = shownConnection.filter((view) => to.pendingFrames.get(view)?.isComplete);
   await Promise.all(complete.map((view) => showCompleteView(to, view)));
-  if (to.bake !== previous?.bake) showNote("The new bake is in place.");
+  if (to.bake !== previous?.bake) showNote("New bake loaded.");
 }

@@ -1,6 +1,5 @@
-/** Free-camera views that this browser draws itself: a moving camera needs no network. The server sends
- * what a look makes (frames of kind "scene_update"), and sends exact images as ever; where it has not caught up, or the
- * browser cannot draw, it sends all images. */
+/** Free-camera views drawn by this browser: camera motion needs no network. The server sends the look's tables (frames of
+ * kind "scene_update") and exact images; while its tables are outdated, or if the browser cannot draw, it sends all images. */
 import { computed, effect, signal } from "@preact/signals";
 import { FreeCameraRenderer } from "../render/freeCamera/freeCameraRenderer";
 import { isSoftwareRenderer } from "../render/freeCamera/isSoftwareRenderer";
@@ -19,14 +18,14 @@ export type RendererMode = "auto" | "client" | "server";
 const RENDERER_KEY = "relume.drawnBy";
 const MAX_RENDER_MS = 80;
 const NUM_TIMINGS = 8;
-/** Of a bake; a browser that loses more of them is left alone. */
+/** Maximum number of lost contexts per bake before the server takes over. */
 const MAX_LOST_CONTEXTS = 3;
-/** What lobes alone ask for; it is more than everything else. */
-const LOBE_LIGHTS_ARRAY = "seen_lights";
+/** Array needed only for lobes; larger than all others. */
+const LOBE_LIGHTS_ARRAY = "visible_lights";
 
-/** Who draws free-camera views, as the user wants it. */
+/** The renderer of free-camera views chosen by the user. */
 export const rendererChoice = signal<RendererMode>(loadRendererChoice());
-/** Whether this browser does. */
+/** True if this browser draws them. */
 export const isClientRendering = signal(false);
 
 interface ClientRenderer {
@@ -34,7 +33,7 @@ interface ClientRenderer {
   renderer: FreeCameraRenderer;
   /** The last tables of each view. */
   headers: Map<string, FrameHeader>;
-  /** Resolves when what lobes ask for is there. */
+  /** Resolves when the array for lobes is loaded. */
   lobeLightsLoading: Promise<void> | null;
 }
 
@@ -42,16 +41,16 @@ let clientRenderer: ClientRenderer | null = null;
 let loadingConnection: BakeConnection | null = null;
 /** Bakes that this browser has failed to draw. */
 const rejectedConnections = new WeakSet<BakeConnection>();
-/** How many graphics contexts were lost while they were drawn. */
+/** Number of lost graphics contexts per bake. */
 const lostContextCounts = new WeakMap<BakeConnection, number>();
-/** Whether the server draws: it was chosen, or the choice is left to us and it shows what this browser cannot. */
+/** True if the server draws: chosen, or automatic with features that this browser cannot draw. */
 const isServerRendering = computed(() => rendererChoice.value === "server" || (rendererChoice.value === "auto" && usesTexelShading.value));
 const cameraSeqs = new Map<string, number>();
 const movingViews = new Set<string>();
 const staleViews = new Set<string>();
-/** Views of which the server sent an image that is wanted while one was being drawn here, older than it. */
+/** Views for which a newer server image came while an older one was being drawn. */
 const supersededViews = new Set<string>();
-/** Of each view: the waiters for its next image. Continued input must not keep frames from being acknowledged. */
+/** Per view: waiters for its next image. Continuous input must not block acknowledgments. */
 const renderWaiters = new Map<string, (() => void)[]>();
 let renderLoop: Promise<void> | null = null;
 let renderDurations: number[] = [];
@@ -61,7 +60,7 @@ function loadRendererChoice(): RendererMode {
     const stored = localStorage.getItem(RENDERER_KEY);
     return stored === "client" || stored === "server" ? stored : "auto";
   } catch {
-    return "auto"; // a browser without storage
+    return "auto"; // no storage
   }
 }
 
@@ -70,27 +69,27 @@ export function setRenderer(choice: RendererMode): void {
   rendererChoice.value = choice;
 }
 
-/** The size of a free-camera view's images. */
+/** Image size of a free-camera view. */
 export function limitRenderSize(width: number, height: number): [number, number] {
   const scale = Math.min(1, Math.sqrt(MAX_CAMERA_PIXELS / (width * height)));
   return [Math.floor(width * scale), Math.floor(height * scale)];
 }
 
-/** Record the camera that the server has: images of others are late. */
+/** Record the camera sent to the server: images of earlier cameras are outdated. */
 export function setCameraSeq(view: string, cameraSeq: number): void {
   cameraSeqs.set(view, cameraSeq);
 }
 
-/** Set whether a view's camera moves without the server. */
+/** Set whether the browser renders a view's camera motion. */
 export function setMoving(view: string, isMovingNow: boolean): void {
   if (isMovingNow) movingViews.add(view);
   else movingViews.delete(view);
 }
 
-/** Whether a view's camera moves without the server. */
+/** True if the browser renders a view's camera motion. */
 export const isMoving = (view: string): boolean => movingViews.has(view);
 
-/** Draw a view from where its camera is now; false where the server has to. */
+/** Draw a view from its current camera; false if the server has to. */
 export function renderIfPossible(view: string): boolean {
   const { shown } = connections;
   if (clientRenderer === null || clientRenderer.bakeConnection !== shown || !clientRenderer.renderer.isReady || !isClientRendering.peek()) return false;
@@ -99,7 +98,7 @@ export function renderIfPossible(view: string): boolean {
   return true;
 }
 
-/** Take a frame of a server. */
+/** Handle a frame of the server. */
 export async function onFrame(source: BakeConnection, frame: Frame): Promise<void> {
   const { view, kind, camera_seq: cameraSeq } = frame.header;
   if (kind === "scene_update") return onTables(source, frame);
@@ -123,7 +122,7 @@ async function onTables(source: BakeConnection, frame: Frame): Promise<void> {
     try {
       await (clientRenderer.lobeLightsLoading ??= loadLobeLights(clientRenderer));
     } catch (error) {
-      return fallBackToServer(`${(error as Error).message}; the server draws instead.`);
+      return fallBackToServer(`${(error as Error).message}. The server draws instead.`);
     }
   }
   return renderView(header.view);
@@ -133,7 +132,7 @@ async function loadLobeLights({ bakeConnection, renderer }: ClientRenderer): Pro
   renderer.store(LOBE_LIGHTS_ARRAY, await loadArray(bakeConnection, LOBE_LIGHTS_ARRAY));
 }
 
-/** One image at a time, each from the newest camera; resolves when the view has been drawn once, or will not be. */
+/** Draw one image at a time, each from the newest camera; resolves when the view has been drawn once, or cannot be. */
 function renderView(view: string): Promise<void> {
   staleViews.add(view);
   const rendered = new Promise<void>((done) => renderWaiters.set(view, [...(renderWaiters.get(view) ?? []), done]));
@@ -159,7 +158,7 @@ async function renderStaleViews(): Promise<void> {
       if (frame !== null && clientRenderer?.bakeConnection === bakeConnection && !supersededViews.has(view)) await showFrame(bakeConnection, frame);
     } catch (error) {
       if (clientRenderer?.bakeConnection !== bakeConnection) return;
-      return clientRenderer.renderer.isLost ? onContextLost() : fallBackToServer(`${(error as Error).message}; the server draws instead.`);
+      return clientRenderer.renderer.isLost ? onContextLost() : fallBackToServer(`${(error as Error).message}. The server draws instead.`);
     } finally {
       for (const done of waiters) done();
     }
@@ -169,7 +168,7 @@ async function renderStaleViews(): Promise<void> {
 
 const firstOf = (items: Set<string>): string | undefined => items.values().next().value;
 
-/** A frame as the server would have sent it. */
+/** The image as a frame of the server. */
 async function renderFrame({ renderer, headers }: ClientRenderer, name: string): Promise<Frame | null> {
   const [view, header] = [views.peek().find((candidate) => candidate.name === name), headers.get(name)];
   if (view === undefined || header === undefined) return null;
@@ -179,24 +178,24 @@ async function renderFrame({ renderer, headers }: ClientRenderer, name: string):
   return { header: { ...header, ...fullFrame, width, height, alpha: coverage !== null, scene_update: null }, payload: encoded, alpha: coverage };
 }
 
-/** Where it was not asked for, drawing here goes on only as long as it is quick. */
+/** In automatic mode the browser draws only as long as it is fast. */
 function recordDuration(ms: number): void {
   renderDurations = [...renderDurations.slice(1 - NUM_TIMINGS), ms];
   const median = [...renderDurations].sort((a, b) => a - b)[NUM_TIMINGS >> 1];
   if (rendererChoice.peek() === "auto" && renderDurations.length === NUM_TIMINGS && (median ?? 0) > MAX_RENDER_MS) fallBackToServer(null);
 }
 
-/** The server draws until all is loaded anew, which its next image begins. */
+/** The server draws until everything is reloaded, which its next image triggers. */
 function onContextLost(): void {
   if (clientRenderer === null) return;
   const { bakeConnection } = clientRenderer;
   const times = 1 + (lostContextCounts.get(bakeConnection) ?? 0);
   lostContextCounts.set(bakeConnection, times);
-  if (times > MAX_LOST_CONTEXTS) return fallBackToServer("This browser keeps losing its graphics context; the server draws instead.");
+  if (times > MAX_LOST_CONTEXTS) return fallBackToServer("This browser keeps losing its graphics context. The server draws instead.");
   releaseToServer();
 }
 
-/** The server draws from now on, until somebody wishes otherwise. */
+/** Let the server draw until the user chooses otherwise. */
 function fallBackToServer(reason: string | null): void {
   if (clientRenderer === null) return;
   rejectedConnections.add(clientRenderer.bakeConnection);
@@ -216,7 +215,7 @@ function releaseToServer(): void {
   bakeConnection.isRenderingAnnounced = false;
 }
 
-/** An image of a view is shown: from now on this browser may draw it. */
+/** Called when a view's image is shown: from now on this browser may draw it. */
 async function offerClientRendering(bakeConnection: BakeConnection, view: string): Promise<void> {
   const isFree = bakeConnection.hello?.views.find(({ name }) => name === view)?.camera_mode === "free";
   if (!isFree || bakeConnection !== connections.shown || isServerRendering.peek() || rejectedConnections.has(bakeConnection)) return;
@@ -233,13 +232,13 @@ async function offerClientRendering(bakeConnection: BakeConnection, view: string
     announceClientRendering(newRenderer);
   } catch (error) {
     rejectedConnections.add(bakeConnection);
-    if (rendererChoice.peek() === "client") showNote(`${(error as Error).message}; the server draws instead.`);
+    if (rendererChoice.peek() === "client") showNote(`${(error as Error).message}. The server draws instead.`);
   } finally {
     loadingConnection = null;
   }
 }
 
-/** The server that greets knows nothing of who draws. */
+/** A new connection: the server does not know yet which views the browser draws. */
 function announceClientRendering({ bakeConnection, headers }: ClientRenderer): void {
   if (bakeConnection.isRenderingAnnounced) return;
   headers.clear();
@@ -247,16 +246,16 @@ function announceClientRendering({ bakeConnection, headers }: ClientRenderer): v
   isClientRendering.value = bakeConnection.isRenderingAnnounced;
 }
 
-/** Everything of a bake that never changes; null where this browser would draw with its processor. */
+/** Load the constant data of a bake; null if this browser would render on the CPU. */
 async function loadClientRenderer(bakeConnection: BakeConnection): Promise<ClientRenderer | null> {
   const gl = new OffscreenCanvas(1, 1).getContext("webgl2", { antialias: false });
-  if (gl === null) throw new Error("This browser offers no WebGL2");
+  if (gl === null) throw new Error("This browser has no WebGL2");
   if (rendererChoice.peek() === "auto" && isSoftwareRenderer(gl)) {
     rejectedConnections.add(bakeConnection);
     return null;
   }
   const surface = await getJson<FreeCameraBody>(arrayUrl(bakeConnection));
-  if (surface.has_alpha_test) throw new Error("This browser cannot draw glass or surfaces with holes");
+  if (surface.has_alpha_test) throw new Error("This browser cannot draw glass or alpha-tested surfaces");
   const names = surface.arrays.filter((name) => name !== LOBE_LIGHTS_ARRAY);
   const arrays = await Promise.all(names.map(async (name) => [name, await loadArray(bakeConnection, name)] as const));
   return { bakeConnection, renderer: new FreeCameraRenderer(gl, surface, new Map(arrays)), headers: new Map(), lobeLightsLoading: null };

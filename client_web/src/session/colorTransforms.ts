@@ -1,4 +1,4 @@
-/** Fetches what the server's OpenColorIO config has, and the tables of its views as they are wanted. */
+/** Loads the server's OpenColorIO config, and the tables of its views on demand. */
 import { computed, effect } from "@preact/signals";
 import { parseLut, type LutTable } from "../render/color/lutTable";
 import { getColor, getLut } from "./net/api";
@@ -14,7 +14,7 @@ export async function loadColor(): Promise<void> {
 const targetToneMap = computed(() => look.value?.display.tone_map ?? "agx");
 const requestedTables = new Set<string>();
 
-/** One that could not be had is asked for again when it is chosen again. */
+/** Tables being loaded; a failed one is requested again when it is chosen again. */
 async function fetchLut(config: string, view: OcioView): Promise<void> {
   const key = toneMapKey(view);
   if (requestedTables.has(key) || lutTables.peek().get(key)) return;
@@ -25,14 +25,14 @@ async function fetchLut(config: string, view: OcioView): Promise<void> {
   lutTables.value = new Map(lutTables.peek()).set(key, table);
 }
 
-/** Resolves when what a look is shown by is there. */
+/** Resolves when the display transform of a look is loaded. */
 export function untilToneMapReady(targetLook: Look): Promise<void> {
   return new Promise((done) => {
     const stop = effect(() => void (lutFor(targetLook.display.tone_map) !== null && queueMicrotask(() => (stop(), done()))));
   });
 }
 
-/** What was shown stays until a view's table has come. */
+/** Keep the previous display transform until the new table is loaded. */
 export function trackToneMap(): void {
   effect(() => void (toneMap.value = lutFor(targetToneMap.value) ?? toneMap.peek()));
   effect(() => {

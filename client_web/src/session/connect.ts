@@ -6,7 +6,7 @@ import { makeSessionHandlers } from "./sessionHandlers";
 import { swapWhenComplete } from "./bakeSwap";
 import { shownViewsOf, sendViews } from "./sendViews";
 
-/** Open a session; where there is one already, it goes on until the new one has an image. */
+/** Open a session; an existing one continues until the new one has an image. */
 export function connectToBake(bake: string): void {
   connections.incoming?.session.close();
   connections.incoming = null;
@@ -22,7 +22,7 @@ effect(() => {
   if (incoming?.hello) sendViews(incoming, shownViewsOf(incoming.hello), focus);
 });
 
-// the focus may move to a view that was complete before
+// the active view may become one that was already complete
 effect(() => {
   activeViewName.value;
   shownViews.value;

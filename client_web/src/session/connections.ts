@@ -1,4 +1,4 @@
-/** The connections to bakes: that whose images are shown, and one on a finer bake until its first image is there. */
+/** The connections to bakes: the shown one, and a pending one to a new bake until its first image is complete. */
 import { Session, type SessionHandlers } from "./net/session";
 import type { OpenParameters } from "./net/socket";
 import { PendingFrames } from "../render/frameArrival";
@@ -8,7 +8,7 @@ import { joinTarget } from "../state/sessionUser";
 import { scene } from "../state/scene";
 import { joinState, ownName, loadMemberToken } from "../state/collaboration";
 
-/** Parameters that open a session: of a read-only user the shared look; of a member the room, and the token in it. */
+/** Parameters that open a session: the shared look of a read-only user; the room and participant token of a member. */
 function openParametersOf(): ReturnType<OpenParameters> {
   const sceneId = scene.peek()?.id;
   const currentJoin = joinState.peek();
@@ -23,15 +23,15 @@ function openParametersOf(): ReturnType<OpenParameters> {
 /** A session with a bake, and its pending images. */
 export class BakeConnection {
   readonly session: Session;
-  /** What the server said first; null until then. */
+  /** The server's hello; null before. */
   hello: HelloMessage | null = null;
   /** Views whose first images are pending. */
   pendingFrames = new PendingFrames();
-  /** The views that the server was asked to show, as text. */
+  /** The views last requested from the server, as text. */
   sentViews: string | null = null;
   /** The visible region of each view as last sent to the server, as text. */
   sentRegions = new Map<string, string>();
-  /** The server knows that this browser draws free-camera views. */
+  /** True if the server knows that this browser draws free-camera views. */
   isRenderingAnnounced = false;
 
   constructor(
@@ -41,7 +41,7 @@ export class BakeConnection {
     this.session = new Session(bake, handlersOf(this), openParametersOf);
   }
 
-  /** The server is there, perhaps again: it knows of no views yet, and nothing of it has come. */
+  /** Reset after a (re)connection: the server knows of no views yet, and has sent no frames. */
   onHello(hello: HelloMessage): void {
     this.hello = hello;
     this.pendingFrames = new PendingFrames();
@@ -56,7 +56,7 @@ export const connections: { shown: BakeConnection | null; incoming: BakeConnecti
   incoming: null,
 };
 
-/** Send a question to the shown bake; whether it went. */
+/** Send a request to the shown bake; true if it was sent. */
 export function sendToShown(message: ClientMessage): boolean {
   return connections.shown?.session.sendAfterEdits(message) ?? false;
 }
@@ -66,7 +66,7 @@ export function reconnectNow(): void {
   connections.incoming?.session.reconnectNow();
 }
 
-/** Follow the browser's network state: pings the server when it is offline, and reconnects at once when it is back. */
+/** Watch the browser's network state: ping the server when offline, reconnect immediately when online again. */
 export function trackNetwork(): void {
   isOffline.value = !navigator.onLine;
   window.addEventListener("offline", () => {

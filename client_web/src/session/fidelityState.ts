@@ -1,4 +1,4 @@
-/** Whether what is on the screens is the look's image, and how near it is. */
+/** Tracks whether the shown images are exact for the look, and their fidelity. */
 import { stage } from "../render/renderStage";
 import type { FrameHeader } from "../protocol";
 import { isFrameExact, fidelity, isOutdated, freeCameraError, worstFidelity } from "../state/fidelity";
@@ -10,7 +10,7 @@ function updateFidelity(): void {
   fidelity.value = worstFidelity(stage.displayed.filter((each) => each.hasPixels).map((each) => each.fidelity));
 }
 
-/** What is shown of these views is not what the server has. */
+/** Views whose shown image differs from the server's. */
 export function resetExactness(viewNames: string[]): void {
   for (const image of viewNames.map((view) => stage.imageOf(view))) {
     image.exactRevision = image.exactShared = -1;
@@ -20,7 +20,7 @@ export function resetExactness(viewNames: string[]): void {
   updateFidelity();
 }
 
-/** A frame is on the screen. */
+/** Record a frame that is on the screen. */
 export function recordShownFrame(bakeConnection: BakeConnection, header: FrameHeader): void {
   const image = stage.imageOf(header.view);
   image.exactRevision = header.exact ? header.revision : -1;
@@ -31,7 +31,7 @@ export function recordShownFrame(bakeConnection: BakeConnection, header: FrameHe
   updateExactness(bakeConnection);
 }
 
-/** Say whether all that is on the screens is exact for what was sent, and for what others have made of the look. */
+/** Update whether all shown images are exact for the sent edits and the room's version of the look. */
 export function updateExactness(bakeConnection: BakeConnection): void {
   const { revision, sharedRevision } = bakeConnection.session;
   isFrameExact.value = stage.displayed.every((each) => each.exactRevision >= revision && each.exactShared >= sharedRevision);
@@ -39,7 +39,7 @@ export function updateExactness(bakeConnection: BakeConnection): void {
   if (isFrameExact.value) for (const done of exactWaiters.splice(0)) done();
 }
 
-/** Whether every shown image is of the newest look that was sent, or converging to it. */
+/** True if every shown image is of the newest sent look, or converging to it. */
 function hasLatestRevision({ session }: BakeConnection): boolean {
   return stage.displayed.every((each) => each.revision >= session.revision);
 }
@@ -50,7 +50,7 @@ export function untilExact(): Promise<void> {
   return new Promise((done) => exactWaiters.push(done));
 }
 
-/** Whether the active view has an image of the newest look, be it a first one. */
+/** True if the active view has an image of the newest look, even an approximate one. */
 export function isUpToDate(): boolean {
   const session = connections.shown?.session;
   return session !== undefined && !session.hasPendingEdits && stage.active.revision >= session.revision;

@@ -1,16 +1,17 @@
-/** Asking what a pixel shows. */
+/** Requests the surface data of a pixel. */
 import type { InspectAnswer } from "../protocol";
 import { sendToShown } from "./connections";
 
 const PROBE_TIMEOUT_MS = 3000;
 const probeListeners = new Set<(answer: InspectAnswer) => void>();
 
-/** The server has said what a pixel is. */
+/** Handle the server's response about a pixel. */
 export function deliverProbe(answer: InspectAnswer): void {
   for (const onAnswer of probeListeners) onAnswer(answer);
 }
 
-/** The server's answer for a pixel of a shown view. The newest request wins there, so another's answer requests again. */
+/** The server's response for a pixel of a shown view. The server answers only the newest request, so a response for
+ * another pixel triggers a retry. */
 export function requestPixelProbe(view: string, x: number, y: number): Promise<InspectAnswer> {
   return new Promise((resolve, reject) => {
     const finish = (): void => {
@@ -25,7 +26,7 @@ export function requestPixelProbe(view: string, x: number, y: number): Promise<I
     };
     const timer = window.setTimeout(() => {
       finish();
-      reject(new Error("The server did not say what is there; try again."));
+      reject(new Error("The server did not respond; try again."));
     }, PROBE_TIMEOUT_MS);
     probeListeners.add(onAnswer);
     sendRequest();

@@ -1,4 +1,4 @@
-/** Announces an upcoming edit to the server, so that it prepares for it. */
+/** Announces upcoming edits to the server, so that it can prepare. */
 import { effect } from "@preact/signals";
 import { activeControl } from "../edit/activeControl";
 import { stage } from "../render/renderStage";
@@ -6,13 +6,13 @@ import { clearCurvePreview } from "../state/curvePreview";
 import { curvePath } from "../state/selection";
 import { sendToShown } from "./connections";
 
-/** The pointer has come to the control of a parameter, a light or a field of the environment. */
+/** The pointer has entered the control of a parameter, a light or an environment field. */
 export function beginDrag(parameter: string): void {
   activeControl.value = parameter;
   sendToShown({ type: "prepare", parameter });
 }
 
-/** The pointer has come back to the open curve, which the server may have evicted meanwhile. */
+/** The pointer has returned to the open curve, whose operator the server may have evicted. */
 export function beginCurveDrag(): void {
   const curve = curvePath.peek();
   if (curve !== null && activeControl.peek() !== curve) prepareCurve(curve);

@@ -1,4 +1,4 @@
-/** Asks the server for the images of the look: on every edit, and when the visible part of it changes. */
+/** Requests images of the look from the server: on every edit, and when light filters change. */
 import { effect } from "@preact/signals";
 import type { LookChange } from "../state/document/jsonPatch";
 import { onLookChange } from "../edit/edit";
@@ -16,8 +16,8 @@ import { clearErrors } from "../ui/toasts";
 import { connections, type BakeConnection } from "./connections";
 import { untilExact } from "./fidelityState";
 
-/** Request frames of a look, or of its visible part; `change` is the edit that made it. Without one, no
- * control is active. */
+/** Request frames of a look with the visible light; `change` is the edit that made it. Without one, no control is
+ * active. */
 export function requestFrames(bakeConnection: BakeConnection | null, targetLook: Look, inputTime: number, change: LookChange | null = null): void {
   const visibleLook = withVisiblePaths(targetLook);
   const target = { look: visibleLook, activeControl: change && activeControl.peek(), solo: soloSources(targetLook), inputTime };
@@ -31,7 +31,7 @@ function requestFramesEverywhere(targetLook: Look, inputTime: number, change: Lo
 }
 
 onLookChange((change, inputTime) => {
-  clearErrors("edit"); // what was refused before is answered by this one
+  clearErrors("edit"); // this edit supersedes a rejected one
   requestFramesEverywhere(change.after, inputTime, change);
 });
 
@@ -42,12 +42,12 @@ effect(() => {
   if (current !== null) requestFramesEverywhere(current, performance.now());
 });
 
-// revisions that the view has already drawn while another one was counted tell nothing about the time they took
+// revisions already drawn while another view was measured have no latency
 effect(() => dropShownEdits(stage.imageOf(focusedView.value).revision));
 
-/** Capture the exact images of another look, while the canvases are frozen. */
+/** Capture the exact images of another look while the canvases are frozen. */
 export async function withViews(targetLook: Look, capture: () => void): Promise<void> {
-  if (connection.peek() !== "open") throw new Error("There is no connection; try again when it is back.");
+  if (connection.peek() !== "open") throw new Error("Not connected. Try again when the connection is back.");
   const previousLook = look.peek() as Look;
   isDisplayFrozen.value = true;
   try {

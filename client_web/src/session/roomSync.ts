@@ -1,4 +1,4 @@
-/** A look that others edit as well: joining its room, applying their edits, and presence. */
+/** Synchronizes a shared look: joining its room, applying others' edits, and presence. */
 import { effect } from "@preact/signals";
 import { rebasePatch } from "../state/document/jsonPatch";
 import { previewedStep } from "../edit/edit";
@@ -12,13 +12,13 @@ import { connections, sendToShown, type BakeConnection } from "./connections";
 import { updateExactness } from "./fidelityState";
 import { requestFrames } from "./requestFrames";
 
-/** A room's look with the own ways of looking, which the room leaves to each. */
+/** A room's look with the user's own view settings, which are not shared. */
 function withOwnView(sharedLook: Look): Look {
   const ownLook = look.peek();
   return ownLook === null ? sharedLook : { ...sharedLook, display: ownLook.display, transport: ownLook.transport };
 }
 
-/** Take note of the room that a session is in. A history that was not made in it is of no use there. */
+/** Record the session's room. A history from outside the room is dropped. */
 function updateRoom({ room }: HelloMessage): void {
   const currentJoin = joinState.peek();
   members.value = room?.people ?? [];
@@ -29,20 +29,20 @@ function updateRoom({ room }: HelloMessage): void {
   joinState.value = { ...currentJoin, watch: room.view_token };
 }
 
-/** Join a room: if it exists, its look replaces the own one; else it begins with the own look, and
- * this says so. */
+/** Join a room: if it exists, its look replaces the own one; else it starts with the own look. Returns true in the
+ * latter case. */
 export function joinRoom(bakeConnection: BakeConnection, hello: HelloMessage): boolean {
   updateRoom(hello);
   const shared = bakeConnection.session.look;
   if (hello.room === null || hello.room.is_new || shared === null) return false;
-  if (bakeConnection !== connections.shown) return true; // it takes over later
+  if (bakeConnection !== connections.shown) return true; // joined when it replaces the shown bake
   previewedStep.value = null;
   look.value = hello.role === "view" ? shared : withOwnView(shared);
   requestFrames(bakeConnection, look.value, performance.now());
   return true;
 }
 
-/** The room's look has become another. */
+/** The room's look has changed. */
 export function onRoomUpdate(bakeConnection: BakeConnection, message: RoomUpdate, shared: Look | null): void {
   if (bakeConnection !== connections.shown || shared === null) return;
   const preview = previewedStep.peek();
@@ -52,7 +52,7 @@ export function onRoomUpdate(bakeConnection: BakeConnection, message: RoomUpdate
   updateExactness(bakeConnection);
 }
 
-/** A new session in the room takes over from an old one: what that one has not brought there yet is brought by this. */
+/** A new session in the room replaces an old one and sends its unsent edits. */
 export function assumeRoom(previous: BakeConnection | null, next: BakeConnection): void {
   const [shared, current] = [next.session.look, look.peek()];
   if (next.hello?.room == null || shared === null || current === null) return;

@@ -1,4 +1,4 @@
-/** The visible region of each image: the server makes it exact first. */
+/** Sends the visible region of each image: the server refines it first. */
 import { effect } from "@preact/signals";
 import { stage } from "../render/renderStage";
 import { visibleRegion } from "../render/zoomTransform";
@@ -10,7 +10,7 @@ import { shownViewsOf } from "./sendViews";
 /** A zoom or pan is sent when it settles. */
 const SETTLE_MS = 150;
 
-/** Say it of the views whose images are baked, where it is news. */
+/** Send changed regions of the views with a fixed camera. */
 export function sendRegions(bakeConnection: BakeConnection | null): void {
   if (!bakeConnection?.hello) return;
   const connection = shownViewsOf(bakeConnection.hello);

@@ -1,4 +1,4 @@
-/** What each message of a server does to what the editor knows. */
+/** Applies each server message to the editor's state. */
 import { previewedStep } from "../edit/edit";
 import { history } from "../edit/history";
 import { problemText } from "./net/api";
@@ -29,27 +29,27 @@ import { requestFrames } from "./requestFrames";
 
 let onBakeReady: (bake: string) => void = () => undefined;
 
-/** Listener for a bake of the scene that is ready. */
+/** Called when a bake of the scene is ready. */
 export function setBakeReadyListener(callback: typeof onBakeReady): void {
   onBakeReady = callback;
 }
 
 let onComments: () => void = () => undefined;
 
-/** Listener for comments of others. */
+/** Called when others comment. */
 export function onComment(callback: typeof onComments): void {
   onComments = callback;
 }
 
-/** The look after a server's first one: a stored look stays, completed by fields of a newer server. Who waited
- * for a look, as a link does, may have changed it when this returns. */
+/** Set the look after the server's hello: a stored look stays, completed by fields of a newer server. Callbacks waiting
+ * for a look, as for a link, may have changed it when this returns. */
 function adoptLook(serverLook: Look): void {
   const currentLook = look.peek();
   if (!mayEdit.peek()) look.value = serverLook;
   else if (currentLook === null || !Object.keys(serverLook).every((section) => section in currentLook)) look.value = { ...serverLook, ...currentLook };
 }
 
-/** What a new connection needs to know: which views, how to stream, and the look where it has another one. */
+/** Send a new connection its settings: views, streaming, and the look if it differs. */
 function handleHello(bakeConnection: BakeConnection, hello: HelloMessage): void {
   bakeConnection.onHello(hello);
   defaultLook.value ??= (hello.room?.default_look ?? hello.look) as unknown as Look;
@@ -69,7 +69,7 @@ function handleHello(bakeConnection: BakeConnection, hello: HelloMessage): void 
   if (curve !== null) bakeConnection.session.send({ type: "prepare", curve });
 }
 
-/** The server has refused the edit that was made last: what it took before is shown again. */
+/** The server has rejected the last edit: show the last accepted look. */
 function revertLook(bakeConnection: BakeConnection, lastGood: Look | null): void {
   if (previewedStep.peek() === null) history.dropLastStep();
   previewedStep.value = null;
@@ -96,7 +96,7 @@ export function makeSessionHandlers(source: BakeConnection): SessionHandlers {
     },
     problem({ problem, revision }, lastGood) {
       if (revision === null) showError(problemText(problem));
-      else showError(`${problemText(problem)} The look is as it was before.`, "edit");
+      else showError(`${problemText(problem)} The look was reset to the last accepted state.`, "edit");
       if (isShown() && revision !== null) revertLook(source, lastGood);
     },
     inspect(message) {
@@ -128,10 +128,10 @@ export function makeSessionHandlers(source: BakeConnection): SessionHandlers {
     ended(reason, code) {
       if (source === connections.incoming) connections.incoming = null;
       if (pendingBake.peek()?.id === source.bake) pendingBake.value = null;
-      if (code === LOGIN_CODE) loginMessage.value = `${reason}. What you have edited is kept in this tab.`;
-      else showError(`The session has ended: ${reason}. Your look is kept here; bake again or reload.`);
+      if (code === LOGIN_CODE) loginMessage.value = `${reason}. Your edits are kept in this tab.`;
+      else showError(`Session ended: ${reason}. Your look is kept. Reload the page or bake again.`);
     },
     invalidMessage: (text) =>
-      showError(`The server's answer was not understood (${text}). The picture stays; reload if it does not follow.`),
+      showError(`Something went wrong (${text}). Reload if the picture stops updating.`),
   };
 }

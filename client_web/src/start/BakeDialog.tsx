@@ -1,4 +1,4 @@
-/** After an import, and on request: what a bake will cost. Not modal: the page stays usable. */
+/** Bake settings and costs, after an import or on request. Not modal: the page stays usable. */
 import { useEffect, useRef } from "preact/hooks";
 import type { SceneBody } from "../protocol";
 import { viewsToBake, type BakeSettings } from "../session/scene/bakeSettings";
@@ -34,7 +34,7 @@ export function BakeDialog({ scene, onClose, onOpen }: BakeDialogProps) {
         <IconButton icon="close" label="Close" onClick={onClose} />
       </header>
       <p>
-        A preview opens the editor at once; the bake you choose takes its place when it is ready, and no edit is lost.
+        You can start on a quick preview; the full bake replaces it when ready and keeps your edits.
       </p>
       {scene.warnings.length > 0 && <ImportWarnings warnings={scene.warnings} />}
       <Presets

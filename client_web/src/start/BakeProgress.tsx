@@ -1,4 +1,4 @@
-/** A scene without an image: whether its first bake is under way, and how far. */
+/** Progress of the first bake of a scene without a preview. */
 import { useEffect, useState } from "preact/hooks";
 import { subscribeToBake } from "../session/net/bakeEvents";
 import type { BakeBody, SceneBody } from "../protocol";
@@ -17,7 +17,7 @@ export function BakeProgress({ scene, onReady }: { scene: SceneBody; onReady(): 
   }, [newest]);
   return (
     <span class="no-picture">
-      {bake === null ? (newest === undefined ? "not baked yet" : "…") : bakeProgressText(bake, elapsed)}
+      {bake === null ? (newest === undefined ? "No preview yet" : "…") : bakeProgressText(bake, elapsed)}
       {bake?.state === "running" && (
         <progress max={1} value={hasProgress(bake) ? bake.progress : undefined} aria-label={`Bake of ${scene.name}`} />
       )}

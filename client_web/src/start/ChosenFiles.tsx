@@ -1,12 +1,12 @@
-/** The scenes among the chosen files, each with what belongs to it and what it lacks. */
+/** The chosen scenes, each with its companion and missing files. */
 import { fileBaseName, type SceneFile } from "./files/sceneFiles";
 import { IconButton } from "../ui/IconButton";
 
 interface ChosenFilesProps {
   scenes: readonly SceneFile[];
-  /** Of chosen files that are parts of scenes. */
+  /** Number of chosen companion files. */
   numParts: number;
-  /** Why the server refused some, by path. */
+  /** Import errors by path. */
   problems: ReadonlyMap<string, string>;
   onLeaveOut(path: string): void;
 }
@@ -20,14 +20,14 @@ function companionsText({ companions, missing }: SceneFile): string {
 
 function missingText({ missing }: SceneFile): string {
   const more = missing.length > MAX_LISTED_MISSING ? ` and ${missing.length - MAX_LISTED_MISSING} more` : "";
-  return `lacks ${missing.slice(0, MAX_LISTED_MISSING).join(", ")}${more}: drop them too, or the folder they lie in`;
+  return `missing: ${missing.slice(0, MAX_LISTED_MISSING).join(", ")}${more}. Drop these files or their folder.`;
 }
 
 export function ChosenFiles({ scenes, numParts, problems, onLeaveOut }: ChosenFilesProps) {
   if (scenes.length === 0)
     return (
       <p class="chosen-scenes">
-        <span class="quiet">Scene: none{numParts > 0 && "; drop the .gltf or .obj that these files belong to"}</span>
+        <span class="quiet">No scene chosen{numParts > 0 && ". Drop the .gltf or .obj of these files."}</span>
       </p>
     );
   return (
@@ -39,7 +39,7 @@ export function ChosenFiles({ scenes, numParts, problems, onLeaveOut }: ChosenFi
           </span>
           {scene.missing.length > 0 && <span class="wrong">{missingText(scene)}</span>}
           {problems.has(scene.path) && <span class="wrong">{problems.get(scene.path)}</span>}
-          <IconButton icon="close" label={`Leave out ${fileBaseName(scene.path)}`} onClick={() => onLeaveOut(scene.path)} />
+          <IconButton icon="close" label={`Remove ${fileBaseName(scene.path)}`} onClick={() => onLeaveOut(scene.path)} />
         </li>
       ))}
     </ul>

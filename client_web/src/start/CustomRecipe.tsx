@@ -1,4 +1,4 @@
-/** A bake of any size and shape, and any number of lights; its plan follows what is typed. */
+/** A custom bake: size, number of lights, sampling. The estimate updates while typing. */
 import { useEffect, useState } from "preact/hooks";
 import { planBake } from "../session/net/api";
 import type { BakeRequest } from "../protocol";
@@ -6,13 +6,13 @@ import { GATHER_RAYS_RANGE, PATCHES_RANGE, LIGHTS_RANGE, validateRecipe, SIDE_RA
 import { PlanText, type BakePlan } from "./PlanText";
 
 const TYPING_DELAY_MS = 300;
-/** What methods that gather light have besides. */
+/** Additional fields of methods with indirect light. */
 const GATHER_FIELDS = [
-  { name: "patches", label: "Patches", range: PATCHES_RANGE },
-  { name: "gather_rays", label: "Rays a sample", range: GATHER_RAYS_RANGE },
+  { name: "patches", label: "Bounce samples", range: PATCHES_RANGE },
+  { name: "gather_rays", label: "Rays per sample", range: GATHER_RAYS_RANGE },
 ] as const;
 
-/** The plan of what was typed last; undefined while it is asked for. */
+/** Estimate for the current input; undefined while loading. */
 function usePlan(request: BakeRequest, problem: string | null): BakePlan {
   const [plan, setPlan] = useState<BakePlan>(undefined);
   const requestText = JSON.stringify(request);
@@ -36,7 +36,7 @@ function usePlan(request: BakeRequest, problem: string | null): BakePlan {
 
 interface RecipeFieldProps {
   label: string;
-  /** Not a number: none is given. */
+  /** NaN: unset. */
   value: number;
   placeholder?: string;
   range: { minimum: number; maximum: number };
@@ -64,7 +64,7 @@ function RecipeField({ label, value, placeholder, range, step, onChange }: Recip
 }
 
 interface CustomRecipeProps {
-  /** What is baked besides: scene, method, views. */
+  /** The other settings: scene, method, views. */
   request: BakeRequest;
   initial: Recipe;
   action: string;
@@ -82,21 +82,21 @@ export function CustomRecipe({ request, initial, action, onChoose }: CustomRecip
   const [width, height] = recipe.size;
   const plan = usePlan({ ...request, ...recipe }, validateRecipe(recipe));
   return (
-    <li class="own-recipe">
+    <li class="custom-recipe">
       <span class="preset-name">
-        <b>Your own</b> any shape: the view keeps its height, a wider picture shows more at its sides
+        <b>Custom</b> a wider frame shows more at the sides
       </span>
-      <div class="recipe-fields" role="group" aria-label="Size and lights of your own bake">
+      <div class="recipe-fields" role="group" aria-label="Custom bake">
         <RecipeField label="Width" value={width} range={SIDE_RANGE} step={1} onChange={(side) => setRecipe({ ...recipe, size: [side, height] })} />
         <RecipeField label="Height" value={height} range={SIDE_RANGE} step={1} onChange={(side) => setRecipe({ ...recipe, size: [width, side] })} />
-        <RecipeField label="Light triangles" value={recipe.lights} range={LIGHTS_RANGE} step={1} onChange={(lights) => setRecipe({ ...recipe, lights })} />
+        <RecipeField label="Environment detail" value={recipe.lights} range={LIGHTS_RANGE} step={1} onChange={(lights) => setRecipe({ ...recipe, lights })} />
         {gathers &&
           GATHER_FIELDS.map(({ name, label, range }) => (
             <RecipeField
               key={name}
               label={label}
               value={recipe[name] ?? NaN}
-              placeholder="as fits"
+              placeholder="auto"
               range={range}
               step={1}
               onChange={(value) => setNumber(name, value)}

@@ -1,4 +1,4 @@
-/** Import: drop files and folders anywhere on the page, or choose them; then the uploads with their progress. */
+/** Import: drop files and folders anywhere on the page, or choose them; then upload progress. */
 import { useEffect, useState } from "preact/hooks";
 import type { DroppedFile } from "./files/dropTypes";
 import {
@@ -44,7 +44,7 @@ function FileInput({ label, folder, onFiles }: { label: string; folder?: boolean
         {...(folder ? { webkitdirectory: true } : { accept })}
         onChange={(event) => {
           onFiles(listSelectedFiles(event.currentTarget.files ?? []));
-          event.currentTarget.value = ""; // so that the same file can be chosen again
+          event.currentTarget.value = ""; // allows choosing the same file again
         }}
       />
     </label>
@@ -52,11 +52,11 @@ function FileInput({ label, folder, onFiles }: { label: string; folder?: boolean
 }
 
 function UploadStatus({ name, fraction, number, count }: UploadState) {
-  const which = count > 1 ? ` (${number} of ${count})` : "";
+  const countText = count > 1 ? ` (${number} of ${count})` : "";
   return (
     <>
       <progress max={1} value={fraction} aria-label="Upload" />
-      <span>{fraction < 1 ? `Sending “${name}”${which}, ${Math.round(100 * fraction)} %` : `The server reads “${name}”${which}…`}</span>
+      <span>{fraction < 1 ? `Uploading “${name}”${countText}, ${Math.round(100 * fraction)} %` : `Importing “${name}”${countText}…`}</span>
     </>
   );
 }
@@ -68,8 +68,8 @@ export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void
   const selection = useSortedFiles(files);
   const { scenes, environment } = selection;
   const addFiles = (files: DroppedFile[]) => {
-    if (files.length === 0) return showError("The folder is empty. Nothing was chosen.", "files");
-    clearErrors("files"); // what was wrong with those before
+    if (files.length === 0) return showError("This folder is empty.", "files");
+    clearErrors("files"); // of earlier drops
     const message = startPageRejection(files);
     if (message !== null) showError(message, "files");
     clearProblems();
@@ -81,7 +81,7 @@ export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void
     setFiles([]);
   };
   const isDropTarget = useFileDrop(addFiles);
-  /** What was refused stays chosen, so that what it lacks can be added. */
+  /** Rejected scenes stay chosen, so that missing files can be added. */
   const sendAll = async () => {
     const { imported, done } = await send(selection, withGround);
     setFiles((current) => (done.size === scenes.length ? [] : current.filter(({ path }) => !done.has(path))));
@@ -90,12 +90,11 @@ export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void
   return (
     <section class={`drop ${isDropTarget ? "over" : ""}`} aria-label="Import a scene">
       <p>
-        <b>Drop a scene, its folder, or an environment anywhere</b>, or <FileInput label="choose files" onFiles={addFiles} />, or{" "}
+        <b>Drop a scene file, a folder or an HDRI anywhere</b>, or <FileInput label="choose files" onFiles={addFiles} />, or{" "}
         <FileInput label="choose a folder" folder onFiles={addFiles} />.
       </p>
       <p class="quiet">
-        Scene: .glb, .gltf, .obj, .ply with the files that belong to it, or a .zip of them. Environment: .hdr or .exr;
-        without one the scene is lit by a studio.
+        Scenes: GLB, glTF, OBJ, PLY (with textures) or ZIP. HDRI: HDR or EXR. Without one, studio lighting is used.
       </p>
       <ChosenFiles
         scenes={scenes}
@@ -104,10 +103,10 @@ export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void
         onLeaveOut={(path) => setFiles((before) => before.filter((each) => each.path !== path))}
       />
       <div class="chosen">
-        <span class={environment ? "" : "quiet"}>Environment: {environment?.name ?? "none"}</span>
+        <span class={environment ? "" : "quiet"}>{environment === null ? "Default studio lighting" : `HDRI: ${environment.name}`}</span>
         <label class="on-ground">
           <input type="checkbox" checked={withGround} onChange={(event) => setWithGround(event.currentTarget.checked)} />
-          Put it on a ground
+          Add a ground plane (shadow catcher)
         </label>
         {upload !== null ? (
           <UploadStatus {...upload} />
@@ -122,7 +121,7 @@ export function DropZone({ onImported }: { onImported(scenes: SceneBody[]): void
       </div>
       {environment !== null && scenes.length === 0 && (
         <p class="quiet" role="status">
-          Add the scene that it shall light. A scene that is here already takes it in the editor, under <i>Environment</i>.
+          Add a scene to light with it, or open an existing scene and drop it there.
         </p>
       )}
     </section>

@@ -1,4 +1,4 @@
-/** Scenes made by code: one click takes one and opens it. */
+/** Procedural built-in scenes: one click opens one. */
 import { useEffect, useState } from "preact/hooks";
 import { listBuiltIns, createBuiltInScene } from "../session/net/api";
 import type { ExampleSceneBody, SceneBody } from "../protocol";
@@ -7,11 +7,11 @@ import type { BakeMethod } from "../session/scene/bakeMethods";
 import { reportErrors } from "../ui/toasts";
 
 interface ExampleScenesProps {
-  /** Without a choice, where it has been baked before. */
+  /** Open the scene; `choice`: bake settings, unset if it was baked before. */
   onOpen(scene: SceneBody, choice?: BakeSettings): void;
 }
 
-/** The bake that shows a built-in scene well. */
+/** Default bake settings of the built-in scenes. */
 function defaultSettingsFor(builtIn: ExampleSceneBody, scene: SceneBody): BakeSettings {
   return { method: builtIn.method as BakeMethod, preset: "good", size: builtIn.size, views: viewsToBake(scene) };
 }
@@ -39,7 +39,7 @@ export function ExampleScenes({ onOpen }: ExampleScenesProps) {
                 onError={(event) => (event.currentTarget.style.visibility = "hidden")}
               />
               <b>{builtIn.label}</b>
-              <small>{creating === builtIn.name ? "Making it…" : builtIn.description}</small>
+              <small>{creating === builtIn.name ? "Creating…" : builtIn.description}</small>
             </button>
           </li>
         ))}

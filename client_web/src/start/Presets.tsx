@@ -1,4 +1,4 @@
-/** What can be baked: which light, which views, and the three presets with what each will cost, before anything starts. */
+/** Bake settings: method, views, aspect ratio, and three presets with their estimated costs. */
 import { useEffect, useId, useState } from "preact/hooks";
 import type { CameraPose } from "../viewport/cameras/orbit";
 import { planBake } from "../session/net/api";
@@ -12,12 +12,12 @@ import { PlanText, type BakePlan } from "./PlanText";
 import { ViewPicker } from "./ViewPicker";
 
 const PRESETS: { name: BakePreset; label: string; help: string }[] = [
-  { name: "preview", label: "Preview", help: "to find the look" },
-  { name: "good", label: "Good", help: "for most work" },
+  { name: "preview", label: "Draft", help: "for exploring looks" },
+  { name: "good", label: "Standard", help: "for most work" },
   { name: "final", label: "Final", help: "for sharp highlights and print" },
 ];
 
-/** The shape of a view of the scene, as its file says. */
+/** Aspect ratio of a view in the scene's file. */
 function aspectOf({ views }: SceneBody, name: string | undefined): number {
   return views.find((view) => view.name === name)?.aspect ?? DEFAULT_SIZE[0] / DEFAULT_SIZE[1];
 }
@@ -54,7 +54,7 @@ function MethodPicker({ selected, onChoose }: MethodPickerProps) {
   const group = useId();
   return (
     <fieldset class="bake-methods">
-      <legend>Light</legend>
+      <legend>Lighting</legend>
       {BAKE_METHODS.map(({ name, label, help }) => (
         <label key={name}>
           <input type="radio" name={group} checked={name === selected} onChange={() => onChoose(name)} />
@@ -75,21 +75,21 @@ function RelightableCheckbox({ isRelightable, onChoose }: RelightableCheckboxPro
   return (
     <label class="bake-relightable">
       <input type="checkbox" checked={isRelightable} onChange={() => onChoose(!isRelightable)} />
-      Ready for other light
-      <small>turning or exchanging the environment errs less; its own light is a little coarser</small>
+      Optimize for swapping HDRIs
+      <small>more accurate when you rotate or replace the environment, slightly coarser in this one</small>
     </label>
   );
 }
 
 interface PresetsProps {
   scene: SceneBody;
-  /** What is chosen at first. */
+  /** Initial method. */
   method: BakeMethod;
   views: readonly string[];
   action: string;
-  /** Where a size of one's own begins. */
+  /** Initial custom size. */
   size?: BakeSize | null;
-  /** Where a new camera begins; else where the scene's first one is. */
+  /** Initial pose of a new camera; null: the scene's first camera. */
   from?: CameraPose | null;
   onChoose(choice: BakeSettings): void;
 }
@@ -107,10 +107,10 @@ export function Presets({ scene, method: initialMethod, views, action, size = nu
       <MethodPicker selected={method} onChoose={setMethod} />
       <ViewPicker scene={scene} from={from} selected={selectedViews} onChoose={setSelectedViews} />
       <div class="bake-shape">
-        Shape of the picture
+        Aspect ratio
         <RadioRow
-          label="Shape of the picture"
-          choices={shapes.map(({ label }) => ({ value: label, label, title: `Width to height, ${label}` }))}
+          label="Aspect ratio"
+          choices={shapes.map(({ label }) => ({ value: label, label, title: `Aspect ratio ${label}` }))}
           selected={shape.label}
           onSelect={(label) => setShape(shapes.find((each) => each.label === label) ?? shape)}
         />

@@ -11,24 +11,24 @@ interface SceneCardProps {
   onOpen(): void;
   onBake(): void;
   onDelete(): void;
-  /** Make the same scene on a ground. */
+  /** Create a copy with a ground plane. */
   onAddGround(): void;
-  /** Its first bake is ready. */
+  /** Called when the first bake is ready. */
   onReady(): void;
 }
 
-/** The scene's thumbnail; the server paints it when it is first asked for, which takes seconds. */
+/** The scene's thumbnail; the server renders it on first request, which takes seconds. */
 function CardImage({ url }: { url: string }) {
-  const [placeholder, setPlaceholder] = useState("painting its picture…");
+  const [placeholder, setPlaceholder] = useState("Rendering preview…");
   return (
     <>
       <span class="no-picture">{placeholder}</span>
-      <img src={url} alt="" loading="lazy" onLoad={() => setPlaceholder("")} onError={() => setPlaceholder("no picture")} />
+      <img src={url} alt="" loading="lazy" onLoad={() => setPlaceholder("")} onError={() => setPlaceholder("No preview")} />
     </>
   );
 }
 
-/** One scene: a click anywhere on the card opens it, but for the card's own buttons. */
+/** One scene: a click on the card opens it, except on the card's buttons. */
 export function SceneCard({ scene, onOpen, onBake, onDelete, onAddGround, onReady }: SceneCardProps) {
   return (
     <li class="scene-card">
@@ -44,7 +44,7 @@ export function SceneCard({ scene, onOpen, onBake, onDelete, onAddGround, onRead
         </small>
         {scene.warnings.length > 0 && (
           <details>
-            <summary>Not as in the file: {warningCounts(scene.warnings)}</summary>
+            <summary>Differs from the file: {warningCounts(scene.warnings)}</summary>
             <ImportWarnings warnings={scene.warnings} />
           </details>
         )}
@@ -54,10 +54,10 @@ export function SceneCard({ scene, onOpen, onBake, onDelete, onAddGround, onRead
         {!scene.materials.some(({ shadow_catcher }) => shadow_catcher) && (
           <button
             onClick={onAddGround}
-            aria-label={`Put ${scene.name} on a ground`}
-            title="A new scene, the same on a ground that catches shadows"
+            aria-label={`Add ground plane to ${scene.name}`}
+            title="Creates a copy with a ground plane (shadow catcher)"
           >
-            On a ground
+          Add ground
           </button>
         )}
         <IconButton icon="trash" label={`Delete ${scene.name}`} onClick={onDelete} />

@@ -1,4 +1,4 @@
-/** Scenes as cards; drop a scene and an environment anywhere. */
+/** The start page: import, built-in scenes, and the scenes as cards. */
 import { useEffect, useState } from "preact/hooks";
 import { addGround, deleteScene, listScenes } from "../session/net/api";
 import type { SceneBody } from "../protocol";
@@ -24,11 +24,11 @@ export function StartPage() {
   useEffect(() => void refresh(), []);
   const onImported = (importedScene: SceneBody[]) => {
     if (importedScene.length === 1) setSceneToBake(importedScene[0] as SceneBody);
-    else showNote(`${importedScene.length} scenes are imported.`);
+    else showNote(`${importedScene.length} scenes imported.`);
     void refresh();
   };
   const confirmDelete = (scene: SceneBody) =>
-    showNote(`Delete “${scene.name}” with its bakes? This cannot be undone.`, {
+    showNote(`Delete “${scene.name}” and its bakes? This can't be undone.`, {
       label: "Delete",
       run: () => void reportErrors(() => deleteScene(scene.id)).then(refresh),
     });
@@ -40,7 +40,7 @@ export function StartPage() {
     <main class="start">
       <header>
         <h1>relume</h1>
-        <p>Edit materials in the finished picture, with its real shadows, while you drag a curve.</p>
+        <p>Edit materials and lights in the finished render. Every drag updates the real shadows and reflections.</p>
         <Account />
       </header>
       <ReadOnly />
@@ -50,8 +50,8 @@ export function StartPage() {
       )}
       {mayEdit.value && <ExampleScenes onOpen={openInEditor} />}
       <h2>Scenes</h2>
-      {scenes === null && <p class="quiet">Looking for scenes…</p>}
-      {scenes?.length === 0 && <p class="quiet">No scenes yet. Take a built-in one, or drop your own above.</p>}
+      {scenes === null && <p class="quiet">Loading scenes…</p>}
+      {scenes?.length === 0 && <p class="quiet">No scenes yet. Open a built-in scene or drop your own above.</p>}
       <ul class="cards">
         {scenes?.map((scene) => (
           <SceneCard

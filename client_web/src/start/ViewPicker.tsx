@@ -1,4 +1,4 @@
-/** Which views are baked; saved cameras are listed among them, and moved and deleted here. */
+/** Selects the views to bake; lists saved cameras, which can be moved and deleted here. */
 import { useEffect, useState } from "preact/hooks";
 import { listCameras } from "../viewport/cameras/cameraRequests";
 import { CameraPlacement } from "../viewport/cameras/CameraPlacement";
@@ -11,15 +11,15 @@ import { reportErrors } from "../ui/toasts";
 
 interface ViewPickerProps {
   scene: SceneBody;
-  /** Where a new camera begins; null: where the scene's first one is. */
+  /** Initial pose of a new camera; null: the scene's first camera. */
   from: CameraPose | null;
   selected: readonly string[];
-  /** An updater: cameras are saved and deleted while the user goes on selecting. */
+  /** An updater: cameras may be saved and deleted while the user selects. */
   onChoose(change: (views: readonly string[]) => string[]): void;
 }
 
 interface CameraPlacementState {
-  /** The camera that is moved; null: a new one. */
+  /** The camera being moved; null: a new one. */
   name: string | null;
   initialCamera: CameraPose | null;
 }
@@ -35,7 +35,7 @@ export function ViewPicker({ scene, from, selected, onChoose }: ViewPickerProps)
     setViews(sceneViews);
     return sceneViews;
   };
-  useEffect(() => void reportErrors(reloadViews), [scene.id]); // cameras may have come and gone since the scene was listed
+  useEffect(() => void reportErrors(reloadViews), [scene.id]); // cameras may have changed since the scene was listed
   const toggle = (name: string) =>
     onChoose((isSelected) => sortByScene(isSelected.includes(name) ? isSelected.filter((each) => each !== name) : [...isSelected, name], views));
   const onCameraSaved = async (name: string) => {
@@ -62,7 +62,7 @@ export function ViewPicker({ scene, from, selected, onChoose }: ViewPickerProps)
   return (
     <fieldset class="bake-views">
       <legend>
-        Views{views.length > MAX_VISIBLE_VIEWS && `, of which the editor shows ${MAX_VISIBLE_VIEWS} at once`}
+        Views{views.length > MAX_VISIBLE_VIEWS && ` (up to ${MAX_VISIBLE_VIEWS} shown at once)`}
       </legend>
       {views.map(({ name, is_placed }) => (
         <span class="bake-view" key={name}>
@@ -75,7 +75,7 @@ export function ViewPicker({ scene, from, selected, onChoose }: ViewPickerProps)
         </span>
       ))}
       <button type="button" onClick={() => setOpen({ name: null, initialCamera: from })}>
-        Place a camera…
+        New camera…
       </button>
       {open !== null && (
         <CameraPlacement

@@ -1,4 +1,4 @@
-/** Files and folders dropped anywhere on the page; whether some are held over it. */
+/** Handles files and folders dropped anywhere on the page; returns true while some are dragged over it. */
 import { useLayoutEffect, useState } from "preact/hooks";
 import type { DroppedFile } from "./files/dropTypes";
 import { listDroppedFiles } from "./files/dropFolders";
@@ -6,12 +6,12 @@ import { reportErrors } from "../ui/toasts";
 
 export function useFileDrop(onFiles: (files: DroppedFile[]) => void): boolean {
   const [isDropTarget, setDropTarget] = useState(false);
-  // with the page itself: what is dropped as soon as it is seen is taken
+  // installed with the page, so that an early drop is not lost
   useLayoutEffect(() => {
     const onDrag = (event: DragEvent) => {
       if (!event.dataTransfer?.types.includes("Files")) return;
-      event.preventDefault(); // else the browser would open the file in place of the page
-      // from one element to the next is no way out of the page
+      event.preventDefault(); // otherwise the browser would open the file
+      // moving between elements does not leave the page
       if (event.type === "dragover" || event.relatedTarget === null) setDropTarget(event.type === "dragover");
     };
     const onDrop = (event: DragEvent) => {

@@ -1,4 +1,4 @@
-/** Import of the selected scenes. */
+/** Imports the chosen scenes. */
 import { useState } from "preact/hooks";
 import { fileBaseName, type ImportSelection } from "./files/sceneFiles";
 import { uploadScene } from "../session/net/upload";
@@ -7,9 +7,9 @@ import { clearErrors, showError } from "../ui/toasts";
 
 export interface UploadState {
   name: string;
-  /** Of the bytes that are sent. */
+  /** Uploaded fraction. */
   fraction: number;
-  /** Which one it is, from 1, of how many. */
+  /** Number of the scene, from 1, and their count. */
   number: number;
   count: number;
 }
@@ -22,10 +22,10 @@ interface ImportOutcome {
 
 interface SceneImport {
   upload: UploadState | null;
-  /** What was wrong with the scenes that were refused, by their paths. */
+  /** Import errors by path. */
   problems: ReadonlyMap<string, string>;
   clearProblems(): void;
-  /** Sequential; rejections are shown. */
+  /** Import scenes sequentially; show errors. */
   send(selection: ImportSelection, ground: boolean): Promise<ImportOutcome>;
 }
 
@@ -34,7 +34,7 @@ function showRejected(problems: ReadonlyMap<string, string>, numSent: number): v
   showError(
     numSent === 1
       ? [...problems].map(([path, problem]) => `${path}: ${problem}`).join()
-      : `${problems.size} of ${numSent} scenes could not be imported; the list says why.`,
+      : `${numSent - problems.size} scenes imported, ${problems.size} failed. See the list above.`,
     "files",
   );
 }

@@ -1,13 +1,13 @@
-/** The bakes of the scene: the shown one, and a pending one. */
+/** The bakes of the scene: the shown one and a pending one. */
 import { signal } from "@preact/signals";
 import type { BakeBody, HelloMessage } from "../protocol";
 
-/** What is known of a bake that is not ready yet. */
+/** Status of a bake that is not ready yet. */
 export type BakeStatus = Pick<BakeBody, "id" | "state" | "progress" | "phase" | "seconds_left" | "problem"> &
   Partial<Pick<BakeBody, "phase_seconds" | "queue_position">>;
 
 export const bakes = signal<BakeBody[]>([]);
-/** The bake that the image shows, which light it has, and what can be changed in its images. */
+/** The shown bake, its method, and its editable parts. */
 export const bake = signal<string | null>(null);
 export const method = signal<string | null>(null);
 export const axes = signal<HelloMessage["axes"]>([]);

@@ -1,10 +1,10 @@
-/** Placed cameras of the open scene's views: each bake of it, also a pending one, is rendered from there. */
+/** Placed cameras of the open scene's views, used for all its bakes, including a pending one. */
 import type { HelloMessage } from "../protocol";
 import { scene } from "./scene";
 
 export interface PlacedCamera {
   camera: HelloMessage["views"][number]["camera"];
-  /** Of the image, pixels. */
+  /** Image size in pixels. */
   size: [width: number, height: number];
 }
 
@@ -12,7 +12,7 @@ const placedCameras = new Map<string, PlacedCamera>();
 
 const cameraKey = (view: string) => JSON.stringify([scene.peek()?.id, view]);
 
-/** Null where a view's camera is where it began, in an image as large as was baked. */
+/** Null if a view has its initial camera and the baked image size. */
 export const placedCameraOf = (view: string): PlacedCamera | null => placedCameras.get(cameraKey(view)) ?? null;
 
 export function storeCamera(view: string, pose: PlacedCamera | null): void {

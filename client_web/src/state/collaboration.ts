@@ -1,33 +1,33 @@
-/** Who works on this look together, and by which link this one has come. */
+/** The room of this tab: its members, and the link that opened it. */
 import { computed, effect, signal } from "@preact/signals";
 import type { Person } from "../protocol";
 
-/** Opens the room of a scene: its id, or a view token for those who only watch. */
+/** Key of a scene's room: its id, or a view token that only allows watching. */
 export interface JoinState {
   scene: string;
   room: string | null;
   watch: string | null;
-  /** The shared look that the room begins with where nobody is in it. */
+  /** The shared look that an empty room starts with. */
   share: string | null;
 }
 
-/** The room that is asked for; null for one who works alone. */
+/** The requested room; null when working alone. */
 export const joinState = signal<JoinState | null>(null);
 export const members = signal<readonly Person[]>([]);
-/** The own number among them. */
+/** This member's number. */
 export const selfNumber = signal<number | null>(null);
 
-/** Whether others share this look. */
+/** True in a room. */
 export const isInRoom = computed(() => selfNumber.value !== null);
 
-/** The other members as text that changes seldom; null if alone. */
+/** The other members as rarely changing text; null if alone. */
 export const membersText = computed(() => {
   const otherMembers = members.value.filter(({ id }) => id !== selfNumber.value);
-  const memberNames = otherMembers.map(({ name, online }) => (online ? name : `${name}, whose connection is lost`));
+  const memberNames = otherMembers.map(({ name, online }) => (online ? name : `${name} (connection lost)`));
   return memberNames.length === 0 ? null : `Together with ${memberNames.join(", ")}`;
 });
 
-/** Come by a link that lets nobody edit. */
+/** True if opened by a view-only link. */
 export const isWatching = computed(() => joinState.value !== null && joinState.value.room === null);
 
 const NAME_KEY = "relume.name";
@@ -36,11 +36,11 @@ function loadName(): string {
   try {
     return localStorage.getItem(NAME_KEY) ?? "";
   } catch {
-    return ""; // forbidden: the server calls them something
+    return ""; // storage is forbidden: the server assigns a name
   }
 }
 
-/** As this one wants to be called where nobody logs in; empty: as the server likes. */
+/** The user's name if the server has no logins; empty: assigned by the server. */
 export const ownName = signal("");
 
 /** Load the stored name, and store its changes. */
@@ -50,14 +50,14 @@ export function trackName(): void {
     try {
       localStorage.setItem(NAME_KEY, ownName.value);
     } catch {
-      // it is asked for again next time
+      // the name is requested again next time
     }
   });
 }
 
-const memberTokenKey = ({ scene, room, watch }: JoinState) => `relume.seat.${scene}.${room ?? watch}`;
+const memberTokenKey = ({ scene, room, watch }: JoinState) => `relume.member.${scene}.${room ?? watch}`;
 
-/** The participant token of this tab in a room; null without one. */
+/** The tab's participant token in a room; null without one. */
 export function loadMemberToken(target: JoinState): string | null {
   try {
     return sessionStorage.getItem(memberTokenKey(target));
@@ -70,6 +70,6 @@ export function saveMemberToken(target: JoinState, token: string): void {
   try {
     sessionStorage.setItem(memberTokenKey(target), token);
   } catch {
-    // a reload is a new member, until the old token expires
+    // storage is forbidden: a reload becomes a new member, until the old token expires
   }
 }

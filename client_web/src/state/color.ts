@@ -1,4 +1,4 @@
-/** The server's OpenColorIO config, and what images are shown by: tone maps, or tables of its views. */
+/** The server's OpenColorIO config, and display transforms: tone maps, or tables of its views. */
 import { computed, signal } from "@preact/signals";
 import type { LutTable } from "../render/color/lutTable";
 import type { DisplayedToneMap } from "../render/color/tonemap";
@@ -7,19 +7,19 @@ import type { ColorBody, Look, OcioView } from "../protocol";
 type ToneMap = Look["display"]["tone_map"];
 
 export const colorConfig = signal<ColorBody | null>(null);
-/** By keys of views; null: it does not work. */
+/** Tables by view key; null: failed. */
 export const lutTables = signal<ReadonlyMap<string, LutTable | null>>(new Map());
-/** What the screens show. */
+/** The current display transform. */
 export const toneMap = signal<DisplayedToneMap>("agx");
 
-/** The color space of the config that EXR files are to be in; "": linear Rec. 709. */
+/** The chosen color space of EXR files; "": linear Rec. 709. */
 export const exrSpace = signal("");
-/** Those of the server's config, but for linear Rec. 709 by its name there. */
+/** Color spaces of the server's config, without its linear Rec. 709. */
 export const exrSpaces = computed(() => colorConfig.value?.spaces.filter((name) => name !== colorConfig.value?.working) ?? []);
-/** The one that is meant, null where it is Rec. 709 or this server has none of that name. */
+/** The chosen color space; null for Rec. 709 or if this server does not have it. */
 export const availableExrSpace = computed(() => (exrSpaces.value.includes(exrSpace.value) ? exrSpace.value : null));
 
-/** A tone map as text: its name, or a view as JSON. */
+/** A tone map's key: its name, or a view as JSON. */
 export const toneMapKey = (value: ToneMap): string => (typeof value === "string" ? value : JSON.stringify([value.display, value.view]));
 
 export function parseToneMapKey(key: string): ToneMap {
@@ -28,11 +28,11 @@ export function parseToneMapKey(key: string): ToneMap {
   return { display, view };
 }
 
-/** Whether the server has a view. */
+/** True if the server has a view. */
 export const hasOcioView = ({ display, view }: OcioView): boolean =>
   colorConfig.value?.displays.some((each) => each.name === display && each.views.includes(view)) ?? false;
 
-/** How a tone map is displayed; null while it is loading. Views that are missing or invalid fall back to AgX. */
+/** The display transform of a tone map; null while loading. Missing or invalid views fall back to AgX. */
 export function lutFor(value: ToneMap): DisplayedToneMap | null {
   if (typeof value === "string") return value;
   if (colorConfig.value === null) return null;
@@ -40,5 +40,5 @@ export function lutFor(value: ToneMap): DisplayedToneMap | null {
   return table === undefined ? null : (table ?? "agx");
 }
 
-/** The same for what cannot wait. */
+/** The same without waiting: falls back to AgX while loading. */
 export const displayedToneMap = (value: ToneMap): DisplayedToneMap => lutFor(value) ?? "agx";

@@ -1,14 +1,14 @@
-/** How the live session is doing. */
+/** Status of the live session. */
 import { signal } from "@preact/signals";
 import type { Connection } from "../session/net/socket";
 
 export const connection = signal<Connection>("connecting");
 export const retryInMs = signal(0);
-/** The browser says that it has no network. A server on the same machine may still answer. */
+/** True if the browser reports no network. A server on the same machine may still respond. */
 export const isOffline = signal(false);
-/** What the server said where it has no room for this session now; null where it said nothing. */
+/** The server's message if it is too full for this session; else null. */
 export const rejectionMessage = signal<string | null>(null);
-/** What takes time on the server: a curve that is frozen, or a term that is shaded for the first time. */
+/** Current long computation of the server: precomputing a curve's operator, or shading a term for the first time. */
 export const freezeStatus = signal<{
   state: "precomputing" | "shading";
   view: string;

@@ -1,4 +1,4 @@
-/** The open curve as the server last sent it, passed on at a pace that leaves the frames to the image. */
+/** The open curve as last sent by the server, throttled so that plotting does not slow down the image. */
 import { signal } from "@preact/signals";
 import type { CurveMessage } from "../protocol";
 
@@ -6,7 +6,7 @@ export const curvePreview = signal<CurveMessage | null>(null);
 /** An interval of the open curve whose pixels are tinted, degrees. */
 export const brushedRange = signal<[from: number, to: number] | null>(null);
 
-/** Drawing a plot in software costs as much as drawing the image. */
+/** Minimum interval between plots: in software, a plot costs as much as the image. */
 const MIN_INTERVAL_MS = 60;
 
 let newestPreview: CurveMessage | null = null;
@@ -19,7 +19,7 @@ function publishPreview(): void {
   curvePreview.value = newestPreview;
 }
 
-/** Show a curve: at once where the last change is long ago, else a little later; the newest always comes. */
+/** Show a curve: immediately if the last change is old enough, else delayed; the newest is always shown. */
 export function showCurvePreview(message: CurveMessage): void {
   newestPreview = message;
   if (timer !== 0) return;
@@ -28,7 +28,7 @@ export function showCurvePreview(message: CurveMessage): void {
   else timer = window.setTimeout(publishPreview, wait);
 }
 
-/** Another curve is open: pending previews are not of it. */
+/** Another curve was opened: drop pending previews. */
 export function clearCurvePreview(): void {
   clearTimeout(timer);
   timer = 0;

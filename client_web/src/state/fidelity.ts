@@ -1,22 +1,22 @@
-/** How near the shown images are to the look. */
+/** Fidelity of the shown images. */
 import { effect, signal } from "@preact/signals";
 import type { Fidelity, HelloMessage } from "../protocol";
 
-/** Whether every shown image equals the look. */
+/** True if every shown image is exact. */
 export const isFrameExact = signal(false);
-/** Whether an edit was sent that no shown image has answered yet: what stands there is of before it. */
+/** True if no shown image includes the newest sent edit yet. */
 export const isOutdated = signal(false);
-/** Exact, and for a moment: what the status bar says, so that it stands still during a drag. */
+/** Exact for a moment, as shown in the status bar, so that it does not flicker during a drag. */
 export const isConverged = signal(false);
-/** Of the shown images the worst; of no image nothing bad is said. */
+/** The lowest fidelity of the shown images; exact without images. */
 export const fidelity = signal<Fidelity>("exact");
 
-/** How far the free-camera image was from the exact one where a camera rested last, relative RMS; null before. */
+/** Relative RMS error of the free-camera image at the last camera stop; null before. */
 export const freeCameraError = signal<number | null>(null);
-/** The same as it was measured in the bake, in the scene's own look; null where that is not known. */
+/** The error measured during the bake, in the scene's own look; null if unknown. */
 export const bakedFreeCameraError = signal<HelloMessage["free_camera_error"]>(null);
 
-/** As the server ranks them, worst first. */
+/** Fidelity levels, lowest first. */
 const FIDELITY_ORDER: Fidelity[] = ["preview", "approximate", "incremental", "near_exact", "exact"];
 
 export function worstFidelity(fidelities: Fidelity[]): Fidelity {

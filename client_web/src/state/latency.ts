@@ -1,18 +1,18 @@
 /** Latency from input to image, for the status bar and for benchmarks (`window.relumeStats`). */
 import { signal } from "@preact/signals";
 
-/** Of a recent edit; what the status bar shows. */
+/** Latency of a recent edit, for the status bar. */
 export const latencyMs = signal<number | null>(null);
 
 export interface Latency {
   revision: number;
-  /** Both on the clock of performance.now, milliseconds. */
+  /** Milliseconds on the clock of performance.now. */
   inputTime: number;
   drawnTime: number;
 }
 
 const MAX_RECORDS = 1000;
-/** The number on the status bar changes at most this often: painting it must not cost frames. */
+/** Minimum interval between updates of the status bar: painting must not cost frames. */
 const SHOW_EVERY_MS = 250;
 let connectedTime = -Infinity;
 const waiting: { revision: number; inputTime: number }[] = [];
@@ -26,7 +26,7 @@ declare global {
 const stats = { latencies, waiting, drawnHere: 0 };
 if (typeof window !== "undefined") window.relumeStats = stats;
 
-/** This browser has drawn an image itself. */
+/** Record an image drawn by this browser. */
 export function recordClientFrame(): void {
   stats.drawnHere += 1;
 }
@@ -36,14 +36,14 @@ export function recordEditSent(revision: number, inputTime: number): void {
   if (waiting.length > MAX_RECORDS) waiting.shift();
 }
 
-/** What was sent is no measure: another session counts its revisions anew, or nothing came for a while. What is sent from
- * now on counts from now, however long it waited for a connection. */
+/** Discard sent revisions: a new session restarts the count, or nothing was received for a while. Later ones are measured from
+ * now on, even if they waited for a connection. */
 export function clearPendingEdits(): void {
   waiting.length = 0;
   connectedTime = performance.now();
 }
 
-/** These revisions are drawn, nobody saw when. */
+/** Discard revisions that were drawn at an unknown time. */
 export function dropShownEdits(revision: number): void {
   while (waiting[0] !== undefined && waiting[0].revision <= revision) waiting.shift();
 }
@@ -56,7 +56,7 @@ function publishLatency(ms: number, now: number): void {
   latencyMs.value = ms;
 }
 
-/** A frame of this revision is on the focused view's canvas. */
+/** A frame of this revision is on the active view's canvas. */
 export function recordFrameShown(revision: number): void {
   const drawnTime = performance.now();
   while (waiting[0] !== undefined && waiting[0].revision <= revision) {

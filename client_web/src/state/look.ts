@@ -1,4 +1,4 @@
-/** The look as the user wants it, and the scene's own. */
+/** The edited look, and the scene's own. */
 import { computed, signal } from "@preact/signals";
 import { isImageReference } from "./document/imageReference";
 import type { Look, MaterialLook, Term } from "../protocol";
@@ -7,16 +7,16 @@ import { materialOf } from "./scene";
 export const look = signal<Look | null>(null);
 /** The scene's own look, for resets. */
 export const defaultLook = signal<Look | null>(null);
-/** The look's part that costs no round trip; apart, so that other edits do not redraw the image twice. */
+/** The display settings, applied without a round trip; a separate signal, so that other edits do not redraw the image twice. */
 export const exposure = computed(() => look.value?.display.exposure ?? 0);
-/** Whether the light is the one that the bake was made for; in another one "exact" refers to the bake's own answer. */
+/** True with the environment that the bake was made for; in another one, "exact" means exact for this bake. */
 export const usesBakedEnvironment = computed(() => (look.value?.environment.map ?? null) === null);
-/** A term whose every texel looks different from every side: this browser draws the mean of them. */
+/** True for a BTF term, of which this browser draws the average of all texels. */
 export const isBtfTerm = (term: Term): boolean => term.model === "measured_btf";
-/** Whether a material shows a tri-planar image, for it has no UVs: this browser supports no others. */
+/** True if a material without UVs has a tri-planar texture, which this browser cannot draw. */
 const usesTriPlanarMaps = (name: string, { terms, normal_map }: MaterialLook) =>
   materialOf(name)?.is_projected === true && ((normal_map ?? null) !== null || terms.some(({ texture }) => isImageReference(texture)));
-/** Whether any material shows either. */
+/** True if any material has a BTF or a tri-planar texture. */
 export const usesTexelShading = computed(() =>
   Object.entries(look.value?.materials ?? {}).some(([name, material]) => material.terms.some(isBtfTerm) || usesTriPlanarMaps(name, material)),
 );

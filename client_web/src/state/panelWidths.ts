@@ -1,9 +1,9 @@
-/** Which panels have room beside the image: where a window is narrow, those that were opened longest ago fold away, and
- * come back when there is room again. */
+/** Which panels fit beside the image: in a narrow window, the least recently opened ones are hidden until they fit
+ * again. */
 import { computed, effect, signal, type Signal } from "@preact/signals";
 import { commentsOpen, inspectorOpen, inspectorWidth, libraryOpen, scenePanelOpen, comparisonOpen } from "./panels";
 
-export type SidePanel = "outline" | "library" | "truth" | "comments" | "inspector";
+export type SidePanel = "outline" | "library" | "comparison" | "comments" | "inspector";
 
 const MIN_VIEWPORT_WIDTH = 240;
 const SPLITTER_WIDTH = 5;
@@ -11,7 +11,7 @@ export const INSPECTOR_RANGE = { narrowest: 288, widest: 720 };
 const PANEL_SIGNALS: Record<SidePanel, Signal<boolean>> = {
   outline: scenePanelOpen,
   library: libraryOpen,
-  truth: comparisonOpen,
+  comparison: comparisonOpen,
   comments: commentsOpen,
   inspector: inspectorOpen,
 };
@@ -19,7 +19,7 @@ const PANEL_SIGNALS: Record<SidePanel, Signal<boolean>> = {
 /** CSS pixels. */
 export const windowWidth = signal(Infinity);
 
-/** A width that the inspector may have in this window. */
+/** Clamp the inspector's width for this window. */
 export function clampInspectorWidth(window: number, requested: number): number {
   const { narrowest, widest } = INSPECTOR_RANGE;
   return Math.round(Math.min(widest, Math.max(narrowest, Math.min(requested, window * 0.55))));
@@ -34,12 +34,12 @@ const clampShareOfWindow = (minimum: number, maximum: number, fraction: number) 
 export const panelWidths = computed<Record<SidePanel, number>>(() => ({
   outline: 250,
   library: clampShareOfWindow(280, 400, 0.24),
-  truth: clampShareOfWindow(280, 480, 0.26),
+  comparison: clampShareOfWindow(280, 480, 0.26),
   comments: clampShareOfWindow(240, 340, 0.2),
   inspector: inspectorShownWidth.value + SPLITTER_WIDTH,
 }));
 
-/** Of panels, newest first, those that fit into `available`; the newest is always among them. */
+/** The panels that fit into `available`, newest first; always includes the newest. */
 export function fittingPanels<Name extends string>(newest: readonly Name[], widths: Record<Name, number>, available: number): Name[] {
   let remaining = available;
   const fitting: Name[] = [];
@@ -51,7 +51,7 @@ export function fittingPanels<Name extends string>(newest: readonly Name[], widt
   return fitting;
 }
 
-/** What was opened last comes first. */
+/** Most recently opened first. */
 const panelOrder = signal<readonly SidePanel[]>([]);
 
 function bringToFront(name: SidePanel): void {
@@ -66,14 +66,14 @@ export const shownPanels = computed(() =>
   ),
 );
 
-/** Close a visible panel; else open it, in the place of others where there is no room for all. */
+/** Close a visible panel; else open it, replacing others if they do not all fit. */
 export function togglePanel(name: SidePanel): void {
   const isShown = shownPanels.peek().includes(name);
   PANEL_SIGNALS[name].value = !isShown;
   if (!isShown) bringToFront(name);
 }
 
-/** Follow the window, and what is opened. */
+/** Track the window's width and opened panels. */
 export function trackPanelWidths(): void {
   for (const name of Object.keys(PANEL_SIGNALS) as SidePanel[]) {
     effect(() => {

@@ -1,10 +1,10 @@
-/** Which panels are open and how wide they are, and what is chosen in them, stored for the next visit. */
+/** Open panels, their widths and settings, stored for the next visit. */
 import { effect, signal, type Signal } from "@preact/signals";
 import { exrSpace } from "./color";
 
 export const scenePanelOpen = signal(true);
 export const inspectorOpen = signal(true);
-/** These are closed again at the next visit. */
+/** Not stored: closed at the next visit. */
 export const libraryOpen = signal(false);
 export const comparisonOpen = signal(false);
 export const commentsOpen = signal(false);
@@ -12,10 +12,10 @@ export const timelineOpen = signal(false);
 export const filmstripOpen = signal(true);
 export const inspectorWidth = signal(320);
 export const histogramOpen = signal(false);
-/** Spots and panels go on aiming at the same point while they are moved. */
+/** True if spots and panels keep aiming at the same point while moved. */
 export const aimLocked = signal(false);
 export const helpOpen = signal(false);
-/** Titles of the panels' sections that are folded away. */
+/** Titles of collapsed panel sections. */
 export const foldedSections = signal<readonly string[]>([]);
 
 export function toggleFolded(title: string): void {
@@ -43,7 +43,7 @@ function loadPanels(): void {
       if (typeof value === typeof panel.value && Array.isArray(value) === Array.isArray(panel.value)) panel.value = value;
     }
   } catch {
-    // forbidden or not ours: everything is open
+    // storage is forbidden or invalid: use the defaults
   }
 }
 
@@ -55,7 +55,7 @@ export function trackPanels(): void {
     try {
       localStorage.setItem(PANELS_KEY, text);
     } catch {
-      // they are open again next time
+      // storage is forbidden: defaults next time
     }
   });
 }

@@ -1,4 +1,4 @@
-/** The pixel that the pointer is over, and what the server has said of it. */
+/** The pixel under the pointer, and the server's data about it. */
 import { signal } from "@preact/signals";
 import type { InspectAnswer } from "../protocol";
 

@@ -1,4 +1,4 @@
-/** The page that is open, the scene that is edited, and the models that its terms may have. */
+/** The open page, the edited scene, and the available term models. */
 import { computed, signal } from "@preact/signals";
 import type { ModelBody, SceneBody, SceneMaterial, Term } from "../protocol";
 

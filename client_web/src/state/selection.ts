@@ -1,4 +1,4 @@
-/** What is selected: a material opens its most telling curve, the highlight's where there is one; a light puts it away. */
+/** The selection: selecting a material opens its most important curve, the highlight's if any; selecting a light closes it. */
 import { batch, computed, signal } from "@preact/signals";
 import { jsonPointer } from "./document/pointer";
 import type { Term } from "../protocol";
@@ -17,7 +17,7 @@ export const selectedTerms = computed<Term[]>(() => {
   return name === null ? [] : (look.value?.materials[name]?.terms ?? []);
 });
 
-/** Pointer of the curve that is open, null where none is. */
+/** Pointer of the open curve; null without one. */
 export const curvePath = computed(() => {
   const [material, curve] = [selectedMaterial.value, selectedCurve.value];
   const term = selectedTerms.value[selectedTerm.value];

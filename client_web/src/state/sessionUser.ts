@@ -1,4 +1,4 @@
-/** Who is here, and what they may do. */
+/** The current user and permissions. */
 import { computed, signal } from "@preact/signals";
 import type { MeBody } from "../protocol";
 import { ownName, isWatching } from "./collaboration";
@@ -9,36 +9,36 @@ const hasEditRole = computed(() => sessionUser.value.role === "edit" || sessionU
 
 export const mayEdit = computed(() => hasEditRole.value && !isWatching.value);
 
-const WATCHING_MESSAGE = "You watch this look: what others edit is shown here. Who sent the link can send you one to edit with them.";
+const WATCHING_MESSAGE = "View-only link: you see others' edits live. Ask the sender for an edit link to join in.";
 
-/** Why nothing can be edited; null where it can. */
+/** Reason why editing is off; null if it is on. */
 export const readOnlyMessage = computed(() =>
   mayEdit.value
     ? null
     : hasEditRole.value
       ? WATCHING_MESSAGE
-      : `${sessionUser.value.name} may look, but not edit: the role is “view”. An admin can hand out a token with the role “edit”.`,
+      : "View-only access. Ask an admin for edit rights.",
 );
 
-/** Who only looks may comment where the server lets them, and is known by a name. */
+/** True if a user may comment: read-only users need the server's permission and a name. */
 export const mayComment = computed(
   () => mayEdit.value || (sessionUser.value.allow_viewer_comments && (sessionUser.value.name !== "" || ownName.value !== "")),
 );
 
-/** Why no comment can be written; null where one can. */
+/** Reason why commenting is off; null if it is on. */
 export const noCommentMessage = computed(() =>
   mayComment.value
     ? null
     : sessionUser.value.allow_viewer_comments
-      ? "Say your name under “Work together” to comment."
-      : "Who only looks reads comments here, and does not write them.",
+      ? "Enter your name under “Work together” to comment."
+      : "You have view-only access.",
 );
 
-/** Counts edits of somebody who may not. */
+/** Number of rejected edits by a read-only user. */
 export const numRejectedEdits = signal(0);
 
-/** Why a token is asked for; null where it is not. */
+/** Message of the login dialog; null while it is closed. */
 export const loginMessage = signal<string | null>(null);
 
-/** What somebody who may not edit looks at: a saved or a shared look of a scene. */
+/** The saved or shared look that a read-only user views. */
 export const joinTarget = signal<{ scene: string; look: string } | { scene: string; share: string } | null>(null);

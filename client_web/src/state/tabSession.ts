@@ -1,11 +1,11 @@
-/** Storage of a tab over a reload of its page. */
+/** Tab storage that survives a page reload. */
 
 export function saveInTab(key: string, value: unknown): void {
   try {
     if (value === null) sessionStorage.removeItem(key);
     else sessionStorage.setItem(key, JSON.stringify(value));
   } catch {
-    // full or forbidden: a reload forgets it
+    // storage is full or forbidden: lost on reload
   }
 }
 

@@ -1,12 +1,12 @@
-/** Small images of the looks that were shown in this visit. */
+/** Thumbnails of looks shown in this session. */
 import { signal } from "@preact/signals";
 import type { Look } from "../protocol";
 
 const lookThumbnails = new WeakMap<Look, string>();
-/** Counts up with every thumbnail. */
+/** Number of taken thumbnails. */
 export const thumbnailRevision = signal(0);
 
-/** A data URL, null where the look has no image. */
+/** A look's thumbnail as data URL; null without one. */
 export function lookThumbnail(thumbnailLook: Look | undefined): string | null {
   thumbnailRevision.value;
   return thumbnailLook === undefined ? null : (lookThumbnails.get(thumbnailLook) ?? null);
@@ -16,7 +16,7 @@ export function hasThumbnail(thumbnailLook: Look): boolean {
   return lookThumbnails.has(thumbnailLook);
 }
 
-/** Keep a look's image. */
+/** Store a look's thumbnail. */
 export function storeThumbnail(thumbnailLook: Look, image: string): void {
   lookThumbnails.set(thumbnailLook, image);
 }

@@ -1,4 +1,4 @@
-/** A term's color: a picker, and the three linear numbers. */
+/** A color: a picker and three linear components. */
 import { fromHex, toHex } from "../render/color/colorMath";
 import { RANGES } from "../look.gen";
 import type { Rgb } from "../protocol";
@@ -9,7 +9,7 @@ export interface ColorProps {
   label: string;
   value: Rgb;
   initial: Rgb | null;
-  /** The picker chooses the hue of a quantity, whose size it keeps; else a fraction of what there is. */
+  /** True for a quantity: the picker changes its hue and keeps its magnitude; else a reflectance. */
   quantity?: boolean;
   onChange(value: Rgb): void;
 }
@@ -23,8 +23,8 @@ export function ColorField({ label, value, initial, quantity = false, onChange }
     <div class="color">
       <input
         type="color"
-        aria-label={`${label}: pick`}
-        title="Pick a colour"
+        aria-label={`${label}: picker`}
+        title="Pick a color"
         value={toHex(value, minimum)}
         onInput={(event) => onChange(fromHex(event.currentTarget.value, value, minimum))}
       />

@@ -1,12 +1,12 @@
-/** A name that a press turns into a field: Enter or leaving takes what was typed, Escape leaves it as it was. */
+/** A name that turns into a text field when pressed: Enter or blur applies, Escape cancels. */
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
 
 interface Props {
   name: string;
-  /** Of both, the button and the field. */
+  /** CSS class of the button and the field. */
   class: string;
   maximum: number;
-  /** What is typed for something new comes up selected, to be typed over at once. */
+  /** Open with the name selected, for new objects. */
   editing?: boolean;
   onRename(name: string): void;
   onDone?(): void;
@@ -17,12 +17,12 @@ export function EditableName({ name, class: className, maximum, editing = false,
   const button = useRef<HTMLButtonElement>(null);
   const isKeyboard = useRef(false);
   useLayoutEffect(() => {
-    if (isKeyboard.current) button.current?.focus(); // the field had it
+    if (isKeyboard.current) button.current?.focus(); // the field had the focus
     isKeyboard.current = false;
   }, [open]);
   if (!open) {
     return (
-      <button ref={button} type="button" class={className} title={`${name}: rename`} aria-label={`${name}: rename`} onClick={() => setOpen(true)}>
+      <button ref={button} type="button" class={className} title={`Rename ${name}`} aria-label={`Rename ${name}`} onClick={() => setOpen(true)}>
         {name}
       </button>
     );
@@ -49,7 +49,7 @@ export function EditableName({ name, class: className, maximum, editing = false,
         event.stopPropagation();
         if (event.key === "Escape") event.currentTarget.value = name;
         if (event.key !== "Enter" && event.key !== "Escape") return;
-        event.preventDefault(); // else the button, which has the focus by then, is pressed
+        event.preventDefault(); // otherwise the key would press the button, which has the focus by then
         isKeyboard.current = true;
         event.currentTarget.blur();
       }}

@@ -3,18 +3,18 @@ import { Icon, type IconName } from "./Icon";
 
 interface IconButtonProps {
   icon: IconName;
-  /** Said by screen readers and shown as tooltip. */
+  /** Accessible name and tooltip. */
   label: string;
   keys?: string;
   pressed?: boolean;
-  /** Of what opens something: whether it is open. */
+  /** For a button that opens something: whether it is open. */
   expanded?: boolean;
   disabled?: boolean;
   onClick(): void;
   children?: ComponentChildren;
 }
 
-/** A small button with an icon and, where there are children, a label beside it. */
+/** A small button with an icon and, if there are children, a label beside it. */
 export function IconButton({ icon, label, keys, pressed, expanded, disabled, onClick, children }: IconButtonProps) {
   return (
     <button

@@ -2,7 +2,7 @@
 import { ColorField, type ColorProps } from "./ColorField";
 
 interface Props extends ColorProps {
-  /** Short label shown, if the panel gives the context. */
+  /** Shorter visible label, if the panel gives the context. */
   shortLabel: string;
 }
 

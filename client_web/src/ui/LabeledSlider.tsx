@@ -2,7 +2,7 @@
 import { Slider, type SliderProps } from "./Slider";
 
 interface Props extends SliderProps {
-  /** Short label shown, if the panel gives the context. */
+  /** Shorter visible label, if the panel gives the context. */
   shortLabel?: string;
   title?: string;
 }

@@ -1,4 +1,4 @@
-/** A number that is typed: Enter or leaving takes it, Escape leaves it as it was, arrows step it. */
+/** A number field: Enter or blur applies, Escape cancels, arrows step. */
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { history } from "../edit/history";
 import { formatNumber, parseNumber } from "./scale";
@@ -10,13 +10,13 @@ interface Props {
   minimum: number;
   maximum: number;
   step: number;
-  /** An integer. */
+  /** Integers only. */
   isInteger?: boolean;
   autoFocus?: boolean;
-  /** What has been typed already, before the field was there. */
+  /** Text typed before the field opened. */
   initialText?: string;
   onChange(value: number): void;
-  /** The field is left; `isKeyboard`: with Enter or Escape, so that the focus is free. */
+  /** Called when the field is left; `isKeyboard`: by Enter or Escape, so that the focus can move on. */
   onDone?(isKeyboard: boolean): void;
 }
 
@@ -40,8 +40,8 @@ export function NumberField({ value, label, minimum, maximum, step, isInteger = 
     if (next !== null) {
       const clamped = Math.min(maximum, Math.max(minimum, next));
       if (clamped !== next)
-        showNote(`${label}: ${formatNumber(next)} is beyond ${formatNumber(minimum)} to ${formatNumber(maximum)}; it became ${formatNumber(clamped)}.`);
-      // a number that was typed is a step by itself
+        showNote(`${label}: ${formatNumber(next)} is out of range (${formatNumber(minimum)}–${formatNumber(maximum)}); set to ${formatNumber(clamped)}.`);
+      // a typed number is its own history step
       history.endGesture();
       setValue(next);
       history.endGesture();
@@ -51,7 +51,7 @@ export function NumberField({ value, label, minimum, maximum, step, isInteger = 
   };
   const key = (event: KeyboardEvent) => {
     event.stopPropagation();
-    // the field is left, so that the next key is the page's again
+    // leave the field, so that the next key is a shortcut again
     if (event.key === "Enter" || event.key === "Escape") {
       isRejected.current = event.key === "Escape";
       isKeyboard.current = true;
@@ -72,7 +72,7 @@ export function NumberField({ value, label, minimum, maximum, step, isInteger = 
       autocomplete="off"
       aria-label={label}
       aria-invalid={wrong}
-      title={wrong ? `A number from ${minimum} to ${maximum}` : undefined}
+      title={wrong ? `Enter a number from ${minimum} to ${maximum}` : undefined}
       value={draft ?? displayedText}
       onFocus={(event) => draft === null && event.currentTarget.select()}
       onInput={(event) => setDraft(event.currentTarget.value)}

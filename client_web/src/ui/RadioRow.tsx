@@ -1,4 +1,4 @@
-/** Buttons side by side of which one is chosen, by click or by arrow keys. */
+/** A row of buttons with one selected, by click or arrow keys. */
 import { onRadioKey } from "./radio";
 
 export interface RadioOption<T> {

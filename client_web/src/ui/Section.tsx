@@ -1,12 +1,12 @@
-/** A part of a panel below its heading, which folds it away. */
+/** A collapsible section of a panel. */
 import type { ComponentChildren } from "preact";
 import { foldedSections, toggleFolded } from "../state/panels";
 
 interface Props {
   title: string;
-  /** How many there are. */
+  /** Count shown beside the title. */
   count?: number;
-  /** Buttons beside the heading; they stay when it is folded. */
+  /** Buttons beside the title, also visible when collapsed. */
   actions?: ComponentChildren;
   children: ComponentChildren;
 }

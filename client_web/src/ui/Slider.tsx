@@ -1,5 +1,5 @@
-/** A slider: drag or click, arrows and Page keys, Shift for fine steps, double-click to type, modifier-click to reset.
- * Digits type a number at once. Fill and thumb move by transforms alone, so that nothing is painted anew during a drag. */
+/** A slider: drag or click, arrow and Page keys, Shift for fine steps, double-click to type, modifier-click to reset.
+ * Digits start typing. Fill and thumb move by transforms, so that nothing is repainted during a drag. */
 import { useRef, useState } from "preact/hooks";
 import { NumberField } from "./NumberField";
 import { useDrag } from "./drag";
@@ -12,7 +12,7 @@ export interface SliderProps extends NumberRange {
   initial?: number;
   tint?: string;
   onChange(value: number): void;
-  /** The drag has begun, and has not moved the slider yet. */
+  /** Called when a drag starts, before the slider moves. */
   onHold?(): void;
 }
 
@@ -26,7 +26,7 @@ const STEPS: Record<string, number> = {
   PageUp: 10,
 };
 
-/** Whether a key begins a number, which is typed in place of the slider's. */
+/** True if a key starts a typed number. */
 function isNumberKey(event: KeyboardEvent, minimum: number): boolean {
   if (event.ctrlKey || event.metaKey || event.altKey) return false;
   return /^[0-9.,]$/.test(event.key) || (event.key === "-" && minimum < 0);
@@ -63,7 +63,7 @@ export function Slider(props: SliderProps) {
       if (dx !== 0) set(drag.current.at + dx * (event.shiftKey ? FINE : 1));
     },
   });
-  /** Several keys may come before the field is there. */
+  /** Several keys may be pressed before the field opens. */
   const begin = (typed: string) => setTyping((now) => ({ initialText: `${now?.initialText ?? ""}${typed}` }));
   const key = (event: KeyboardEvent) => {
     const step = STEPS[event.key];
@@ -97,7 +97,7 @@ export function Slider(props: SliderProps) {
         onDblClick={() => setTyping({})}
       >
         <span class="fill" style={{ transform: `scaleX(${fraction.toFixed(4)})` }} />
-        <span class="way" style={{ transform: `translateX(${(100 * fraction).toFixed(2)}%)` }}>
+        <span class="fill-track" style={{ transform: `translateX(${(100 * fraction).toFixed(2)}%)` }}>
           <span class="thumb" />
         </span>
         {initial !== undefined && <span class="initial" style={{ left: `${toFraction(props, initial) * 100}%` }} />}
@@ -105,7 +105,7 @@ export function Slider(props: SliderProps) {
       {typing !== null ? (
         <NumberField
           value={value}
-          label={`${label}, as a number`}
+          label={`${label} value`}
           minimum={props.minimum}
           maximum={props.maximum}
           step={props.step ?? (props.maximum - props.minimum) / 100}
@@ -121,8 +121,8 @@ export function Slider(props: SliderProps) {
         <button
           type="button"
           class="value"
-          title="Type a number"
-          aria-label={`${label}: ${valueText}; type a number`}
+          title="Type a value"
+          aria-label={`${label}: ${valueText}; type a value`}
           onClick={() => setTyping({})}
         >
           {valueText}

@@ -1,4 +1,4 @@
-/** The border between image and inspector: drag it, or move it by keys. */
+/** The border between image and inspector: drag it, or move it with keys. */
 import { inspectorWidth } from "../state/panels";
 import { INSPECTOR_RANGE, inspectorShownWidth, clampInspectorWidth } from "../state/panelWidths";
 import { useDrag } from "./drag";
@@ -27,7 +27,7 @@ export function Splitter() {
       role="separator"
       tabIndex={0}
       aria-orientation="vertical"
-      aria-label="Width of the inspector"
+      aria-label="Inspector width"
       aria-valuemin={INSPECTOR_RANGE.narrowest}
       aria-valuemax={INSPECTOR_RANGE.widest}
       aria-valuenow={inspectorShownWidth.value}

@@ -2,7 +2,7 @@ import type { Signal } from "@preact/signals";
 import { IconButton } from "./IconButton";
 import type { IconName } from "./Icon";
 
-/** A button with an icon that turns something on and off. */
+/** An icon button that toggles a signal. */
 interface Props {
   icon: IconName;
   label: string;

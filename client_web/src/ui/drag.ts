@@ -1,23 +1,22 @@
-/** Dragging, the same everywhere: the pointer is captured, the browser's own dragging of text and images stays away,
- * and however the pointer is lost, the drag ends. */
+/** Common dragging: captures the pointer, prevents native drag and drop of text and images, and ends however the
+ * pointer is lost. */
 import { useEffect, useRef } from "preact/hooks";
 import { history } from "../edit/history";
 
 type DragTarget = PointerEvent & { readonly currentTarget: Element };
 
 interface DragHandlers {
-  /** The pointer went down; false where it takes hold of nothing. */
+  /** The pointer went down; return false to ignore it. */
   begin(event: DragTarget): boolean | void;
-  /** It moved while it was held. */
+  /** It moved while pressed. */
   move?(event: DragTarget): void;
-  /** It moved while it was not held. */
+  /** It moved while not pressed. */
   hover?(event: DragTarget): void;
-  /** The drag is over; `released` if the pointer was released, not if it was lost. */
+  /** The drag ended; `released`: the pointer was released, not lost. */
   end?(event: DragTarget, released: boolean): void;
 }
 
-/** Selected text, or an image that a moved border uncovers, would be dragged in the thumb's place: the browser then takes
- * the pointer away. */
+/** Prevents native dragging of selected text or images, which would cancel the pointer. */
 function preventDefault(event: Event): void {
   event.preventDefault();
 }
@@ -27,7 +26,7 @@ function listenForDragStart(listen: boolean): void {
   else window.removeEventListener("dragstart", preventDefault, { capture: true });
 }
 
-/** Properties of an element that is dragged. */
+/** Event handlers of a draggable element. */
 export function useDrag({ begin, move, hover, end }: DragHandlers) {
   const activePointer = useRef<{ pointer: number; buttons: number } | null>(null);
   const over = (event: DragTarget, released: boolean) => {
@@ -39,7 +38,7 @@ export function useDrag({ begin, move, hover, end }: DragHandlers) {
   };
   useEffect(
     () => () => {
-      if (activePointer.current !== null) listenForDragStart(false); // it was removed during the drag
+      if (activePointer.current !== null) listenForDragStart(false); // the element was removed during the drag
     },
     [],
   );
@@ -54,7 +53,7 @@ export function useDrag({ begin, move, hover, end }: DragHandlers) {
       event.currentTarget.setPointerCapture(event.pointerId);
     },
     onPointerMove(event: DragTarget) {
-      // released without an event, such as outside the window
+      // released without an event, as outside the window
       if (activePointer.current !== null && (event.buttons & activePointer.current.buttons) === 0) lost(event);
       if (activePointer.current === null) hover?.(event);
       else if (activePointer.current.pointer === event.pointerId) move?.(event);

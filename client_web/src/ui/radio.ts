@@ -1,8 +1,8 @@
-/** Arrow keys in a group of radio buttons: they move along and choose, round the ends. */
+/** Arrow keys in a radio group: move and select, with wrap-around. */
 
 const STEPS: Record<string, number> = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 };
 
-/** Hear a key of the group, of whose `count` buttons one is chosen. */
+/** Handle a key in a group of `count` buttons. */
 export function onRadioKey(event: KeyboardEvent, count: number, selectedIndex: number, select: (index: number) => void): void {
   const step = STEPS[event.key];
   if (step === undefined || event.ctrlKey || event.metaKey || event.altKey) return;

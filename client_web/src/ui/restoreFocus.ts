@@ -1,4 +1,5 @@
-/** Keyboard focus: if the focused element is removed, the nearest one gets it, or the one focused before a panel opened. */
+/** Restores keyboard focus: after the focused element is removed, focus the nearest one, or the one focused before a
+ * panel opened. */
 import { useLayoutEffect } from "preact/hooks";
 
 const FOCUSABLE = "button:not(:disabled), input:not(:disabled), select:not(:disabled), textarea, a[href], canvas[tabindex='0'], [tabindex='0']";
@@ -24,7 +25,7 @@ function firstFocusable(root: Element): HTMLElement | undefined {
   return [...inside, ...root.querySelectorAll<HTMLElement>(FOCUSABLE)].find(isReachable);
 }
 
-/** What stands now where a removed element stood, or the first control around it. */
+/** The element now at a removed element's position, or the first control around it. */
 export function nearestFocusable(steps: readonly PathStep[]): HTMLElement | undefined {
   const home = steps.findIndex(({ element }) => element.isConnected);
   if (home < 1) return undefined;
@@ -41,12 +42,12 @@ function restoreFocus(): void {
   nearestFocusable(focusPath)?.focus();
 }
 
-/** Follow the focus of the page. */
+/** Track the page's focus. */
 export function trackFocus(): void {
   window.addEventListener("keydown", () => (isKeyboardFocus = true), { capture: true });
   window.addEventListener("pointerdown", () => (isKeyboardFocus = false), { capture: true });
   window.addEventListener("focusin", ({ target }) => (focusPath = pathToRoot(target as Element)));
-  // what leaves the focus by itself, as a field does with Escape, wants the page's keys
+  // an element that blurs itself, like a field on Escape, returns the keys to the page
   window.addEventListener("focusout", ({ target, relatedTarget }) => {
     if (relatedTarget !== null) return;
     queueMicrotask(() => {
@@ -56,8 +57,8 @@ export function trackFocus(): void {
   new MutationObserver(restoreFocus).observe(document.body, { childList: true, subtree: true });
 }
 
-/** A panel gives the focus back to what had it when it opened. `toPage`: where nothing had it, the keys are the page's
- * again; else what is nearest gets it. */
+/** Return the focus to the element that had it before a panel opened. If none had it: to the page with `toPage`, else
+ * to the nearest element. */
 export function useReturnFocus(panel: { current: HTMLElement | null }, toPage = false): void {
   useLayoutEffect(() => {
     const [opened, previousFocus] = [panel.current, document.activeElement];

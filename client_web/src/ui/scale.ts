@@ -1,10 +1,10 @@
-/** How a slider's way maps to its value, and how numbers are written. */
+/** Slider scales, and number formatting. */
 
 export interface NumberRange {
   minimum: number;
   maximum: number;
   scale: "linear" | "log";
-  /** Values are multiples of it, and one key press moves by it. */
+  /** Values are multiples of this; one key press moves by it. */
   step?: number;
 }
 
@@ -16,7 +16,7 @@ export function clampTo(range: NumberRange, value: number): number {
   return Math.min(range.maximum, Math.max(range.minimum, value));
 }
 
-/** Position 0…1 of a value on its slider. */
+/** Slider position 0…1 of a value. */
 export function toFraction(range: NumberRange, value: number): number {
   const { minimum, maximum } = range;
   const v = clampTo(range, value);
@@ -32,12 +32,12 @@ export function fromFraction(range: NumberRange, fraction: number): number {
   return snap(range, roundToStep(value, isLog(range) ? value : maximum - minimum));
 }
 
-/** The nearest value that the range has. */
+/** The nearest value of the range. */
 export function snap(range: NumberRange, value: number): number {
   return clampTo(range, range.step === undefined ? value : Math.round(value / range.step) * range.step);
 }
 
-/** How far a key press moves along the slider, of its whole way. */
+/** Fraction of the slider's length per key press. */
 export function keyStep({ minimum, maximum, step = 0 }: NumberRange): number {
   return Math.max(0.01, step / (maximum - minimum));
 }
@@ -61,13 +61,13 @@ export function formatNumber(value: number): string {
   return value.toFixed(3);
 }
 
-/** A round number on an axis: no trailing noughts. */
+/** A round number on an axis, without trailing zeros. */
 export function tickLabel(value: number): string {
   const rounded = Number(value.toPrecision(3));
   return rounded >= 1e5 ? rounded.toExponential().replace("e+", "e") : String(rounded);
 }
 
-/** A number that somebody typed, with point or comma; null where it is none. */
+/** Parse a typed number with point or comma; null if invalid. */
 export function parseNumber(text: string): number | null {
   const cleaned = text.trim().replace(",", ".");
   if (cleaned === "") return null;
@@ -89,7 +89,7 @@ export function formatSeconds(seconds: number): string {
   return `${(seconds / 3600).toFixed(1)} h`;
 }
 
-/** The same of what is foreseen: "under a second", "about 12 s". */
+/** An estimated duration: "under a second", "about 12 s". */
 export function formatEstimatedTime(seconds: number): string {
   return seconds < 1 ? formatSeconds(seconds) : `about ${formatSeconds(seconds)}`;
 }

@@ -1,10 +1,10 @@
-/** Short messages, announced to screen readers; errors stay until they are closed, or what they say is mended. */
+/** Toast messages, announced to screen readers; errors stay until closed or resolved. */
 import { signal } from "@preact/signals";
 import { useRef } from "preact/hooks";
 import { UnreachableError } from "../session/net/api";
 import { useReturnFocus } from "./restoreFocus";
 
-/** What an error is about: the next success there takes it away. */
+/** Topic of an error: the next success on it removes the error. */
 type ToastTopic = "server" | "files" | "edit";
 
 interface Toast {
@@ -18,11 +18,11 @@ interface Toast {
 const toasts = signal<Toast[]>([]);
 let nextId = 1;
 const NOTE_MS = 5000;
-/** Long messages are read more slowly. */
+/** Long messages stay longer. */
 const NOTE_MS_PER_CHARACTER = 60;
 const MAX_SHOWN = 3;
 
-/** The texts on the screen. */
+/** The visible texts. */
 export const visibleTexts = (): string[] => toasts.peek().map(({ text }) => text);
 
 function dismissToast(id: number): void {
@@ -46,12 +46,12 @@ export function showError(error: unknown, topic?: ToastTopic): void {
   addToast({ kind: "error", text, ...(topicShown ? { topic: topicShown } : {}) });
 }
 
-/** What errors of a topic said no longer holds. */
+/** Remove the errors of a topic. */
 export function clearErrors(topic: ToastTopic): void {
   if (toasts.peek().some((toast) => toast.topic === topic)) toasts.value = toasts.value.filter((toast) => toast.topic !== topic);
 }
 
-/** Run something that may fail, and say so where it does; where it succeeds, what was wrong with its topic is mended. */
+/** Run an action and show its error; on success, remove errors of its topic. */
 export async function reportErrors<T>(work: () => Promise<T>, topic?: ToastTopic): Promise<T | undefined> {
   try {
     const result = await work();
@@ -80,7 +80,7 @@ function ToastMessage({ toast: { id, kind, text, action } }: { toast: Toast }) {
           {action.label}
         </button>
       )}
-      <button class="icon" aria-label="Close this message" onClick={() => dismissToast(id)}>
+      <button class="icon" aria-label="Dismiss" onClick={() => dismissToast(id)}>
         ×
       </button>
     </div>

@@ -1,7 +1,7 @@
-/** Menus that a press beside them closes. */
+/** Closes a menu on a press outside of it. */
 import { useEffect } from "preact/hooks";
 
-/** Call `close` on a press outside of a menu that is open. */
+/** Call `close` on a press outside an open menu. */
 export function useDismiss(open: boolean, menu: { current: HTMLElement | null }, close: () => void): void {
   useEffect(() => {
     if (!open) return undefined;

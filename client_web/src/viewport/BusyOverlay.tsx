@@ -1,4 +1,4 @@
-/** Before the first image: what is waited for, and for how long. */
+/** Progress shown before the first image. */
 import type { ViewImage } from "../render/viewImage";
 import { bakeProgressText, hasProgress, phaseText, useElapsedSeconds } from "../session/scene/bakeStatus";
 import { bake, pendingBake } from "../state/bakes";
@@ -7,9 +7,9 @@ import { displayedFrames } from "../state/display";
 
 interface BusyMessage {
   text: string;
-  /** Without numbers that run. */
+  /** Text for screen readers, without running numbers. */
   announced: string;
-  /** Null where nothing is measured, not even that something goes on. */
+  /** Undefined: indeterminate; null: no progress bar. */
   progress: number | undefined | null;
 }
 
@@ -23,16 +23,16 @@ function busyMessage(view: string, elapsed: number): BusyMessage {
     };
   const job = freezeStatus.value;
   if (connection.value === "open" && job?.view === view) {
-    const activity = job.label === "a preview" ? `Shading ${view}` : `Shading ${view}: ${job.label}`;
+    const activity = job.label === "a preview" ? "Rendering" : `Rendering ${job.label}`;
     const percent = Math.round(100 * job.progress);
     return { text: `${activity}… ${percent} %`, announced: `${activity}…`, progress: job.progress };
   }
   const text = {
-    reconnecting: rejectionMessage.value === null ? "Waiting for the server" : `Waiting: ${rejectionMessage.value}`,
-    silent: "Waiting for the server",
-    closed: "There is no picture to show",
-    connecting: "Opening the scene",
-    open: "Waiting for the first picture",
+    reconnecting: rejectionMessage.value === null ? "Waiting for the server…" : `Waiting: ${rejectionMessage.value}`,
+    silent: "Waiting for the server…",
+    closed: "No picture available",
+    connecting: "Opening the scene…",
+    open: "Waiting for the first picture…",
   };
   return { text: text[connection.value], announced: text[connection.value], progress: null };
 }

@@ -1,5 +1,5 @@
 import { falseColor } from "../state/display";
-/** What the false colors mean: stops about middle gray. The colors are the shader's. */
+/** Legend of the exposure heat map: stops relative to middle gray, in the shader's colors. */
 
 const STEPS = [
   ["#050505", "< −6"],
@@ -16,7 +16,7 @@ const STEPS = [
 export function FalseColorLegend() {
   if (!falseColor.value) return null;
   return (
-    <div class="legend" aria-label="False colours, stops about middle grey">
+    <div class="legend" aria-label="Exposure heat map, stops relative to middle gray">
       {STEPS.map(([color, label]) => (
         <span key={label}>
           <i style={{ background: color }} />

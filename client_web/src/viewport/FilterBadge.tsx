@@ -1,4 +1,4 @@
-/** In the image's corner: what it leaves out, which a click brings back, and how near it is to its look. */
+/** Badges in the image's corner: active filters, which a click clears, and the image's fidelity. */
 import { activeFilters } from "../state/visibility/activeFilters";
 import { fidelityMarks } from "./fidelityLabels";
 

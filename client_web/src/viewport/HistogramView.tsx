@@ -1,4 +1,4 @@
-/** The displayed image's histogram, made when input pauses. */
+/** Histogram of the displayed image, computed when input pauses. */
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
 import { computeHistogram, MAX_STOP, MIN_STOP, NUM_BINS, percentile, type Histogram } from "../render/histogram";
 import { stage } from "../render/renderStage";
@@ -19,7 +19,7 @@ function formatStop(stop: number): string {
 
 function summarize(histogram: Histogram): string {
   const [low, middle, high] = [0.01, 0.5, 0.99].map((fraction) => formatStop(percentile(histogram, fraction)));
-  return `median ${middle}, 98 % from ${low} to ${high} stops`;
+  return `Median ${middle}, 98 % in ${low} to ${high} stops`;
 }
 
 function paintArea(ctx: CanvasRenderingContext2D, bins: Uint32Array, largest: number): void {
@@ -65,7 +65,7 @@ function paintHistogram(canvas: HTMLCanvasElement, histogram: Histogram): void {
 
 const IDLE_MS = 250; // after the last frame
 
-/** Of the image that is shown once no more frames come, and whether that was exact. */
+/** The histogram once frames pause, and whether the image was exact. */
 function useHistogram(): { histogram: Histogram; isExact: boolean } | null {
   const [idleFrame, setIdleFrame] = useState(-1);
   const frame = displayedFrames.value;
@@ -85,9 +85,9 @@ function HistogramBars() {
   useLayoutEffect(() => {
     if (histogram !== null) paintHistogram(canvas.current as HTMLCanvasElement, histogram.histogram);
   }, [histogram]);
-  const summaryText = histogram === null ? "Waiting for the picture" : `${histogram.isExact ? "" : "not exact yet: "}${summarize(histogram.histogram)}`;
+  const summaryText = histogram === null ? "Waiting for the picture…" : `${histogram.isExact ? "" : "Approximate: "}${summarize(histogram.histogram)}`;
   return (
-    <figure class="histogram" aria-label="Histogram, stops about middle grey">
+    <figure class="histogram" aria-label="Histogram, stops relative to middle gray">
       <canvas ref={canvas} aria-hidden="true" style={{ width: `${WIDTH}px`, height: `${HEIGHT}px` }} />
       <figcaption>{summaryText}</figcaption>
     </figure>

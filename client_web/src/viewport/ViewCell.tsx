@@ -1,4 +1,4 @@
-/** One view: its canvas, what is laid over it, and the pointer's and keys' ways to move in it. */
+/** One view: its canvas, overlays, and pointer and keyboard navigation. */
 import { useEffect, useRef, useState } from "preact/hooks";
 import { freeCameraOf } from "./cameras/freeCamera";
 import { dollyOrbit } from "./cameras/orbit";
@@ -35,7 +35,7 @@ function onWheel(screen: ImageCanvas, event: WheelEvent): void {
   setTransform(view, zoomAt(transformOf(view), screen.size(), factor, x, y));
 }
 
-/** Keep the screen as large as its canvas, and take what is not the framework's to hear; returns how to stop. */
+/** Keep the screen at its canvas's size, and add native event listeners; returns a cleanup function. */
 function connectScreen(screen: ImageCanvas): () => void {
   const { canvas } = screen;
   const fit = () => {
@@ -59,7 +59,7 @@ function connectScreen(screen: ImageCanvas): () => void {
   };
 }
 
-/** The screen of a canvas, once there is one; it shows the image of `view`. */
+/** The screen of a mounted canvas; it shows the image of `view`. */
 function useScreen(view: string) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const [screen, setScreen] = useState<ImageCanvas | null>(null);
@@ -82,7 +82,7 @@ function useScreen(view: string) {
   return { canvas, screen, failure };
 }
 
-/** Look at what a pixel shows; beside others, the view is shown alone first. */
+/** Zoom to a pixel or focus the camera on it; in the grid, show the view alone first. */
 async function onDoubleClick(screen: ImageCanvas, view: string, event: MouseEvent): Promise<void> {
   const freeCamera = freeCameraOf(view);
   if (sideBySide.peek() || freeCamera === null) return sideBySide.peek() ? showSingleView(view) : undefined;
@@ -109,12 +109,12 @@ function onViewKey(screen: ImageCanvas, event: KeyboardEvent): void {
   event.preventDefault();
 }
 
-/** The view's name, which also marks the focused view; a press shows the view alone. */
+/** The view's name, which also marks the active view; a press shows the view alone. */
 function ViewName({ view }: { view: string }) {
   return (
     <button
       class="cell-name"
-      title={`Show “${view}” alone (double-click in the picture, or Enter)`}
+      title={`Show only “${view}” (double-click or Enter)`}
       onClick={() => showSingleView(view)}
     >
       {view}
@@ -123,19 +123,19 @@ function ViewName({ view }: { view: string }) {
 }
 
 export function ViewCell({ view }: { view: string }) {
-  scene.value; // another scene has other images, also under the same name
+  scene.value; // another scene may have a view of the same name
   const { canvas, screen, failure } = useScreen(view);
   const pointer = useViewPointer(screen, view);
   const isGrid = sideBySide.value;
   const moves = views.value.find(({ name }) => name === view)?.camera_mode === "free";
-  const label = isGrid ? `The view ${view}. Enter shows it alone.` : "The picture.";
+  const label = isGrid ? `View ${view}. Enter: show alone.` : "Picture.";
   return (
     <div class={`cell ${isGrid && view === activeViewName.value ? "active" : ""}`}>
       <canvas
         ref={canvas}
         tabIndex={0}
         role="img"
-        aria-label={`${label} ${moves ? "Arrow keys turn the eye, with Shift they slide it, plus and minus go nearer and farther, Home goes back" : "Arrow keys pan, plus and minus zoom"}; choose materials in the list.`}
+        aria-label={`${label} ${moves ? "Arrow keys: orbit. Shift+arrows: pan. Plus and minus: dolly. Home: reset view." : "Arrow keys: pan. Plus and minus: zoom."} Select materials in the list.`}
         onKeyDown={(event) => screen !== null && onViewKey(screen, event)}
         onFocus={() => setFocus(view)}
         onDblClick={(event) => screen !== null && void reportErrors(() => onDoubleClick(screen, view, event))}
@@ -145,8 +145,8 @@ export function ViewCell({ view }: { view: string }) {
       {failure !== null && <p class="failure">{failure}</p>}
       {screen?.isLost.value === true && (
         <p class="failure" role="status">
-          The browser took the graphics memory away. The picture returns with it, or when you reload the page; nothing of
-          your work is lost.
+          The browser lost its graphics context. Your work is safe; the picture returns automatically or when you reload the
+          page.
         </p>
       )}
       {screen !== null && <LightHandles screen={screen} />}

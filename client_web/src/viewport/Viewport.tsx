@@ -1,4 +1,4 @@
-/** The image of one view, or those of several side by side, with their labels. */
+/** The image of one view, or of several side by side, with labels. */
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { CameraBar } from "./cameras/CameraBar";
 import { PlacementBar } from "../panels/lights/PlacementBar";
@@ -11,7 +11,7 @@ import { FilterBadge } from "./FilterBadge";
 import { ViewportBar } from "./ViewportBar";
 import { columnsFor } from "./viewGrid";
 
-/** The size of an element, followed. */
+/** Size of an element, updated when it changes. */
 function useElementSize() {
   const element = useRef<HTMLDivElement>(null);
   const [size, setSize] = useState<[width: number, height: number]>([1, 1]);
@@ -35,7 +35,7 @@ export function Viewport() {
       <div class="canvas" ref={element}>
         <div class="cells" style={{ "--columns": columns }}>
           {visibleViews.map((name, index) => (
-            // a canvas stays, whichever view it shows: a graphics context is slow to make
+            // canvases are reused for other views: creating a graphics context is slow
             <ViewCell key={index} view={name} />
           ))}
         </div>

@@ -1,4 +1,4 @@
-/** Under the image: the probed pixel on the left, zoom on the right. */
+/** Bar under the image: pixel probe on the left, view controls on the right. */
 import { toDisplay } from "../render/color/tonemap";
 import { stage } from "../render/renderStage";
 import { zoomActual, zoomBy, zoomFactor, zoomFit } from "../render/zoom";
@@ -16,7 +16,7 @@ function PixelProbe() {
   const probed = pixelProbe.value;
   const image = probed === null ? null : stage.imageOf(probed.view);
   const radiance = probed === null ? null : (image?.radiance(probed.x, probed.y) ?? null);
-  if (probed === null || radiance === null) return <span class="probe quiet">Point at the picture to read a pixel</span>;
+  if (probed === null || radiance === null) return <span class="probe quiet">Hover to inspect a pixel</span>;
   const displayed = toDisplay(radiance, exposure.value, toneMap.value).map((v) => Math.round(255 * v));
   const material = image?.ids ? image.material(probed.x, probed.y) : probed.answer?.material;
   return (
@@ -48,24 +48,24 @@ export function ViewportBar() {
       <span class="spacer" />
       <button
         aria-pressed={shownPanels.value.includes("comments")}
-        title="Words that people pinned to pixels (N: a new one)"
+        title="Comments (N: add)"
         onClick={() => togglePanel("comments")}
       >
         Comments{openComments.value.length > 0 && <span class="count">{openComments.value.length}</span>}
       </button>
       <button
         aria-pressed={histogramOpen.value}
-        title="How often each brightness occurs (H)"
+        title="Brightness distribution (H)"
         onClick={() => (histogramOpen.value = !histogramOpen.value)}
       >
         Histogram
       </button>
       <button
         aria-pressed={falseColor.value}
-        title="Luminance in stops, as colours (E)"
+        title="Luminance in stops, false color (E)"
         onClick={() => (falseColor.value = !falseColor.value)}
       >
-        False colour
+        Exposure heat map
       </button>
       <button class="icon" aria-label="Zoom out" title="Zoom out (−)" onClick={() => zoomBy(1 / 1.25)}>
         −
@@ -76,10 +76,10 @@ export function ViewportBar() {
       <button class="icon" aria-label="Zoom in" title="Zoom in (+)" onClick={() => zoomBy(1.25)}>
         +
       </button>
-      <button title="Fit the picture (F)" onClick={zoomFit}>
+      <button title="Fit to window (F)" onClick={zoomFit}>
         Fit
       </button>
-      <button title="One to one (1)" onClick={zoomActual}>
+      <button title="Actual size (1)" onClick={zoomActual}>
         1:1
       </button>
     </div>

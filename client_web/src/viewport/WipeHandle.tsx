@@ -1,4 +1,4 @@
-/** The line between A (left) and B, the live image (right): drag it, or move it by keys. */
+/** The line between A (left) and the live image B (right): drag it, or move it with keys. */
 import { useRef } from "preact/hooks";
 import type { ImageCanvas } from "../render/canvas";
 import { displayedWidth, toScreenPoint } from "../render/zoomTransform";
@@ -43,7 +43,7 @@ export function WipeHandle({ screen }: { screen: ImageCanvas }) {
       class="wipe"
       role="slider"
       tabIndex={0}
-      aria-label="Wipe between A and B, the live picture"
+      aria-label="Wipe between A and B (live)"
       aria-valuemin={0}
       aria-valuemax={100}
       aria-valuenow={Math.round(position * 100)}

@@ -1,5 +1,5 @@
-/** How near the image is to its look, in the image's corner: said where it is not exact for longer than a blink, so
- * that nothing flickers during a drag. */
+/** Fidelity labels in the image's corner: shown if the image is approximate for a while, so that nothing flickers during
+ * a drag. */
 import { computed, effect, signal, untracked } from "@preact/signals";
 import type { Fidelity } from "../protocol";
 import { DEFAULT_BAKE_METHOD, methodLabelsOf } from "../session/scene/bakeMethods";
@@ -15,40 +15,40 @@ export interface FidelityMark {
 }
 
 const MARKS: Record<Exclude<Fidelity, "exact">, FidelityMark> = {
-  preview: { label: "Preview", title: "A few points are shaded, the others guessed from them. All are shaded next." },
-  approximate: { label: "Updating…", title: "The picture is of a moment ago; what the new one needs is being made." },
-  incremental: { label: "Followed closely", title: "What the hand changes is followed roughly. Exact at rest." },
-  near_exact: { label: "Nearly exact", title: "What the hand changes is followed closely. Exact at rest." },
+  preview: { label: "Preview", title: "Rendered from a subset of pixels; the full picture follows." },
+  approximate: { label: "Updating…", title: "Showing the previous picture while the new one renders." },
+  incremental: { label: "Approximate while dragging", title: "Exact when you let go." },
+  near_exact: { label: "Almost final", title: "Exact when you let go." },
 };
 const OTHER_LIGHT_MARK: FidelityMark = {
-  label: "Baked for other light",
-  title: "Shadows were baked before this light was known: those of small lamps are approximate. A new bake mends it.",
+  label: "Baked for a different environment",
+  title: "This environment was added after baking, so shadows of small light sources are approximate. Bake again to fix this.",
 };
 
 const DIRECT_ONLY_MARK: FidelityMark = {
   label: "Direct light only",
-  title: `Objects are not reflected, in metal and glass neither, and do not light each other. A bake “${methodLabelsOf(DEFAULT_BAKE_METHOD).label}” shows both.`,
+  title: `No bounce light, and objects don't appear in reflections. Bake with “${methodLabelsOf(DEFAULT_BAKE_METHOD).label}” to get both.`,
 };
 
 const PLAYBACK_MARK: FidelityMark = {
   label: "Playing",
-  title: "Frames of the time line, as near to it as each comes in time. Exact where it is paused.",
+  title: "Frames may be approximate to keep up. Exact when paused.",
 };
 
-const FREE_CAMERA_REASON = "Light is kept at points of the surfaces: fine shadows and sharp highlights are softer.";
-const WHEN_STOPPED = "Where the eye rests the exact picture follows.";
+const FREE_CAMERA_REASON = "While the camera moves, fine shadows and sharp highlights are softer.";
+const WHEN_STOPPED = "The exact picture follows when the camera stops.";
 
 const formatPercent = (fraction: number) => (fraction < 0.095 ? (100 * fraction).toFixed(1) : `${Math.round(100 * fraction)}`);
 
-/** With how far it is off: where the camera rested last, else as it was measured in the bake. */
+/** Label with the error at the last camera stop, else as measured in the bake. */
 function freeCameraMark(): FidelityMark {
   const [errorWhenStopped, baked] = [freeCameraError.value, bakedFreeCameraError.value];
-  const off = errorWhenStopped ?? baked?.value ?? null;
-  if (off === null) return { label: "Moving view, approximate", title: `${FREE_CAMERA_REASON} ${WHEN_STOPPED}` };
+  const error = errorWhenStopped ?? baked?.value ?? null;
+  if (error === null) return { label: "Approximate while moving", title: `${FREE_CAMERA_REASON} ${WHEN_STOPPED}` };
   const measured =
-    baked === null ? "" : ` In the bake, in the scene's own look, it was ${formatPercent(baked.value)} ± ${formatPercent(baked.standard_error)} % off (RMS of surfaces, standard error).`;
-  const idleError = errorWhenStopped === null ? "" : ` Where the eye rested last this was ${formatPercent(errorWhenStopped)} % of the picture (RMS).`;
-  return { label: `Moving view, about ${formatPercent(off)} % off`, title: `${FREE_CAMERA_REASON}${measured}${idleError} ${WHEN_STOPPED}` };
+    baked === null ? "" : ` Error in the original look: ${formatPercent(baked.value)} ± ${formatPercent(baked.standard_error)} % RMS (surfaces only).`;
+  const idleError = errorWhenStopped === null ? "" : ` Error at the last stop: ${formatPercent(errorWhenStopped)} % RMS.`;
+  return { label: `Approximate while moving (about ${formatPercent(error)} % error)`, title: `${FREE_CAMERA_REASON}${measured}${idleError} ${WHEN_STOPPED}` };
 }
 
 const SHOWN_AFTER_MS = 300;
@@ -67,18 +67,18 @@ effect(() => {
   const timer = isRough.value ? setTimeout(updateRoughMark, SHOWN_AFTER_MS) : undefined;
   return () => clearTimeout(timer);
 });
-/** The image is of before the newest edit, for longer than a blink. */
+/** True if the image has been older than the newest edit for a while. */
 const isLate = signal(false);
 effect(() => {
   const timer = isOutdated.value ? setTimeout(() => (isLate.value = true), SHOWN_AFTER_MS) : undefined;
   if (!isOutdated.value && isLate.peek()) {
     isLate.value = false;
-    untracked(updateRoughMark); // the previous label stays with the next, without a delay
+    untracked(updateRoughMark); // continue with the next label without a delay
   }
   return () => clearTimeout(timer);
 });
 
-// a displayed label changes when another one has lasted
+// change a displayed label only after another one has lasted
 effect(() => {
   const timer = fidelity.value !== roughSince.peek() && roughSince.peek() !== null ? setTimeout(updateRoughMark, SHOWN_AFTER_MS) : undefined;
   return () => clearTimeout(timer);
@@ -88,7 +88,7 @@ function viewMark(now: Exclude<Fidelity, "exact">): FidelityMark {
   return hasFreeCamera.value && now === "approximate" ? freeCameraMark() : MARKS[now];
 }
 
-/** Current labels: of the image, and of what its bake does not include. */
+/** Current labels of the image and of its bake's limits. */
 export function fidelityMarks(): FidelityMark[] {
   const phrase = isLate.value ? "approximate" : roughSince.value;
   const ofImage = phrase === null ? [] : [isPlaying.value ? PLAYBACK_MARK : viewMark(phrase)];

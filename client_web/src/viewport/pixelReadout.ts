@@ -1,4 +1,4 @@
-/** Pixel → curve: asks the server what a pixel is made of, one question at a time, the newest pixel first. */
+/** Pixel → curve: requests a pixel's contributions, one request at a time, the newest pixel first. */
 import { effect } from "@preact/signals";
 import { sendToShown } from "../session/connections";
 import { isMoving } from "../session/clientRendering";
@@ -18,7 +18,7 @@ function waitTime(): boolean {
 function sendProbe(): void {
   timer = 0;
   const position = pixelProbe.peek();
-  if (position === null || isMoving(position.view)) return; // the server has the previous camera: the probe is sent when both have stopped
+  if (position === null || isMoving(position.view)) return; // the server still has the previous camera: probe when the camera has stopped
   lastRequest = performance.now();
   sendToShown({ type: "inspect", view: position.view, x: position.x, y: position.y });
 }
@@ -27,13 +27,13 @@ function scheduleProbe(): void {
   if (timer === 0) timer = window.setTimeout(sendProbe, waitTime() ? EVERY_MS * 3 : EVERY_MS);
 }
 
-/** The pointer is over this pixel; outside the image nothing is probed. */
+/** Probe the pixel under the pointer; nothing outside the image. */
 export function probeAt(image: ViewImage, x: number, y: number): void {
   if (image.radiance(x, y) === null) return clearProbe();
   const { view } = image;
   const last = pixelProbe.peek();
   if (last?.view === view && last.x === x && last.y === y) return;
-  // the last answer stays until the next one, so that the plot does not flicker
+  // keep the last response until the next one, so that the plot does not flicker
   pixelProbe.value = { view, x, y, answer: last?.answer ?? null };
   scheduleProbe();
 }
@@ -44,7 +44,7 @@ export function clearProbe(): void {
   if (pixelProbe.peek() !== null) pixelProbe.value = null;
 }
 
-// what the pixel is made of changes with the image
+// the contributions change with the image
 effect(() => {
   displayedFrames.value;
   if (pixelProbe.peek() !== null && performance.now() - lastRequest > 4 * EVERY_MS) scheduleProbe();

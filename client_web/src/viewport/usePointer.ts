@@ -1,4 +1,4 @@
-/** The pointer's and fingers' ways to move in an image, or to move its camera. */
+/** Pointer and touch navigation in an image, or of its free camera. */
 import { useRef } from "preact/hooks";
 import { freeCameraOf } from "./cameras/freeCamera";
 import { TouchGestures, type PinchMove } from "./cameras/touchGestures";
@@ -26,13 +26,13 @@ export function panView(screen: ImageCanvas, dx: number, dy: number): void {
   setTransform(view, panTransform(transformOf(view), screen.size(), dx, dy));
 }
 
-/** Select what a pixel shows: where the camera moves, the server knows. */
+/** Select the material of a pixel; in free-camera views the server picks it. */
 async function selectAt(view: string, x: number, y: number): Promise<void> {
   const { material } = await requestPixelProbe(view, x, y);
   if (material !== null) selectMaterial(material);
 }
 
-/** Two fingers slide what they hold, and spread it. */
+/** Two fingers pan and pinch. */
 function pinchCamera(screen: ImageCanvas, view: string, { across, down, center, spread }: PinchMove): void {
   const freeCamera = freeCameraOf(view);
   if (freeCamera === null) {
@@ -62,14 +62,14 @@ export function useViewPointer(screen: ImageCanvas | null, view: string) {
     drag.current = { x: event.clientX, y: event.clientY, moved: true };
     const freeCamera = freeCameraOf(view);
     if (freeCamera === null) return panView(screen, dx, dy);
-    clearProbe(); // what was probed has moved away from the pointer
+    clearProbe(); // the probed point has moved away from the pointer
     const { height } = screen.size();
     if (event.shiftKey || (event.buttons & 6) !== 0) freeCamera.change((orbit) => panOrbit(orbit, dx / height, dy / height));
     else freeCamera.change((orbit) => rotateOrbit(orbit, (-RADIANS_PER_PIXEL * dx) / height, (RADIANS_PER_PIXEL * dy) / height));
   };
   const hover = (event: PointerEvent) => {
     if (screen === null) return;
-    hoveredView.value = view; // not when it enters: the view under a resting pointer may become another
+    hoveredView.value = view; // not on enter: the view under an idle pointer may change
     const { px, py, material } = pickMaterial(screen, event);
     probeAt(screen.image, px, py);
     hoveredMaterial.value = material;
@@ -91,7 +91,7 @@ export function useViewPointer(screen: ImageCanvas | null, view: string) {
   const lift = (event: PointerEvent) => {
     const { current } = fingers;
     const left = current.lift(event) ? current.only : null;
-    if (left !== null) drag.current = { ...left, moved: true }; // it goes on from where it is
+    if (left !== null) drag.current = { ...left, moved: true }; // continue with the remaining finger
   };
   return {
     ...dragHandlers,
@@ -103,7 +103,7 @@ export function useViewPointer(screen: ImageCanvas | null, view: string) {
     onPointerMove(event: ViewPointerTarget) {
       const pull = fingers.current.move(event);
       if (screen === null || pull === null || pull.count < 2) return dragHandlers.onPointerMove(event);
-      drag.current.moved = true; // no click
+      drag.current.moved = true; // not a click
       return pinchCamera(screen, view, pull);
     },
     onPointerUp: (event: ViewPointerTarget) => (lift(event), dragHandlers.onPointerUp(event)),

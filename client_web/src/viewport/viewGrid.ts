@@ -1,7 +1,7 @@
-/** How several images share the space. */
+/** Grid layout of several views. */
 import { fitWidth, MARGIN_GRID } from "../render/zoomTransform";
 
-/** The number of columns in which `count` images of an aspect become largest; of equals, the wider arrangement. */
+/** Number of columns that maximizes the size of `count` images of an aspect ratio; ties prefer more columns. */
 export function columnsFor(count: number, width: number, height: number, aspect: number): number {
   const displayedSize = (columns: number) =>
     fitWidth({ width: width / columns, height: height / Math.ceil(count / columns), aspect, margin: MARGIN_GRID });

@@ -1,4 +1,4 @@
-/** Who is logged in, and the way out; nothing where nobody logs in. Explains to a read-only user why editing is off. */
+/** The logged-in user and logging out, if the server has logins. Tells a read-only user why editing is off. */
 import { sessionUser, readOnlyMessage } from "../../state/sessionUser";
 import { reportErrors } from "../../ui/toasts";
 import { logOut } from "./account";

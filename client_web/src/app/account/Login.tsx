@@ -1,4 +1,4 @@
-/** Asks for a token, over whatever was there: that goes on after it. */
+/** Login dialog over the page, which continues after the login. */
 import { useState } from "preact/hooks";
 import { loginMessage } from "../../state/sessionUser";
 import { logIn } from "./account";
@@ -22,7 +22,7 @@ export function Login() {
         <h1>relume</h1>
         <p>{message}</p>
         <label>
-          Token
+          Access token
           <input
             type="password"
             autoComplete="current-password"

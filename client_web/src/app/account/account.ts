@@ -5,9 +5,9 @@ import type { MeBody } from "../../protocol";
 import { loginMessage, sessionUser, readOnlyMessage, numRejectedEdits } from "../../state/sessionUser";
 import { showNote } from "../../ui/toasts";
 
-const LOGIN_PROMPT = "This server asks who you are. Paste the token that you were given.";
+const LOGIN_PROMPT = "Sign in: paste your access token.";
 
-/** Find out who is here; whether they may go on. */
+/** Load the current user; false if the server asks for a login. */
 export async function initializeUser(): Promise<boolean> {
   sessionUser.value = await getJson<MeBody>("/api/me");
   if (sessionUser.value.role === "anyone") loginMessage.value = LOGIN_PROMPT;
@@ -16,7 +16,7 @@ export async function initializeUser(): Promise<boolean> {
 
 export async function logIn(token: string): Promise<void> {
   await request("/api/login", json("POST", { token: token.trim() }));
-  location.reload(); // edits are stored in the tab
+  location.reload(); // edits survive: they are stored in the tab
 }
 
 export async function logOut(): Promise<void> {

@@ -1,15 +1,15 @@
-/** The plot's axes: angle to fraction of the width, value to fraction of the height, and back. */
+/** The plot's axes: angle to and from fraction of the width, value to and from fraction of the height. */
 
 export const MAX_DEGREES = 90;
 const LOG_DECADES = 5;
-/** Below this fraction of a log axis the value is zero, which a logarithm cannot show. */
+/** Below this fraction of a logarithmic axis the value is zero. */
 const LOG_ZERO = 0.004;
 
 export interface CurveAxes {
-  /** Stretched near zero, where highlights live: fraction = sqrt(angle / 90°). */
+  /** Expands small angles, where highlights are: fraction = sqrt(angle / 90°). */
   stretched: boolean;
   log: boolean;
-  /** Value at the top. */
+  /** Value at the top of the plot. */
   top: number;
 }
 
@@ -27,7 +27,7 @@ export function bottomOf(axes: CurveAxes): number {
   return axes.log ? axes.top / 10 ** LOG_DECADES : 0;
 }
 
-/** 0 at the bottom, 1 at the top; may leave that range. */
+/** 0 at the bottom, 1 at the top; may lie outside. */
 export function yFraction(axes: CurveAxes, value: number): number {
   if (!axes.log) return value / axes.top;
   if (value <= 0) return 0;
@@ -39,7 +39,7 @@ export function valueAt(axes: CurveAxes, fraction: number): number {
   return fraction < LOG_ZERO ? 0 : bottomOf(axes) * 10 ** (fraction * LOG_DECADES);
 }
 
-/** The next of 1, 2, 5 × 10ⁿ above the largest value, with a little room; powers of ten on a log axis. */
+/** The next of 1, 2, 5 × 10ⁿ above the largest value plus a margin; powers of ten on a logarithmic axis. */
 export function niceTop(largest: number, log: boolean): number {
   if (!(largest > 0)) return 1;
   if (log) return 10 ** Math.ceil(Math.log10(largest * 1.05));

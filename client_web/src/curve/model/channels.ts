@@ -1,11 +1,11 @@
-/** A curve's edits in the look, per channel, and back in the shortest form. */
+/** A curve's edits: from the look to channels, and back in the shortest form. */
 import type { CurveEdits, DrawnCurve } from "../../protocol";
 
 export type ChannelName = "r" | "g" | "b";
 export const CHANNELS: readonly ChannelName[] = ["r", "g", "b"];
-/** What is drawn of one channel: `bands`, `factors` and `offsets` are its own J numbers. */
+/** The edits of one channel: `bands`, `factors` and `offsets` are its own J numbers. */
 export type DrawnChannels = Omit<DrawnCurve, "channels">;
-/** Null where the model's parameters make the curve. */
+/** Null if the model generates the curve. */
 export type Channels = readonly [DrawnChannels | null, DrawnChannels | null, DrawnChannels | null];
 export type ActiveChannels = "rgb" | ChannelName;
 
@@ -15,7 +15,7 @@ export function channelsOf(active: ActiveChannels): number[] {
   return CHANNELS_OF[active];
 }
 
-/** A channel's row of J numbers for all, 3 · J flat, or three lists of J. */
+/** A channel's J numbers, from J numbers for all channels, 3 · J flat, or three lists of J. */
 function rowOf(rows: number[] | number[][], channel: number, numBands: number): number[] {
   if (Array.isArray(rows[0])) return (rows as number[][])[channel] ?? [];
   const flat = rows as number[];
@@ -43,7 +43,7 @@ export function readChannels(edits: CurveEdits | undefined, numBands: number): C
   return result;
 }
 
-/** Channels with equal edits share one object; undefined if nothing is drawn. */
+/** Channels with equal edits share one object; undefined without edits. */
 export function writeChannels(channels: Channels): CurveEdits | undefined {
   const groups = new Map<string, DrawnCurve & { channels: string }>();
   channels.forEach((drawn, channel) => {
@@ -57,7 +57,7 @@ export function writeChannels(channels: Channels): CurveEdits | undefined {
   return list.length === 0 ? undefined : list.length === 1 ? list[0] : list;
 }
 
-/** Whether all three channels are drawn alike (or none). */
+/** True if all three channels have the same edits, or none. */
 export function joinChannels(channels: Channels): boolean {
   const [r, g, b] = channels.map((drawn) => JSON.stringify(drawn));
   return r === g && g === b;

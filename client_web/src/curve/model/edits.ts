@@ -1,4 +1,4 @@
-/** Edits relative to what a curve was: a factor and an offset for each band. `relume/brdf/curve_edits.py` computes alike. */
+/** Edits relative to a curve: a factor and an offset per band. Same computation as `relume/brdf/curve_edits.py`. */
 import type { DrawnCurve, Handle } from "../../protocol";
 
 /** edited = factors · before + offsets, band by band. */
@@ -7,7 +7,7 @@ export interface CurveLayer {
   offsets: number[];
 }
 
-/** What an edit does to each band of the curve `original`; exactly one and zero where it does nothing. */
+/** Factors and offsets of an edit for each band of the curve `original`; exactly 1 and 0 in unchanged bands. */
 export function layerOf(drawn: DrawnCurve | null, original: readonly number[]): CurveLayer {
   const layer = bandsLayer(drawn, original.length);
   if (drawn?.handles === undefined) return layer;
@@ -18,7 +18,7 @@ export function layerOf(drawn: DrawnCurve | null, original: readonly number[]): 
   };
 }
 
-/** The same without its handles. */
+/** The same edit without its handles. */
 export function bandsLayer(drawn: DrawnCurve | null, numBands: number): CurveLayer {
   const plain = (value: number) => Array<number>(numBands).fill(value);
   const { factors = plain(1), offsets = plain(0) } = (drawn ?? {}) as Partial<CurveLayer>;
@@ -29,12 +29,12 @@ export function applyLayer({ factors, offsets }: CurveLayer, original: readonly 
   return original.map((value, j) => (factors[j] as number) * value + (offsets[j] as number));
 }
 
-/** Where an angle lies among the bands' middles; the outer halves of the first and the last band belong to theirs. */
+/** An angle's position between band centers; angles beyond the first and the last center are clamped to them. */
 function bandPosition(degrees: number, numBands: number): number {
   return Math.min(numBands - 1, Math.max(0, (degrees / 90) * numBands - 0.5));
 }
 
-/** A curve's value at an angle: linear between the bands' middles. */
+/** A curve's value at an angle: linear between band centers. */
 export function sampleBands(bands: readonly number[], degrees: number): number {
   const position = bandPosition(degrees, bands.length);
   const band = Math.min(Math.floor(position), bands.length - 2);
@@ -58,8 +58,8 @@ function pullsLayer(handles: readonly Handle[], original: readonly number[]): Cu
   return pulls;
 }
 
-/** How a handle moves a value, by gain · value + lift: lower ones in proportion, higher ones as far as itself; one that
- * more than doubles what was there adds the rest to the low ones too. */
+/** Gain and lift of a handle, value → gain · value + lift: lower values change in proportion, higher ones by the same
+ * amount; beyond a doubling, the remainder is added to low values as well. */
 function handlePull([, original, target]: Handle, value: number): { gain: number; lift: number } {
   const move = target - original;
   const rise = Math.max(move, 0);
@@ -68,7 +68,7 @@ function handlePull([, original, target]: Handle, value: number): { gain: number
   return { gain: move / reach, lift: (rise * Math.max(rise - original, 0)) / reach };
 }
 
-/** Where a handle brings a value. */
+/** A value after a handle's gain and lift. */
 export function applyPull(handle: Handle, value: number): number {
   const { gain, lift } = handlePull(handle, value);
   return value + gain * value + lift;

@@ -1,4 +1,4 @@
-/** From many samples to few points: the curve as editable control points. */
+/** Fits few editable control points to many samples of a curve. */
 import { MAX_CURVE_VALUE } from "../../look.gen";
 import type { Point } from "../../protocol";
 import { xFraction, yFraction, type CurveAxes } from "./axes";
@@ -8,7 +8,7 @@ import { pchip } from "./pchip";
 export const MAX_POINTS = 64;
 const TOLERANCE = 0.004;
 
-/** Six digits are more than an image can show and keep the document readable. */
+/** Six digits exceed an image's precision and keep the document readable. */
 export function roundValue(value: number): number {
   return Number(Math.min(MAX_CURVE_VALUE, Math.max(0, value)).toPrecision(6));
 }
@@ -40,21 +40,21 @@ export function fitPoints(samples: readonly Point[], axes: CurveAxes, maxPoints 
   return [...selected].sort((a, b) => a - b).map((i) => roundPoint(...(samples[i] as Point)));
 }
 
-/** Band averages as samples at the bands' middles, the ends carried to 0° and 90°. */
+/** Band averages as samples at the band centers, with the ends extended to 0° and 90°. */
 export function bandSamples(bands: readonly number[], maxDegrees = 90): Point[] {
   const width = maxDegrees / bands.length;
   const inner = bands.map((value, j): Point => [(j + 0.5) * width, value]);
   return [[0, bands[0] ?? 0], ...inner, [maxDegrees, bands.at(-1) ?? 0]];
 }
 
-/** Band averages as samples that points may stand on: the first and the last band's at 0° and at 90°. */
+/** Band averages as samples at valid point angles: the first and the last band's at 0° and 90°. */
 export function knotSamples(bands: readonly number[], maxDegrees = 90): Point[] {
   const width = maxDegrees / bands.length;
   const last = bands.length - 1;
   return bands.map((value, j) => [j === 0 ? 0 : j === last ? maxDegrees : (j + 0.5) * width, value]);
 }
 
-/** Points at the angles of others, on the curve to the last digit: where they stand once their angles are tidy. */
+/** Points at given angles, exactly on the curve: used after rounding their angles. */
 export function outlinePoints(points: readonly Point[], bands: readonly number[]): Point[] {
   return points.map(([degrees]) => {
     const [x] = roundPoint(degrees, 0);
@@ -62,7 +62,7 @@ export function outlinePoints(points: readonly Point[], bands: readonly number[]
   });
 }
 
-/** A freehand stroke: a height for each band it covers; the newest pass wins, smoothed in the plot. */
+/** A freehand stroke: a smoothed height per covered band; later passes overwrite earlier ones. */
 export class BrushStroke {
   private readonly values: Float64Array;
   private last: Point | null = null;
@@ -71,7 +71,7 @@ export class BrushStroke {
     private readonly numBands: number,
     private readonly axes: CurveAxes,
   ) {
-    // heights in the plot, so that smoothing means the same on linear and logarithmic axes
+    // heights in the plot, so that smoothing acts alike on linear and logarithmic axes
     this.values = new Float64Array(numBands).fill(Number.NaN);
   }
 
@@ -89,15 +89,14 @@ export class BrushStroke {
     this.last = [degrees, height];
   }
 
-  /** First and last band that was drawn. */
+  /** First and last drawn band. */
   range(): [first: number, last: number] | null {
     const a = this.values.findIndex((v) => !Number.isNaN(v));
     const b = this.values.findLastIndex((v) => !Number.isNaN(v));
     return a < 0 ? null : [a, b];
   }
 
-  /** Heights from the first band to the last, smoothed by `passes` of a binomial filter; the ends stay where the pointer
-   * put them. */
+  /** Heights from the first band to the last, smoothed by `passes` of a binomial filter; the ends stay fixed. */
   heights(passes = 6): number[] {
     const range = this.range();
     if (range === null) return [];
@@ -111,7 +110,7 @@ export class BrushStroke {
     return heights;
   }
 
-  /** Fraction of the plot's width that it takes, for deciding how many points it deserves. */
+  /** Fraction of the plot's width that the stroke covers; it determines the number of points. */
   mergeAxes(): number {
     const [first, last] = this.range() ?? [0, 0];
     return (

@@ -1,14 +1,14 @@
-/** Less than this fraction of a pixel's light is nothing: what is left of it is rounding. */
+/** Fractions of a pixel's light below this are rounding errors. */
 const NOTHING = 1e-4;
 
-/** Which part of a pixel's radiance came through a curve, 0…1. */
+/** Fraction of a pixel's radiance that depends on a curve, 0…1. */
 export function outputShares(bands: number[][], radiance: readonly number[]): number {
   const total = radiance.reduce((a, b) => a + b, 0);
   const through = bands.flat().reduce((a, b) => a + Math.max(0, b), 0);
   return total > 0 && through > NOTHING * total ? Math.min(1, through / total) : 0;
 }
 
-/** The interval that carries `fraction` of a pixel's light: the narrowest run of bands, in degrees. */
+/** The narrowest interval of bands, in degrees, with `fraction` of a pixel's light. */
 export function mainInterval(bands: number[][], fraction = 0.8): [from: number, to: number] | null {
   const weights = (bands[0] ?? []).map((_, j) => bands.reduce((sum, channel) => sum + Math.max(0, channel[j] ?? 0), 0));
   const total = weights.reduce((a, b) => a + b, 0);

@@ -1,4 +1,4 @@
-/** Changes to an interval of a curve, band by band: outside it nothing changes. Points come along as they are then. */
+/** Changes to an interval of a curve, band by band; outside it nothing changes. Points in it follow the curve. */
 import { MAX_CURVE_VALUE } from "../../look.gen";
 import type { Point } from "../../protocol";
 import { MAX_DEGREES, valueAt, type CurveAxes } from "./axes";
@@ -6,7 +6,7 @@ import type { DrawnChannels } from "./channels";
 import { applyLayer, layerOf, sampleBands, type CurveLayer } from "./edits";
 import { fitPoints, knotSamples, MAX_POINTS, outlinePoints, roundPoint, roundValue, type BrushStroke } from "./fit";
 
-/** What an interval is cut out of: what is drawn of a channel, what that stands on, its points, and the plot's axes. */
+/** Input of an interval edit: a channel's edits, the curve that they change, its points, and the plot's axes. */
 export interface EditBase {
   curve: DrawnChannels | null;
   baseline: number[];
@@ -17,13 +17,13 @@ export interface EditBase {
 /** Precision of stored factors. */
 const DIGITS = 9;
 
-/** First and last band whose middle lies in an interval; the last is before the first where there is none. */
+/** First and last band with its center in an interval; the last precedes the first if there is none. */
 export function bandsWithin(from: number, to: number, numBands: number): [first: number, last: number] {
   const bandPosition = (degrees: number) => (degrees / MAX_DEGREES) * numBands - 0.5;
   return [Math.max(0, Math.ceil(bandPosition(from) - 1e-9)), Math.min(numBands - 1, Math.floor(bandPosition(to) + 1e-9))];
 }
 
-/** Numbers of a layer as the look stores them; undefined if they change nothing. */
+/** Numbers of an edit layer as the look stores them; undefined if they change nothing. */
 function roundNumbers(numbers: readonly number[], plain: number): number[] | undefined {
   const tidy = numbers.map((v) => Math.min(MAX_CURVE_VALUE, Number(v.toPrecision(DIGITS))));
   return tidy.every((v) => v === plain) ? undefined : tidy;
@@ -34,7 +34,7 @@ const ENDS: readonly Point[] = [
   [MAX_DEGREES, 0],
 ];
 
-/** The layer as part of a document, with handles that pull nothing at the angles of points. */
+/** The layer as part of a document, with neutral handles at the points' angles. */
 function rebuildCurve({ curve, baseline }: EditBase, layer: CurveLayer, points: readonly Point[]): DrawnChannels {
   const outline = outlinePoints(points.length < 2 ? ENDS : points, applyLayer(layer, baseline));
   const [factors, offsets] = [roundNumbers(layer.factors, 1), roundNumbers(layer.offsets, 0)];
@@ -47,7 +47,7 @@ function rebuildCurve({ curve, baseline }: EditBase, layer: CurveLayer, points: 
   };
 }
 
-/** `layer` with the bands from `first` on at these values, whatever they stand on. */
+/** `layer` with the bands from `first` on set to these values. */
 function layerWithValues({ factors, offsets }: CurveLayer, first: number, values: readonly number[]): CurveLayer {
   const within = (j: number) => j >= first && j < first + values.length;
   return {
@@ -56,7 +56,7 @@ function layerWithValues({ factors, offsets }: CurveLayer, first: number, values
   };
 }
 
-/** Lay a freehand stroke over the curve: the bands it covers take its values, with points of their own. */
+/** Apply a freehand stroke: the covered bands take its values and get points of their own. */
 export function drawInterval(base: EditBase, stroke: BrushStroke): DrawnChannels | null {
   const range = stroke.range();
   if (range === null) return base.curve;
@@ -71,26 +71,26 @@ export function drawInterval(base: EditBase, stroke: BrushStroke): DrawnChannels
   return rebuildCurve(base, layer, points.length <= MAX_POINTS ? points : fitPoints(points, axes, MAX_POINTS));
 }
 
-/** Points with one at each end of an interval. */
+/** The points, plus one at each end of an interval. */
 function addIntervalEnds(points: readonly Point[], from: number, to: number, band: number): Point[] {
   const hasRoom = points.length < MAX_POINTS - 1;
   const ends = [from, to].filter((end) => hasRoom && points.every(([x]) => Math.abs(x - end) >= band));
   return [...points, ...ends.map((x) => roundPoint(x, 0))].sort((a, b) => a[0] - b[0]);
 }
 
-/** Multiply an interval. */
+/** Scale an interval. */
 export function scaleInterval(base: EditBase, from: number, to: number, factor: number): DrawnChannels {
   const { baseline, points } = base;
   const layer = layerOf(base.curve, baseline);
   const values = applyLayer(layer, baseline);
   const [first, last] = bandsWithin(from, to, baseline.length);
-  // no value leaves what documents may hold
+  // values stay within the document's limits
   const factorAt = (j: number) => (j < first || j > last ? 1 : Math.min(factor, MAX_CURVE_VALUE / (values[j] as number)));
   const scaled = { factors: layer.factors.map((v, j) => v * factorAt(j)), offsets: layer.offsets.map((v, j) => v * factorAt(j)) };
   return rebuildCurve(base, scaled, addIntervalEnds(points, from, to, MAX_DEGREES / baseline.length));
 }
 
-/** Move an interval along the angle. What it lays bare goes on at the value where it was torn off. */
+/** Move an interval along the angle. The uncovered bands take the value at the edge it left. */
 export function shiftInterval(base: EditBase, from: number, to: number, degrees: number): DrawnChannels {
   const { baseline, points } = base;
   const layer = layerOf(base.curve, baseline);

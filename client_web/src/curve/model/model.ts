@@ -1,5 +1,5 @@
-/** The open curve as the editor shows it, channel by channel, and how to change it. What is not changed stays as it is:
- * points that are moved bend the curve, they do not replace it (docs/direct-light.md#curves-as-bands). */
+/** The open curve as the editor shows it, channel by channel, and how to change it. Moving points bends the curve
+ * instead of replacing it (docs/direct-light.md#curves-as-bands). */
 import { editValue } from "../../edit/edit";
 import type { CurveBody, CurveEdits, CurveMessage, Handle, Point } from "../../protocol";
 import { niceTop, type CurveAxes } from "./axes";
@@ -12,20 +12,20 @@ export interface CurveModel {
   path: string;
   info: CurveBody;
   channels: Channels;
-  /** Band values per channel: what edits stand on, and what is displayed. Null until the server has sent the
-   * generator's own curve, where that is needed. */
+  /** Band values per channel: the curve under the edits, and the displayed one. Null until the server has sent the
+   * generated curve, if it is needed. */
   baselines: (number[] | null)[];
   curves: (number[] | null)[];
-  /** Curves to draw: samples per channel. */
+  /** Displayed curves: samples per channel. */
   lines: Point[][];
-  /** The generator's own curves, as bands and to draw; null until the server has sent them. */
+  /** The generated curves, as bands and as samples; null until the server has sent them. */
   generated: number[][] | null;
   generatedLines: Point[][] | null;
-  /** Whether red, green and blue are one curve. */
+  /** True if red, green and blue share one curve. */
   areJoined: boolean;
 }
 
-/** Of a difference as small as this, the server's six digits are the reason. */
+/** Differences below this come from the server's rounding to six digits. */
 const ROUNDING = 1e-5;
 
 function isNearby(a: number, b: number): boolean {
@@ -42,7 +42,7 @@ function baselineOf(drawn: DrawnChannels | null, generated: number[] | null, num
   return (drawn?.bands as number[] | undefined) ?? generated;
 }
 
-/** What the look and the server say about a curve. Points that were just moved are drawn before the server answers. */
+/** A curve from the look and the server. Points just moved are drawn before the server answers. */
 export function curveModel(
   path: string,
   info: CurveBody,
@@ -67,13 +67,13 @@ export function largestValue(model: CurveModel): number {
   return largest;
 }
 
-/** What a channel's handles stand on. */
+/** The curve that a channel's handles change. */
 function unpulledValue(model: CurveModel, channel: number): number[] | null {
   const baseline = model.baselines[channel] ?? null;
   return baseline && applyLayer(bandsLayer(model.channels[channel] ?? null, baseline.length), baseline);
 }
 
-/** The value under a handle as it is now: parameters may have moved it since. */
+/** The current value under a handle: parameters may have changed it since. */
 function pullRange(model: CurveModel, channel: number, [degrees, was]: Handle): number {
   const { points, bands } = model.channels[channel] ?? {};
   const below = unpulledValue(model, channel);
@@ -87,7 +87,7 @@ function pointAt(model: CurveModel, channel: number, handle: Handle): Point {
   return [handle[0], foot === handle[1] ? handle[2] : roundValue(applyPull(handle, foot))];
 }
 
-/** The editable points: those that were moved or placed; before that, some that outline the curve. */
+/** The editable points: moved or placed ones, or else points fitted to the curve. */
 export function pointsOf(model: CurveModel, channel: number, axes: CurveAxes): Point[] {
   const drawn = model.channels[channel] ?? null;
   if (drawn?.handles !== undefined) return drawn.handles.map((handle) => pointAt(model, channel, handle));
@@ -97,8 +97,8 @@ export function pointsOf(model: CurveModel, channel: number, axes: CurveAxes): P
   return outlinePoints(fitPoints(knotSamples(bands), { ...axes, top }), bands);
 }
 
-/** The curve bent to go through `after`. Points that `original` has too are fixed: where both
- * neighbors are, nothing changes. */
+/** The curve bent through the points `after`. Points also in `original` are fixed: between two fixed neighbors
+ * nothing changes. */
 export function bendCurve(
   model: CurveModel,
   channel: number,
@@ -118,7 +118,7 @@ export function bendCurve(
   return { ...drawn, handles };
 }
 
-/** What is drawn of a channel, so that it gives the same curve to any. */
+/** A channel's edits in a form that gives the same curve to any channel. */
 export function copyCurve(model: CurveModel, channel: number, axes: CurveAxes): DrawnChannels | null {
   const drawn = model.channels[channel] ?? null;
   const hasOwnBaseline = drawn?.points !== undefined || drawn?.bands !== undefined;
@@ -127,7 +127,7 @@ export function copyCurve(model: CurveModel, channel: number, axes: CurveAxes): 
   return { factors: Array<number>(model.info.bands).fill(0), offsets: model.curves[channel] ?? [], handles };
 }
 
-/** Write what is drawn of some channels; null gives a channel back to its generator. */
+/** Write the edits of some channels; null resets a channel to its generated curve. */
 export function applyChannels(
   model: CurveModel,
   label: string,
@@ -138,7 +138,7 @@ export function applyChannels(
   editValue(label, model.path, writeChannels(changed));
 }
 
-/** Move, add or remove points of some channels that share `original`. */
+/** Move, add or remove points of channels that share `original`. */
 export function applyPoints(
   model: CurveModel,
   label: string,

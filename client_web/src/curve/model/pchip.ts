@@ -25,7 +25,7 @@ function pchipSlopes(points: readonly Point[]): number[] {
   return [first, ...inner, last];
 }
 
-/** The function through at least one point, its angles strictly increasing; never below zero. */
+/** The interpolant of at least one point, with strictly increasing angles; never below zero. */
 export function pchip(points: readonly Point[]): (degrees: number) => number {
   const first = points[0];
   const last = points.at(-1);
@@ -62,7 +62,7 @@ const GAUSS: [number, number][] = [
   [0.5 + Math.sqrt(0.15), 5 / 18],
 ];
 
-/** The curve through points as averages over equal bands of 0…90°. */
+/** The interpolated curve as averages over equal bands of 0…90°. */
 export function averageBands(points: readonly Point[], numBands: number): number[] {
   const curve = pchip(points);
   const valueAtBand = (band: number) => curve((90 * band) / numBands);

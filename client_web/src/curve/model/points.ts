@@ -1,19 +1,19 @@
-/** Operations on a curve's points. Points are sorted, those placed by the user about a `band` apart: nothing finer is
- * resolved. Nothing is mutated; points that stay are the same objects. */
+/** Operations on a curve's points. Points are sorted; those placed by the user are about a `band` apart, the curve's
+ * resolution. Nothing is mutated; unchanged points are the same objects. */
 import type { Point } from "../../protocol";
 import { MAX_DEGREES } from "./axes";
 import { MAX_POINTS, roundPoint } from "./fit";
 
-/** Degrees between neighbors, in bands. */
+/** Minimum distance between neighbors, in bands. */
 const GAP = 0.9;
 
-/** An angle where a point can stand: the outer halves of the first and the last band are their ends. */
+/** The nearest valid angle of a point: the outer halves of the first and the last band snap to 0° and 90°. */
 function pointAtBand(degrees: number, band: number): number {
   if (degrees < band / 2) return 0;
   return degrees > MAX_DEGREES - band / 2 ? MAX_DEGREES : degrees;
 }
 
-/** Add a point; one that is as good as there takes the new value. Returns its index too, -1 where there is no room. */
+/** Add a point, or move a nearby one to the new value. Also returns its index, -1 if there is no room. */
 export function addPoint(
   points: readonly Point[],
   degrees: number,
@@ -31,7 +31,7 @@ export function addPoint(
   return { points: next, index: next.indexOf(point) };
 }
 
-/** Move a point; its neighbors stop it. */
+/** Move a point, at most to its neighbors. */
 export function movePoint(
   points: readonly Point[],
   index: number,
@@ -46,7 +46,7 @@ export function movePoint(
   return points.map((p, i) => (i === index ? roundPoint(x, value) : p));
 }
 
-/** Remove a point; two always stay. */
+/** Remove a point; at least two remain. */
 export function removePoint(points: readonly Point[], index: number): Point[] {
   return points.length <= 2 ? [...points] : points.filter((_, i) => i !== index);
 }

@@ -1,4 +1,4 @@
-/** The members of the room: a dot and a name for each in the top bar; the menu has the list and the links. */
+/** The members of the room as dots and names in the top bar; the menu has the list and the links. */
 import { useEffect, useRef, useState } from "preact/hooks";
 import { MAX_PERSON_NAME, type Person } from "../../protocol";
 import { sessionUser, mayEdit } from "../../state/sessionUser";
@@ -13,8 +13,8 @@ const MAX_CHIPS = 3;
 /** A member's status as text. */
 export function memberStatus({ online: isOnline, role, material }: Person): string {
   if (!isOnline) return "connection lost";
-  if (role === "view") return "watches";
-  return material === null ? "nothing in hand" : `has ${material} in hand`;
+  if (role === "view") return "viewing";
+  return material === null ? "idle" : `editing ${material}`;
 }
 
 function MemberDot({ person }: { person: Person }) {
@@ -23,7 +23,7 @@ function MemberDot({ person }: { person: Person }) {
 
 function MemberChips() {
   const otherMembers = members.value.filter(({ id }) => id !== selfNumber.value);
-  if (otherMembers.length === 0) return <span class="alone">Nobody else yet</span>;
+  if (otherMembers.length === 0) return <span class="alone">Waiting for others</span>;
   return (
     <>
       {otherMembers.slice(0, MAX_CHIPS).map((person) => (
@@ -40,12 +40,12 @@ function MemberChips() {
 
 function MemberList() {
   return (
-    <ul class="people" aria-label="People who share this look">
+    <ul class="people" aria-label="Session members">
       {members.value.map((person) => (
         <li key={person.id}>
           <MemberDot person={person} />
           <span class="who">{person.name}</span>
-          <span class="status-words">
+          <span class="status-text">
             {person.id === selfNumber.value && "you, "}
             {memberStatus(person)}
           </span>
@@ -70,7 +70,7 @@ function OwnNameField() {
   );
 }
 
-/** A link that the browser did not let us copy is shown to be copied by hand. */
+/** Links into the room. If the browser blocks copying, the link is shown. */
 function RoomLinks() {
   const [visibleLink, setVisibleLink] = useState<string | null>(null);
   const field = useRef<HTMLInputElement>(null);
@@ -80,20 +80,20 @@ function RoomLinks() {
     if (link === null) return;
     try {
       await navigator.clipboard.writeText(link);
-      showNote(kind === "edit" ? "The link is copied. Who opens it edits with you." : "The link is copied. Who opens it watches.");
+      showNote(kind === "edit" ? "Link copied. Anyone with this link can edit." : "Link copied. Anyone with this link can watch.");
     } catch {
       setVisibleLink(link);
     }
   };
   return (
     <>
-      <button onClick={() => void copy("edit")}>Copy link: work together</button>
+      <button onClick={() => void copy("edit")}>Copy edit link</button>
       <button disabled={joinState.value?.watch == null} onClick={() => void copy("watch")}>
-        Copy link: watch only
+        Copy view-only link
       </button>
       {visibleLink !== null && (
         <label>
-          This browser does not let the editor copy. Copy the link yourself (Ctrl+C):
+          The browser blocked copying. Copy this link (Ctrl+C):
           <input ref={field} type="text" readOnly value={visibleLink} />
         </label>
       )}
@@ -105,8 +105,8 @@ function CollaborationBody() {
   if (joinState.value === null) {
     return (
       <>
-        <p>Others see this look change as you edit it, and edit it with you, each from their own eye and in their own exposure.</p>
-        <button onClick={startRoom}>Share this look live</button>
+        <p>Edit this look together, live. Everyone keeps their own camera and exposure.</p>
+        <button onClick={startRoom}>Start live session</button>
       </>
     );
   }
@@ -115,7 +115,7 @@ function CollaborationBody() {
       <MemberList />
       <OwnNameField />
       {mayEdit.value && <RoomLinks />}
-      {!isWatching.value && <button onClick={leaveRoom}>Go on alone</button>}
+      {!isWatching.value && <button onClick={leaveRoom}>Leave session</button>}
     </>
   );
 }
@@ -136,7 +136,7 @@ export function CollaborationMenu() {
       {joinState.value === null ? (
         <IconButton icon="people" label="Work together" expanded={open} onClick={toggle} />
       ) : (
-        <button class="chips" aria-label={`Work together: ${members.value.length} here`} aria-expanded={open} onClick={toggle}>
+        <button class="chips" aria-label={`Work together: ${members.value.length} online`} aria-expanded={open} onClick={toggle}>
           <MemberChips />
         </button>
       )}

@@ -1,4 +1,4 @@
-/** Over a view's image: a numbered pin for each comment on it, and the one that is being placed. */
+/** Over a view's image: a numbered pin per comment, and the pin of a new comment. */
 import type { ImageCanvas } from "../../render/canvas";
 import { toScreenPoint } from "../../render/zoomTransform";
 import { transformOf } from "../../render/viewTransforms";
@@ -15,14 +15,14 @@ const ARROW_STEPS: Record<string, [dx: number, dy: number]> = {
 };
 const LARGE_STEP = 10;
 
-/** Where the middle of a pixel lies on the screen. */
+/** CSS position of a pixel's center. */
 function pinTransform(screen: ImageCanvas, { x, y, size: [width, height] }: CommentPin): { transform: string } {
   const { view } = screen.image;
   const [left, top] = toScreenPoint(transformOf(view), screen.size(), (x + 0.5) / width, (y + 0.5) / height);
   return { transform: `translate(${left.toFixed(1)}px, ${top.toFixed(1)}px)` };
 }
 
-/** The pin of the comment that is being written. */
+/** The pin of a new comment. */
 function NewPin({ screen, pin }: { screen: ImageCanvas; pin: CommentPin }) {
   const onKeyDown = (event: KeyboardEvent) => {
     const step = ARROW_STEPS[event.key];
@@ -37,8 +37,8 @@ function NewPin({ screen, pin }: { screen: ImageCanvas; pin: CommentPin }) {
       class="pin new"
       style={pinTransform(screen, pin)}
       aria-roledescription="pin"
-      aria-label={`Pin of the new comment, at ${pin.x}, ${pin.y}. Arrow keys move it, with Shift by ten.`}
-      title="Click in the picture, or move it with the arrow keys"
+      aria-label={`Pin of the new comment, at ${pin.x}, ${pin.y}. Arrow keys move it, Shift by 10 pixels.`}
+      title="Click in the picture or use arrow keys to move the pin"
       onKeyDown={onKeyDown}
     >
       <i aria-hidden="true">+</i>
@@ -48,7 +48,7 @@ function NewPin({ screen, pin }: { screen: ImageCanvas; pin: CommentPin }) {
 
 export function CommentPins({ screen }: { screen: ImageCanvas }) {
   if (!commentsOpen.value) return null;
-  displayedFrames.value; // the canvas may have another size
+  displayedFrames.value; // the canvas may have changed size
   const { view } = screen.image;
   const visibleComments = shownComments.value.filter((comment) => comment.view === view && isCameraAtComment(comment));
   const pin = pendingPin.value;

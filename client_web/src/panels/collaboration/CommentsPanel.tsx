@@ -1,4 +1,4 @@
-/** The comments on a scene, oldest first, and the one that is being written. */
+/** The comments on a scene, oldest first, and a new one. */
 import { useEffect, useRef, useState } from "preact/hooks";
 import { MAX_COMMENT, type CommentBody } from "../../protocol";
 import { comments, shownComments, commentNumber, openComments, pendingPin, showResolved, selectedComment } from "../../state/comments";
@@ -14,7 +14,7 @@ function CommentForm() {
   const [text, setText] = useState("");
   const field = useRef<HTMLTextAreaElement>(null);
   const pin = pendingPin.value;
-  // a click that pins it elsewhere must not give the typed text to the keys of the page; a pin moved by keys keeps the focus
+  // after a click moves the pin, typing must not trigger shortcuts; a pin moved by keys keeps the focus
   useEffect(() => {
     if (document.activeElement?.matches(".pin:focus-visible") !== true) field.current?.focus();
   }, [pin]);
@@ -50,12 +50,12 @@ function CommentForm() {
           onInput={(event) => setText(event.currentTarget.value)}
         />
       </label>
-      <p>Click in the picture to pin it elsewhere, or move its pin with the arrow keys.</p>
+      <p>Click in the picture to move the pin (or use arrow keys).</p>
       <div class="group" role="group" aria-label="New comment">
-        <button type="submit" disabled={text.trim() === ""} title="Keep it, with a picture of this moment (Ctrl+Enter)">
+        <button type="submit" disabled={text.trim() === ""} title="Post with a snapshot of the picture (Ctrl+Enter)">
           Comment
         </button>
-        <button type="button" title="Write nothing (Esc)" onClick={cancelComment}>
+        <button type="button" title="Cancel (Esc)" onClick={cancelComment}>
           Cancel
         </button>
       </div>
@@ -63,7 +63,7 @@ function CommentForm() {
   );
 }
 
-/** Where the pin is in the image of the moment. */
+/** CSS position of the pin in the snapshot. */
 function pinPosition({ x, y, size: [width, height] }: CommentBody): { left: string; top: string } {
   return { left: `${(100 * (x + 0.5)) / width}%`, top: `${(100 * (y + 0.5)) / height}%` };
 }
@@ -78,7 +78,7 @@ function CommentEntry({ comment }: { comment: CommentBody }) {
   }, [isSelected]);
   return (
     <li ref={item} class={`comment ${isSelected ? "selected" : ""} ${resolved ? "resolved" : ""}`}>
-      <button class="comment-show" aria-label={`Show what comment ${number} is about`} onClick={() => showComment(comment)}>
+      <button class="comment-show" aria-label={`Show comment ${number} in the picture`} onClick={() => showComment(comment)}>
         {snapshot === null ? <span>{view}</span> : <img src={snapshot} alt="" loading="lazy" />}
         {snapshot !== null && <i class="comment-place" style={pinPosition(comment)} aria-hidden="true" />}
       </button>
@@ -91,7 +91,7 @@ function CommentEntry({ comment }: { comment: CommentBody }) {
       {resolved && <p class="quiet">Resolved by {resolved_by}</p>}
       {mayEdit.value && (
         <div class="group" role="group" aria-label={`Comment ${number}`}>
-          <button onClick={() => void setCommentResolved(comment, !resolved)}>{resolved ? "Open again" : "Resolve"}</button>
+          <button onClick={() => void setCommentResolved(comment, !resolved)}>{resolved ? "Reopen" : "Resolve"}</button>
           <IconButton icon="trash" label={`Delete comment ${number}`} onClick={() => void deleteCommentWithUndo(comment)} />
         </div>
       )}
@@ -111,12 +111,12 @@ export function CommentsPanel() {
       </header>
       {noCommentMessage.value !== null && <p class="quiet">{noCommentMessage.value}</p>}
       {mayComment.value && pendingPin.value === null && (
-        <button title="Pin words to a pixel (N: where the pointer is)" onClick={beginComment}>
+        <button title="Pin a comment to a pixel (N: at the pointer)" onClick={beginComment}>
           New comment
         </button>
       )}
       {pendingPin.value !== null && <CommentForm />}
-      {shownComments.value.length === 0 && <p class="quiet">{numResolved > 0 ? "All are resolved." : "Nobody has written any yet."}</p>}
+      {shownComments.value.length === 0 && <p class="quiet">{numResolved > 0 ? "All comments are resolved." : "No comments yet."}</p>}
       <ol aria-label="Comments, oldest first">
         {shownComments.value.map((comment) => (
           <CommentEntry key={comment.id} comment={comment} />

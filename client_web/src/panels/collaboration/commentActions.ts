@@ -1,4 +1,4 @@
-/** Writing, resolving and deleting comments; finding what one is about. */
+/** Writes, resolves, deletes and shows comments. */
 import { effect } from "@preact/signals";
 import { cameraOf, moveFreeCamera } from "../../viewport/cameras/freeCamera";
 import { onComment } from "../../session/sessionHandlers";
@@ -20,7 +20,7 @@ import { reportErrors, showNote } from "../../ui/toasts";
 
 const SNAPSHOT_WIDTH = 320;
 
-/** Read the list again. */
+/** Reload the list. */
 export async function refreshComments(): Promise<void> {
   const sceneId = scene.peek()?.id;
   if (sceneId === undefined) return;
@@ -41,14 +41,14 @@ effect(() => {
   if (openScene !== null) void reportErrors(refreshComments);
 });
 
-/** Put the pin of the comment that is being written to a pixel of a view, as near as the image has it. */
+/** Move the pin of the new comment to a pixel of a view, clamped to the image. */
 export function placePin(view: string, x: number, y: number): void {
   const { width, height } = stage.imageOf(view).pixels;
   const clampTo = (coordinate: number, size: number) => Math.min(size - 1, Math.max(0, coordinate));
   pendingPin.value = { view, x: clampTo(x, width), y: clampTo(y, height), size: [width, height] };
 }
 
-/** Begin a comment on the pixel that the pointer is over, else on the middle of the active view. */
+/** Start a comment on the pixel under the pointer, else on the center of the active view. */
 export function beginComment(): void {
   if (noCommentMessage.peek() !== null) return showNote(noCommentMessage.peek() as string);
   const pixel = pixelProbe.peek();
@@ -62,13 +62,13 @@ export function cancelComment(): void {
   pendingPin.value = null;
 }
 
-/** Save the comment with a snapshot of the image; whether that succeeded. */
+/** Save the comment with a snapshot of the image; true if that succeeded. */
 export async function saveComment(text: string): Promise<boolean> {
   const [pin, sceneId, bakeId, current] = [pendingPin.peek(), scene.peek()?.id, bake.peek(), look.peek()];
   if (pin === null || sceneId === undefined || bakeId === null || current === null) return false;
   const snapshot = renderThumbnail(stage.imageOf(pin.view).pixels, current.display, SNAPSHOT_WIDTH);
   const isSaved = await reportErrors(async () => {
-    const memberName = members.peek().find(({ id }) => id === selfNumber.peek())?.name; // as others see this one
+    const memberName = members.peek().find(({ id }) => id === selfNumber.peek())?.name; // the name that others see
     const author = ownName.peek() || memberName || null;
     const created = await api.addComment(sceneId, { ...pin, bake: bakeId, camera: cameraOf(pin.view), text, author, picture: snapshot });
     pendingPin.value = null;
@@ -92,24 +92,24 @@ async function snapshotBase64({ picture: url }: CommentBody): Promise<string | n
   return btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
 }
 
-/** Delete a comment; for a while it can be restored, as a new one. */
+/** Delete a comment; its toast offers to restore it as a new one. */
 export async function deleteCommentWithUndo(comment: CommentBody): Promise<void> {
   const sceneId = scene.peek()?.id ?? "";
   await reportErrors(async () => {
     const { bake: bakeId, view, x, y, size, camera, text, author } = comment;
     const commentToRestore: CommentRequest = { bake: bakeId, view, x, y, size, camera, text, author, picture: await snapshotBase64(comment) };
-    const label = `Comment ${commentNumber(comment.id)} is deleted.`;
+    const label = `Comment ${commentNumber(comment.id)} deleted.`;
     await api.deleteComment(sceneId, comment.id);
     await refreshComments();
     showNote(label, { label: "Undo", run: () => void reportErrors(() => api.addComment(sceneId, commentToRestore).then(refreshComments)) });
   });
 }
 
-/** Show what a comment is about: its view, and where the camera was. */
+/** Show a comment's view from its camera. */
 export function showComment(comment: CommentBody): void {
   selectedComment.value = comment.id;
   const { view, camera } = comment;
-  if (!views.peek().some(({ name }) => name === view)) return showNote(`The view “${view}” is not in this bake.`);
+  if (!views.peek().some(({ name }) => name === view)) return showNote(`This bake has no view “${view}”.`);
   if (shownViews.peek().includes(view)) setFocus(view);
   else showSingleView(view);
   if (camera !== null) moveFreeCamera(view, camera);
@@ -117,7 +117,7 @@ export function showComment(comment: CommentBody): void {
 
 const CAMERA_TOLERANCE = 1e-3;
 
-/** Whether a view's camera is where a comment was written. */
+/** True if a view's camera is where the comment was written. */
 export function isCameraAtComment({ view, camera }: CommentBody): boolean {
   const currentCamera = cameraOf(view);
   if (camera === null || currentCamera == null) return camera === null && currentCamera == null;

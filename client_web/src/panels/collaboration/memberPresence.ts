@@ -1,4 +1,4 @@
-/** Working together: making a room, the links into it, and leaving it. */
+/** Live sessions: starting and leaving a room, and the links into it. */
 import { connectToBake } from "../../session/connect";
 import { createShareLink } from "../looks/shareLink";
 import { keyFragment } from "../../session/scene/url";
@@ -7,13 +7,13 @@ import { scene } from "../../state/scene";
 import { joinState, members, selfNumber } from "../../state/collaboration";
 import { reportErrors } from "../../ui/toasts";
 
-/** A name that nobody guesses. */
+/** An unguessable room name. */
 function generateRoomKey(): string {
   const bytes = crypto.getRandomValues(new Uint8Array(16));
   return [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
-/** Open a room with the look that is here; the image stays until the room's is there. */
+/** Start a room with the current look; the image stays until the room's first one is complete. */
 export function startRoom(): void {
   const [sceneId, bakeId] = [scene.value?.id, bake.value];
   if (sceneId === undefined || bakeId === null) return;
@@ -21,15 +21,15 @@ export function startRoom(): void {
   connectToBake(bakeId);
 }
 
-/** Go on alone with the look as it is. */
+/** Leave the room and keep its current look. */
 export function leaveRoom(): void {
   joinState.value = selfNumber.value = null;
   members.value = [];
   if (bake.value !== null) connectToBake(bake.value);
 }
 
-/** The link into the room, to edit or only to watch. It carries the look of now as well: where nobody is in the room any
- * more, it opens that. */
+/** The link into the room, to edit or only to watch. It also carries the current look, which it opens if the room is
+ * empty by then. */
 export async function createRoomLink(kind: "edit" | "watch"): Promise<string | null> {
   const room = joinState.value;
   const key = kind === "edit" ? room?.room : room?.watch;

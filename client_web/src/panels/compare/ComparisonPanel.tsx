@@ -1,4 +1,4 @@
-/** The error map beside the image, and what it means. */
+/** The accuracy check: an error map beside the image, and its statistics. */
 import { useRef, useState } from "preact/hooks";
 import { comparisonImageUrl } from "../../session/net/api";
 import type { ComparisonBody } from "../../protocol";
@@ -11,22 +11,22 @@ import { mapSentences, omittedPathSentences, type ComparedPaths, comparisonPlanT
 type ComparisonView = "error" | "reference";
 
 const COMPARISON_VIEWS: readonly RadioOption<ComparisonView>[] = [
-  { value: "error", label: "Error", title: "Where the picture is too dark or too bright" },
-  { value: "reference", label: "Brute force", title: "The picture made the slow way" },
+  { value: "error", label: "Error", title: "Too dark and too bright areas" },
+  { value: "reference", label: "Reference", title: "Path-traced reference" },
 ];
 const COMPARED_PATHS: readonly RadioOption<ComparedPaths>[] = [
-  { value: "all", label: "All light paths", title: "Against all light that the scene has" },
-  { value: "method", label: "The method's", title: "Against the light that the method follows" },
+  { value: "all", label: "All light paths", title: "Compare with all light in the scene" },
+  { value: "method", label: "Simulated paths", title: "Compare only the light paths that this bake simulates" },
 ];
 
 function ErrorScale() {
   return (
-    <p class="truth-scale">
+    <p class="comparison-scale">
       <span>
-        <i class="too-dark" aria-hidden="true" /> a quarter stop too dark
+        <i class="too-dark" aria-hidden="true" /> ¼ stop too dark
       </span>
       <span>
-        <i class="as-it-is" aria-hidden="true" /> within the noise
+        <i class="within-noise" aria-hidden="true" /> within noise
       </span>
       <span>
         <i class="too-bright" aria-hidden="true" /> too bright
@@ -35,20 +35,20 @@ function ErrorScale() {
   );
 }
 
-/** What can be done now: begin, stop, go on, begin again. */
+/** Buttons for the current state: start, stop, resume, restart. */
 function ComparisonButtons({ isOld: isOutdated }: { isOld: boolean }) {
   const body = activeComparison.value?.body;
-  if (body === undefined) return <button onClick={() => void beginComparison()}>Begin</button>;
+  if (body === undefined) return <button onClick={() => void beginComparison()}>Start</button>;
   return (
     <div class="group" role="group" aria-label="Comparison">
       {isInProgress(body) && <button onClick={() => void haltComparison()}>Stop</button>}
-      {body.state === "stopped" && <button onClick={() => void continueComparison()}>Go on</button>}
-      <button onClick={() => void beginComparison()}>{isOutdated ? "Ask again for this picture" : "Begin again"}</button>
+      {body.state === "stopped" && <button onClick={() => void continueComparison()}>Resume</button>}
+      <button onClick={() => void beginComparison()}>{isOutdated ? "Check this picture" : "Restart"}</button>
     </div>
   );
 }
 
-/** The images of a comparison, and what it has found. */
+/** The images and statistics of a comparison. */
 function ComparisonResult({ body }: { body: ComparisonBody }) {
   const [view, setView] = useState<ComparisonView>("error");
   const [selectedPaths, setPaths] = useState<ComparedPaths>("all");
@@ -58,16 +58,16 @@ function ComparisonResult({ body }: { body: ComparisonBody }) {
   const file = paths === "all" ? view : (`method-${view}` as const);
   return (
     <>
-      <ul class="truth-verdicts" aria-live="polite" aria-label="How far it is from brute force">
+      <ul class="comparison-errors" aria-live="polite" aria-label="Error">
         {errorSentences(body).map((sentence) => (
           <li key={sentence}>{sentence}</li>
         ))}
       </ul>
       {body.omitted_paths.length > 0 && <RadioRow label="Light paths" choices={COMPARED_PATHS} selected={selectedPaths} onSelect={(value) => setPaths(value)} />}
-      <img src={comparisonImageUrl(body.id, file, body.completed)} alt={view === "error" ? "Error map" : "Brute force"} />
-      <RadioRow label="Picture shown" choices={COMPARISON_VIEWS} selected={view} onSelect={(value) => setView(value)} />
+      <img src={comparisonImageUrl(body.id, file, body.completed)} alt={view === "error" ? "Error map" : "Reference"} />
+      <RadioRow label="Displayed picture" choices={COMPARISON_VIEWS} selected={view} onSelect={(value) => setView(value)} />
       {view === "error" && <ErrorScale />}
-      <ul class="truth-notes" aria-live="polite" aria-label="What the map shows">
+      <ul class="comparison-notes" aria-live="polite" aria-label="Notes">
         {[...mapSentences(errorStats), ...omittedPathSentences(body)].map((sentence) => (
           <li key={sentence}>{sentence}</li>
         ))}
@@ -76,14 +76,14 @@ function ComparisonResult({ body }: { body: ComparisonBody }) {
   );
 }
 
-/** Something to look at, of which nothing can be said yet. */
+/** The reference after its first pass, before there are statistics. */
 function FirstPass({ body }: { body: ComparisonBody }) {
   return (
     <>
-      <img src={comparisonImageUrl(body.id, "reference", body.completed)} alt="Brute force" />
-      <p class="truth-scale">
-        {body.completed === 0 ? "A small brute force of few samples meanwhile." : "Brute force after one pass."} From the second pass
-        on it is compared.
+      <img src={comparisonImageUrl(body.id, "reference", body.completed)} alt="Reference" />
+      <p class="comparison-scale">
+        {body.completed === 0 ? "Low-resolution preview of the reference." : "Reference after one pass."} Results follow after
+        the second pass.
       </p>
     </>
   );
@@ -93,17 +93,17 @@ export function ComparisonPanel() {
   const panel = useRef<HTMLElement>(null);
   useReturnFocus(panel);
   const body = activeComparison.value?.body;
-  const elapsed = activeComparison.value === null ? 0 : (Date.now() - activeComparison.value.since) / 1000; // it is asked for every second
+  const elapsed = activeComparison.value === null ? 0 : (Date.now() - activeComparison.value.since) / 1000; // polled every second
   const isOld = activeComparison.value !== null && activeComparison.value.look !== comparedState();
   return (
-    <aside ref={panel} class="truth beside-picture" aria-label="How true is this picture?">
+    <aside ref={panel} class="comparison beside-picture" aria-label="Accuracy check">
       <header class="panel-head">
-        <h2>How true is this?</h2>
+        <h2>Accuracy check</h2>
         <IconButton icon="close" label="Close" onClick={toggleComparison} />
       </header>
       {body === undefined && (
         <>
-          <p>Compares the picture with one made the slow way, by a ray for every light that is drawn.</p>
+          <p>Compares this picture with a brute-force path-traced reference.</p>
           <p role="status">{comparisonPlanText(comparisonPlan.value)}</p>
         </>
       )}
@@ -111,13 +111,13 @@ export function ComparisonPanel() {
         <>
           <p>{comparisonProgressText(body, elapsed)}</p>
           {isInProgress(body) && (
-            <progress max={1} value={body.progress > 0 ? body.progress : undefined} aria-label="Brute force" />
+            <progress max={1} value={body.progress > 0 ? body.progress : undefined} aria-label="Reference" />
           )}
           {body.error_all_paths !== null && <ComparisonResult body={body} />}
           {body.error_all_paths === null && body.progress > 0 && <FirstPass body={body} />}
         </>
       )}
-      {isOld && <p class="truth-old">The picture has changed since.</p>}
+      {isOld && <p class="comparison-outdated">The picture has changed since this check.</p>}
       <ComparisonButtons isOld={isOld} />
     </aside>
   );

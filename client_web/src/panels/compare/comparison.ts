@@ -1,5 +1,5 @@
-/** "How true is this?": one comparison of the image with brute force, followed while its panel is open, over reloads of
- * the page and while the server is away. */
+/** The accuracy check: one comparison of the image with a reference, polled while its panel is open, over page reloads
+ * and server restarts. */
 import { effect, signal } from "@preact/signals";
 import { currentPose, currentSize } from "../looks/exportImage";
 import { deleteComparison, getComparison, planComparison, resumeComparison, startComparison, stopComparison, nullIfUnavailable } from "../../session/net/api";
@@ -18,25 +18,25 @@ import { reportErrors } from "../../ui/toasts";
 const POLL_MS = 1000;
 const COMPARISON_KEY = "relume.comparison";
 
-/** What a comparison would take; null while that is being found out. */
+/** Estimated cost of a comparison; null while unknown. */
 export const comparisonPlan = signal<ComparisonPlanBody | "unknown" | null>(null);
 interface ActiveComparison {
   body: ComparisonBody;
-  /** The look that it judges. */
+  /** The compared look. */
   look: string;
-  /** When this tab asked for it, or for going on: what has been done before counts for nobody who waits. */
+  /** When this tab started or resumed it; earlier work does not count as waiting time. */
   since: number;
 }
 
-/** The comparison that is looked at. */
+/** The displayed comparison. */
 export const activeComparison = signal<ActiveComparison | null>(null);
 
-/** What the comparison depends on: the display of the look does not matter. */
+/** The state that the comparison depends on, without the look's display settings. */
 export function comparedState(): string {
   const visibleLight = [pathOverride.value, soloLight.value];
   views.value; // the camera has moved
   const camera = [currentPose(), currentSize()];
-  return JSON.stringify({ ...look.value, display: null, bake: bake.value, view: activeViewName.value, seen: visibleLight, eye: camera });
+  return JSON.stringify({ ...look.value, display: null, bake: bake.value, view: activeViewName.value, light: visibleLight, camera });
 }
 
 export function isInProgress(body: ComparisonBody): boolean {
@@ -59,12 +59,12 @@ function comparisonRequest(): ComparisonRequest | null {
   return { bake: id, view: activeViewName.value, look: { ...visibleLookOf(current) }, camera: currentPose(), size: currentSize() };
 }
 
-/** Keep it for a reload, as long as there is one. */
+/** Store the comparison for a reload. */
 function trackComparison(): void {
   effect(() => saveInTab(COMPARISON_KEY, activeComparison.value && { id: activeComparison.value.body.id, look: activeComparison.value.look }));
 }
 
-/** Go on with the comparison of a bake that was looked at when the page was reloaded. */
+/** Continue with the comparison of a bake that was displayed before a reload. */
 export async function loadComparison(bakeId: string | null): Promise<void> {
   const stored = loadFromTab<{ id: string; look: string }>(COMPARISON_KEY);
   const body = stored === null ? null : await getComparison(stored.id).catch(() => null);
@@ -72,15 +72,15 @@ export async function loadComparison(bakeId: string | null): Promise<void> {
   if (stored === null || body === null || activeComparison.peek() !== null) return;
   if (body.bake !== bakeId) return void deleteComparison(stored.id).catch(() => undefined);
   activeComparison.value = { body, look: stored.look, since: Date.now() };
-  if (!comparisonOpen.peek()) togglePanel("truth");
+  if (!comparisonOpen.peek()) togglePanel("comparison");
   await reportErrors(() => pollComparison(body.id));
 }
 
-/** Estimate the duration without starting; timings of other images are used until this one has been timed. */
+/** Estimate the duration without starting; timings of other images are used until this one is timed. */
 async function planWhileOpen(): Promise<void> {
   comparisonPlan.value = null;
   for (let request = comparisonRequest(); request !== null && isPlanning(); request = comparisonRequest()) {
-    // the server may be away for a while
+    // the server may be unreachable for a while
     const newPlan = await planComparison(request).catch(() => "unknown" as const);
     if (!isPlanning()) return;
     comparisonPlan.value = newPlan;
@@ -102,7 +102,7 @@ export async function beginComparison(): Promise<void> {
   });
 }
 
-/** Stop; what was found so far stays. */
+/** Stop; results so far remain. */
 export async function haltComparison(): Promise<void> {
   const current = activeComparison.value;
   if (current === null) return;
@@ -121,15 +121,15 @@ export async function continueComparison(): Promise<void> {
   });
 }
 
-/** Stop the server's work: nobody looks at it any more. */
+/** Delete the comparison that is no longer displayed. */
 async function discardComparison(): Promise<void> {
   const current = activeComparison.value;
   activeComparison.value = null;
-  if (current !== null) await deleteComparison(current.body.id).catch(() => undefined); // it may have ended by itself
+  if (current !== null) await deleteComparison(current.body.id).catch(() => undefined); // it may be deleted already
 }
 
 export function toggleComparison(): void {
   const wasOpen = comparisonOpen.value;
-  togglePanel("truth");
+  togglePanel("comparison");
   if (comparisonOpen.value !== wasOpen) void (comparisonOpen.value ? planWhileOpen() : discardComparison());
 }

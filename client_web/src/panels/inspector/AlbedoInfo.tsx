@@ -12,7 +12,7 @@ export function AlbedoInfo({ terms }: { terms: readonly Term[] }) {
   const message = albedo && albedoMessage(albedo);
   if (!message) return null;
   return (
-    <p class="aside" role="status" title="Directional albedo of all terms, their images taken as white.">
+    <p class="aside" role="status" title="Directional albedo of all layers, with white textures">
       {message}
     </p>
   );

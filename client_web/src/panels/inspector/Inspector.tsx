@@ -1,4 +1,4 @@
-/** What is selected: a light, or a material with its terms as cards. */
+/** Inspector of the selected light, or of the selected material with one card per term. */
 import { jsonPointer } from "../../state/document/pointer";
 import { editValue } from "../../edit/edit";
 import { history } from "../../edit/history";
@@ -28,16 +28,16 @@ function AddTerm({ material }: { material: string }) {
   return (
     <select
       class="add-term"
-      aria-label="Add a term"
+      aria-label="Add a layer"
       value=""
       disabled={selectedTerms.value.length >= MAX_TERMS}
       onChange={(event) => {
         const model = models.value.find((m) => m.model === event.currentTarget.value);
-        if (model !== undefined) replaceTerms("Add term", material, [...selectedTerms.value, defaultTerm(model)]);
+        if (model !== undefined) replaceTerms("Add layer", material, [...selectedTerms.value, defaultTerm(model)]);
         event.currentTarget.value = "";
       }}
     >
-      <option value="">+ Add a term…</option>
+      <option value="">+ Add a layer…</option>
       {modelsFor(null, models.value).map((m) => (
         <option key={m.model} value={m.model}>
           {m.label}
@@ -47,7 +47,7 @@ function AddTerm({ material }: { material: string }) {
   );
 }
 
-/** A ground shows shadows alone, in front of what is behind it, or is a surface like others. */
+/** Makes a ground plane a shadow catcher, which shows the background darkened by shadows, or a visible surface. */
 function ShadowCatcherToggle({ material }: { material: string }) {
   const catcher = look.value?.materials[material]?.shadow_catcher;
   if (catcher === undefined) return null;
@@ -59,25 +59,25 @@ function ShadowCatcherToggle({ material }: { material: string }) {
           checked={catcher}
           onChange={(event) => {
             const only = event.currentTarget.checked;
-            editValue(only ? "Shadows only" : "A surface to see", jsonPointer("materials", material, "shadow_catcher"), only);
+            editValue(only ? "Shadow catcher on" : "Shadow catcher off", jsonPointer("materials", material, "shadow_catcher"), only);
           }}
         />
-        Shadows only
-      </label>
+        Shadow catcher
+        </label>
       {catcher && (
         <p>
-          The background shows through, as dark as the shadows on it. Switch this off to see and change the material
-          itself; in reflected light it goes on lighting the objects.
+          Shows only the shadows, over the background. Turn it off to see and edit the material; indirect light still
+          includes it.
         </p>
       )}
     </div>
   );
 }
 
-/** What of glass is edited here, and what is not. */
+/** Note about the editable part of glass. */
 function GlassToggle({ material }: { material: string }) {
   if (materialOf(material)?.is_glass !== true) return null;
-  return <p class="aside">Glass: what it reflects is edited here; what comes through it is as in the scene’s file.</p>;
+  return <p class="aside">Glass: edit its reflection here. Transmission stays as in the scene file.</p>;
 }
 
 export function Inspector() {
@@ -98,7 +98,7 @@ function MaterialInspector() {
           </button>
         </header>
         <p class="hint">
-          Click something in the picture, or choose a material on the left, to change how it reflects light.
+          Click an object or pick a material to edit it.
         </p>
       </div>
     );
@@ -115,7 +115,7 @@ function MaterialInspector() {
         </button>
         <IconButton
           icon="reset"
-          label="Reset this material"
+          label="Reset material"
           disabled={original === undefined || original === materialLook}
           onClick={() => editValue("Reset material", jsonPointer("materials", material), original)}
         />
@@ -135,7 +135,7 @@ function MaterialInspector() {
                   selectedCurve.value = null;
                   selectedTerm.value = 0;
                   replaceTerms(
-                    "Remove term",
+                    "Remove layer",
                     material,
                     selectedTerms.value.filter((_, i) => i !== index),
                   );
@@ -147,7 +147,7 @@ function MaterialInspector() {
       {!isShadowCatcher && <AlbedoInfo key={material} terms={selectedTerms.value} />}
       {!isShadowCatcher && <AddTerm material={material} />}
       {!isShadowCatcher && materialLook !== undefined && (
-        <Section title="Metal and normal maps">
+        <Section title="Metalness and normals">
           <MetalnessImage material={material} terms={selectedTerms.value} />
           <NormalImage material={material} materialLook={materialLook} mirrors={materialOf(material)?.terms.some(isMirror) === true} />
         </Section>

@@ -1,4 +1,4 @@
-/** One parameter: a slider, or three where red, green and blue were parted. */
+/** One parameter: one slider, or three for separate red, green and blue values. */
 import type { ParameterBody, ParamValue, Rgb } from "../../protocol";
 import { IconButton } from "../../ui/IconButton";
 import { Slider } from "../../ui/Slider";
@@ -29,14 +29,14 @@ export function ParamRow({ info, value, initial, onChange, onHold }: Props) {
     <IconButton
       icon={channelsDiffer ? "unlink" : "link"}
       label={
-        channelsDiffer ? `${info.label}: one value for red, green and blue` : `${info.label}: separate red, green and blue`
+        channelsDiffer ? `${info.label}: link red, green and blue` : `${info.label}: separate red, green and blue`
       }
       pressed={channelsDiffer}
       onClick={toggle}
     />
   );
   return (
-    <div class={`param ${channelsDiffer ? "parted" : ""}`}>
+    <div class={`param ${channelsDiffer ? "by-channel" : ""}`}>
       <span class="param-label" title={info.help}>
         {info.label}
       </span>

@@ -1,4 +1,4 @@
-/** One term of the selected material: model, color, parameters, and its curves; the open curve unfolds in place. */
+/** One term of the selected material: model, color, parameters and curves; the open curve expands in place. */
 import { useMemo } from "preact/hooks";
 import { toHex } from "../../render/color/colorMath";
 import { CurveEditor } from "../../curve/CurveEditor";
@@ -39,7 +39,7 @@ function TermCurves({ model, term, index }: { model: ModelBody; term: Term; inde
   const open = selectedTerm.value === index ? selectedCurve.value : null;
   const info = model.curves.find((curve) => curve.name === open);
   const edits = info && term.curves?.[info.name];
-  // the same node for the same curve: moving a parameter leaves the plot alone until the server sends the new shape
+  // the same node for the same curve: a parameter change keeps the plot until the server sends the new shape
   const editor = useMemo(() => info && <CurveEditor info={info} edits={edits} />, [info, edits]);
   return (
     <>
@@ -57,7 +57,7 @@ function TermCurves({ model, term, index }: { model: ModelBody; term: Term; inde
           >
             {curve.name === open ? curve.label : termSymbol(curve.label)}
             {term.curves?.[curve.name] !== undefined && (
-              <span class="dot" title="Drawn by hand" aria-label="drawn by hand" />
+              <span class="dot" title="Edited" aria-label="edited" />
             )}
           </button>
         ))}
@@ -68,13 +68,13 @@ function TermCurves({ model, term, index }: { model: ModelBody; term: Term; inde
 }
 
 interface TextureProps {
-  /** The images that the material has. */
+  /** The material's textures. */
   channels: readonly string[];
   value: string | null;
   onChange(value: string | null): void;
 }
 
-/** Which image of the material multiplies the color. */
+/** Chooses the texture that multiplies the color. */
 function TextureRow({ channels, value, onChange }: TextureProps) {
   const image = isImageReference(value) ? value : null;
   if (channels.length === 0 && image === null) return null;
@@ -83,7 +83,7 @@ function TextureRow({ channels, value, onChange }: TextureProps) {
       <span class="param-label">Texture</span>
       <select value={image ?? channels.find((name) => name === value) ?? ""} onChange={(event) => onChange(event.currentTarget.value || null)}>
         <option value="">None</option>
-        {image !== null && <option value={image}>{imageOf(image)?.name ?? "Image"}</option>}
+        {image !== null && <option value={image}>{imageOf(image)?.name ?? "Texture"}</option>}
         {channels.map((name) => (
           <option key={name} value={name}>
             {TEXTURES[name]}
@@ -94,17 +94,17 @@ function TextureRow({ channels, value, onChange }: TextureProps) {
   );
 }
 
-/** What becomes of the map that a term follows. */
+/** How the term's roughness map, width slider and curves combine. */
 function MapWidthRow({ term, model }: { term: Term; model: ModelBody }) {
   const width = model.width_parameter as string;
   if (model.curves.some((curve) => curve.parameters.includes(width) && term.curves?.[curve.name] !== undefined)) {
-    return <p class="aside">Curves that are drawn replace the map.</p>;
+    return <p class="aside">Drawing a curve overrides the map.</p>;
   }
   const label = model.parameters.find((info) => info.name === width)?.label ?? width;
   return (
     <p class="aside">
-      {`“${label}” scales the map; curves show its mean`}
-      {hasFreeCamera.value ? ", and so does the view while the eye moves." : "."}
+      {`“${label}” multiplies the map; the curve shows its average`}
+      {hasFreeCamera.value ? ", as does the view while the camera moves." : "."}
     </p>
   );
 }
@@ -123,12 +123,12 @@ export function TermCard({ material, term, index, onRemove }: Props) {
     selectedCurve.value = models.value.find((m) => m.model === name)?.curves[0]?.name ?? null;
   };
   return (
-    <section class={`card ${open ? "" : "folded"}`} aria-label={`Term ${index + 1}: ${model?.label ?? term.model}`}>
+    <section class={`card ${open ? "" : "folded"}`} aria-label={`Layer ${index + 1}: ${model?.label ?? term.model}`}>
       <header>
         <button
           class="icon fold"
           aria-expanded={open}
-          aria-label={open ? "Open term" : "Unfold this term"}
+          aria-label={open ? "Open layer" : "Expand"}
           onClick={() => selectTerm(index)}
         >
           {open ? "▾" : "▸"}
@@ -146,15 +146,15 @@ export function TermCard({ material, term, index, onRemove }: Props) {
             </option>
           ))}
         </select>
-        {onRemove !== null && <IconButton icon="trash" label="Remove this term" onClick={onRemove} />}
+        {onRemove !== null && <IconButton icon="trash" label="Remove layer" onClick={onRemove} />}
       </header>
       {open && (
         <>
           <ColorField
-            label="Colour"
+            label="Color"
             value={term.color}
             initial={same?.color ?? null}
-            onChange={(value: Rgb) => editValue("Colour", `${path}/color`, value)}
+            onChange={(value: Rgb) => editValue("Color", `${path}/color`, value)}
           />
           <TextureRow
             channels={texturesOf(material)}
@@ -182,7 +182,7 @@ export function TermCard({ material, term, index, onRemove }: Props) {
             />
           ))}
           {isSoftMirror(material, term) && (
-            <p class="aside">Reflections stay soft here: this material was no mirror when the scene was baked.</p>
+            <p class="aside">This material was not a mirror when the scene was baked, so sharp reflections are blurred. Bake again to see them.</p>
           )}
           {model !== undefined && <TermCurves model={model} term={term} index={index} />}
           <ZernikeFit term={term} material={material} />

@@ -1,4 +1,4 @@
-/** What a view with a free camera makes of a term: how many functions of the incoming light it takes, and what they miss. */
+/** Fit of a term in the Zernike basis that free-camera views use: number of functions, and residual. */
 import { getInOut } from "../../session/net/api";
 import type { ZernikeFitBody, Term } from "../../protocol";
 import { materialOf } from "../../state/scene";
@@ -9,17 +9,17 @@ import { useServerQuery } from "./useServerQuery";
 
 function fitMessage({ functions, residual, required_functions, is_mirror }: ZernikeFitBody): string {
   const percent = residual < 0.01 ? "less than 1 %" : `${Math.round(100 * residual)} %`;
-  if (is_mirror) return `While the eye moves: a blurred mirror. ${functions} terms would miss ${percent} of this highlight.`;
-  const enough = required_functions === null || required_functions === functions ? "" : required_functions === 1 ? "; one misses less than 5 %" : `; ${required_functions} miss less than 5 %`;
-  return `While the eye moves: ${functions} terms, which miss ${percent}${enough}.`;
+  if (is_mirror) return "Drawn as a blurred mirror while the camera moves.";
+  const enough = required_functions === null || required_functions === functions ? "" : required_functions === 1 ? "; 1 is enough for under 5 %" : `; under 5 % needs ${required_functions}`;
+  return `While the camera moves: error ${percent} with ${functions} basis functions${enough}.`;
 }
 
-/** How a texture that looks different from every side lies on a material, and who can draw it; null: as everywhere. */
+/** Notes about the BTF or tri-planar mapping of a material; null without any. */
 export function coverText(material: string): string | null {
   const isProjected = materialOf(material)?.is_projected === true;
   const sentences = [
-    isProjected && "The object has no places in textures: it is projected along the world’s axes, a metre for each repeat.",
-    hasFreeCamera.value && isClientRendering.value && "While the eye moves: the mean of all texels, as this browser draws.",
+    isProjected && "The object has no UVs: the texture is projected along the world axes (tri-planar, 1 m per repeat).",
+    hasFreeCamera.value && isClientRendering.value && "While the camera moves, this browser draws the average of all texels.",
   ].filter(Boolean);
   return sentences.length > 0 ? sentences.join(" ") : null;
 }
@@ -34,7 +34,7 @@ export function ZernikeFit({ term, material }: { term: Term; material: string })
   }
   if (fit === null) return null;
   return (
-    <p class="in-motion" title="In-out factorisation of this term, cosine-weighted RMS. Where the eye rests it is exact.">
+    <p class="in-motion" title="Cosine-weighted RMS error of the in-out factorization. Exact when the camera stops.">
       {fitMessage(fit)}
     </p>
   );

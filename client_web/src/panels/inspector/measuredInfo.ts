@@ -1,11 +1,11 @@
-/** BTFs are stored with as many components as each needs, which limits their quality. */
+/** BTFs are stored with as many components as each needs; the quality parameter cannot exceed that. */
 import { getBtf } from "../../session/net/api";
 import type { ParameterBody, ParamValue, Term } from "../../protocol";
 
 const PREFIX = "btf:";
 const QUALITY = "components";
 
-/** The id of the texture that a term names. */
+/** The id of a term's BTF. */
 export function btfOf({ data }: Term): string | null {
   return data?.startsWith(PREFIX) ? data.slice(PREFIX.length) : null;
 }
@@ -19,7 +19,7 @@ export function limitToStored(info: ParameterBody, storedQuality: number | null)
   return { ...info, maximum, default: maximum };
 }
 
-/** What is in force: more components than there are, are all. */
+/** The effective number of components, at most those stored. */
 export function isWithinStored(info: ParameterBody, value: ParamValue | undefined): ParamValue {
   return info.name === QUALITY && typeof value === "number" ? Math.min(value, info.maximum) : (value ?? info.default);
 }

@@ -1,23 +1,23 @@
-/** Making terms: defaults from the model's declaration, and changing a model without losing what both have. */
+/** Creates terms with a model's defaults, and changes a term's model, keeping shared settings. */
 import { isImageReference } from "../../state/document/imageReference";
 import type { ModelBody, Term } from "../../protocol";
 import { materialOf, modelOf } from "../../state/scene";
 
-/** Labels of the images that a material may have. */
-export const TEXTURES: Record<string, string> = { diffuse: "Base colour", specular: "Highlight" };
+/** Labels of a material's texture slots. */
+export const TEXTURES: Record<string, string> = { diffuse: "Base color", specular: "Specular" };
 
-/** Those that a material of the scene has: its own terms take them. */
+/** Texture slots that a material's original terms use. */
 export function texturesOf(material: string): string[] {
   const ownTerms = materialOf(material)?.terms ?? [];
   return Object.keys(TEXTURES).filter((channel) => ownTerms.some((term) => term.texture === channel));
 }
 
-/** Whether a material of the scene has a map that its terms' widths may follow. */
+/** True if a material of the scene has a roughness map. */
 export function hasRoughnessMap(material: string): boolean {
   return materialOf(material)?.terms.some((term) => term.roughness_map !== undefined) ?? false;
 }
 
-/** Whether a term is so smooth that it is a mirror rather than a highlight, by `relume/brdf/specular.py`. */
+/** True if a term is smooth enough to be a mirror, by the rule of `relume/brdf/specular.py`. */
 export function isMirror(term: Term): boolean {
   const { specular_below: below, width_parameter, curves } = modelOf(term) ?? {};
   if (below == null || width_parameter == null || term.roughness_map != null) return false;
@@ -27,7 +27,7 @@ export function isMirror(term: Term): boolean {
   return [term.params?.[width_parameter] ?? below].flat().some((value) => value < below);
 }
 
-/** Whether what a term mirrors is shown blurred, since its material mirrored nothing when the scene was baked. */
+/** True if a term's reflections are blurred because its material was not a mirror when the scene was baked. */
 export function isSoftMirror(material: string, term: Term): boolean {
   return isMirror(term) && materialOf(material)?.terms.some(isMirror) === false;
 }
@@ -42,14 +42,14 @@ export function defaultTerm(model: ModelBody): Term {
   };
 }
 
-/** The models that a term can take: those that are measured only where it names a measurement of their kind. */
+/** The models that a term can have: measured models only if it refers to a measurement of their kind. */
 export function modelsFor(term: Term | null, models: readonly ModelBody[]): readonly ModelBody[] {
   return models.filter(({ data_prefix: prefix }) => prefix === null || term?.data?.startsWith(prefix) === true);
 }
 
-/** The term under another model: color and texture stay, and parameters of the same name; the map of roughness where
- * the new model has a width. Drawn curves belong to the old model's angles and go; a measured material stays where the
- * new model is measured too. */
+/** The term with another model: keeps color, texture and parameters of the same name, and the roughness map if the new
+ * model has a width. Edited curves belong to the old model's angles and are dropped; a measurement stays if the new
+ * model is measured too. */
 export function withModel(term: Term, name: string, models: readonly ModelBody[]): Term {
   const model = models.find((m) => m.model === name);
   if (model === undefined) return term;

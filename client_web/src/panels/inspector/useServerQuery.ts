@@ -1,10 +1,10 @@
 /** A server query about an edited value, sent once editing pauses. */
 import { useEffect, useState } from "preact/hooks";
 
-const AFTER_MS = 250; // a slider that moves asks once
+const AFTER_MS = 250; // one query per slider drag
 
-/** The answer to `query`, the previous one until it has come; null without a query or if it was rejected, which is
- * said where it is edited. */
+/** The response to `query`, or the previous one until then; null without a query or if it was rejected, which the
+ * edit itself reports. */
 export function useServerQuery<T>(query: string | null, fetchAnswer: (queryText: string) => Promise<T | null>): T | null {
   const [answer, setAnswer] = useState<T | null>(null);
   useEffect(() => {

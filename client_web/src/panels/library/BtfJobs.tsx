@@ -10,15 +10,15 @@ const MESH_FILES = ".glb,.obj,.ply,.zip";
 function BtfJob({ work }: { work: BtfJobBody }) {
   const { id, name, progress, state } = work;
   return (
-    <li class={`library-making ${state === "failed" ? "has-failed" : ""}`}>
-      <span class="library-making-name">{name}</span>
-      {isRunning(work) && <progress max={1} value={progress} aria-label={`Making of ${name}`} />}
+    <li class={`library-job ${state === "failed" ? "has-failed" : ""}`}>
+      <span class="library-job-name">{name}</span>
+      {isRunning(work) && <progress max={1} value={progress} aria-label={`Progress of ${name}`} />}
       <span role="status">{jobText(work)}</span>
       {isRunning(work) ? (
         <button onClick={() => void stopJob(id)}>Stop</button>
       ) : (
         <span class="group" role="group" aria-label={name}>
-          {state === "stopped" && <button onClick={() => void resumeJob(id)}>Go on</button>}
+          {state === "stopped" && <button onClick={() => void resumeJob(id)}>Resume</button>}
           <button onClick={() => void deleteJob(id)}>Remove</button>
         </span>
       )}
@@ -35,19 +35,19 @@ function ImageImport() {
     if (file !== undefined) void importMaterial(file);
   };
   const fraction = materialUploadProgress.value ?? btfUploadProgress.value;
-  const label = fraction !== null && fraction < 1 ? `Sending, ${Math.round(100 * fraction)} %` : "Factorising…";
+  const label = fraction !== null && fraction < 1 ? `Uploading, ${Math.round(100 * fraction)} %` : "Factorizing…";
   return (
     <div class="library-import">
       <input ref={picker} type="file" accept={MATERIAL_FILES} aria-label="Measured material" hidden onChange={onImport} />
       <button disabled={fraction !== null} onClick={() => picker.current?.click()}>
-        Import a measured material…
+        Import measured material…
       </button>
       {fraction !== null && <span role="status">{label}</span>}
     </div>
   );
 }
 
-/** A user's mesh that holds one period, viewed from above. */
+/** Uploads a mesh of one period, viewed from above, to render a BTF from. */
 function MeshImport() {
   const picker = useRef<HTMLInputElement>(null);
   const period = useRef<HTMLInputElement>(null);
@@ -60,22 +60,22 @@ function MeshImport() {
   };
   return (
     <div class="library-mesh">
-      <input ref={picker} type="file" accept={MESH_FILES} aria-label="Mesh of one period" hidden onChange={onImport} />
+      <input ref={picker} type="file" accept={MESH_FILES} aria-label="Mesh of one repeat" hidden onChange={onImport} />
       <button
         disabled={btfUploadProgress.value !== null}
-        title="A mesh that holds one period, seen from above (+Y): .glb, .obj, .ply, or a .zip with its materials"
+        title="A mesh of one repeat, viewed from above (+Y): GLB, OBJ, PLY, or a ZIP with its materials"
         onClick={() => picker.current?.click()}
       >
-        a mesh of yours…
+        From mesh…
       </button>
-      <label title="Side of the square that repeats; empty: the mesh is as wide as it">
-        period
-        <input
+      <label title="Width of one repeat; empty: the width of the mesh">
+      Repeat
+      <input
           ref={period}
           type="number"
           min={0}
           step="any"
-          aria-label="Period of the mesh, metres"
+          aria-label="Repeat of the mesh, meters"
           onKeyDown={(event) => event.stopPropagation()}
         />
         m
@@ -88,8 +88,8 @@ function MeshImport() {
 function GeneratedBtf() {
   if (model.value !== BTFS) return null;
   return (
-    <div class="library-synthetic" role="group" aria-label="Make a synthetic texture">
-      <span>Render a synthetic one, some minutes:</span>
+    <div class="library-synthetic" role="group" aria-label="Render a BTF">
+      <span>Render a BTF (takes minutes):</span>
       {GEOMETRIES.map((geometry) => (
         <button key={geometry} disabled={isBeingMade(geometry)} onClick={() => void generateBtf(geometry)}>
           {geometry}
@@ -106,7 +106,7 @@ export function BtfJobs() {
       <ImageImport />
       <GeneratedBtf />
       {btfJobs.value.length > 0 && (
-        <ul class="library-makings" aria-label="In the making">
+        <ul class="library-jobs" aria-label="BTF jobs">
           {btfJobs.value.map((work) => (
             <BtfJob key={work.id} work={work} />
           ))}

@@ -1,4 +1,4 @@
-/** The material library: drag a ball into the image, or choose one for the selection. */
+/** The material library: drag a ball onto an object, or click one for the selected material. */
 import { useRef } from "preact/hooks";
 import { libraryOpen } from "../../state/panels";
 import { models } from "../../state/scene";
@@ -24,7 +24,7 @@ import {
   visibleEntries,
 } from "./libraryItems";
 
-const UNFITTED: Record<string, string> = { [MEASURED]: "imported measurements", [BTFS]: "textures from all sides" };
+const UNFITTED: Record<string, string> = { [MEASURED]: "Imported measurements", [BTFS]: "Measured textures (BTF)" };
 
 const label = (name: string) => UNFITTED[name] ?? models.value.find((info) => info.model === name)?.label ?? name;
 
@@ -32,12 +32,12 @@ function Filters() {
   return (
     <div class="library-filters">
       <select
-        aria-label="Kind"
+        aria-label="Category"
         value={group.value}
         disabled={!hasGroups.value}
         onChange={(event) => (group.value = event.currentTarget.value)}
       >
-        <option value="all">all kinds</option>
+        <option value="all">All categories</option>
         {groups.value.map((name) => (
           <option key={name}>{name}</option>
         ))}
@@ -53,7 +53,7 @@ function Filters() {
   );
 }
 
-/** Files that are dropped onto the panel are materials, wherever else they would be scenes. */
+/** Files dropped on the panel are imported as materials; elsewhere they would be scenes. */
 function importFiles(event: DragEvent): void {
   const files = [...(event.dataTransfer?.files ?? [])];
   if (files.length === 0) return;
@@ -69,7 +69,7 @@ export function LibraryPanel() {
     <aside
       ref={panel}
       class="panel library"
-      aria-label="Library of materials"
+      aria-label="Material library"
       onDragOver={(event) => event.preventDefault()}
       onDrop={importFiles}
     >
@@ -79,9 +79,9 @@ export function LibraryPanel() {
       </header>
       <p class="library-help">
         {selectedMaterial.value === null
-          ? "Drag a ball onto an object, or select one first."
-          : `A click puts it on ${selectedMaterial.value}; drag onto any object.`}{" "}
-        It comes without the object's images; Texture, in the inspector, brings one back.
+          ? "Drag a ball onto an object, or select an object first."
+          : `Click to apply to ${selectedMaterial.value} or drag onto an object.`}{" "}
+        Textures aren’t kept; re-add them under Texture.
       </p>
       <NavigationMap />
       <input
@@ -98,7 +98,7 @@ export function LibraryPanel() {
       <BtfJobs />
       {visibleEntries.value.length === 0 && query.value !== "" && (
         <div class="library-help library-elsewhere" role="status">
-          Nothing here is called “{query.value}”{otherGroupMatches.value.length > 0 && ", but elsewhere"}.
+          No matches for “{query.value}” here{otherGroupMatches.value.length > 0 && "; found in"}:
           {otherGroupMatches.value.map(([name, num]) => (
             <button key={name} type="button" onClick={() => showGroup(name)}>
               {label(name)}: {num}
@@ -107,12 +107,12 @@ export function LibraryPanel() {
         </div>
       )}
       {visibleEntries.value.length === 0 && query.value === "" && model.value === MEASURED && (
-        <p class="library-help">No measurements yet. A MERL file (.binary) becomes a material whose curves can be edited.</p>
+        <p class="library-help">No measurements yet. Import a MERL file (.binary) to edit its curves.</p>
       )}
       {visibleEntries.value.length === 0 && query.value === "" && model.value === BTFS && (
         <p class="library-help">
-          No such textures yet. Render one here, or import measured ones: a .btf file of UBO2014, or a zip of images that
-          are named by the directions of light and view.
+          No BTFs yet. Render one here, or import one: a UBO2014 .btf file, or a ZIP of images named by light and view
+          direction.
         </p>
       )}
       <ul class="library-balls">

@@ -1,4 +1,4 @@
-/** The navigation map of fitted materials: each of its points is a material, applied to the selected object. */
+/** The navigation map of fitted materials: each point is a material, applied to the selected object. */
 import { useEffect, useRef, useState } from "preact/hooks";
 import { getMaterialMap, getMaterialAt } from "../../session/net/api";
 import type { MaterialMapBody } from "../../protocol";
@@ -17,13 +17,13 @@ const clampToPlane = ({ x, y }: MapPosition): MapPosition => ({ x: clamp(x), y: 
 const highlightText = ({ f0, sigma }: { f0: number; sigma: number }) =>
   `reflectance ${(100 * f0).toFixed(1)} %, roughness ${sigma.toFixed(3)}`;
 
-/** Request the newest point only: an answer superseded by a later move is dropped. `done` when none is pending. */
+/** Request only the newest point: a response superseded by a later move is dropped. `done` when none is pending. */
 function useMaterialChoice(range: ReturnType<typeof mapRange> | null, done: () => void) {
   const newest = useRef(0);
   return async (point: MapPosition) => {
     const target = selectedMaterial.value;
     if (range === null) return;
-    if (target === null) return showNote("Choose a material of the scene first; the map changes it.");
+    if (target === null) return showNote("Select a material in the scene first.");
     const requestNumber = ++newest.current;
     const { f0, sigma } = highlightAt(point, range);
     await reportErrors(async () => {
@@ -60,7 +60,7 @@ function MapPlane({ map, range }: { map: MaterialMapBody; range: ReturnType<type
 
 export function NavigationMap() {
   const [map, setMap] = useState<MaterialMapBody | null>(null);
-  const [pendingPoint, setPendingPoint] = useState<MapPosition | null>(null); // until the material has come there
+  const [pendingPoint, setPendingPoint] = useState<MapPosition | null>(null); // until the material is applied
   useEffect(() => void reportErrors(async () => setMap(await getMaterialMap())), []);
   const range = map === null ? null : mapRange(map.points);
   const choose = useMaterialChoice(range, () => setPendingPoint(null));
@@ -93,22 +93,22 @@ export function NavigationMap() {
     go(from.x + size * (step[0] as number), from.y + size * (step[1] as number));
   };
   if (map === null || range === null) return <p>Loading the map…</p>;
-  const valueText = position === null ? "no material of the map" : highlightText(highlightAt(position, range));
+  const valueText = position === null ? "Not on the map" : highlightText(highlightAt(position, range));
   return (
     <div class="material-map">
       <svg
         viewBox={`-6 -6 ${WIDTH + 12} ${HEIGHT + 12}`}
         tabindex={0}
         role="application"
-        aria-label={`Map of materials; arrow keys move the point. Now ${valueText}`}
+        aria-label={`Material map; arrow keys move the point. Now ${valueText}`}
         onKeyDown={key}
         {...drag}
       >
         <MapPlane map={map} range={range} />
         {position !== null && <circle class="here" cx={position.x * WIDTH} cy={position.y * HEIGHT} r={6} />}
       </svg>
-      <p class="material-map-words">
-        {valueText} <span>→ brighter, ↓ rougher</span>
+      <p class="material-map-text">
+        {valueText} <span>right: more reflective, down: rougher</span>
       </p>
     </div>
   );

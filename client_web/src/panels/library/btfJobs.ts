@@ -1,4 +1,4 @@
-/** BTF jobs of the server, polled while the library is open. */
+/** BTF jobs on the server, polled while the library is open. */
 import { signal } from "@preact/signals";
 import { ApiError, deleteBtfJob, listBtfJobs, resumeBtfJob, startBtfJob, stopBtfJob } from "../../session/net/api";
 import { uploadBtf, uploadGeometry } from "../../session/net/upload";
@@ -12,7 +12,7 @@ const POLL_MS = 1000;
 export type Geometry = SyntheticBtfRequest["geometry"];
 export const GEOMETRIES: readonly Geometry[] = ["weave", "pebbles", "corduroy"];
 
-/** Jobs that run, wait, were stopped or failed; finished BTFs are in the library instead. */
+/** Running, queued, stopped and failed jobs; finished BTFs are in the library instead. */
 export const btfJobs = signal<readonly BtfJobBody[]>([]);
 /** Uploaded fraction of the images or the mesh; null without an upload. */
 export const btfUploadProgress = signal<number | null>(null);
@@ -23,12 +23,12 @@ export function isRunning({ state }: Pick<BtfJobBody, "state">): boolean {
   return state === "queued" || state === "running";
 }
 
-/** A second one would be the same. */
+/** True if such a job exists: a second one would give the same BTF. */
 export function isBeingMade(geometry: Geometry): boolean {
   return btfJobs.value.some((work) => work.geometry === geometry && isRunning(work));
 }
 
-/** Poll the jobs until none runs or the library is closed; `onReady` is called when one is ready. */
+/** Poll the jobs until none runs or the library is closed; `onReady` is called when one finishes. */
 export async function trackJobs(onReady: () => Promise<void>): Promise<void> {
   if (isFollowing) return;
   isFollowing = true;
@@ -40,7 +40,7 @@ export async function trackJobs(onReady: () => Promise<void>): Promise<void> {
       if (ready.length > 0) {
         await onReady();
         for (const { id, name } of ready) {
-          showNote(`${name} is in the library.`);
+          showNote(`“${name}” added to the library.`);
           await deleteBtfJob(id);
         }
       }
@@ -57,7 +57,7 @@ export async function generate(geometry: Geometry): Promise<void> {
 }
 
 export const importImages = (file: File) => uploadJob((onProgress) => uploadBtf(file, onProgress));
-/** `period`: side of what repeats, meters; null: that of the box about it. */
+/** `period`: width of one repeat in meters; null: the width of the bounding box. */
 export const makeFromMesh = (file: File, period: number | null) => uploadJob((onProgress) => uploadGeometry(file, period, onProgress));
 
 async function uploadJob(upload: (onProgress: (fraction: number) => void) => Promise<BtfJobBody>): Promise<void> {
@@ -65,13 +65,13 @@ async function uploadJob(upload: (onProgress: (fraction: number) => void) => Pro
   try {
     const { name, geometry } = await upload((progress) => (btfUploadProgress.value = progress));
     const isBefore = (work: BtfJobBody) => work.state === "failed" && work.name === name && work.geometry === geometry;
-    for (const { id } of btfJobs.value.filter(isBefore)) await removeJob(id); // what was wrong with the file has been read
+    for (const { id } of btfJobs.value.filter(isBefore)) await removeJob(id); // a new attempt replaces failed jobs
   } finally {
     btfUploadProgress.value = null;
   }
 }
 
-/** The results so far are kept. */
+/** Stop a job; its results so far remain. */
 export async function stopJob(id: string): Promise<void> {
   await reportErrors(async () => {
     await stopBtfJob(id);
@@ -91,7 +91,7 @@ async function removeJob(id: string): Promise<void> {
   try {
     await deleteBtfJob(id);
   } catch (error) {
-    if (!(error instanceof ApiError && error.status === 404)) throw error; // else somebody else has forgotten it
+    if (!(error instanceof ApiError && error.status === 404)) throw error; // 404: already deleted elsewhere
   }
   btfJobs.value = btfJobs.value.filter((work) => work.id !== id);
 }
@@ -99,13 +99,13 @@ async function removeJob(id: string): Promise<void> {
 export function jobText({ state, progress, seconds_left, problem }: BtfJobBody): string {
   switch (state) {
     case "queued":
-      return "waits for its turn";
+      return "queued";
     case "running": {
       const left = seconds_left === null ? "" : `, ${formatSeconds(seconds_left)} left`;
       return `${Math.floor(100 * progress)} %${left}`;
     }
     case "stopped":
-      return "stopped; what was found is kept";
+      return "stopped; progress is saved";
     case "failed":
       return problem ?? "failed";
     case "ready":

@@ -1,5 +1,5 @@
-/** A library material dragged over the image: the object below takes it when it is dropped. It is outlined where the
- * view's camera stays; where it moves, the server knows what is there, and is asked at the drop. */
+/** Drops a library material on the object below the pointer. With a fixed camera the object is outlined; in free-camera
+ * views the server picks the object at the drop. */
 import { freeCameraOf } from "../../viewport/cameras/freeCamera";
 import { requestPixelProbe } from "../../session/pixelProbe";
 import { pickMaterial } from "../../render/materialPicking";
@@ -16,7 +16,7 @@ export function acceptMaterialDrops(screen: ImageCanvas): () => void {
     const { material, px, py } = pickMaterial(screen, event);
     hoveredMaterial.value = material;
     const canDrop = material !== null || (moves() && screen.image.radiance(px, py) !== null);
-    if (canDrop) event.preventDefault(); // the browser's word for "may be dropped here"
+    if (canDrop) event.preventDefault(); // tells the browser that dropping is allowed
   };
   const drop = (event: DragEvent) => {
     const id = event.dataTransfer?.getData(DRAG_TYPE);

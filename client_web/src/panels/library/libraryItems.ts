@@ -1,4 +1,4 @@
-/** The library: fitted materials, measurements that were imported here, and putting one onto an object. */
+/** The library: fitted materials, imported measurements and BTFs, and applying one to an object. */
 import { computed, signal } from "@preact/signals";
 import { jsonPointer } from "../../state/document/pointer";
 import { editValue } from "../../edit/edit";
@@ -12,28 +12,28 @@ import { reportErrors, showNote } from "../../ui/toasts";
 import { trackJobs, type Geometry, continueJob, importImages, makeFromMesh, generate } from "./btfJobs";
 
 export const DRAG_TYPE = "application/x-relume-material";
-/** Among the models: what was measured and is not fitted. */
+/** Entry of the model filter for imported measurements. */
 export const MEASURED = "measured";
-/** And textures that look different from every side. */
+/** Entry of the model filter for BTFs. */
 export const BTFS = "btfs";
 
-/** What a ball of the library stands for. */
+/** A material of the library, shown as a ball. */
 interface LibraryEntry {
   id: string;
   name: string;
   description: string;
   thumbnail: string;
   terms: Term[];
-  /** Of its fit, `MEASURED` or `BTFS`. */
+  /** Model of the fit, `MEASURED` or `BTFS`. */
   model: string;
-  /** What it is made of; measurements do not say. */
+  /** Category such as metal; unknown for measurements. */
   group: string | null;
 }
 
 export const library = signal<MaterialBody[]>([]);
 const measured = signal<MeasuredBody[]>([]);
 const btfs = signal<BtfBody[]>([]);
-/** The search text: all of its words must occur in an entry's name or description. */
+/** The search text: all its words must occur in an entry's name or description. */
 export const query = signal("");
 export const group = signal("all");
 export const model = signal("cook_torrance");
@@ -49,14 +49,14 @@ function fittedEntry({ id, name, source, terms, model: modelName, group: groupNa
 }
 
 function measuredEntry({ id, name, thumbnail, terms }: MeasuredBody): LibraryEntry {
-  const description = `${name}, measured. Exact until its curves are edited.`;
+  const description = `${name}, measured. Exact until you edit its curves.`;
   return { id, name, description, thumbnail, terms, model: MEASURED, group: null };
 }
 
 function btfEntry({ id, name, thumbnail, terms, synthetic, size, error }: BtfBody): LibraryEntry {
-  const from = synthetic === null ? "measured" : "synthetic, rendered from a small geometry";
+  const from = synthetic === null ? "measured" : "synthetic, rendered from geometry";
   const missed = (100 * (error.at(-1) ?? 0)).toFixed(1);
-  const description = `${name}, ${from}. ${size[1]}×${size[0]} texels, kept to ${missed} %.`;
+  const description = `${name}, ${from}. ${size[1]}×${size[0]} texels, compression error ${missed} %.`;
   return { id, name, description, thumbnail, terms, model: BTFS, group: null };
 }
 
@@ -65,10 +65,10 @@ const entries = computed<LibraryEntry[]>(() => [
   ...measured.value.map(measuredEntry),
   ...btfs.value.map(btfEntry),
 ]);
-/** Whether what is shown has kinds: measurements have none. */
+/** True if the listed entries have categories; measurements have none. */
 export const hasGroups = computed(() => model.value !== MEASURED && model.value !== BTFS);
 
-/** One entry a material and source, of the model and group that are chosen. */
+/** Entries of the selected model and category, one per material and source. */
 export const visibleEntries = computed<LibraryEntry[]>(() => {
   const isOfGroup = (entry: LibraryEntry) => !hasGroups.value || group.value === "all" || entry.group === group.value;
   return entries.value.filter((entry) => entry.model === model.value && isOfGroup(entry) && matchesSearch(entry, query.value));
@@ -76,7 +76,7 @@ export const visibleEntries = computed<LibraryEntry[]>(() => {
 
 const MAX_OTHER_GROUPS = 4;
 
-/** Where nothing that is shown is called as was typed: the models that have something, and how much. */
+/** If no listed entry matches the search: the other models with matches, and their number. */
 export const otherGroupMatches = computed<[model: string, num: number][]>(() => {
   if (query.value.trim() === "" || visibleEntries.value.length > 0) return [];
   const counts = new Map<string, number>();
@@ -97,7 +97,7 @@ export function matchesSearch({ name, description }: Pick<LibraryEntry, "name" |
 export async function openLibrary(): Promise<void> {
   togglePanel("library");
   await reportErrors(async () => {
-    await refreshBtfs(); // commands make them meanwhile
+    await refreshBtfs(); // the command line may have created some
     if (library.value.length === 0) [library.value, measured.value] = await Promise.all([listMaterials(), listMeasured()]);
     if (libraryOpen.value) await trackJobs(refreshBtfs);
   });
@@ -107,7 +107,7 @@ async function refreshBtfs(): Promise<void> {
   btfs.value = await listBtfs();
 }
 
-/** Begin something that is made on the server, show it, and follow it. */
+/** Start a job on the server, show it, and poll it. */
 async function startJob(work: () => Promise<void>): Promise<void> {
   await reportErrors(async () => {
     model.value = BTFS;
@@ -122,19 +122,19 @@ export const resumeJob = (id: string) => startJob(() => continueJob(id));
 
 const BTF_SUFFIXES = [".zip", ".btf"];
 
-/** A zip of images or a container is a texture from all sides, anything else a MERL file. */
+/** A ZIP of images or a .btf file is a BTF, anything else a MERL file. */
 export async function importMaterial(file: File): Promise<void> {
   if (BTF_SUFFIXES.some((suffix) => file.name.toLowerCase().endsWith(suffix))) await startJob(() => importImages(file));
   else await importMeasured(file);
 }
 
-/** Import several, one after another, in the open library. */
+/** Import several files sequentially, with the library open. */
 export async function importMaterials(files: readonly File[]): Promise<void> {
   if (!libraryOpen.value) await openLibrary();
   for (const file of files) await importMaterial(file);
 }
 
-/** Import a MERL file and show it among the measurements. */
+/** Import a MERL file and list it among the measurements. */
 async function importMeasured(file: File): Promise<void> {
   await reportErrors(async () => {
     materialUploadProgress.value = 0;
@@ -142,15 +142,15 @@ async function importMeasured(file: File): Promise<void> {
       const material = await uploadMeasured(file, (fraction) => (materialUploadProgress.value = fraction));
       measured.value = await listMeasured();
       model.value = MEASURED;
-      showNote(`${material.name} is in the library.`);
+      showNote(`“${material.name}” added to the library.`);
     } finally {
       materialUploadProgress.value = null;
     }
   }, "files");
 }
 
-/** Give an object the terms of another material. A material is what it looks like: the object's images do not come
- * along, the texture switch of each term brings one back. */
+/** Replace an object's terms by a library material's. Its textures are dropped; the Texture list of each term restores
+ * one. */
 export function applyTerms(target: string, label: string, terms: readonly Term[]): void {
   const bare = terms.map((term) => ({ ...term, texture: null }));
   editValue(label, jsonPointer("materials", target, "terms"), bare);
@@ -165,6 +165,6 @@ export function applyEntry(target: string, id: string): void {
 }
 
 export function applyToSelected(id: string): void {
-  if (selectedMaterial.value === null) showNote("Choose a material of the scene first; it takes what you pick here.");
+  if (selectedMaterial.value === null) showNote("Select a material in the scene first.");
   else applyEntry(selectedMaterial.value, id);
 }

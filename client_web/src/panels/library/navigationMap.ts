@@ -1,4 +1,4 @@
-/** Sun's navigation map: where a point of the plane lies on the plot. Reflectance by its root, roughness by its logarithm. */
+/** Sun's navigation map: positions on the plot. Reflectance by its square root, roughness by its logarithm. */
 import type { ParamValue, Term } from "../../protocol";
 
 export interface HighlightRange {
@@ -13,7 +13,7 @@ export interface MapPosition {
 const fractionOf = (value: number, [low, high]: [number, number]) => (value - low) / (high - low || 1);
 const interpolate = (fraction: number, [low, high]: [number, number]) => low + Math.min(1, Math.max(0, fraction)) * (high - low);
 
-/** Of the materials on the map; at least two. */
+/** Range over the materials on the map; at least two. */
 export function mapRange(points: readonly { f0: number; sigma: number }[]): HighlightRange {
   const [f0, sigma] = [points.map((p) => p.f0), points.map((p) => p.sigma)];
   return { f0: [Math.min(...f0), Math.max(...f0)], sigma: [Math.min(...sigma), Math.max(...sigma)] };
@@ -22,7 +22,7 @@ export function mapRange(points: readonly { f0: number; sigma: number }[]): High
 const mean = (value: ParamValue | undefined, otherwise: number): number =>
   value === undefined ? otherwise : typeof value === "number" ? value : (value[0] + value[1] + value[2]) / 3;
 
-/** Where a material's highlight is on the map; null where it has none of its kind. */
+/** Position of a material's highlight on the map; null if it has no Cook–Torrance highlight. */
 export function highlightOf(terms: readonly Term[]): { f0: number; sigma: number } | null {
   const params = terms.find(({ model }) => model === "cook_torrance")?.params;
   if (params === undefined) return null;
@@ -33,12 +33,12 @@ export function highlightOf(terms: readonly Term[]): { f0: number; sigma: number
 const squareRootRange = (range: HighlightRange): [number, number] => [Math.sqrt(range.f0[0]), Math.sqrt(range.f0[1])];
 const logRange = (range: HighlightRange): [number, number] => [Math.log(range.sigma[0]), Math.log(range.sigma[1])];
 
-/** Place in a unit square, smooth and dark at the upper left. */
+/** Position in the unit square; smooth and dark is at the upper left. */
 export function positionOf(point: { f0: number; sigma: number }, range: HighlightRange): MapPosition {
   return { x: fractionOf(Math.sqrt(point.f0), squareRootRange(range)), y: fractionOf(Math.log(point.sigma), logRange(range)) };
 }
 
-/** The inverse; points outside the square are clamped to its edge. */
+/** Inverse of `positionOf`; points outside the square are clamped to its edge. */
 export function highlightAt(position: MapPosition, range: HighlightRange): { f0: number; sigma: number } {
   return { f0: interpolate(position.x, squareRootRange(range)) ** 2, sigma: Math.exp(interpolate(position.y, logRange(range))) };
 }

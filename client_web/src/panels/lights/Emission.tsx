@@ -52,16 +52,16 @@ function Temperature({ name, light }: Props) {
   const { kelvin, isColored } = kelvinOf(light.emission);
   return (
     <LabeledSlider
-      label="Temperature"
-      shortLabel={isColored ? "Temperature (now coloured; this is the nearest)" : "Temperature"}
-      title="The colour of a glowing body: a candle 1,900 K, a bulb 2,700 K, daylight 6,500 K. It stays as bright as it is."
+      label="Color temperature"
+      shortLabel={isColored ? "Color temperature (nearest to this color)" : "Color temperature"}
+      title="Candle 1,900 K, bulb 2,700 K, daylight 6,500 K. Brightness is kept."
       value={kelvin}
       minimum={MIN_KELVIN}
       maximum={MAX_KELVIN}
       scale="log"
       step={1}
       unit="K"
-      onChange={(next) => editLight("Temperature", name, "emission", withKelvin(light.emission, next))}
+      onChange={(next) => editLight("Color temperature", name, "emission", withKelvin(light.emission, next))}
       onHold={() => beginDrag(lightPath(name))}
     />
   );

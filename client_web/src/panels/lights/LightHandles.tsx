@@ -1,4 +1,4 @@
-/** Over a view's image: a handle for each light, and for the selected one its size and what it aims at. */
+/** Over a view's image: a handle for each light, and the size and target of the selected one. */
 import { useRef } from "preact/hooks";
 import { toHex } from "../../render/color/colorMath";
 import { beginDrag } from "../../session/prepare";
@@ -17,7 +17,7 @@ import { aimLight, anchorsOf, moveLight, lightOutline, type LightChange } from "
 import { labelOf } from "./lightKinds";
 import { changeLight, lightPath, lights, removeLight } from "./lightEdits";
 
-/** How a point of the world lies on a canvas, and how the canvas pulls at it. */
+/** Maps world points to the canvas, and drags on the canvas to world points. */
 class HandleProjection {
   private readonly transform;
   private readonly size;
@@ -35,14 +35,14 @@ class HandleProjection {
     return projected === null ? null : toScreenPoint(this.transform, this.size, projected.u, projected.v);
   }
 
-  /** A path through points; empty where a part of it is behind the camera. */
+  /** An SVG path through points; empty if a point is behind the camera. */
   path(points: readonly Triple[]): string {
     const screenPoints = points.map((point) => this.project(point));
     if (screenPoints.length === 0 || screenPoints.some((screenPoint) => screenPoint === null)) return "";
     return `M${screenPoints.map((screenPoint) => (screenPoint as number[]).map((x) => x.toFixed(1)).join(" ")).join("L")}`;
   }
 
-  /** A point pulled by pixels: across the image, or with `away` up and away from the camera. */
+  /** A point dragged by pixels: parallel to the image, or with `away` upwards and away from the camera. */
   dragged(point: Triple, dx: number, dy: number, away: boolean): Triple {
     const width = displayedWidth(this.transform, this.size);
     const [du, dv] = [dx / width, (dy * this.size.aspect) / width];
@@ -58,7 +58,7 @@ const STEPS: Record<string, [dx: number, dy: number]> = {
   ArrowDown: [0, STEP_PX],
 };
 
-/** What a handle looks like: a bulb is round, a spot a cone, a panel a square, a sun has rays; an aim is a diamond. */
+/** Shapes of the handles: circle for point lights, cone for spots, square for panels, rays for directional lights, diamond for targets. */
 const SHAPES: Record<LightKind | "aim", string> = {
   point: "M-5 0a5 5 0 1 0 10 0a5 5 0 1 0 -10 0z",
   spot: "M-2 -6h4l4 11h-12z",
@@ -74,7 +74,7 @@ interface HandleProps {
   light: Light;
   position: Triple;
   label: "Move" | "Aim";
-  /** What pulling the handle to a point changes. */
+  /** The light's changes when the handle is dragged to a point. */
   change(to: Triple): LightChange | null;
 }
 
@@ -122,9 +122,9 @@ function LightHandle({ projection, name, light, position, label, change }: Handl
     <button
       class={`light-handle ${label.toLowerCase()} ${selectedLight.value === name ? "selected" : ""}`}
       style={{ transform: `translate(${screenPosition[0].toFixed(1)}px, ${screenPosition[1].toFixed(1)}px)` }}
-      title={label === "Move" ? `${name}: ${labelOf(light.kind)}` : `What ${name} aims at`}
+      title={label === "Move" ? `${name}: ${labelOf(light.kind)}` : `Target of ${name}`}
       aria-roledescription="handle"
-      aria-label={`${name}, ${label === "Move" ? "at" : "aims at"} ${where}. Arrow keys move it, with Shift away and near.`}
+      aria-label={`${name}, ${label === "Move" ? "at" : "aims at"} ${where}. Arrow keys move it, Shift+↑↓ farther and nearer.`}
       {...dragHandlers}
       onClick={applyDrag}
       onKeyDown={key}
@@ -136,7 +136,7 @@ function LightHandle({ projection, name, light, position, label, change }: Handl
   );
 }
 
-/** The lines of the selected light. */
+/** Outline of the selected light. */
 function LightOutline({ projection, light }: { projection: HandleProjection; light: Light }) {
   const anchors = anchorsOf(light, projection.camera);
   const outline = projection.path(lightOutline(light));
@@ -153,7 +153,7 @@ export function LightHandles({ screen }: { screen: ImageCanvas }) {
   const all = lights.value;
   const info = views.value.find(({ name }) => name === screen.image.view);
   if (!handlesOpen.value || info === undefined || Object.keys(all).length === 0) return null;
-  displayedFrames.value; // the canvas may have another size
+  displayedFrames.value; // the canvas may have changed size
   const projection = new HandleProjection(projectionCameraOf(info), screen);
   const { camera } = projection;
   const selected = selectedLight.value;

@@ -1,4 +1,4 @@
-/** The selected light: its kind, how strong it is, and where it is. */
+/** The selected light: type, emission, position and direction. */
 import { editValue } from "../../edit/edit";
 import { beginDrag } from "../../session/prepare";
 import { MAX_LIGHT_NAME } from "../../look.gen";
@@ -69,12 +69,12 @@ function AngleFieldSlider({ name, light, angleField }: NamedLight & { angleField
 
 function LightKindSelect({ name, light }: NamedLight) {
   if (light.kind === "mesh")
-    return <p class="hint">The surfaces of “{light.material}” shine. Where they are is the scene’s own.</p>;
-  const change = (kind: AddedKind) => editValue("Change kind", lightPath(name), changeKind(light, kind));
+    return <p class="hint">Emissive mesh with material “{light.material}”. Its position comes from the scene.</p>;
+  const change = (kind: AddedKind) => editValue("Change type", lightPath(name), changeKind(light, kind));
   return (
     <div class="kind">
       <select
-        aria-label="Kind of light"
+        aria-label="Light type"
         value={light.kind}
         onChange={(event) => change(event.currentTarget.value as AddedKind)}
       >
@@ -90,13 +90,13 @@ function LightKindSelect({ name, light }: NamedLight) {
 
 function AimLockSwitch() {
   return (
-    <label class="aim-lock" title="While it is moved, it goes on aiming at the same point">
+    <label class="aim-lock" title="Keep aiming at the same point when the light moves">
       <input
         type="checkbox"
         checked={aimLocked.value}
         onChange={(event) => (aimLocked.value = event.currentTarget.checked)}
       />
-      Keep the aim when it moves
+      Lock target
     </label>
   );
 }
@@ -120,14 +120,14 @@ export function LightInspector({ name, light }: NamedLight) {
           )}
         </h2>
         {light.kind !== "mesh" && (
-          <IconButton icon="copy" label="Duplicate this light" onClick={() => duplicateLight(name)} />
+          <IconButton icon="copy" label="Duplicate light" onClick={() => duplicateLight(name)} />
         )}
         {isAddedLight(name) ? (
-          <IconButton icon="trash" label="Remove this light" keys="Delete" onClick={() => removeLight(name)} />
+          <IconButton icon="trash" label="Remove light" keys="Delete" onClick={() => removeLight(name)} />
         ) : (
           <IconButton
             icon="reset"
-            label="Reset this light"
+            label="Reset light"
             disabled={initial === light}
             onClick={() => editValue("Reset", lightPath(name), initial)}
           />

@@ -1,4 +1,4 @@
-/** The lights of the scene as a mixer: each switched on and off, alone, stronger or weaker, and tinted. */
+/** The light mixer: on/off, solo, intensity and tint of each light. */
 import { useEffect, useRef } from "preact/hooks";
 import { fromHex, toHex } from "../../render/color/colorMath";
 import { beginDrag } from "../../session/prepare";
@@ -22,7 +22,7 @@ function LightRow({ name, light }: { name: string; light: Light }) {
   const selected = name === selectedLight.value;
   const row = useRef<HTMLLIElement>(null);
   useEffect(() => {
-    if (selected) row.current?.scrollIntoView({ block: "nearest" }); // a new one may be below the fold
+    if (selected) row.current?.scrollIntoView({ block: "nearest" }); // a new light may be out of view
   }, [selected]);
   return (
     <li
@@ -30,10 +30,10 @@ function LightRow({ name, light }: { name: string; light: Light }) {
       class={`light ${selected ? "selected" : ""} ${light.enabled ? "" : "off"}`}
     >
       <IconButton
-        icon="lamp"
-        label={`${name}: ${light.enabled ? "switch off" : "switch on"}`}
+        icon="light"
+        label={`Turn ${light.enabled ? "off" : "on"} ${name}`}
         pressed={light.enabled}
-        onClick={() => editLight(light.enabled ? "Off" : "On", name, "enabled", !light.enabled)}
+        onClick={() => editLight(light.enabled ? "Turn off" : "Turn on", name, "enabled", !light.enabled)}
       />
       <button
         class="name"
@@ -45,14 +45,14 @@ function LightRow({ name, light }: { name: string; light: Light }) {
       </button>
       <input
         type="color"
-        aria-label={`${name}: colour`}
+        aria-label={`${name}: tint`}
         title="Tint"
         value={toHex(light.color)}
         onInput={(event) => editLight("Tint", name, "color", fromHex(event.currentTarget.value, light.color))}
       />
       <IconButton
         icon="solo"
-        label={`${name} alone`}
+        label={`Solo ${name}`}
         pressed={soloLight.value === name}
         onClick={() => toggleLightSolo(name)}
       />
@@ -73,7 +73,7 @@ function LightRow({ name, light }: { name: string; light: Light }) {
 
 function LightKindMenu() {
   return (
-    <div class="light-kinds" role="group" aria-label="Kind of light">
+    <div class="light-kinds" role="group" aria-label="Light type">
       {LIGHT_KINDS.map(({ kind, label, help }) => (
         <button key={kind} title={help} aria-pressed={placingKind.value === kind} onClick={() => startPlacement(kind)}>
           {label}
@@ -92,8 +92,8 @@ function LightActions() {
   const movable = Object.values(lights.value).some(({ kind }) => kind !== "mesh");
   return (
     <>
-      {movable && <ToggleButton icon="handles" label="Handles in the picture" keys="G" state={handlesOpen} />}
-      <IconButton icon="plus" label="Add a light" pressed={isAddMenuOpen.value} onClick={toggle} />
+      {movable && <ToggleButton icon="handles" label="Light handles" keys="G" state={handlesOpen} />}
+      <IconButton icon="plus" label="Add light" pressed={isAddMenuOpen.value} onClick={toggle} />
     </>
   );
 }
@@ -103,7 +103,7 @@ export function LightsPanel() {
   return (
     <Section title={TITLE} count={all.length} actions={<LightActions />}>
       {isAddMenuOpen.value && <LightKindMenu />}
-      {all.length === 0 && look.value !== null && !isAddMenuOpen.value && <p class="environment-words">None yet; + adds one.</p>}
+      {all.length === 0 && look.value !== null && !isAddMenuOpen.value && <p class="environment-text">No lights yet. Click + to add one.</p>}
       <ul class="lights">
         {all.map(([name, light]) => (
           <LightRow key={name} name={name} light={light} />

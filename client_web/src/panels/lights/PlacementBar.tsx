@@ -1,9 +1,9 @@
-/** While a light is being placed: what to do, a way without the pointer, and the way out. */
+/** Bar shown while placing a light: the instruction, placing without the pointer, and cancel. */
 import { useEffect, useRef } from "preact/hooks";
 import { LIGHT_KINDS } from "./lightKinds";
 import { placeAtCenterOf, placingKind, stopPlacement } from "./placement";
 
-/** The bar goes, and with it the focus: the keys go on here. */
+/** Move the focus here when the bar closes. */
 function focusOn(selector: string): void {
   requestAnimationFrame(() => document.querySelector<HTMLElement>(selector)?.focus());
 }
@@ -15,7 +15,7 @@ async function placeAtCenter(): Promise<void> {
 
 function cancelPlacement(): void {
   stopPlacement();
-  focusOn("[aria-label='Add a light']");
+  focusOn("[aria-label='Add light']");
 }
 
 export function PlacementBar() {
@@ -26,11 +26,11 @@ export function PlacementBar() {
   if (kindLabels === undefined) return null;
   return (
     <div class="placing" role="group" aria-label={`Place a light: ${kindLabels.label}`}>
-      <span role="status">Click where to {kindLabels.click}</span>
+      <span role="status">Click a surface to {kindLabels.click}</span>
       <button ref={middle} onClick={() => void placeAtCenter()}>
-        In the middle
+        Place in center
       </button>
-      <button title="Add no light (Esc)" onClick={cancelPlacement}>
+      <button title="Cancel (Esc)" onClick={cancelPlacement}>
         Cancel
       </button>
     </div>

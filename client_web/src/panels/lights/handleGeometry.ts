@@ -1,9 +1,9 @@
-/** What of a light is shown in an image, and what pulling at it changes. */
+/** Handle positions of a light, and the changes when they are dragged. */
 import type { Light, Triple } from "../../protocol";
 import type { ProjectionCamera } from "./lightProjection";
 import { add, cross, dot, length, scale, subtract, roundComponents, normalize } from "./vector";
 
-/** Where a light's handles are: where it is, and where it aims; null where there is no such thing. */
+/** World positions of a light's handles: position and target; null if the light has none. */
 export interface Anchors {
   position: Triple;
   target: Triple | null;
@@ -12,8 +12,8 @@ export interface Anchors {
 const FAR = 0.3;
 const MIN_LENGTH = 1e-3;
 
-/** A directional light has no position: its handle is shown a fraction of the image's height from the image's center, about as
- * far away as the middle of the world. */
+/** A directional light has no position: its handle is shown a fraction of the image's height from the image's center, at
+ * about the distance of the world's origin. */
 function placementPivot(camera: ProjectionCamera): { middle: Triple; reach: number } {
   const depth = Math.max(0.1, length(camera.position));
   return { middle: add(camera.position, scale(camera.forward, depth)), reach: FAR * depth * camera.height };
@@ -41,8 +41,8 @@ export interface LightChange {
   direction?: Triple;
 }
 
-/** What moving a light to a place changes: where it is, and with a locked aim the way it points, so that it goes on
- * aiming at the same point. Null where that would leave it without a direction. */
+/** Changes of a light moved to a position: the position, and with a locked target the direction. Null if that would
+ * leave no direction. */
 export function placeLight(light: Light, to: Triple, aimLocked: boolean): LightChange | null {
   if (light.kind === "mesh" || light.kind === "directional") return null;
   const position = roundComponents(to);
@@ -51,21 +51,21 @@ export function placeLight(light: Light, to: Triple, aimLocked: boolean): LightC
   return length(direction) < MIN_LENGTH ? null : { position, direction: roundComponents(direction) };
 }
 
-/** What pulling a light's handle to a point changes. */
+/** Changes of a light whose handle is dragged to a point. */
 export function moveLight(light: Light, to: Triple, camera: ProjectionCamera, aimLocked: boolean): LightChange | null {
   if (light.kind !== "directional") return placeLight(light, to, aimLocked);
   const direction = subtract(placementPivot(camera).middle, to);
   return length(direction) < MIN_LENGTH ? null : { direction: roundComponents(normalize(direction)) };
 }
 
-/** What aiming a light at a point changes. */
+/** Changes of a light aimed at a point. */
 export function aimLight(light: Light, target: Triple): LightChange | null {
   if (light.kind !== "spot" && light.kind !== "rectangle") return null;
   const direction = subtract(target, light.position);
   return length(direction) < MIN_LENGTH ? null : { direction: roundComponents(direction) };
 }
 
-/** Two unit vectors across a direction: the first along a rectangle's width, the second along its height. */
+/** Two unit vectors perpendicular to a direction: along a rectangle's width, and along its height. */
 export function spotEdgePoint(direction: Triple, degrees: number): [width: Triple, height: Triple] {
   const axis = normalize(direction);
   const up: Triple = Math.abs(axis[1]) < 0.999 ? [0, 1, 0] : [0, 0, 1];
@@ -78,7 +78,7 @@ export function spotEdgePoint(direction: Triple, degrees: number): [width: Tripl
 const RING = 48;
 const WIDEST_DEGREES = 80;
 
-/** A closed line in the world that shows a light's size: a rectangle's edge, the edge of a spot's cone at its target. */
+/** World-space outline of a light: a rectangle's edge, or a spot's cone at its target. */
 export function lightOutline(light: Light): Triple[] {
   if (light.kind === "rectangle") {
     const [width, height] = spotEdgePoint(light.direction, light.rotation);

@@ -1,4 +1,4 @@
-/** The lights of the look: which is selected, and changing, adding and removing them. */
+/** The lights of the look: changing, adding, renaming and removing them. */
 import { batch, computed } from "@preact/signals";
 import { jsonPointer } from "../../state/document/pointer";
 import { editValue, replaceLook } from "../../edit/edit";
@@ -14,10 +14,10 @@ import { offsetCopy, nextLightName } from "./lightKinds";
 export const lights = computed<Record<string, Light>>(() => look.value?.lights ?? {});
 export const lightNames = computed(() => Object.keys(lights.value));
 
-/** The selected light, while it is there. */
+/** The selected light, if it exists. */
 export const openLight = computed<Light | null>(() => lights.value[selectedLight.value ?? ""] ?? null);
 
-/** Whether a light was added here: it can be removed, where the scene's own can be switched off. */
+/** True if a light was added in the editor: only these can be removed; the scene's lights can be turned off. */
 export function isAddedLight(name: string): boolean {
   return defaultLook.value?.lights[name] === undefined;
 }
@@ -26,7 +26,7 @@ export function lightPath(name: string, field?: string): string {
   return field === undefined ? jsonPointer("lights", name) : jsonPointer("lights", name, field);
 }
 
-/** Change a field of a light; during one gesture on one field that is one step. */
+/** Change a field of a light; edits of one gesture on one field are one step. */
 export function editLight(label: string, name: string, field: string, value: unknown): void {
   editValue(label, lightPath(name, field), value);
 }
@@ -47,19 +47,19 @@ export function changeLight(label: string, name: string, change: LightChange): v
   else editValue(label, lightPath(name), { ...light, ...change });
 }
 
-/** Another light like this one, beside it. */
+/** Add a copy of a light beside it. */
 export function duplicateLight(name: string): void {
   const light = lights.peek()[name];
   if (light === undefined || light.kind === "mesh") return;
-  if (lightNames.peek().length >= MAX_LIGHTS) showNote(`A scene has at most ${MAX_LIGHTS} lights; remove one first.`);
+  if (lightNames.peek().length >= MAX_LIGHTS) showNote(`Limit of ${MAX_LIGHTS} lights reached. Remove one first.`);
   else addLight(nextLightName(name, lightNames.peek()), offsetCopy(light));
 }
 
-/** Give a light that was added here another name; it stays where it is in the list. */
+/** Rename a light that was added in the editor; it keeps its position in the list. */
 export function renameLight(name: string, to: string): void {
   const current = look.peek();
   if (current === null || !isAddedLight(name) || to === name) return;
-  if (current.lights[to] !== undefined) return showNote(`There is a light “${to}” already; take another name.`);
+  if (current.lights[to] !== undefined) return showNote(`A light named “${to}” already exists.`);
   const renamed = Object.entries(current.lights).map(([entryName, light]) => [entryName === name ? to : entryName, light]);
   batch(() => {
     replaceLook(`${name} · Rename to ${to}`, { ...current, lights: Object.fromEntries(renamed) as Look["lights"] });

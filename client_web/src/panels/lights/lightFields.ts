@@ -1,4 +1,4 @@
-/** What of a light the inspector shows as numbers and as angles: which field, in which range, and how it is changed. */
+/** Numeric and angle fields of a light in the inspector: label, range and changes. */
 import { RANGES } from "../../look.gen";
 import type { Light, Triple } from "../../protocol";
 import { length } from "./vector";
@@ -12,12 +12,12 @@ export interface NumbersField {
   editLabel: string;
   label: string;
   unit: string;
-  /** What each number is called. */
+  /** Label of each number. */
   names: readonly string[];
   minimum: number;
   maximum: number;
   step: number;
-  /** Whether a light may have these numbers; others are rejected. */
+  /** True if a light may have these numbers; others are rejected. */
   allows?(values: number[]): boolean;
 }
 
@@ -46,7 +46,7 @@ const NUMBERS: readonly NumbersField[] = [
   },
 ];
 
-/** An angle of the kinds of light that have its field, degrees. */
+/** An angle in degrees, for the kinds of light that have its field. */
 export interface AngleField {
   field: "rotation" | "cone";
   editLabel: string;
@@ -54,7 +54,7 @@ export interface AngleField {
   minimum: number;
   maximum: number;
   valueOf(light: Light): number;
-  /** The field with another angle. */
+  /** The field's value for an angle. */
   changeFor(light: Light, angle: number): unknown;
 }
 
@@ -63,7 +63,7 @@ const cone = (light: Light) => (light as Spot).cone;
 const ANGLES: readonly AngleField[] = [
   {
     field: "rotation",
-    editLabel: "Turn",
+    editLabel: "Rotate",
     label: "Rotation",
     minimum: -180,
     maximum: 180,
@@ -73,7 +73,7 @@ const ANGLES: readonly AngleField[] = [
   {
     field: "cone",
     editLabel: "Cone",
-    label: "Cone, full light",
+    label: "Inner cone",
     ...RANGES.light.cone,
     valueOf: (light) => cone(light)[0],
     changeFor: (light, angle) => [angle, Math.max(angle, cone(light)[1])],
@@ -81,7 +81,7 @@ const ANGLES: readonly AngleField[] = [
   {
     field: "cone",
     editLabel: "Cone",
-    label: "Cone, edge",
+    label: "Outer cone",
     minimum: 1,
     maximum: RANGES.light.cone.maximum,
     valueOf: (light) => cone(light)[1],

@@ -1,31 +1,31 @@
-/** The kinds of light: their labels, and a new light of each. */
+/** The kinds of light: labels, and creating a new one. */
 import { DEFAULT_LIGHTS, MAX_LIGHT_NAME } from "../../look.gen";
 import type { Light, LightKind, Rgb, Triple } from "../../protocol";
 import { add, length, scale, subtract, roundComponents } from "./vector";
 
-/** Kinds that can be added; a mesh that shines only comes with a scene. */
+/** Kinds that can be added; emissive meshes only come with a scene. */
 export type AddedKind = Exclude<LightKind, "mesh">;
 
 interface LightKindLabels {
   kind: AddedKind;
   label: string;
   help: string;
-  /** What a click in the image shall be on. */
+  /** Purpose of the click that places the light. */
   click: string;
 }
 
 export const LIGHT_KINDS: readonly LightKindLabels[] = [
-  { kind: "point", label: "Point", help: "A bulb: shines alike in all directions", click: "hang the light" },
-  { kind: "spot", label: "Spot", help: "Shines into a cone", click: "aim the spot" },
-  { kind: "rectangle", label: "Panel", help: "A rectangle that shines to its front", click: "aim the panel" },
-  { kind: "directional", label: "Sun", help: "Parallel light from far away", click: "aim the sun" },
+  { kind: "point", label: "Point", help: "Emits evenly in all directions", click: "place the light" },
+  { kind: "spot", label: "Spot", help: "Emits in a cone", click: "aim the spot" },
+  { kind: "rectangle", label: "Panel", help: "Rectangular area light (one-sided)", click: "aim the panel" },
+  { kind: "directional", label: "Sun", help: "Parallel light from a distant source", click: "aim the sun" },
 ];
 
 export function labelOf(kind: LightKind): string {
-  return LIGHT_KINDS.find((candidate) => candidate.kind === kind)?.label ?? "Shining surface";
+  return LIGHT_KINDS.find((candidate) => candidate.kind === kind)?.label ?? "Emissive mesh";
 }
 
-/** The quantity that a light's emission is. */
+/** Unit of a light's emission. */
 export const UNITS: Record<LightKind, string> = {
   point: "W/sr",
   spot: "W/sr",
@@ -34,12 +34,12 @@ export const UNITS: Record<LightKind, string> = {
   mesh: "W/sr/m²",
 };
 
-/** What a click in an image found, and what light there is in it. */
+/** The clicked surface point, and the brightness of the image. */
 export interface ClickedSurface {
   position: Triple;
-  /** Unit, towards the camera. */
+  /** Unit vector, towards the camera. */
   normal: Triple;
-  /** From the camera, meters. */
+  /** Distance from the camera, meters. */
   distance: number;
   /** Mean radiance of the image. */
   radiance: number;
@@ -47,19 +47,19 @@ export interface ClickedSurface {
 
 const OFFSET_FRACTION = 0.2;
 const SIDE_FRACTION = 0.4;
-/** Irradiance of a new light, of the image's mean radiance: as bright as what is there on a surface of middle gray. */
+/** Irradiance of a new light divided by the image's mean radiance: as bright as the image on a middle gray surface. */
 const BRIGHTNESS_FRACTION = 6;
 
-/** Where a panel is put, so that its lower edge is not below what was clicked, which may stand on a floor. A panel that hangs
- * below what was clicked stays there. */
+/** Position of a panel, raised so that its lower edge is not below the clicked point, which may be on a floor. A panel
+ * under a downward-facing surface stays there. */
 function liftAboveSurface(clicked: Triple, position: Triple, direction: Triple, halfSide: number): Triple {
   const hangs = direction[1] > Math.SQRT1_2 * length(direction);
   const below = clicked[1] - (position[1] - halfSide * Math.sqrt(1 - (direction[1] / length(direction)) ** 2));
   return hangs || below <= 0 ? position : roundComponents(add(position, [0, below, 0]));
 }
 
-/** A light for what was clicked: off the surface by a part of the camera's distance, aimed at it, and as bright as the
- * rest of the image. */
+/** A new light for a clicked point: offset from the surface by a fraction of the camera's distance, aimed at the point,
+ * and as bright as the rest of the image. */
 export function createLight(kind: AddedKind, { position, normal, distance, radiance }: ClickedSurface): Light {
   const offset = distance * OFFSET_FRACTION;
   const lightPosition = roundComponents(add(position, scale(normal, offset)));
@@ -84,7 +84,7 @@ export function createLight(kind: AddedKind, { position, normal, distance, radia
   }
 }
 
-/** The first of "Spot", "Spot 2", … that is free; after "Key 2" comes "Key 3". */
+/** The first unused name of "Spot", "Spot 2", …; after "Key 2" comes "Key 3". */
 export function nextLightName(like: string, usedNames: readonly string[]): string {
   if (!usedNames.includes(like)) return like;
   const stem = like.replace(/ \d+$/, "").slice(0, MAX_LIGHT_NAME - 4);
@@ -95,20 +95,20 @@ export function nextLightName(like: string, usedNames: readonly string[]): strin
 
 const COPY_OFFSET = 0.25;
 
-/** A copy of a light, offset if it has a position, so that their handles do not coincide. */
+/** A copy of a light, offset so that the handles do not coincide. */
 export function offsetCopy(light: Light): Light {
   if (!("position" in light)) return { ...light };
   const reach = "direction" in light ? length(light.direction) : 1;
   return { ...light, position: roundComponents(add(light.position, [COPY_OFFSET * Math.max(reach, 0.1), 0, 0])) };
 }
 
-/** A complete light from a partial look; missing fields are as in `base`, or else as in a new light. */
+/** A complete light from a partial one; missing fields come from `base`, or else from the defaults. */
 export function completeLight(partial: Partial<Light>, base: Light | undefined): Light {
   const kind = partial.kind ?? base?.kind ?? "point";
   return { ...(base?.kind === kind ? base : DEFAULT_LIGHTS[kind]), ...partial } as Light;
 }
 
-/** The same light as another kind: what both have stays. */
+/** The light as another kind, keeping shared fields. */
 export function changeKind(light: Light, kind: AddedKind): Light {
   const start = DEFAULT_LIGHTS[kind];
   const shared = Object.entries(light).filter(([field]) => field !== "kind" && field in start);

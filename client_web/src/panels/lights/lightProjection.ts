@@ -1,10 +1,10 @@
-/** Where a point of the world is in a view's image, and how it moves when it is pulled there. */
+/** Projects world points into a view's image, and moves them by drags in the image. */
 import type { HelloMessage, Triple } from "../../protocol";
 import { add, dot, scale, subtract } from "./vector";
 
 type SessionView = HelloMessage["views"][number];
 
-/** A pinhole camera. Places in the image are fractions of its sides from the top left, depths are meters. */
+/** A pinhole camera. Image positions are fractions of its sides from the top left; depths are in meters. */
 export interface ProjectionCamera {
   position: Triple;
   right: Triple;
@@ -34,7 +34,7 @@ export function projectionCameraOf({ camera, width, height }: SessionView): Proj
   };
 }
 
-/** Nearer than this a point is behind the camera, or as good as. */
+/** Points nearer than this count as behind the camera. */
 const NEAREST = 1e-3;
 
 /** Project a point; null if it is behind the camera. */
@@ -49,7 +49,7 @@ export function project(camera: ProjectionCamera, point: Triple): ProjectedPoint
   };
 }
 
-/** A point moved in the plane parallel to the image at its depth, by fractions of the image's sides. */
+/** A point moved parallel to the image at its depth, by fractions of the image's sides. */
 export function slidePoint(camera: ProjectionCamera, point: Triple, du: number, dv: number): Triple {
   const depth = Math.max(NEAREST, dot(subtract(point, camera.position), camera.forward));
   const across = scale(camera.right, du * depth * camera.width);

@@ -1,4 +1,4 @@
-/** Placing a new light: a kind is chosen, then a surface in the image, or what the image has in its middle. */
+/** Places a new light: choose a kind, then click a surface in the image or use the image's center. */
 import { signal } from "@preact/signals";
 import { luminance } from "../../render/color/tonemap";
 import { requestPixelProbe } from "../../session/pixelProbe";
@@ -13,7 +13,7 @@ import { nextLightName, labelOf, createLight, type AddedKind } from "./lightKind
 import { addLight, lightNames } from "./lightEdits";
 import { length, subtract } from "./vector";
 
-/** Whether the kinds are offered, and that of which a light is being placed. */
+/** Whether the menu of kinds is open, and the kind being placed. */
 export const isAddMenuOpen = signal(false);
 export const placingKind = signal<AddedKind | null>(null);
 
@@ -24,7 +24,7 @@ export function stopPlacement(): void {
 
 const SAMPLE_GRID = 32;
 
-/** Mean radiance of an image, by some of its pixels. */
+/** Mean radiance of an image, estimated from a subset of its pixels. */
 function meanRadiance(image: ViewImage): number {
   const { width, height } = image.pixels;
   const pixelIndex = (k: number, size: number) => Math.floor(((k + 0.5) / SAMPLE_GRID) * size);
@@ -38,7 +38,7 @@ function addPlacedLight(kind: AddedKind, view: string, probed: InspectAnswer): v
   const { position, normal } = probed;
   const info = views.peek().find(({ name }) => name === view);
   if (position === null || normal === null || info === undefined) {
-    showNote("There is no surface in that place; choose one that there is.");
+    showNote("No surface here. Click on an object.");
     return;
   }
   const distance = length(subtract(position, projectionCameraOf(info).position));
@@ -47,7 +47,7 @@ function addPlacedLight(kind: AddedKind, view: string, probed: InspectAnswer): v
   addLight(nextLightName(labelOf(kind), lightNames.peek()), createLight(kind, { position, normal, distance, radiance }));
 }
 
-/** Put the light where this pixel of a view is. */
+/** Place the light at the surface under this pixel of a view. */
 export async function placeLightAt(view: string, x: number, y: number): Promise<void> {
   const kind = placingKind.peek();
   if (kind === null) return;
@@ -57,13 +57,13 @@ export async function placeLightAt(view: string, x: number, y: number): Promise<
   });
 }
 
-/** Put the light where the middle of the active view's image is. */
+/** Place the light at the surface in the center of the active view's image. */
 export function placeAtCenterOf(): Promise<void> {
   const { view, pixels } = stage.active;
   return placeLightAt(view, Math.floor(pixels.width / 2), Math.floor(pixels.height / 2));
 }
 
 export function startPlacement(kind: AddedKind): void {
-  if (lightNames.value.length >= MAX_LIGHTS) showNote(`A scene has at most ${MAX_LIGHTS} lights; remove one first.`);
+  if (lightNames.value.length >= MAX_LIGHTS) showNote(`Limit of ${MAX_LIGHTS} lights reached. Remove one first.`);
   else placingKind.value = placingKind.value === kind ? null : kind;
 }

@@ -1,12 +1,12 @@
-/** How strong a light is as a whole: in watts, and as cameras count it.
+/** Total power of a light, radiometric and photometric.
  *
- * relume's light is radiometric; 683 lumens are a watt, as in imported files. Of R, G and B the luminance counts. */
+ * relume's light is radiometric; 683 lm are 1 W, as in imported files. RGB values count by their luminance. */
 import { luminance } from "../../render/color/tonemap";
 import type { Light, Rgb } from "../../protocol";
 
 export const LUMENS_PER_WATT = 683;
 
-/** Units of a light's whole: as energy, and as cameras count it. */
+/** Radiometric and photometric units of a light's power. */
 export interface PhotometricUnits {
   label: string;
   watts: string;
@@ -14,9 +14,9 @@ export interface PhotometricUnits {
 }
 
 const POWER: PhotometricUnits = { label: "Power", watts: "W", lumens: "lm" };
-/** Light from far away has no power; it has what it gives a surface that faces it. */
-const IRRADIANCE: PhotometricUnits = { label: "On a surface that faces it", watts: "W/m²", lumens: "lx" };
-/** How large the surfaces are is the scene's. */
+/** Directional lights have no power, but an irradiance on a perpendicular surface. */
+const IRRADIANCE: PhotometricUnits = { label: "Illuminance", watts: "W/m²", lumens: "lx" };
+/** For emissive meshes, whose area belongs to the scene. */
 const RADIANCE: PhotometricUnits = { label: "Radiance", watts: "W/sr/m²", lumens: "cd/m²" };
 
 export function unitsOf(light: Light): PhotometricUnits {
@@ -26,13 +26,13 @@ export function unitsOf(light: Light): PhotometricUnits {
 
 const cosine = (degrees: number) => Math.cos((degrees * Math.PI) / 180);
 
-/** What emission is multiplied by to have the whole: the directions it goes to, and the surface it comes from. */
+/** Factor from emission to power: the integral over directions and area. */
 function emittingExtent(light: Light): number {
   switch (light.kind) {
     case "point":
       return 4 * Math.PI;
     case "spot": {
-      // between its two angles the light falls as the square of a ramp over the cosine, a third of which is full
+      // between its two angles the light falls off as the square of a linear ramp over the cosine, whose mean is 1/3
       const [full, edge] = [cosine(light.cone[0]), cosine(light.cone[1])];
       return 2 * Math.PI * (1 - full + (full - edge) / 3);
     }
@@ -43,13 +43,13 @@ function emittingExtent(light: Light): number {
   }
 }
 
-/** Watts of a light as it is now: with its intensity and tint, whether it is on or not. */
+/** Power of a light in watts, with intensity and tint, whether it is on or off. */
 export function wattsOf(light: Light): number {
   const emittedRadiance = light.emission.map((value, channel) => value * light.intensity * (light.color[channel] as number)) as Rgb;
   return luminance(emittedRadiance) * emittingExtent(light);
 }
 
-/** The emission with which a light has so many watts; null where its intensity or tint leaves nothing of any. */
+/** The emission for a power in watts; null if intensity or tint are zero. */
 export function emissionForWatts(light: Light, watts: number): Rgb | null {
   const currentWatts = wattsOf(light);
   const white: Light = { ...light, emission: [1, 1, 1] };

@@ -1,10 +1,10 @@
-/** Colors of glowing bodies: temperature in kelvin to linear Rec. 709, and the temperature next to a color. */
+/** Black-body colors: temperature in kelvin to linear Rec. 709, and the nearest temperature of a color. */
 import { luminance } from "../../render/color/tonemap";
 import type { Rgb } from "../../protocol";
 
 export const MIN_KELVIN = 1000;
 export const MAX_KELVIN = 15000;
-/** Distance from the line of glowing bodies, in CIE 1960 u and v, from which on a color is called colored. */
+/** Distance from the Planckian locus in CIE 1960 (u, v) above which a color counts as colored. */
 const MAX_PLANCKIAN_DISTANCE = 0.03;
 
 /** u and v (CIE 1960) of a black body; Krystek 1985, within 1e-4 from 1,000 to 15,000 K. */
@@ -18,7 +18,7 @@ export function planckian(kelvin: number): [u: number, v: number] {
   ];
 }
 
-/** Linear Rec. 709 of a glowing body, of luminance 1. What the primaries cannot mix, below 1,900 K, is cut off. */
+/** Linear Rec. 709 of a black body, of luminance 1. Out-of-gamut colors, below 1,900 K, are clipped. */
 export function rgbOfKelvin(kelvin: number): Rgb {
   const [u, v] = planckian(kelvin);
   const scale = 2 * u - 8 * v + 4;
@@ -44,7 +44,7 @@ const STEPS = 400;
 const kelvinSteps = Array.from({ length: STEPS + 1 }, (_, k) => MIN_KELVIN * (MAX_KELVIN / MIN_KELVIN) ** (k / STEPS));
 const chromaticities = kelvinSteps.map(planckian);
 
-/** The temperature next to a color, and whether the color is far from that of any glowing body. */
+/** The correlated color temperature, and whether the color is far from the Planckian locus. */
 export function kelvinOf(rgb: Rgb): { kelvin: number; isColored: boolean } {
   if (luminance(rgb) <= 0) return { kelvin: 6500, isColored: false };
   const [u, v] = uvOf(rgb);
@@ -54,7 +54,7 @@ export function kelvinOf(rgb: Rgb): { kelvin: number; isColored: boolean } {
   return { kelvin: Math.round(kelvin / 10) * 10, isColored: (distances[nearest] as number) > MAX_PLANCKIAN_DISTANCE };
 }
 
-/** A quantity of light as bright as before, in the color of a glowing body. */
+/** A light quantity of the same brightness with the color of a black body. */
 export function withKelvin(previous: Rgb, kelvin: number): Rgb {
   const brightness = luminance(previous);
   return rgbOfKelvin(kelvin).map((value) => Number((value * brightness).toPrecision(6))) as Rgb;

@@ -1,4 +1,4 @@
-/** Vectors of the world: right-handed, +Y up, meters. */
+/** World-space vectors: right-handed, +Y up, meters. */
 import type { Triple } from "../../protocol";
 
 export const add = (a: Triple, b: Triple): Triple => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
@@ -13,11 +13,11 @@ export const cross = (a: Triple, b: Triple): Triple => [
   a[0] * b[1] - a[1] * b[0],
 ];
 
-/** The unit vector along `a`; `a` itself where it has no direction. */
+/** The unit vector along `a`; `a` itself if its length is zero. */
 export function normalize(a: Triple): Triple {
   const size = length(a);
   return size > 0 ? scale(a, 1 / size) : a;
 }
 
-/** Numbers that a document can be read with: tenths of a millimetre are enough. */
+/** Round to a tenth of a millimeter, so that documents stay readable. */
 export const roundComponents = (a: Triple): Triple => a.map((value) => Number(value.toFixed(4)) + 0) as Triple;

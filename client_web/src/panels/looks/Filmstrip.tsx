@@ -1,4 +1,4 @@
-/** Saved looks, and the steps of this visit: click one to return to it. */
+/** Saved looks, and the history steps of this session: click one to return to it. */
 import { useEffect, useRef } from "preact/hooks";
 import { isDeepEqual } from "../../state/document/difference";
 import { previewedStep, replaceLook } from "../../edit/edit";
@@ -42,7 +42,7 @@ function TileImage({ image, text }: { image: string | null; text: string }) {
   return image === null ? <span class="blank">{text.slice(0, 2)}</span> : <img src={image} alt="" draggable={false} />;
 }
 
-/** Take a saved look over; for one who only looks the session begins again with it. */
+/** Apply a saved look; for a read-only user, a new session starts with it. */
 function showSaved(name: string, fullLook: Look): void {
   const [openScene, current] = [scene.value, bake.value];
   if (mayEdit.value || openScene === null || current === null) return replaceLook(`Show ${name}`, fullLook);
@@ -68,15 +68,15 @@ function SavedTile({ saved }: { saved: SavedLook }) {
       <span class="tile-actions">
         <button
           class="icon"
-          title={`Compare with ${saved.name}: keep it as A`}
-          aria-label={`Keep ${saved.name} as A`}
+          title={`Compare: store ${saved.name} as A`}
+          aria-label={`Store ${saved.name} as A`}
           onClick={() => void storeLookAsA(fullLook, saved.name)}
         >
           A
         </button>
         <IconButton
           icon="save"
-          label={`Save the live look over ${saved.name}`}
+          label={`Overwrite ${saved.name} with the current look`}
           disabled={isDisplayed || !mayEdit.value}
           onClick={() => look.value && void updateLook(saved, look.value)}
         />
@@ -87,7 +87,7 @@ function SavedTile({ saved }: { saved: SavedLook }) {
   );
 }
 
-/** A look that came with the scene's file: to show, to compare with, not to change. */
+/** A variant from the scene's file: can be shown and compared, not changed. */
 function VariantTile({ name, partial }: { name: string; partial: Partial<Look> }) {
   thumbnailRevision.value;
   const fullLook = completeLook(partial);
@@ -106,14 +106,14 @@ function VariantTile({ name, partial }: { name: string; partial: Partial<Look> }
       <span class="tile-actions">
         <button
           class="icon"
-          title={`Compare with ${name}: keep it as A`}
-          aria-label={`Keep ${name} as A`}
+          title={`Compare: store ${name} as A`}
+          aria-label={`Store ${name} as A`}
           onClick={() => void storeLookAsA(fullLook, name)}
         >
           A
         </button>
       </span>
-      <span class="tile-name" title={`${name}, a variant of the scene's file`}>
+      <span class="tile-name" title={`${name}, a variant from the scene file`}>
         {name}
       </span>
     </li>
@@ -126,7 +126,7 @@ function SceneVariants() {
   return (
     <>
       <h2>Variants</h2>
-      <ul class="tiles saved" aria-label="Variants of the scene">
+      <ul class="tiles saved" aria-label="Scene variants">
         {variants.map(({ name, look: partial }) => (
           <VariantTile key={name} name={name} partial={partial as Partial<Look>} />
         ))}
@@ -135,7 +135,7 @@ function SceneVariants() {
   );
 }
 
-/** What was edited on a line of its own, so that a long name leaves room for what was done. */
+/** A step's label with the object on its own line, so that a long name leaves room for the action. */
 function StepLabel({ label }: { label: string }) {
   const { subject, action } = splitStepLabel(label);
   return (
@@ -170,20 +170,20 @@ function HistorySteps() {
   const showCurrent = () => strip.current?.querySelector(".shown")?.scrollIntoView({ block: "nearest", inline: "nearest" });
   useEffect(showCurrent, [history.cursor.value, steps.length]);
   useEffect(() => {
-    const observer = new ResizeObserver(showCurrent); // saved looks and variants that arrive take room from it
+    const observer = new ResizeObserver(showCurrent); // loading saved looks and variants shrinks the strip
     observer.observe(strip.current as Element);
     return () => observer.disconnect();
   }, []);
   const first = Math.max(0, steps.length - MAX_STEPS);
   const opened = steps.find((step) => step.kind === "look")?.before ?? previewedStep.value?.before ?? look.value ?? undefined;
-  // steps that are not of the look (one was deleted) show the image before them
+  // steps without a look, such as a deletion, show the previous image
   let last = opened;
   const tiles = steps.map((step, i) => {
     if (step.kind === "look") last = step.after;
     return { count: i + 1, label: step.label, look: last };
   });
   return (
-    <ul class="tiles" ref={strip} aria-label="Steps of this visit">
+    <ul class="tiles" ref={strip} aria-label="History">
       {first === 0 && <StepTile count={0} label="Opened" look={opened} />}
       {tiles.slice(first).map((tile) => (
         <StepTile key={tile.count} {...tile} />
@@ -201,7 +201,7 @@ export function Filmstrip() {
         class="save"
         onClick={() => void saveLook()}
         disabled={look.value === null || !mayEdit.value}
-        title="Save the live look (Ctrl+S)"
+        title="Save the current look (Ctrl+S)"
       >
         <Icon name="plus" />
         Save look
@@ -211,10 +211,10 @@ export function Filmstrip() {
         disabled={!mayEdit.value}
         aria-expanded={timelineOpen.value}
         onClick={() => (timelineOpen.value = !timelineOpen.value)}
-        title="Play looks one after another, and render what lies between (M)"
+        title="Play and render transitions between looks (M)"
       >
         <Icon name="film" />
-        Time line
+        Timeline
       </button>
       {defaultLook.value !== null && savedLooks.value.length > 0 && (
         <ul class="tiles saved" aria-label="Saved looks">

@@ -23,10 +23,10 @@ import { addLook, unusedName } from "./savedLooks";
 /** The look whose image is stored as A, its label, and its cameras. */
 export const sideA = signal<{ look: Look; label: string; cameras: CameraSet } | null>(null);
 
-/** The look that was saved last, while its name waits to be typed over. */
+/** The look just saved, while its name is being edited. */
 export const justSaved = signal<string | null>(null);
 
-/** Missing parts of a saved look are the scene's own. */
+/** A full look: missing parts of a saved look come from the scene. */
 export function completeLook(partial: Partial<Look>): Look {
   const base = defaultLook.value as Look;
   return {
@@ -48,10 +48,10 @@ export function storeA(): void {
   if (look.value === null || !stage.active.hasPixels) return;
   sideA.value = { look: look.value, label: "kept", cameras: currentCameras() };
   stage.storeReference();
-  showNote("This picture is A now. W wipes between A and B, the live picture; C shows A while it is held.");
+  showNote("Stored as A. W: wipe, hold C: show A.");
 }
 
-/** Keep the image of another look as A; it is fetched from the server. */
+/** Store the image of another look as A, rendered by the server. */
 export async function storeLookAsA(storedLook: Look, label: string): Promise<void> {
   await reportErrors(async () => {
     await withViews(storedLook, () => stage.storeReference());
@@ -59,15 +59,14 @@ export async function storeLookAsA(storedLook: Look, label: string): Promise<voi
   });
 }
 
-/** The live image becomes A, and A becomes live, with its cameras. It is a way to compare, so it takes no undone
- * steps away. */
+/** Swap A and the live look, with their cameras. Undone steps are kept, since this only compares. */
 export function swapWithA(): void {
   const [a, live] = [sideA.value, look.value];
   if (a === null || live === null) return;
   const cameras = currentCameras();
   stage.storeReference();
   if (!isDeepEqual(live, a.look) && history.commitUndone())
-    showNote("What you had undone is kept in the history, before the swap.");
+    showNote("Your redo steps are kept in the history.");
   replaceLook("Swap A and B", a.look);
   applyCameras(a.cameras);
   sideA.value = { look: live, label: "swapped", cameras };
@@ -85,20 +84,20 @@ export async function saveLook(): Promise<void> {
   if (name === undefined) return;
   filmstripOpen.value = true;
   justSaved.value = name;
-  await addLook(name, current, image); // without one it gets its own when it is shown whole
+  await addLook(name, current, image); // without an image, the thumbnail is taken when the look is shown exactly
 }
 
-// until another image is stored, A is the one the scene opened with
+// by default, A is the look that the scene opened with
 let openedScene: string | null = null;
 effect(() => {
   const id = scene.value?.id ?? null;
   if (!isFrameExact.value || id === null || id === openedScene) return;
   openedScene = id;
-  sideA.value = { look: look.peek() as Look, label: "as opened", cameras: currentCameras() };
+  sideA.value = { look: look.peek() as Look, label: "original", cameras: currentCameras() };
   stage.storeReference();
 });
 
-// a view that was not shown when A was stored has no image of it yet
+// a view that was hidden when A was stored has no image of A yet
 effect(() => {
   const a = sideA.value;
   const isCompared = wipe.value.isOn || isReferenceShown.value;

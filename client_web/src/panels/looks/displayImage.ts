@@ -1,4 +1,4 @@
-/** Images made on the client from what it holds: thumbnails and PNG export. Same tone map as the canvas. */
+/** Images made on the client: thumbnails and PNG export. Same tone mapping as the canvas. */
 import { decodeRgb9e5 } from "../../render/color/rgb9e5";
 import { toDisplay } from "../../render/color/tonemap";
 import type { PixelBuffer } from "../../render/pixels";
@@ -15,7 +15,7 @@ function writePixel(image: ImageData, index: number, radiance: Rgb, display: Dis
   image.data.set([...displayColor.map((v) => Math.round(255 * v)), alpha], 4 * index);
 }
 
-/** The whole image as it is displayed. `alpha`: of each pixel, whose light it has been multiplied by; null: 255. */
+/** The whole image as displayed. `alpha`: coverage per pixel, premultiplied into the radiance; null: opaque. */
 export function renderDisplay(pixels: PixelBuffer, alpha: Uint8Array | null, display: Display): ImageData {
   const image = new ImageData(pixels.width, pixels.height);
   pixels.encoded.forEach((word, i) => {
@@ -26,7 +26,7 @@ export function renderDisplay(pixels: PixelBuffer, alpha: Uint8Array | null, dis
   return image;
 }
 
-/** Mean of a few samples spread over a thumbnail's pixel. */
+/** Mean of a few samples of a thumbnail's pixel. */
 function boxSample(pixels: PixelBuffer, x: number, y: number, step: number): Rgb {
   const sum: Rgb = [0, 0, 0];
   for (let i = 0; i < TAPS * TAPS; i++) {
@@ -54,15 +54,15 @@ export function renderThumbnail(pixels: PixelBuffer, display: Display, width = T
   return toCanvas(image).toDataURL("image/jpeg", 0.85);
 }
 
-/** The first chunk of a PNG, which is always its header, ends here. */
+/** End of a PNG's first chunk, its header. */
 const HEADER_END = 33;
-/** A chunk "sRGB" with its checksum: the colors are sRGB, to be shown perceptually. */
+/** An "sRGB" chunk with its checksum: sRGB colors, perceptual rendering intent. */
 const SRGB_CHUNK = new Uint8Array([0, 0, 0, 1, 0x73, 0x52, 0x47, 0x42, 0, 0xae, 0xce, 0x1c, 0xe9]);
 
-/** Whether what is displayed is meant for sRGB screens: all but views of other displays. */
+/** True if the displayed image is sRGB: all tone maps except views of other displays. */
 const isSrgb = ({ tone_map }: Display): boolean => typeof tone_map === "string" || tone_map.display.includes("sRGB");
 
-/** A PNG that says that its colors are sRGB. */
+/** The PNG tagged as sRGB. */
 export function addSrgbChunk(png: Blob): Blob {
   return new Blob([png.slice(0, HEADER_END), SRGB_CHUNK, png.slice(HEADER_END)], { type: png.type });
 }
@@ -70,6 +70,6 @@ export function addSrgbChunk(png: Blob): Blob {
 export async function encodePng(pixels: PixelBuffer, alpha: Uint8Array | null, display: Display): Promise<Blob> {
   const canvas = toCanvas(renderDisplay(pixels, alpha, display));
   const png = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve, "image/png"));
-  if (png === null) throw new Error("The picture could not be written as PNG.");
+  if (png === null) throw new Error("The browser could not write the picture as PNG. Try again.");
   return isSrgb(display) ? addSrgbChunk(png) : png;
 }

@@ -1,5 +1,5 @@
-/** Export: PNG as displayed, made here; EXR in linear radiance and turntables, rendered by the server. All are of the light
- * that is shown: one source alone, or some of its paths. */
+/** Export: PNG as displayed, made on the client; EXR in linear radiance and turntables, rendered by the server. All
+ * respect solo lights and light-path filters. */
 import { signal } from "@preact/signals";
 import { freeCameraOf } from "../../viewport/cameras/freeCamera";
 import type { CameraPose } from "../../viewport/cameras/orbit";
@@ -19,11 +19,10 @@ import { reportErrors } from "../../ui/toasts";
 import { encodePng } from "./displayImage";
 import { download, renderAndSave } from "./renderJob";
 
-/** As many characters as the server leaves of a name. */
+/** The server's limit of a file name's length. */
 const LONGEST_STEM = 120;
 
-/** What an image's file is called, without what it ends with: the scene, the view, what it is where it is no single image
- * (a turntable), which light is missing, and which color space it is in. */
+/** File name without extension: scene, view, kind (such as a turntable), active light filters, and color space. */
 export function fileStem(kind = "", space = ""): string {
   const limits = lightFilters.value.map((limit) => limit.label);
   const nameParts = [scene.value?.name ?? "picture", activeViewName.value, kind, ...limits, space].join(" ").trim();
@@ -42,16 +41,16 @@ export async function exportPng(): Promise<void> {
   });
 }
 
-/** Pose of the focused view, if its camera is free. */
+/** Pose of the active view, if its camera is free. */
 export const currentPose = (): CameraPose | null => freeCameraOf(activeViewName.peek())?.pose ?? null;
 
-/** Image size of the focused view, if its camera is free. */
+/** Image size of the active view, if its camera is free. */
 export function currentSize(): [number, number] | null {
   const freeCamera = freeCameraOf(activeViewName.peek());
   return freeCamera === null ? null : limitRenderSize(...freeCamera.size);
 }
 
-/** Have the server render the visible look, or others in the same light; `fetchFrom` is the file of the finished batch. */
+/** Render the visible look, or other looks with the same filters, on the server; `fetchFrom`: the result's file. */
 export async function startExport(exportName: string, fetchFrom: string, more: Pick<RenderRequest, "format"> & Partial<RenderRequest>) {
   const [id, current] = [bake.value, look.value];
   if (id === null || current === null) return;
@@ -62,7 +61,7 @@ export async function startExport(exportName: string, fetchFrom: string, more: P
 
 const KINDS = new Map<boolean | "light_groups", string>([[false, "flat"], ["light_groups", "light groups"]]);
 
-/** With layers: one for each light and each kind of light path, where there are several; or both of each light. */
+/** Export an EXR: flat, with one layer per light and per light path, or with direct and indirect light per light. */
 export function exportExr(layers: boolean | "light_groups"): Promise<void> {
   const pose = currentPose();
   return startExport("EXR", "frames/0", {
@@ -76,14 +75,14 @@ export function exportExr(layers: boolean | "light_groups"): Promise<void> {
 
 export const TURNTABLE_FRAMES = 72;
 
-/** Exact, or as while the camera moves. */
+/** Full quality, or approximate as while the camera moves. */
 export type RenderQuality = NonNullable<RenderRequest["quality"]>;
 
-/** What goes around in a turntable. */
+/** The rotating part of a turntable. */
 export type TurntableRotation = NonNullable<Turntable["rotate"]>;
 export const turntableRotation = signal<TurntableRotation>("camera");
 
-/** Once around, from where the camera is: numbered frames in a ZIP, or a video. `quality`: exact, or as while the camera moves. */
+/** Export a full rotation from the current camera: a PNG sequence in a ZIP, or a video. */
 export function exportTurntable(format: "png" | "mp4", quality: RenderQuality): Promise<void> {
   const path = { turntable: TURNTABLE_FRAMES, rotate: turntableRotation.value, start_camera: currentPose() };
   return startExport("turntable", format === "mp4" ? "video.mp4" : "archive.zip", { format, path, quality });

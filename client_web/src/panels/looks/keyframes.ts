@@ -1,4 +1,4 @@
-/** Keyframes of the timeline, stored for this tab. Their changes are steps of the history. */
+/** Keyframes of the timeline, stored in this tab. Their changes are history steps. */
 import { computed, effect, signal } from "@preact/signals";
 import { history, type Keyframe } from "../../edit/history";
 import type { LooksRequest } from "../../protocol";
@@ -10,16 +10,16 @@ export const [MIN_SECONDS, MAX_SECONDS] = [0.5, 20];
 
 export const keyframes = signal<readonly Keyframe[]>([]);
 export const seconds = signal(4);
-/** How materials go from one look to the next. */
+/** Interpolation of materials between looks. */
 export const interpolation = signal<NonNullable<LooksRequest["interpolation"]>>("parameters");
 export const isLooping = signal(true);
-/** What moves during playback: nothing; the camera, once around from the first look's pose, or from key to key; or, before a
- * camera that stays, the object or the environment, once around. */
+/** Motion during playback: none; the camera, once around or through the keyframes; or, with a fixed camera, the object or
+ * the environment, once around. */
 export type CameraPathMode = "still" | "around" | "along" | "object" | "environment";
 export const cameraPathMode = signal<CameraPathMode>("still");
-/** What can move in the focused view: with a fixed camera the environment alone. */
+/** The motion possible in the active view: with a fixed camera, only of the environment. */
 export const currentPath = computed<CameraPathMode>(() => (hasFreeCamera.value || cameraPathMode.value === "environment" ? cameraPathMode.value : "still"));
-/** How many looks there is something to play of. */
+/** Minimum number of looks for playback. */
 export const fewestKeyframes = computed(() => (currentPath.value === "still" || currentPath.value === "along" ? 2 : 1));
 
 function replaceKeyframes(label: string, after: readonly Keyframe[]): void {
@@ -30,28 +30,28 @@ function replaceKeyframes(label: string, after: readonly Keyframe[]): void {
 }
 
 export function addKeyframe(keyframe: Keyframe): void {
-  if (keyframes.peek().length < MAX_KEYFRAMES) replaceKeyframes(`${keyframe.name} to the time line`, [...keyframes.peek(), keyframe]);
+  if (keyframes.peek().length < MAX_KEYFRAMES) replaceKeyframes(`Add ${keyframe.name} to timeline`, [...keyframes.peek(), keyframe]);
 }
 
 export function removeKeyframe(index: number): void {
   const name = keyframes.peek()[index]?.name ?? "";
-  replaceKeyframes(`${name} off the time line`, keyframes.peek().toSpliced(index, 1));
+  replaceKeyframes(`Remove ${name} from timeline`, keyframes.peek().toSpliced(index, 1));
 }
 
 /** Move a keyframe by one position. */
 export function moveKeyframe(index: number, offset: -1 | 1): void {
   const [moved, to] = [keyframes.peek()[index], index + offset];
   if (moved === undefined || to < 0 || to >= keyframes.peek().length) return;
-  replaceKeyframes(`${moved.name} ${offset < 0 ? "earlier" : "later"}`, keyframes.peek().toSpliced(index, 1).toSpliced(to, 0, moved));
+  replaceKeyframes(`Move ${moved.name} ${offset < 0 ? "earlier" : "later"}`, keyframes.peek().toSpliced(index, 1).toSpliced(to, 0, moved));
 }
 
-/** See one from somewhere else on a way from key to key. */
+/** Change a keyframe's camera on the camera path. */
 export function setKeyframeCamera(index: number, camera: NonNullable<Keyframe["camera"]>): void {
   const moved = keyframes.peek()[index];
-  if (moved !== undefined) replaceKeyframes(`${moved.name} from elsewhere`, keyframes.peek().with(index, { ...moved, camera }));
+  if (moved !== undefined) replaceKeyframes(`Camera of ${moved.name}`, keyframes.peek().with(index, { ...moved, camera }));
 }
 
-/** A name for a look that has none. */
+/** A name for an unsaved look. */
 export function nextKeyframeName(): string {
   const usedNames = new Set(keyframes.peek().map(({ name }) => name));
   let number = keyframes.peek().length + 1;
@@ -73,7 +73,7 @@ function loadTimeline(id: string): void {
   try {
     stored = JSON.parse(sessionStorage.getItem(storageKey(id)) ?? "null") as StoredTimeline | null;
   } catch {
-    // forbidden or not ours: the timeline is empty
+    // storage is forbidden or invalid: the timeline is empty
   }
   keyframes.value = stored?.keyframes ?? [];
   seconds.value = stored?.seconds ?? 4;
@@ -81,7 +81,7 @@ function loadTimeline(id: string): void {
   cameraPathMode.value = stored?.cameraPath ?? "still";
 }
 
-/** Keep the timeline of each scene for a reload. */
+/** Store the timeline of each scene for a reload. */
 export function trackTimeline(): void {
   let displayedScene: string | null = null;
   effect(() => {
@@ -97,7 +97,7 @@ export function trackTimeline(): void {
     try {
       sessionStorage.setItem(storageKey(id), JSON.stringify(stored));
     } catch {
-      // storage is full or forbidden: a reload then begins with an empty time line
+      // storage is full or forbidden: a reload starts with an empty timeline
     }
   });
 }

@@ -1,11 +1,10 @@
-/** Thumbnails of looks that have names: of saved ones on the server, for everybody; of variants of a scene's file in this
- * browser. */
+/** Thumbnails of named looks: of saved looks on the server, for all users; of scene variants in this browser. */
 import { signal } from "@preact/signals";
 import { json, request } from "../../session/net/api";
 import { mayEdit } from "../../state/sessionUser";
 import { scene } from "../../state/scene";
 
-/** By version of a saved look, which is a hash of what it says: an address of the server, or a data URL. */
+/** Per version (content hash) of a saved look: a URL of the server, or a data URL. */
 const thumbnailsByVersion = signal<ReadonlyMap<string, string>>(new Map());
 
 export function thumbnailOf(etag: string): string | null {
@@ -16,7 +15,7 @@ export function cacheThumbnail(etag: string, image: string): void {
   thumbnailsByVersion.value = new Map([...thumbnailsByVersion.peek(), [etag, image]]);
 }
 
-/** The thumbnail as a data URL, which outlives the look's name. */
+/** The thumbnail as a data URL, which survives the look's deletion. */
 export async function fetchThumbnail(etag: string): Promise<void> {
   const image = thumbnailOf(etag);
   if (image === null || image.startsWith("data:")) return;
@@ -24,14 +23,14 @@ export async function fetchThumbnail(etag: string): Promise<void> {
   cacheThumbnail(etag, `data:image/webp;base64,${btoa(String.fromCharCode(...bytes))}`);
 }
 
-/** Give everybody the thumbnail of a saved look; the tab has it in any case. */
+/** Upload the thumbnail of a saved look for all users; this tab has it in any case. */
 export async function uploadThumbnail(path: string, etag: string): Promise<void> {
   try {
     await fetchThumbnail(etag);
     const base64 = thumbnailOf(etag);
     if (base64 !== null && mayEdit.peek()) await request(`${path}/thumbnail`, json("PUT", { picture: base64 }, { "If-Match": etag }));
   } catch {
-    // the look was changed meanwhile, or the server is away: whoever shows it next sends one
+    // the look has changed or the server is unreachable: the next client to show it uploads one
   }
 }
 
@@ -45,6 +44,6 @@ export function storeVariantThumbnail(name: string, image: string): void {
   try {
     localStorage.setItem(variantKey(name), image);
   } catch {
-    // the strip then shows the name alone
+    // the filmstrip then shows only the name
   }
 }

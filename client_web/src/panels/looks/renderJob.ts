@@ -1,5 +1,4 @@
-/** The batch that the server renders for this tab, one at a time: followed to its end, over reloads of the page and while
- * the server is away, and then saved. */
+/** The render job of this tab, one at a time: polled to its end, over page reloads and server restarts, then downloaded. */
 import { signal } from "@preact/signals";
 import { deleteRender, getRender, problemText, startRender, nullIfUnavailable } from "../../session/net/api";
 import type { RenderBody, RenderRequest } from "../../protocol";
@@ -10,14 +9,14 @@ import { reportErrors, showNote } from "../../ui/toasts";
 const POLL_MS = 300;
 const KEY = "relume.rendering";
 
-/** `fetchFrom`: the file of the finished batch. */
+/** `fetchFrom`: the file of the finished job. */
 interface ExportJob {
   id: string;
   exportName: string;
   fetchFrom: string;
 }
 
-/** What the server renders now: how far it is, and a way to stop it, once it has begun. */
+/** The running export: its progress, and a way to stop it once it has started. */
 export const exporting = signal<{ exportName: string; progress: number; secondsLeft: number | null; stop: (() => void) | null } | null>(null);
 
 export function exportText({ exportName, progress, secondsLeft }: NonNullable<typeof exporting.value>): string {
@@ -32,7 +31,7 @@ export function download(href: string, name: string): void {
   link.click();
 }
 
-/** Its last state; null where it was stopped on the way. */
+/** The job's final state; null if it was stopped. */
 async function finishRendering({ id, exportName }: ExportJob): Promise<RenderBody | null> {
   let isStopped = false;
   const stop = () => {
@@ -56,17 +55,17 @@ function clearExport(): void {
   saveInTab(KEY, null);
 }
 
-/** Follow it to its end, and save it. */
+/** Poll the job to its end and download the result. */
 async function pollRendering(rendering: ExportJob): Promise<void> {
   const { id, exportName, fetchFrom } = rendering;
   const state = await finishRendering(rendering);
-  if (state === null) return; // another one may have begun since
-  if (state.state === "failed") throw new Error(`The ${exportName} could not be rendered: ${problemText(state.problem)}`);
+  if (state === null) return; // another job may have started since
+  if (state.state === "failed") throw new Error(`${exportName} export failed: ${problemText(state.problem)}`);
   clearExport();
   download(`/api/renders/${encodeURIComponent(id)}/${fetchFrom}`, "");
 }
 
-/** Do `work` while nothing else is exported; a failure is shown. */
+/** Run `work` unless another export is running; report errors. */
 async function runExport(exportName: string, work: () => Promise<void>): Promise<void> {
   exporting.value = { exportName, progress: 0, secondsLeft: null, stop: null };
   await reportErrors(async () => {
@@ -79,18 +78,18 @@ async function runExport(exportName: string, work: () => Promise<void>): Promise
   });
 }
 
-/** Have a batch rendered and saved, unless one is running; `light` says which is missing. */
+/** Render and download a job, unless one is running; `light`: text of the active filters. */
 export async function renderAndSave(exportName: string, fetchFrom: string, request: RenderRequest, light: string): Promise<void> {
   if (exporting.peek() !== null) return;
   await runExport(exportName, async () => {
-    showNote(`Rendering the ${exportName} on the server${light}…`);
+    showNote(`Rendering ${exportName}${light}…`);
     const { id } = await startRender(request);
     saveInTab(KEY, { id, exportName, fetchFrom });
     await pollRendering({ id, exportName, fetchFrom });
   });
 }
 
-/** Go on with what the page was following when it was reloaded. */
+/** Resume the job that was running before a reload. */
 export async function resumeRendering(): Promise<void> {
   const stored = loadFromTab<ExportJob>(KEY);
   if (stored !== null && exporting.peek() === null) await runExport(stored.exportName, () => pollRendering(stored));

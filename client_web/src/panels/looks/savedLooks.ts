@@ -1,4 +1,4 @@
-/** Saved looks on the server, each with its version; saving and deleting can be undone. */
+/** Saved looks on the server, with versions; saving and deleting can be undone. */
 import { signal } from "@preact/signals";
 import { history } from "../../edit/history";
 import type { NamedLook } from "../../edit/history";
@@ -18,7 +18,7 @@ export interface SavedLook extends NamedLook {
 export const savedLooks = signal<SavedLook[]>([]);
 const MAX_READ = 60;
 const path = (name: string) => `/api/looks/${encodeURIComponent(name)}`;
-/** Whether a look speaks only of what this scene has, or can be given. */
+/** True if the look only refers to materials and lights of this scene, or to ones it can have. */
 function fitsScene(look: Partial<Look>): boolean {
   const materialNames = new Set(scene.value?.materials.map((material) => material.name));
   const lightNames = new Set(scene.value?.lights);
@@ -34,7 +34,7 @@ async function readSavedLook({ name, etag, created, thumbnail }: LookEntry): Pro
   return { name, etag: response.headers.get("etag") ?? etag, created, look: (await response.json()) as Partial<Look> };
 }
 
-/** In the order in which they were saved first: times of the server, all written alike. */
+/** Sorted by the time of their first save, as formatted by the server. */
 function sortByCreation(looks: SavedLook[]): SavedLook[] {
   return looks.sort((a, b) => (a.created < b.created ? -1 : Number(a.created > b.created)));
 }
@@ -48,7 +48,7 @@ export async function refreshSavedLooks(): Promise<void> {
   });
 }
 
-/** A name that no look has: looks of other scenes, which are not shown, have names too. */
+/** An unused name, also among looks of other scenes, which are not listed. */
 export async function unusedName(): Promise<string> {
   const entries = (await (await request("/api/looks")).json()) as LookEntry[];
   return nextName(
@@ -59,11 +59,11 @@ export async function unusedName(): Promise<string> {
 
 function reportConflict(error: unknown, name: string, isNew = false): never {
   if (isNew && error instanceof ApiError && error.status === 412)
-    throw new Error(`There is a look called “${name}” already, perhaps of another scene. Choose another name.`);
+    throw new Error(`A look named “${name}” already exists, perhaps in another scene. Choose another name.`);
   if (error instanceof ApiError && (error.status === 412 || error.status === 428)) {
     void refreshSavedLooks();
     throw new Error(
-      `“${name}” was changed elsewhere meanwhile. Nothing was overwritten; look at the new version first.`,
+      `“${name}” was changed elsewhere. Nothing was overwritten; check the new version first.`,
     );
   }
   throw error;
@@ -89,41 +89,41 @@ async function writeLook({ name, look, created }: NamedLook, etag: string | null
 
 async function eraseLook(name: string): Promise<void> {
   const etag = etagOf(name) ?? "*";
-  await fetchThumbnail(etag).catch(() => undefined); // it goes with the look, which may come back
+  await fetchThumbnail(etag).catch(() => undefined); // kept for undoing the deletion
   await request(path(name), { method: "DELETE", headers: { "If-Match": etag } }).catch((error: unknown) =>
     reportConflict(error, name),
   );
   savedLooks.value = savedLooks.value.filter((entry) => entry.name !== name);
 }
 
-/** Replace a saved look by another; null for none. `image`: its thumbnail, where it has one. */
+/** Replace a saved look by another; null: none. `image`: its thumbnail, if any. */
 export async function exchangeSavedLook(from: NamedLook | null, to: NamedLook | null, image: string | null = null): Promise<void> {
   if (to !== null) await writeLook({ created: from?.created, ...to }, from?.name === to.name ? etagOf(to.name) : null, image);
   if (from !== null && from.name !== to?.name) await eraseLook(from.name);
 }
 
-/** Give a saved look a thumbnail. */
+/** Set a saved look's thumbnail. */
 export function attachSavedThumbnail({ name, etag }: SavedLook, image: string): void {
   cacheThumbnail(etag, image);
   void uploadThumbnail(path(name), etag);
 }
 
-/** The pending change of the saved looks, and those that wait for it. */
+/** The pending change of the saved looks, followed by queued ones. */
 let pendingChange: Promise<void> | null = null;
 
-/** When no change is under way: each is a step of the history then. Null where none is. */
+/** Resolves when all changes are done and in the history; null without pending changes. */
 export const whenSaved = (): Promise<void> | null => pendingChange;
 
 async function runChange(label: string, before: NamedLook | null, to: NamedLook | null, image: string | null): Promise<void> {
   await reportErrors(async () => {
     await exchangeSavedLook(before, to, image);
     const saved = savedLooks.value.find(({ name }) => name === to?.name);
-    history.record({ kind: "shelf", label, before, after: saved === undefined ? to : toNamedLook(saved) });
+    history.record({ kind: "savedLook", label, before, after: saved === undefined ? to : toNamedLook(saved) });
     history.endGesture();
   });
 }
 
-/** Change the saved looks after the previous changes: an undo in between would undo the step before. */
+/** Change the saved looks after the pending changes: an undo in between would undo an earlier step. */
 async function queueChange(
   label: string,
   previous: NamedLook | null,

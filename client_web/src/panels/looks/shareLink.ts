@@ -1,4 +1,4 @@
-/** Links that carry the look: saved on the server, never changed, opened as a step that can be undone. */
+/** Share links: the look is stored on the server, immutable, and opened as an undoable step. */
 import { effect, signal } from "@preact/signals";
 import { moveFreeCamera, currentCameras } from "../../viewport/cameras/freeCamera";
 import { replaceLook } from "../../edit/edit";
@@ -15,13 +15,13 @@ import { mayEdit, joinTarget } from "../../state/sessionUser";
 import { shownViews, activeViewName, views } from "../../state/views";
 import { reportErrors, showNote } from "../../ui/toasts";
 
-/** A link that the browser did not let us copy: it is shown to be copied by hand. */
+/** A link that the browser did not let us copy, shown for copying by hand. */
 export const linkToCopy = signal<string | null>(null);
 
-/** Save the visible state. */
+/** Store the visible state on the server. */
 export async function createShareLink(): Promise<ShareEntry> {
   const [id, current] = [bake.value, look.value];
-  if (id === null || current === null) throw new Error("There is no picture to share yet.");
+  if (id === null || current === null) throw new Error("Nothing to share yet. Wait for the first picture.");
   const { poses, sizes } = currentCameras();
   return createShare({
     bake: id,
@@ -36,13 +36,13 @@ export async function createShareLink(): Promise<ShareEntry> {
   });
 }
 
-/** Save the visible state and copy the link to it. */
+/** Store the visible state and copy its link. */
 export async function copyShareLink(): Promise<void> {
   await reportErrors(async () => {
     const link = new URL((await createShareLink()).url, location.href).href;
     try {
       await navigator.clipboard.writeText(link);
-      showNote("The link is copied. It shows this picture as it is now, whatever you change later.");
+      showNote("Link copied. It always shows this version.");
     } catch {
       linkToCopy.value = link;
     }
@@ -55,7 +55,7 @@ function urlStateOf(shared: ShareBody, room: string | null, watch: string | null
   return { scene: shared.scene, bake: shared.bake, view: shared.view, sideBySide, ...nothing, room, watch, share: shared.id };
 }
 
-/** Apply a shared state: the look is a step, which undo takes back to the user's own. */
+/** Apply a shared state: the look is a step, which undo reverts. */
 function applySharedState(shared: ShareBody): void {
   replaceLook("Shared look", shared.look);
   history.endGesture();
@@ -64,7 +64,7 @@ function applySharedState(shared: ShareBody): void {
   pathOverride.value = shared.paths;
 }
 
-/** See the views from where they were shared, once they are there: the look is, before. */
+/** Apply the shared cameras once the views exist, which is after the look. */
 function applySharedCameras({ cameras: poses, sizes }: ShareBody): void {
   let waits = true;
   const stop = effect(() => {
@@ -77,7 +77,7 @@ function applySharedCameras({ cameras: poses, sizes }: ShareBody): void {
   });
 }
 
-/** Open what a link carries. In a room that it names it is what the room begins with. */
+/** Open a link's shared state. If the link names a room, it is the room's initial state. */
 export async function openShare(id: string, { room, watch }: Pick<UrlState, "room" | "watch">): Promise<void> {
   await reportErrors(async () => {
     const shared = await getShare(id);
@@ -90,6 +90,6 @@ export async function openShare(id: string, { room, watch }: Pick<UrlState, "roo
     };
     await openScene(shared.scene, urlStateOf(shared, room, watch), undefined, isFromServer);
     if (bakes.value.every((bake) => bake.id !== shared.bake || bake.state !== "ready"))
-      showNote("The bake of this link is gone. Its look is shown in another bake of the scene.");
+      showNote("This link's bake was deleted. Its look is shown in another bake of the scene.");
   });
 }

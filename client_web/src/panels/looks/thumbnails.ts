@@ -1,5 +1,4 @@
-/** Thumbnails of the looks that were shown: of the image when input pauses, and again when it is exact; of a
- * step that is left before, as it is then. */
+/** Thumbnails of shown looks: taken when input pauses, again when the image is exact, and when a step is left earlier. */
 import { effect, untracked } from "@preact/signals";
 import { isDeepEqual } from "../../state/document/difference";
 import { history, type LookStep, type Step } from "../../edit/history";
@@ -21,11 +20,11 @@ import { attachSavedThumbnail, savedLooks } from "./savedLooks";
 
 const IDLE_MS = 350;
 const IDLE_INEXACT_MS = 700;
-/** Looks whose thumbnail is not of their exact image. */
+/** Looks whose thumbnail shows an approximate image. */
 const inexact = new WeakSet<Look>();
 let timer = 0;
 
-/** A saved look without an image, or a variant of the scene's file, gets one when it is shown here. */
+/** Set the thumbnail of a saved look or scene variant that has none, when it is shown. */
 export function attachThumbnail(storedLook: Look, image: string): void {
   const isOf = (partial: unknown) => isDeepEqual(completeLook(partial as Partial<Look>), storedLook);
   for (const saved of savedLooks.peek()) if (thumbnailOf(saved.etag) === null && isOf(saved.look)) attachSavedThumbnail(saved, image);
@@ -36,7 +35,7 @@ export function attachThumbnail(storedLook: Look, image: string): void {
 
 function takeThumbnail(current: Look): void {
   if (look.peek() !== current || isDisplayFrozen.peek() || isLookFiltered() || !stage.active.hasPixels) return;
-  // while there is no connection, what is shown is of the step before
+  // without a connection, the image is of the previous step
   if (connection.peek() !== "open" || !isUpToDate()) return;
   const image = renderThumbnail(stage.active.pixels, current.display);
   storeThumbnail(current, image);
@@ -47,7 +46,7 @@ function takeThumbnail(current: Look): void {
   thumbnailRevision.value += 1;
 }
 
-/** The look that a history has come to, as far as its steps say. */
+/** The look at the history's cursor, if its steps contain it. */
 function currentStep(): Look | null {
   const [steps, cursor] = [history.steps.value, history.cursor.value];
   const isCurrentLook = (step: Step) => step.kind === "look";
@@ -57,7 +56,7 @@ function currentStep(): Look | null {
 
 const isStepLook = (candidate: Look) => history.steps.peek().some((step) => step.before === candidate || step.after === candidate);
 
-/** What the screen shows when a step is left is its image, if it has had none: input may be quicker than shading. */
+/** Take a step's thumbnail when it is left, if it has none: input may be faster than shading. */
 function takePreviousThumbnail(left: Look): void {
   if (hasThumbnail(left) || isDisplayFrozen.peek() || !stage.active.hasPixels) return;
   const pixels = copyPixels(stage.active.pixels);
@@ -69,13 +68,13 @@ function takePreviousThumbnail(left: Look): void {
   });
 }
 
-/** Take thumbnails from now on, only when input pauses: one must never cost a frame. */
+/** Take thumbnails from now on, only when input pauses, so that they never cost a frame. */
 export function trackThumbnails(): void {
   let previous: Look | null = null;
   effect(() => {
     const [left, now] = [previous, currentStep()];
     previous = now;
-    // of a drag the looks on the way are of no step
+    // looks during a drag belong to no step
     if (left !== null && left !== now && isStepLook(left)) untracked(() => takePreviousThumbnail(left));
   });
   effect(() => {

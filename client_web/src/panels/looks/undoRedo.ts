@@ -1,4 +1,4 @@
-/** Undo and redo for buttons and keys: a step that cannot be undone now is reported, and stays. */
+/** Undo and redo for buttons and keys: a step that cannot be undone is reported and stays. */
 import { changeByPatch, changeToLook, type LookChange } from "../../state/document/jsonPatch";
 import { isDeepEqual } from "../../state/document/difference";
 import { getAt } from "../../state/document/pointer";
@@ -15,18 +15,18 @@ function reverseStep({ before, after, patch, inverse }: LookStep): LookChange {
   return { before: after, after: before, patch: inverse, inverse: patch };
 }
 
-/** Of a change what nobody else has come to since: each undoes their own edits. */
+/** The part of a change that nobody else has edited since: users undo only their own edits. */
 function isUnchangedSince(change: LookChange, step: LookStep, current: Look): LookChange {
   const patch = change.patch.filter(({ path }) => isDeepEqual(getAt(current, path), getAt(change.before, path)));
-  if (patch.length < change.patch.length) showNote(`Others have edited what “${step.label}” changed. That stays as they made it.`);
+  if (patch.length < change.patch.length) showNote(`“${step.label}” was changed by someone else; their version is kept.`);
   return changeByPatch(current, patch);
 }
 
-/** Make a change of the look that is there: where that is not what the change begins with, because the server refused
- * an edit in between, the way to its end is another. */
+/** Apply a change to the current look. If the look differs from the change's start, because the server rejected an edit
+ * in between, the patch is computed again. */
 function applyStep(step: Step, isUndo: boolean): void | Promise<void> {
   if (step.kind === "timeline") return void (keyframes.value = isUndo ? step.before : step.after);
-  if (step.kind === "shelf") return isUndo ? exchangeSavedLook(step.after, step.before) : exchangeSavedLook(step.before, step.after);
+  if (step.kind === "savedLook") return isUndo ? exchangeSavedLook(step.after, step.before) : exchangeSavedLook(step.before, step.after);
   const change = isUndo ? reverseStep(step) : step;
   const current = look.peek();
   if (isInRoom.peek() && current !== null) return applyChange(isUnchangedSince(change, step, current));
@@ -38,7 +38,7 @@ export function goToStep(count: number): void {
   void reportErrors(() => history.goTo(count, applyStep));
 }
 
-/** A look that is being saved, renamed or deleted is a step when that is done: the press refers to what was displayed by then. */
+/** Wait for a pending save, rename or deletion, which becomes a step when done, before undoing or redoing. */
 async function moveInHistory(offset: 1 | -1): Promise<void> {
   const pending = whenSaved();
   if (pending !== null) await pending;

@@ -1,4 +1,4 @@
-/** The background: the environment map, the map out of focus, a color, or nothing. */
+/** The background: the environment map, the blurred map, a color, or transparent. */
 import { editValue } from "../../edit/edit";
 import { RANGES } from "../../look.gen";
 import type { Background } from "../../protocol";
@@ -9,10 +9,10 @@ import { RadioRow, type RadioOption } from "../../ui/RadioRow";
 import { Section } from "../../ui/Section";
 
 const KINDS: readonly RadioOption<Background["kind"]>[] = [
-  { value: "map", label: "Map", title: "The environment, sharp" },
-  { value: "blurred", label: "Blurred", title: "The environment, out of focus" },
-  { value: "color", label: "Colour", title: "One colour" },
-  { value: "transparent", label: "None", title: "Nothing: PNG and EXR are transparent there" },
+  { value: "map", label: "HDRI", title: "The environment map, sharp" },
+  { value: "blurred", label: "Blurred", title: "The environment map, out of focus" },
+  { value: "color", label: "Color", title: "A single color" },
+  { value: "transparent", label: "Transparent", title: "PNG and EXR exports have an alpha channel" },
 ];
 
 function chooseBackground(kind: Background["kind"]): void {
@@ -41,14 +41,14 @@ export function BackgroundPanel() {
       )}
       {background.kind === "color" && (
         <LabeledColor
-          shortLabel="Colour"
-          label="Background colour"
+          shortLabel="Color"
+          label="Background color"
           value={background.color}
           initial={initial.color}
-          onChange={(value) => editValue("Background colour", "/background/color", value)}
+          onChange={(value) => editValue("Background color", "/background/color", value)}
         />
       )}
-      <p class="environment-words">Only what is seen behind the objects. The light on them stays.</p>
+      <p class="environment-text">Changes the background only, not the lighting.</p>
     </Section>
   );
 }

@@ -1,4 +1,4 @@
-/** Small images of environments to choose from: the scene's own first, then built-in ones, then imported ones. */
+/** Thumbnails of environments: the scene's original first, then built-in and imported ones. */
 import { useEffect, useRef } from "preact/hooks";
 import { bakedEnvironmentThumbnailUrl } from "../../session/net/api";
 import { bake } from "../../state/bakes";
@@ -9,14 +9,14 @@ import { chooseEnvironment, environments, importProgress, loadEnvironments, impo
 
 interface EnvironmentEntry {
   map: string | null;
-  /** Room is small: the whole name is its tooltip. */
+  /** May be truncated: the tooltip has the full name. */
   name: string;
   title: string;
   thumbnail: string;
 }
 
 function entriesOf(current: string): EnvironmentEntry[] {
-  const ownEntry = { map: null, name: "Own", title: "The scene’s own", thumbnail: bakedEnvironmentThumbnailUrl(current) };
+  const ownEntry = { map: null, name: "Original", title: "The scene’s original environment", thumbnail: bakedEnvironmentThumbnailUrl(current) };
   const importedEntries = environments.value.map(({ map, name, thumbnail }) => ({ map, name, title: name, thumbnail }));
   return [ownEntry, ...importedEntries];
 }
@@ -43,20 +43,20 @@ export function ImportEnvironment() {
     <>
       <input
         ref={input}
-        class="unseen"
+        class="hidden-input"
         type="file"
         tabIndex={-1}
         aria-label="Environment file"
         accept=".hdr,.exr"
         onChange={(event) => {
           const files = [...(event.currentTarget.files ?? [])];
-          event.currentTarget.value = ""; // the same file may be chosen again
+          event.currentTarget.value = ""; // allows choosing the same file again
           if (files.length > 0) void importEnvironmentFile(files);
         }}
       />
       <IconButton
         icon="plus"
-        label="Import an environment, .hdr or .exr; or drop one onto the picture"
+        label="Import HDRI (HDR or EXR); or drop one on the picture"
         disabled={importProgress.value !== null}
         onClick={() => input.current?.click()}
       />
@@ -86,9 +86,9 @@ export function EnvironmentGallery() {
           <EnvironmentTile key={entry.map} entry={entry} isSelected={k === selectedIndex} focusable={k === focusable} />
         ))}
       </div>
-      <div class="environment-words" role="status">
+      <div class="environment-text" role="status">
         {importProgress.value}
-        {map !== null && <p>Shadows were baked before this light was known: those of small lamps are approximate.</p>}
+        {map !== null && <p>This environment was added after baking, so shadows of small light sources are approximate.</p>}
       </div>
     </>
   );

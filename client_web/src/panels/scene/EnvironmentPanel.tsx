@@ -1,4 +1,4 @@
-/** The light around the scene: which one it is, how bright, which way it is turned, and its tint. */
+/** The environment: choice, brightness, rotation and tint. */
 import { useRef } from "preact/hooks";
 import { editValue } from "../../edit/edit";
 import { beginDrag } from "../../session/prepare";
@@ -12,31 +12,31 @@ import { EnvironmentGallery, ImportEnvironment } from "./EnvironmentGallery";
 import { imported, offerToDeleteEnvironment } from "./environments";
 
 function EnvironmentActions({ scale }: { scale: number }) {
-  /** How bright it was when it was switched off. */
+  /** Intensity when it was turned off. */
   const previousScale = useRef(1);
   const isOn = scale > 0;
   const toggle = () => {
     if (isOn) previousScale.current = scale;
-    editValue(isOn ? "Environment off" : "Environment on", "/environment/intensity", isOn ? 0 : previousScale.current);
+    editValue(isOn ? "Turn off environment" : "Turn on environment", "/environment/intensity", isOn ? 0 : previousScale.current);
   };
   return (
     <>
       <IconButton
-        icon="lamp"
-        label={`Environment: ${isOn ? "switch off" : "switch on"}`}
+        icon="light"
+        label={`Turn ${isOn ? "off" : "on"} environment`}
         pressed={isOn}
         onClick={toggle}
       />
       <IconButton
         icon="solo"
-        label="Environment alone"
+        label="Solo environment"
         pressed={soloLight.value === ENVIRONMENT_SOURCE}
         onClick={() => toggleLightSolo(ENVIRONMENT_SOURCE)}
       />
       {imported.value !== null && (
         <IconButton
           icon="trash"
-          label={`Delete the environment ${imported.value.name}`}
+          label={`Delete HDRI ${imported.value.name}`}
           onClick={() => imported.value && offerToDeleteEnvironment(imported.value)}
         />
       )}

@@ -1,4 +1,4 @@
-/** What is in the scene: materials to select, the lights and the light around them. */
+/** The scene's contents: materials, lights, environment, background and light paths. */
 import { useEffect } from "preact/hooks";
 import { toHex } from "../../render/color/colorMath";
 import { isDeepEqual } from "../../state/document/difference";
@@ -17,8 +17,8 @@ import { BackgroundPanel } from "./BackgroundPanel";
 import { EnvironmentPanel } from "./EnvironmentPanel";
 import { TransportPanel } from "./TransportPanel";
 
-/** A ball of the material; until it is rendered one in its colors: body from its diffuse term, highlight from the rest. Of
- * what was measured its image. */
+/** A preview ball of the material; until it is rendered, a gradient of its diffuse and highlight colors. Measured materials
+ * show their thumbnail. */
 function MaterialSwatch({ name, material }: { name: string; material: MaterialLook | undefined }) {
   const terms = material?.terms ?? [];
   const ball = displayedBalls.value.get(name);
@@ -91,7 +91,7 @@ function SoloButton() {
   return (
     <IconButton
       icon="solo"
-      label={selected === null ? "Select a material to show it alone" : `Show ${selected} alone`}
+      label={selected === null ? "Select a material to solo it" : `Solo ${selected}`}
       keys="S"
       pressed={soloMaterial.value !== null}
       disabled={selected === null && soloMaterial.value === null}

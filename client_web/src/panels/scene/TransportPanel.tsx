@@ -1,4 +1,4 @@
-/** Which light paths are shown, of a bake that has light between surfaces. */
+/** Filter of the displayed light paths, for bakes with indirect light. */
 import { DEFAULTS, RANGES } from "../../look.gen";
 import { LIGHT_PATHS } from "../../state/visibility/pathLabels";
 import { setVisiblePaths, visiblePaths } from "../../state/visibility/lightPaths";
@@ -20,7 +20,7 @@ export function TransportPanel() {
         onSelect={(show) => setVisiblePaths({ ...transport, show })}
       />
       <LabeledSlider
-        title="How many surfaces light may meet before the one that is seen"
+        title="Maximum number of bounces"
         label="Bounces"
         value={transport.bounces}
         initial={defaultLook.value?.transport.bounces ?? DEFAULTS.transport.bounces}

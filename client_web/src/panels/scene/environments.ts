@@ -1,4 +1,4 @@
-/** The environments that a look may name: the list, choosing one, and importing a file. */
+/** The environments of the server: listing, choosing, importing and deleting them. */
 import { computed, signal } from "@preact/signals";
 import { editValue } from "../../edit/edit";
 import { isEnvironment } from "../../start/files/sceneFiles";
@@ -18,20 +18,20 @@ export async function loadEnvironments(): Promise<void> {
   });
 }
 
-/** Light the scene by an environment, null for its own. */
+/** Light the scene with an environment; null: the original one. */
 export function chooseEnvironment(map: string | null): void {
-  const name = environments.value.find((entry) => entry.map === map)?.name ?? "the scene's own";
+  const name = environments.value.find((entry) => entry.map === map)?.name ?? "original";
   editValue(`Environment · ${name}`, "/environment/map", map);
 }
 
-/** The environment that lights the scene, where it is one that was imported. */
+/** The current environment, if it was imported. */
 export const imported = computed(
   () => environments.value.find(({ map, created }) => created !== null && map === look.value?.environment.map) ?? null,
 );
 
-/** Delete an imported environment once that was confirmed; the scene has its own light again. */
+/** Delete an imported environment after confirmation; the scene gets its original one back. */
 export function offerToDeleteEnvironment({ id, name }: EnvironmentBody): void {
-  showNote(`Delete the environment “${name}”? Looks that name it cannot be shown any more, and this cannot be undone.`, {
+  showNote(`Delete the HDRI “${name}”? Saved looks that use it will stop working. This can't be undone.`, {
     label: "Delete",
     run: () =>
       void reportErrors(async () => {
@@ -42,24 +42,24 @@ export function offerToDeleteEnvironment({ id, name }: EnvironmentBody): void {
   });
 }
 
-/** Of dropped or chosen files, the first that is an environment. */
+/** The first environment among dropped or chosen files. */
 export function environmentOf(files: readonly File[]): File | null {
   return files.find(isEnvironment) ?? null;
 }
 
-/** Import the environment among some files, and light the scene by it. */
+/** Import the environment among some files, and light the scene with it. */
 export async function importEnvironmentFile(files: readonly File[]): Promise<void> {
   const file = environmentOf(files);
   if (file === null) {
-    showError(`${files.map((file) => file.name).join(", ")}: an environment is one of .hdr .exr.`, "files");
+    showError(`Can't use ${files.map((file) => file.name).join(", ")}. HDRIs: HDR or EXR.`, "files");
     return;
   }
   if (importProgress.value !== null) {
-    showNote("One environment is being imported already; drop the next one when it is there.");
+    showNote("Still importing another HDRI; try again in a moment.");
     return;
   }
   const onProgress = (fraction: number) =>
-    (importProgress.value = fraction < 1 ? `Sending ${file.name}, ${Math.round(100 * fraction)} %` : `Reading ${file.name}…`);
+    (importProgress.value = fraction < 1 ? `Uploading ${file.name}, ${Math.round(100 * fraction)} %` : `Processing ${file.name}…`);
   onProgress(0);
   const body = await reportErrors(() => uploadEnvironment(file, onProgress), "files");
   importProgress.value = null;

@@ -1,17 +1,17 @@
-/** Preview balls of the scene's materials, rendered by the server as the library's are: one at a time, once edits of a material pause. */
+/** Preview balls of the scene's materials, rendered by the server: one at a time, when edits of a material pause. */
 import { effect, signal } from "@preact/signals";
 import { renderMaterialBall } from "../../session/net/api";
 import type { Term } from "../../protocol";
 import { look } from "../../state/look";
 import { materialOf, scene } from "../../state/scene";
 
-/** Pause of edits before a material's ball is rendered anew. */
+/** Pause of edits before a material's ball is rendered again. */
 const IDLE_MS = 800;
 const MAX_STORED = 200;
 
-/** Addresses of images, by what they show; null where the server has none to give. */
+/** Image URLs by material content; null if the server cannot render it. */
 const materialBalls = new Map<string, string | null>();
-/** Of each material: the ball that is shown. */
+/** The displayed ball of each material. */
 export const displayedBalls = signal<ReadonlyMap<string, string>>(new Map());
 
 let timer: ReturnType<typeof setTimeout> | undefined;
@@ -28,11 +28,11 @@ function store(key: string, ball: string | null): void {
   materialBalls.delete(oldest);
 }
 
-/** Show what there is, and render the first ball that there is not. */
+/** Show the available balls, and render the first missing one. */
 async function requestBalls(): Promise<void> {
   const [sceneId, materials] = [scene.peek()?.id, look.peek()?.materials];
   if (sceneId === undefined || materials === undefined) return;
-  // light passes glass, and a ball shows reflection alone
+  // a ball shows only reflection, not the transmission of glass
   const renderable = Object.entries(materials).filter(([name]) => materialOf(name)?.is_glass !== true);
   const keys = renderable.map(([name, { terms }]) => [name, keyOf(sceneId, name, terms), terms] as const);
   displayedBalls.value = new Map(keys.flatMap(([name, key]) => (materialBalls.get(key) == null ? [] : [[name, materialBalls.get(key) as string]])));
@@ -43,7 +43,7 @@ async function requestBalls(): Promise<void> {
   try {
     store(key, URL.createObjectURL(await renderMaterialBall(sceneId, name, terms)));
   } catch {
-    store(key, null); // its colors alone are shown
+    store(key, null); // only its colors are shown
   } finally {
     isBusy = false;
   }

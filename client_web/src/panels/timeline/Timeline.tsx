@@ -1,4 +1,4 @@
-/** Looks as keyframes: played in the image, scrubbed, rendered as numbered frames or a video. */
+/** Looks as keyframes: played and scrubbed in the image, rendered as numbered frames or a video. */
 import { previewedStep } from "../../edit/edit";
 import { completeLook } from "../looks/abCompare";
 import { currentPose } from "../looks/exportImage";
@@ -36,26 +36,26 @@ import { exportAnimation } from "./exportTimeline";
 import { playhead, FPS, frameLookList, commitShownLook, numFrames, isPlaying, seek, togglePlay } from "./playback";
 
 const INTERPOLATIONS = [
-  { value: "parameters", label: "Parameters", title: "From parameter to parameter; roughness evenly in its logarithm" },
-  { value: "map", label: "Material map", title: "Cook–Torrance materials go across the map, through what lies between" },
+  { value: "parameters", label: "Parameters", title: "Interpolate each parameter; roughness on a logarithmic scale" },
+  { value: "map", label: "Material map", title: "Move Cook–Torrance materials across the material map" },
 ] as const;
 
 const MOTION_LABELS: Record<CameraPathMode, string> = {
-  still: "Eye stays",
-  around: "Once around",
-  along: "From key to key",
-  object: "Object turns",
-  environment: "Environment turns",
+  still: "Fixed camera",
+  around: "Orbit once",
+  along: "Camera path",
+  object: "Rotate object",
+  environment: "Rotate environment",
 };
 const FIXED_CAMERA_MOTIONS: CameraPathMode[] = ["still", "environment"];
 
-/** What moves meanwhile. */
+/** Chooses the motion during playback. */
 function MotionSelect() {
   const options = Object.entries(MOTION_LABELS).filter(([mode]) => hasFreeCamera.value || FIXED_CAMERA_MOTIONS.includes(mode as CameraPathMode));
   return (
     <select
-      aria-label="What moves meanwhile"
-      title="The eye once around from where the first look is seen, or from where each look is seen to the next; or, before an eye that stays, the object under light that stays too, or the environment alone"
+      aria-label="Motion"
+      title="Orbit the camera from the first look, move it from look to look, or rotate the object or the environment in front of a fixed camera"
       value={currentPath.value}
       onChange={(event) => (cameraPathMode.value = event.currentTarget.value as CameraPathMode)}
     >
@@ -68,12 +68,12 @@ function MotionSelect() {
   );
 }
 
-/** The hint while nothing plays yet. */
+/** Hint while there is nothing to play. */
 function keyframeHint(): string | null {
   const [numKeyframes, missing] = [keyframes.value.length, fewestKeyframes.value - keyframes.value.length];
-  if (missing === 2) return "Add two looks to see what lies between them, or one and what turns.";
-  if (missing === 1) return numKeyframes === 0 ? "Add a look." : "Add one more look, or choose what turns.";
-  return frameLookList.value === null ? "Finding what lies between…" : null;
+  if (missing === 2) return "Add two looks to blend between them, or one look and choose what rotates.";
+  if (missing === 1) return numKeyframes === 0 ? "Add a look." : "Add another look, or choose what rotates.";
+  return frameLookList.value === null ? "Computing transitions…" : null;
 }
 
 function PlaybackControls() {
@@ -88,7 +88,7 @@ function PlaybackControls() {
         disabled={!ready}
         onClick={togglePlay}
       />
-      <div class="timeline-way">
+      <div class="timeline-track">
         <Slider
           label="Time"
           minimum={0}
@@ -112,16 +112,16 @@ function PlaybackControls() {
       </div>
       <label class="timeline-seconds">
         <NumberField
-          label="Seconds in all"
+          label="Total seconds"
           value={seconds.value}
           minimum={MIN_SECONDS}
           maximum={MAX_SECONDS}
           step={0.5}
           onChange={(value) => (seconds.value = value)}
         />
-        s in all
+        seconds total
       </label>
-      <ToggleButton icon="loop" label="Again from the beginning" state={isLooping} />
+      <ToggleButton icon="loop" label="Loop" state={isLooping} />
       <MotionSelect />
     </div>
   );
@@ -143,17 +143,17 @@ function KeyframeTile({ index, name }: { index: number; name: string }) {
       </button>
       {hasFreeCamera.value && (
         <IconButton
-          icon="eye"
-          label={`See ${name} from where the eye is now`}
+          icon="view"
+          label={`Use current camera for ${name}`}
           onClick={() => {
             const camera = currentPose();
             if (camera !== null) setKeyframeCamera(index, camera);
           }}
         />
       )}
-      <IconButton icon="earlier" label={`${name} earlier`} disabled={index === 0} onClick={() => moveKeyframe(index, -1)} />
-      <IconButton icon="later" label={`${name} later`} disabled={index === last} onClick={() => moveKeyframe(index, 1)} />
-      <IconButton icon="close" label={`Take ${name} off`} onClick={() => removeKeyframe(index)} />
+      <IconButton icon="earlier" label={`Move ${name} earlier`} disabled={index === 0} onClick={() => moveKeyframe(index, -1)} />
+      <IconButton icon="later" label={`Move ${name} later`} disabled={index === last} onClick={() => moveKeyframe(index, 1)} />
+      <IconButton icon="close" label={`Remove ${name}`} onClick={() => removeKeyframe(index)} />
     </li>
   );
 }
@@ -174,7 +174,7 @@ function AddKeyframe() {
   };
   return (
     <select
-      aria-label="Add a look to the time line"
+      aria-label="Add a look to the timeline"
       value=""
       disabled={keyframes.value.length >= MAX_KEYFRAMES || look.value === null}
       onChange={(event) => {
@@ -183,7 +183,7 @@ function AddKeyframe() {
       }}
     >
       <option value="">Add a look…</option>
-      <option value="live">The live look</option>
+      <option value="live">Current look</option>
       {[...lookChoiceMap].map(([value, { name }]) => (
         <option key={value} value={value}>
           {name}
@@ -198,7 +198,7 @@ function RenderSelect() {
   const count = numFrames.value;
   return (
     <select
-      aria-label="Render the time line"
+      aria-label="Render timeline"
       value=""
       disabled={busy}
       onChange={(event) => {
@@ -208,19 +208,19 @@ function RenderSelect() {
       }}
     >
       <option value="">Render…</option>
-      {hasFreeCamera.value && <option value="mp4 quick">Video, quick, {count} frames</option>}
-      <option value="mp4 exact">Video{hasFreeCamera.value ? ", exact" : ""}, {count} frames at {FPS} a second</option>
-      {hasFreeCamera.value && <option value="png quick">Numbered PNG, quick, in a ZIP</option>}
-      <option value="png exact">Numbered PNG{hasFreeCamera.value ? ", exact" : ""}, in a ZIP</option>
+      {hasFreeCamera.value && <option value="mp4 quick">Video (fast), {count} frames</option>}
+      <option value="mp4 exact">Video{hasFreeCamera.value ? " (full quality)" : ""}, {count} frames at {FPS} fps</option>
+      {hasFreeCamera.value && <option value="png quick">PNG sequence (fast), ZIP</option>}
+      <option value="png exact">PNG sequence{hasFreeCamera.value ? " (full quality)" : ""}, ZIP</option>
     </select>
   );
 }
 
-/** By itself: what is shown in passing changes with every frame. */
+/** A component of its own: the previewed look changes with every frame. */
 function KeepLookButton() {
   return (
-    <button disabled={previewedStep.value === null} title="Go on with the look that is shown, as one step" onClick={commitShownLook}>
-      Keep this look
+    <button disabled={previewedStep.value === null} title="Continue with the look shown, as one step" onClick={commitShownLook}>
+      Use this look
     </button>
   );
 }
@@ -228,10 +228,10 @@ function KeepLookButton() {
 export function Timeline() {
   const hintText = keyframeHint();
   return (
-    <section class="timeline" aria-label="Time line">
+    <section class="timeline" aria-label="Timeline">
       <PlaybackControls />
       <div class="timeline-keys">
-        <ol aria-label="Looks on the time line">
+        <ol aria-label="Keyframes">
           {keyframes.value.map(({ name }, index) => (
             <KeyframeTile key={`${index} ${name}`} index={index} name={name} />
           ))}
@@ -240,10 +240,10 @@ export function Timeline() {
         <span class="timeline-hint" role="status">
           {hintText}
         </span>
-        <RadioRow label="Between looks" choices={INTERPOLATIONS} selected={interpolation.value} onSelect={(mode) => (interpolation.value = mode)} />
+        <RadioRow label="Interpolation" choices={INTERPOLATIONS} selected={interpolation.value} onSelect={(mode) => (interpolation.value = mode)} />
         <RenderSelect />
         <KeepLookButton />
-        <IconButton icon="close" label="Close the time line; the look is as it was" onClick={() => (timelineOpen.value = false)} />
+        <IconButton icon="close" label="Close timeline and restore the look" onClick={() => (timelineOpen.value = false)} />
       </div>
     </section>
   );

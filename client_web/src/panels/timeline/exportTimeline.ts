@@ -1,11 +1,11 @@
-/** The timeline as numbered frames in a ZIP, or as a video. */
+/** Exports the timeline as numbered frames in a ZIP, or as a video. */
 import { completeLook } from "../looks/abCompare";
 import { currentPose, startExport, type RenderQuality } from "../looks/exportImage";
 import { interpolation, keyframes, currentPath } from "../looks/keyframes";
 import type { RenderRequest } from "../../protocol";
 import { FPS, numFrames, renderPath } from "./playback";
 
-/** `quality`: of a camera that moves. */
+/** `quality`: for free cameras. */
 export function exportAnimation(format: "png" | "mp4", quality: RenderQuality): Promise<void> {
   const looks = keyframes.value.map(({ look }) => completeLook(look)) as unknown as RenderRequest["looks"];
   const frames = Math.max(numFrames.value, looks.length);

@@ -1,4 +1,4 @@
-/** Playing the timeline: the server says what each frame shows, as it would render it, and frames are shown in passing. */
+/** Timeline playback: the server computes the look of each frame, as for rendering, and the frames are previewed. */
 import { computed, effect, signal } from "@preact/signals";
 import { freeCameraOf } from "../../viewport/cameras/freeCamera";
 import type { CameraPose } from "../../viewport/cameras/orbit";
@@ -14,18 +14,18 @@ import { interpolation, fewestKeyframes, keyframes, isLooping, seconds, currentP
 export const FPS = 25;
 const REQUEST_DELAY_MS = 120; // after the last change of the timeline
 
-/** Where the timeline is: 0 the first look, 1 the last. */
+/** Position of the playhead: 0 at the first look, 1 at the last. */
 export const playhead = signal(0);
 export const isPlaying = signal(false);
-/** The look of each frame; null while there are none, or they are loading. */
+/** The look of each frame; null while missing or loading. */
 export const frameLookList = signal<readonly Look[] | null>(null);
-/** Camera of each frame; null if the camera stays. */
+/** Camera of each frame; null with a fixed camera. */
 const frameCameras = signal<LooksBody["cameras"]>(null);
 export const numFrames = computed(() => Math.max(2, Math.round(seconds.value * FPS) + 1));
 
-const previewLabel = (fraction: number) => `The time line at ${(fraction * seconds.peek()).toFixed(1)} s`;
+const previewLabel = (fraction: number) => `Timeline at ${(fraction * seconds.peek()).toFixed(1)} s`;
 
-/** What goes where while `num` frames are shown; null where nothing does. */
+/** The motion over `num` frames; null without one. */
 export function renderPath(motion: CameraPathMode, num: number): NonNullable<RenderRequest["path"]> | null {
   const freeCamera = freeCameraOf(activeViewName.peek());
   if (motion === "environment") return { turntable: num, rotate: motion, start_camera: freeCamera?.pose ?? null };
@@ -46,7 +46,7 @@ function showPlayhead(): void {
   if (!isPlaying.peek()) freeCamera?.stop();
 }
 
-/** Move the playhead, and stop there. */
+/** Move the playhead and stop. */
 export function seek(fraction: number): void {
   playhead.value = Math.min(1, Math.max(0, fraction));
   showPlayhead();
@@ -54,7 +54,7 @@ export function seek(fraction: number): void {
 
 let [previousTime, animationFrame] = [0, 0];
 
-/** One loop at most: a pause and a play within one frame begin no second. */
+/** Handle of the only playback loop: pausing and playing within one frame must not start a second. */
 function scheduleTick(): void {
   cancelAnimationFrame(animationFrame);
   animationFrame = requestAnimationFrame(tick);
@@ -71,7 +71,7 @@ function tick(now: number): void {
   scheduleTick();
 }
 
-let isPlayRequested = false; // play was requested while the frames were loading
+let isPlayRequested = false; // play was pressed while the frames were loading
 
 export function play(): void {
   isPlayRequested = frameLookList.peek() === null;
@@ -89,23 +89,23 @@ export function togglePlay(): void {
   else play();
 }
 
-/** What is shown becomes the look that is edited. */
+/** Make the previewed look the edited one. */
 export function commitShownLook(): void {
   isPlaying.value = false;
   commitPreview();
 }
 
-// with the timeline closed the look is as it was
+// closing the timeline restores the look
 effect(() => {
   if (!timelineOpen.value) cancelPreview();
 });
 
-// an edit or an undo ends the playing: what is shown is the user's again
+// an edit or an undo ends the playback
 effect(() => {
   if (previewedStep.value === null) isPlaying.value = false;
 });
 
-// when playback ends, the camera stops
+// at the end of playback, the camera stops
 effect(() => {
   if (!isPlaying.value) freeCameraOf(activeViewName.peek())?.stop();
 });
@@ -127,7 +127,7 @@ effect(() => {
       const path = renderPath(motion, body.frames);
       const answer = await interpolateLooks({ bake: id, looks: looks.map((look) => ({ ...look })), path, ...body });
       if (requestNumber !== newestRequest) return;
-      frameCameras.value = motion === "environment" ? null : answer.cameras; // the user may move a camera that stays
+      frameCameras.value = motion === "environment" ? null : answer.cameras; // the user may move the camera during an environment rotation
       frameLookList.value = answer.looks as unknown as Look[];
       if (isPlayRequested) play();
       else if (previewedStep.peek() !== null) showPlayhead();

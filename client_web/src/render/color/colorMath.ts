@@ -2,7 +2,7 @@
 import type { Rgb } from "../../protocol";
 import { srgbDecode, srgbEncode } from "./tonemap";
 
-/** What a color is divided by before it fits the picker: one above 1; a quantity, whose `minimum` is 0, always fills it. */
+/** Divisor that fits a color into the picker's range: only above 1; a quantity (`minimum` 0) always fills the range. */
 export function peakValue(color: Rgb, minimum = 1): number {
   return Math.max(minimum, ...color) || 1;
 }
@@ -18,7 +18,7 @@ export function toHex(color: Rgb, minimum = 1): string {
     .join("")}`;
 }
 
-/** The picked color at the old one's strength; six digits keep the document readable. */
+/** The picked color at the old one's scale; six digits keep the document readable. */
 export function fromHex(hex: string, previous: Rgb, minimum = 1): Rgb {
   const scale = peakValue(previous, minimum);
   const channel = (i: number) => srgbDecode(parseInt(hex.slice(1 + 2 * i, 3 + 2 * i), 16) / 255) * scale;

@@ -1,4 +1,4 @@
-/** From linear Rec. 709 radiance to display values in [0, 1], sRGB-encoded; the shader's twin for probe and export. */
+/** Linear Rec. 709 radiance to sRGB-encoded display values in [0, 1], as in the shader, for pixel probe and export. */
 import type { Rgb } from "../../protocol";
 import { sampleLut, type LutTable } from "./lutTable";
 
@@ -8,7 +8,7 @@ export const TONE_MAPS = [
   { name: "none", label: "None" },
 ] as const;
 
-/** What an image is shown by: a tone map, or the table of a view. */
+/** A display transform: a tone map, or the table of a view. */
 export type DisplayedToneMap = (typeof TONE_MAPS)[number]["name"] | LutTable;
 
 const clamp01 = (x: number) => Math.min(1, Math.max(0, x));
@@ -59,7 +59,7 @@ function filmic(x: number): number {
   return (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14);
 }
 
-/** What the screen shows for a radiance: exposure in stops, then the tone map, then the sRGB curve; or then a view. */
+/** Display values of a radiance: exposure in stops, then tone map and sRGB curve, or a view. */
 export function toDisplay(radiance: Rgb, exposure: number, toneMap: DisplayedToneMap): Rgb {
   const exposed = radiance.map((v) => v * 2 ** exposure) as Rgb;
   if (typeof toneMap !== "string") return sampleLut(toneMap, exposed);

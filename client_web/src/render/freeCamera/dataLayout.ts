@@ -1,18 +1,18 @@
-/** What all shaders of a free-camera view share: how texels are addressed, the rows of tables, the environment. */
+/** GLSL shared by the free-camera shaders: texel addressing, table rows, the environment. */
 
-/** Texels are numbered through rows of this many. */
+/** Texels per texture row; texels are numbered row by row. */
 export const TEXELS_PER_ROW = 2048;
-/** Groups of terms: untextured, then those that a diffuse and a specular texture multiply. */
+/** Groups of terms: untextured, with a diffuse texture, with a specular texture. */
 export const NUM_GROUPS = 3;
-/** Which groups have a table over θo alone, and which one over φo too. */
+/** Per group: whether it has a table over θo, and one over θo and φo. */
 export interface TableKinds {
   isotropic: readonly boolean[];
   anisotropic: readonly boolean[];
 }
-/** Texels of one material: its groups, its lobe and its normal map, its emission, the tables of its highlights. */
+/** Texels per material: groups, lobe and normal map, emission, tables of the highlights. */
 export const MATERIAL_TEXELS = 2 * NUM_GROUPS + 2;
 /** Maximum number of bright environment lights. */
-export const MAX_SKY_LAMPS = 2;
+export const MAX_BRIGHT_LIGHTS = 2;
 
 export const SHADER_HEADER = `#version 300 es
 precision highp float;
@@ -24,25 +24,25 @@ precision highp isampler2D;
 ivec2 at(int texel) { return ivec2(texel & ${TEXELS_PER_ROW - 1}, texel >> ${Math.log2(TEXELS_PER_ROW)}); }
 `;
 
-/** Covers everything with one triangle, behind all others. */
+/** One triangle over the whole target, at the far plane. */
 export const FULLSCREEN_VERTEX = `#version 300 es
 void main() {
   gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0, 1.0, 1.0);
 }
 `;
 
-/** Where cos θo lies in tables of so many rows: a row, and the fraction of the next. */
+/** Table row of cos θo, and the interpolation fraction to the next row. */
 export const elevationRowGlsl = (rows: number) => `
-int rowOf(float cosine, out float share) {
-  float place = sqrt(max(1.0 - cosine, 0.0)) * ${(rows - 1).toFixed(1)};
-  int row = min(int(place), ${rows - 2});
-  share = place - float(row);
+int rowOf(float cosine, out float fraction) {
+  float coordinate = sqrt(max(1.0 - cosine, 0.0)) * ${(rows - 1).toFixed(1)};
+  int row = min(int(coordinate), ${rows - 2});
+  fraction = coordinate - float(row);
   return row;
 }
 `;
 
-/** Where a unit direction lies in equirectangular maps: arc functions by polynomials of Abramowitz and Stegun
- * (4.4.46, 4.4.47), at most 1e-5 radians off: those of the language are what software pays most for in a background. */
+/** Equirectangular coordinates of a unit direction. Inverse trigonometry by polynomials of Abramowitz and Stegun (4.4.46,
+ * 4.4.47), error below 1e-5 radians: the built-in functions dominate the cost of a background in software. */
 export const EQUIRECTANGULAR_GLSL = `
 uniform float uTurn;
 const float PI = 3.14159265358979;
@@ -60,97 +60,98 @@ float arcCosine(float x) {
     size * (0.0308918810 + size * (-0.0170881256 + size * (0.0066700901 - 0.0012624911 * size)))))));
   return x < 0.0 ? PI - angle : angle;
 }
-vec2 placeOf(vec3 d) { return vec2(arcTangent(d.z, d.x) * 0.5 / PI + uTurn, arcCosine(d.y) / PI); }
+vec2 equirectangular(vec3 d) { return vec2(arcTangent(d.z, d.x) * 0.5 / PI + uTurn, arcCosine(d.y) / PI); }
 `;
 
-/** The light of a level of a map: bilinear, round about in u. A level is first texel, height, width. */
+/** Radiance of a mip level of an environment map: bilinear, periodic in u. A level is (first texel, height, width). */
 export const ENVIRONMENT_GLSL = `
-uniform sampler2D uSky;
-vec3 skyTexel(ivec3 level, int row, int column) { return texelFetch(uSky, at(level.x + row * level.z + column), 0).rgb; }
-vec3 skyAt(ivec3 level, vec2 place) {
-  float x = place.x * float(level.z) - 0.5;
-  float y = clamp(place.y * float(level.y) - 0.5, 0.0, float(level.y - 1));
+uniform sampler2D uEnvironment;
+vec3 environmentTexel(ivec3 level, int row, int column) { return texelFetch(uEnvironment, at(level.x + row * level.z + column), 0).rgb; }
+vec3 environmentAt(ivec3 level, vec2 uv) {
+  float x = uv.x * float(level.z) - 0.5;
+  float y = clamp(uv.y * float(level.y) - 0.5, 0.0, float(level.y - 1));
   float left = floor(x), upper = floor(y), fx = x - left, fy = y - upper;
   int column = int(left) - level.z * int(floor(left / float(level.z)));
   int beside = column + 1 == level.z ? 0 : column + 1, row = int(upper), below = min(row + 1, level.y - 1);
-  vec3 top = mix(skyTexel(level, row, column), skyTexel(level, row, beside), fx);
-  return mix(top, mix(skyTexel(level, below, column), skyTexel(level, below, beside), fx), fy);
+  vec3 top = mix(environmentTexel(level, row, column), environmentTexel(level, row, beside), fx);
+  return mix(top, mix(environmentTexel(level, below, column), environmentTexel(level, below, beside), fx), fy);
 }
 `;
 
-/** The most levels of a sky: sharp, then blurred ever more. */
+/** Maximum number of mip levels of an environment: sharp, then increasingly blurred. */
 export const ENVIRONMENT_LEVELS = 12;
 
-/** The direction of a lobe, and the prefiltered environment along it (relume.live.free_camera.highlights.environment_lobe_lookup). The texel `of` of its table. */
+/** The directions of a lobe pair, and the prefiltered environment along them, as
+ * `relume.live.free_camera.highlights.environment_lobe_lookup`. `lobeTexel`: texel of its table. */
 export const LOBES_GLSL = `
 uniform sampler2D uLobes;
-uniform ivec3 uSkyLevels[${ENVIRONMENT_LEVELS}];
-uniform int uNumSkyLevels, uNumLamps;
-uniform vec3 uSkyGain;
-uniform vec4 uLampDirections[${MAX_SKY_LAMPS}];
-uniform vec3 uLampLights[${MAX_SKY_LAMPS}];
-struct Lobes { vec3 one, other; float first, sigma, sigma2; };
+uniform ivec3 uEnvironmentLevels[${ENVIRONMENT_LEVELS}];
+uniform int uNumEnvironmentLevels, uNumBrightLights;
+uniform vec3 uEnvironmentGain;
+uniform vec4 uBrightLightDirections[${MAX_BRIGHT_LIGHTS}];
+uniform vec3 uBrightLightRadiances[${MAX_BRIGHT_LIGHTS}];
+struct Lobes { vec3 first, second; float firstWeight, sigma, sigma2; };
 float levelOf(float sigma) { return max(2.0 * log2(max(sigma * 180.0 / PI / 2.0, 1e-3)) + 1.0, 0.0); }
-vec3 skyAbout(vec3 direction, float sigma) {
-  float place = min(levelOf(sigma), float(uNumSkyLevels - 1));
-  int lower = int(place);
-  float share = place - float(lower);
-  vec2 where = placeOf(direction);
-  vec3 found = skyAt(uSkyLevels[lower], where);
-  return share > 0.0 ? mix(found, skyAt(uSkyLevels[lower + 1], where), share) : found;
+vec3 prefilteredEnvironment(vec3 direction, float sigma) {
+  float level = min(levelOf(sigma), float(uNumEnvironmentLevels - 1));
+  int lower = int(level);
+  float fraction = level - float(lower);
+  vec2 uv = equirectangular(direction);
+  vec3 radiance = environmentAt(uEnvironmentLevels[lower], uv);
+  return fraction > 0.0 ? mix(radiance, environmentAt(uEnvironmentLevels[lower + 1], uv), fraction) : radiance;
 }
-vec3 lampAbout(int lamp, vec3 direction, float sigma) {
-  vec4 towards = uLampDirections[lamp];
+vec3 brightLightInLobe(int light, vec3 direction, float sigma) {
+  vec4 towards = uBrightLightDirections[light];
   float per = 1.0 / (sigma * sigma + towards.w), near = exp(-per * (1.0 - dot(direction, towards.xyz)));
-  return min(levelOf(sigma), 1.0) * near * per * 0.5 / PI / (1.0 - exp(-2.0 * per)) * uLampLights[lamp];
+  return min(levelOf(sigma), 1.0) * near * per * 0.5 / PI / (1.0 - exp(-2.0 * per)) * uBrightLightRadiances[light];
 }
-vec3 skyInLobe(vec3 direction, float sigma, vec3 seen) {
-  vec3 found = seen.x * skyAbout(direction, sigma);
-  if (uNumLamps > 0) found += seen.y * lampAbout(0, direction, sigma);
-  if (uNumLamps > 1) found += seen.z * lampAbout(1, direction, sigma);
-  return uSkyGain * found;
+vec3 environmentInLobe(vec3 direction, float sigma, vec3 visibility) {
+  vec3 radiance = visibility.x * prefilteredEnvironment(direction, sigma);
+  if (uNumBrightLights > 0) radiance += visibility.y * brightLightInLobe(0, direction, sigma);
+  if (uNumBrightLights > 1) radiance += visibility.z * brightLightInLobe(1, direction, sigma);
+  return uEnvironmentGain * radiance;
 }
-vec3 asideOf(vec3 n, vec3 d) {
+vec3 tangentialDirection(vec3 n, vec3 d) {
   vec3 aside = d - dot(n, d) * n;
   return aside * inversesqrt(max(dot(aside, aside), 1e-20));
 }
-vec3 leanTo(float cosine, vec3 aside, vec3 n) { return sqrt(max(1.0 - cosine * cosine, 0.0)) * aside + cosine * n; }
-vec4 lobeRow(int texel, float share) { return mix(texelFetch(uLobes, at(texel), 0), texelFetch(uLobes, at(texel + ${NUM_GROUPS + 1}), 0), share); }
-Lobes alongBoth(int of, float share, vec3 n, vec3 d) {
-  vec4 shape = lobeRow(of, share);
-  vec3 aside = asideOf(n, d);
-  return Lobes(leanTo(shape.x, aside, n), leanTo(shape.y, aside, n), shape.z, shape.w, lobeRow(of - 2, share).a);
+vec3 tiltTowards(float cosine, vec3 aside, vec3 n) { return sqrt(max(1.0 - cosine * cosine, 0.0)) * aside + cosine * n; }
+vec4 lobeRow(int texel, float fraction) { return mix(texelFetch(uLobes, at(texel), 0), texelFetch(uLobes, at(texel + ${NUM_GROUPS + 1}), 0), fraction); }
+Lobes lobesAlong(int lobeTexel, float fraction, vec3 n, vec3 d) {
+  vec4 shape = lobeRow(lobeTexel, fraction);
+  vec3 aside = tangentialDirection(n, d);
+  return Lobes(tiltTowards(shape.x, aside, n), tiltTowards(shape.y, aside, n), shape.z, shape.w, lobeRow(lobeTexel - 2, fraction).a);
 }
-float wideOf(int of, float share) { return lobeRow(of - 1, share).a; }
-vec3 middleOf(Lobes lobes) {
+float lobeWidth(int lobeTexel, float fraction) { return lobeRow(lobeTexel - 1, fraction).a; }
+vec3 meanDirection(Lobes lobes) {
   vec2 length = 1.0 - vec2(lobes.sigma * lobes.sigma, lobes.sigma2 * lobes.sigma2);
-  return normalize(lobes.first * length.x * lobes.one + (1.0 - lobes.first) * length.y * lobes.other);
+  return normalize(lobes.firstWeight * length.x * lobes.first + (1.0 - lobes.firstWeight) * length.y * lobes.second);
 }
-vec3 skyInBoth(Lobes lobes, vec3 seen) {
-  return mix(skyInLobe(lobes.other, lobes.sigma2, seen), skyInLobe(lobes.one, lobes.sigma, seen), lobes.first);
+vec3 environmentInLobes(Lobes lobes, vec3 visibility) {
+  return mix(environmentInLobe(lobes.second, lobes.sigma2, visibility), environmentInLobe(lobes.first, lobes.sigma, visibility), lobes.firstWeight);
 }
 `;
-/** The albedo of a lobe in a group of terms, whose texel of a table is `of`. */
+/** Albedo of a lobe in a group of terms, interpolated between table rows. */
 export const albedoGlsl = (lobe: string) =>
-  `mix(texelFetch(uLobes, at(${lobe}), 0).rgb, texelFetch(uLobes, at(${lobe} + ${NUM_GROUPS + 1}), 0).rgb, share)`;
+  `mix(texelFetch(uLobes, at(${lobe}), 0).rgb, texelFetch(uLobes, at(${lobe} + ${NUM_GROUPS + 1}), 0).rgb, fraction)`;
 
-/** How that changes from a row to the next. */
+/** Difference of that albedo between neighboring rows. */
 export const albedoStepGlsl = (lobe: string) => `(texelFetch(uLobes, at(${lobe} + ${NUM_GROUPS + 1}), 0).rgb - texelFetch(uLobes, at(${lobe}), 0).rgb)`;
 /** Y of linear Rec. 709. */
 export const LUMINANCE = [0.2126, 0.7152, 0.0722] as const;
 export const luminanceGlsl = `vec3(${LUMINANCE.join(", ")})`;
 
-/** What lies behind surfaces: a map, or one color. */
+/** The background radiance: a map or a color. */
 export const backgroundGlsl = (isMap: boolean) =>
   isMap
     ? `
 uniform sampler2D uBackground;
 uniform vec3 uBackgroundGain;
-vec3 behind(vec3 d) { return uBackgroundGain * textureLod(uBackground, placeOf(d), 0.0).rgb; }
+vec3 backgroundRadiance(vec3 d) { return uBackgroundGain * textureLod(uBackground, equirectangular(d), 0.0).rgb; }
 `
     : `
 uniform vec3 uBackgroundColor;
-vec3 behind(vec3 d) { return uBackgroundColor; }
+vec3 backgroundRadiance(vec3 d) { return uBackgroundColor; }
 `;
 
 /** Texels [start, end) of an array as rectangles of its rows: left, top, width, height. */

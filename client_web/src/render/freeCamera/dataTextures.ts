@@ -4,10 +4,10 @@ import { TEXELS_PER_ROW } from "./dataLayout";
 type Gl = WebGL2RenderingContext;
 export type TexelType = "float32" | "float16" | "uint32" | "int32" | "rgb9e5";
 
-/** Of each number. */
+/** Number type of a texel. */
 export const BYTES_PER_TEXEL: Record<TexelType, number> = { float32: 4, float16: 2, uint32: 4, int32: 4, rgb9e5: 4 };
 
-/** Internal format, format and type of texels of so many numbers. */
+/** Internal format, format and type of texels, by number of components. */
 function formatOf(gl: Gl, kind: TexelType, numbers: number): [number, number, number] {
   if (kind === "rgb9e5") return [gl.RGB9_E5, gl.RGB, gl.UNSIGNED_INT_5_9_9_9_REV];
   const formatIndex = numbers === 1 ? 0 : numbers === 2 ? 1 : 2;
@@ -38,18 +38,18 @@ export class DataTextures {
 
   constructor(private readonly gl: Gl) {}
 
-  /** How many texels an array has. */
+  /** Number of texels of an array. */
   count(name: string): number {
     return this.counts.get(name) ?? 0;
   }
 
-  /** Keep an array. Throws where it is too large. */
+  /** Upload an array. Throws if it is too large. */
   upload(name: string, kind: TexelType, numbers: number, bytes: Uint8Array): void {
     const { gl } = this;
     const [internal, format, type] = formatOf(gl, kind, numbers);
     const count = bytes.byteLength / (BYTES_PER_TEXEL[kind] * numbers);
     const height = Math.max(1, Math.ceil(count / TEXELS_PER_ROW));
-    if (height > (gl.getParameter(gl.MAX_TEXTURE_SIZE) as number)) throw new Error(`“${name}” is too large to draw here`);
+    if (height > (gl.getParameter(gl.MAX_TEXTURE_SIZE) as number)) throw new Error(`The array “${name}” is too large for this browser's textures`);
     gl.bindTexture(gl.TEXTURE_2D, this.textureNamed(name));
     gl.texImage2D(gl.TEXTURE_2D, 0, internal, TEXELS_PER_ROW, height, 0, format, type, null);
     const [view, fullRows] = [viewOf(kind, bytes), Math.floor(count / TEXELS_PER_ROW)];
@@ -59,7 +59,7 @@ export class DataTextures {
     this.counts.set(name, count);
   }
 
-  /** Keep a map of radiance that goes round about, to be looked up between its texels. */
+  /** Upload a radiance map, periodic in u, with bilinear filtering. */
   uploadMap(name: string, width: number, height: number, encoded: Uint8Array): void {
     const { gl } = this;
     gl.bindTexture(gl.TEXTURE_2D, this.textureNamed(name));
@@ -69,7 +69,7 @@ export class DataTextures {
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGB9_E5, width, height, 0, gl.RGB, gl.UNSIGNED_INT_5_9_9_9_REV, view);
   }
 
-  /** Bind an array to a unit; one that is not there reads as nothing. */
+  /** Bind an array to a unit; a missing one reads as zero. */
   bind(name: string, unit: number, target: number = this.gl.TEXTURE_2D): void {
     this.gl.activeTexture(this.gl.TEXTURE0 + unit);
     this.gl.bindTexture(target, this.textures.get(name) ?? null);

@@ -1,7 +1,7 @@
-/** Draws free-camera views of one bake: points, then slots, then pixels; what it holds of a look comes in tables. */
+/** Draws free-camera views of one bake: probes, then lattice nodes, then pixels, from a look's tables. */
 import { Program } from "../webgl";
 import type { FrameHeader, FreeCameraBody } from "../../protocol";
-import { FULLSCREEN_VERTEX, MAX_SKY_LAMPS, rectanglesOf, ENVIRONMENT_LEVELS } from "./dataLayout";
+import { FULLSCREEN_VERTEX, MAX_BRIGHT_LIGHTS, rectanglesOf, ENVIRONMENT_LEVELS } from "./dataLayout";
 import { groupFaces, layersOfMaterials, readMaterials, type FaceClass, type RendererMaterial } from "./materials";
 import { probeShader, latticeShader } from "./probeShader";
 import { readPixels } from "./readback";
@@ -12,7 +12,7 @@ import { BYTES_PER_TEXEL, DataTextures, type TexelType } from "./dataTextures";
 
 type Tables = NonNullable<FrameHeader["scene_update"]>;
 
-/** Where a camera is, as the protocol says it. */
+/** A camera pose of the protocol. */
 export interface RenderCamera {
   to_world: readonly number[];
   /** Radians. */
@@ -27,7 +27,7 @@ export interface RenderedImage {
   coverage: Uint8Array | null;
 }
 
-/** Numbers a texel of what never changes; the server says only what there is. */
+/** Component type and count of the bake's constant arrays, which the server sends as plain bytes. */
 const STORED_ARRAYS: Record<string, [TexelType, number]> = {
   corners: ["uint32", 4],
   sides: ["uint32", 4],
@@ -36,27 +36,27 @@ const STORED_ARRAYS: Record<string, [TexelType, number]> = {
   normals: ["float16", 4],
   points: ["uint32", 4],
   weights: ["float16", 4],
-  places: ["float32", 4],
-  point_normals: ["float16", 4],
+  probe_positions: ["float32", 4],
+  probe_normals: ["float16", 4],
   tangents: ["float16", 4],
-  seen_lights: ["uint32", 4],
+  visible_lights: ["uint32", 4],
   uvs: ["float32", 4],
   texels: ["float16", 4],
   levels: ["uint32", 4],
 };
-/** What points ask for, beside incident radiance coefficients. */
-const PROBE_ARRAYS = ["places", "point_normals", "tangents", "even", "uneven", "lobes", "sky", "seen_lights", "lobe_lights", "lobe_lists", "lobe_firsts", "lights_of_lamps", "sky_lights"];
-const SAMPLES = 4; // a pixel
+/** Arrays of the probe shader, besides incident radiance coefficients. */
+const PROBE_ARRAYS = ["probe_positions", "probe_normals", "tangents", "isotropic", "anisotropic", "lobes", "environment", "visible_lights", "lobe_lights", "lobe_lists", "lobe_firsts", "bright_light_members", "environment_lights"];
+const SAMPLES = 4; // per pixel
 const NEAR_PLANE = 1e-4; // fraction of the scene's size, to the nearest visible point
 const FAR_PLANE = 100;
 
-/** A sampler's uniform by its array's name: uSeenLights of seen_lights. */
+/** Name of the sampler uniform of an array: uVisibleLights for visible_lights. */
 const uniform = (name: string) => `u${name.replace(/(^|_)(.)/g, (_, __, letter: string) => letter.toUpperCase())}`;
 
 export class FreeCameraRenderer {
   private readonly gl: WebGL2RenderingContext;
   private readonly texels: DataTextures;
-  /** A processor draws, which has no time for several samples a pixel. */
+  /** True if graphics are rendered on the CPU, which is too slow for several samples per pixel. */
   readonly isSoftware: boolean;
   private readonly samples: number;
   private readonly compiled = new Map<string, Program>();
@@ -70,43 +70,43 @@ export class FreeCameraRenderer {
   private materials: RendererMaterial[] = [];
   private faces: (FaceClass & { buffer: WebGLBuffer })[] = [];
   private layers: number[] = [0];
-  /** What materials were read from. */
+  /** Material rows as last received. */
   private rows = { materials: new Uint8Array(), lobes: new Uint8Array() };
   private environment = new Uint8Array();
   private blurred = new Uint8Array();
-  /** Which of both lies behind surfaces. */
+  /** The background map in use: `environment` or `blurred`. */
   private map = new Uint8Array();
-  /** By how much incident radiance coefficients were divided, and how many functions they have, by their names. */
+  /** Scale and number of functions of incident radiance coefficients, by array name. */
   private readonly scales = new Map<string, readonly number[]>();
 
-  /** Throws where this browser cannot draw it. */
+  /** Throws if this browser cannot draw it. */
   constructor(
     gl: WebGL2RenderingContext,
     private readonly surface: FreeCameraBody,
     arrays: ReadonlyMap<string, Uint8Array>,
   ) {
     this.gl = gl;
-    if (gl.getExtension("EXT_color_buffer_float") === null) throw new Error("this browser draws no floating-point images");
-    if (gl.getParameter(gl.MAX_DRAW_BUFFERS) < LAYERS) throw new Error("this browser draws into too few images at once");
+    if (gl.getExtension("EXT_color_buffer_float") === null) throw new Error("This browser cannot render floating-point images");
+    if (gl.getParameter(gl.MAX_DRAW_BUFFERS) < LAYERS) throw new Error("This browser supports too few render targets");
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     this.texels = new DataTextures(gl);
     for (const [name, bytes] of arrays) this.store(name, bytes);
     this.isSoftware = isSoftwareRenderer(gl);
     this.samples = this.isSoftware ? 0 : SAMPLES;
     const count = (name: string) => this.texels.count(name);
-    this.probeValues = new ValueTarget(gl, count("places"));
+    this.probeValues = new ValueTarget(gl, count("probe_positions"));
     this.slotValues = new ValueTarget(gl, count("normals"));
     this.faceMaterial = encodedBytesOf(arrays.get("corners") ?? new Uint8Array()).filter((_, index) => index % 4 === 3);
     this.size = diagonalOf(arrays.get("positions") ?? new Uint8Array());
   }
 
-  /** Keep an array of what never changes. */
+  /** Upload a constant array of the bake. */
   store(name: string, bytes: Uint8Array): void {
     const layout = STORED_ARRAYS[name];
     if (layout !== undefined) this.texels.upload(name, ...layout, bytes);
   }
 
-  /** Whether there is a look to be drawn. */
+  /** True if a look can be drawn. */
   get isReady(): boolean {
     return this.tables !== null && !this.lacksVisibleLights && !this.isLost;
   }
@@ -115,17 +115,17 @@ export class FreeCameraRenderer {
     return this.gl.isContextLost();
   }
 
-  /** Whether the look has lobes, which ask for an array that is not there yet. */
+  /** True if the look has lobes, whose light visibility is not loaded yet. */
   get lacksVisibleLights(): boolean {
-    return this.layers.includes(3) && this.texels.count("seen_lights") === 0;
+    return this.layers.includes(3) && this.texels.count("visible_lights") === 0;
   }
 
-  /** Give the context back: a browser has few of them. */
+  /** Release the context: browsers limit their number. */
   release(): void {
     this.gl.getExtension("WEBGL_lose_context")?.loseContext();
   }
 
-  /** Follow a look: arrays that have changed, and all numbers. */
+  /** Apply a look's tables: changed arrays and all numbers. */
   setTables(tables: Tables, payload: Uint8Array): void {
     let start = 0;
     for (const { name, dtype, shape } of tables.arrays) {
@@ -135,8 +135,8 @@ export class FreeCameraRenderer {
         continue;
       }
       if (name === "background") this.blurred = bytes.slice();
-      else this.texels.upload(name, name === "sky" ? "rgb9e5" : dtype, shape[1], bytes);
-      if (name === "sky") this.environment = bytes.slice();
+      else this.texels.upload(name, name === "environment" ? "rgb9e5" : dtype, shape[1], bytes);
+      if (name === "environment") this.environment = bytes.slice();
       if (name === "materials" || name === "lobes") this.rows[name] = bytes.slice();
     }
     const map = tables.background === "blurred" ? this.blurred : this.environment;
@@ -149,7 +149,7 @@ export class FreeCameraRenderer {
     this.tables = tables;
   }
 
-  /** What materials make use of, and which faces show what. */
+  /** Read the features of the materials, and group faces by them. */
   private setMaterials(): void {
     const { gl, rows, scales } = this;
     const previous = JSON.stringify(this.materials.map(({ pixels }) => pixels));
@@ -165,10 +165,10 @@ export class FreeCameraRenderer {
     });
   }
 
-  /** The image from a camera; throws where the context was lost. */
+  /** Render the image of a camera; throws if the context was lost. */
   async draw(camera: RenderCamera, width: number, height: number): Promise<RenderedImage> {
     const { gl, tables } = this;
-    if (tables === null) throw new Error("there is no look yet");
+    if (tables === null) throw new Error("No look is loaded yet");
     const hasAlpha = tables.background === "transparent";
     if (this.images?.width !== width || this.images.height !== height || this.images.hasAlpha !== hasAlpha) {
       this.images?.dispose();
@@ -181,7 +181,7 @@ export class FreeCameraRenderer {
     this.drawPixels(camera, tables, images);
     if (images.radiance !== null) this.encodeRadiance(images, images.radiance);
     const [encoded, hiding] = await readPixels(gl, images.encoded, hasAlpha ? 2 : 1, width, height);
-    if (gl.isContextLost() || encoded === undefined) throw new Error("the graphics context was lost");
+    if (gl.isContextLost() || encoded === undefined) throw new Error("The graphics context was lost");
     return { width, height, encoded, coverage: hiding?.filter((_, index) => index % 4 === 0) ?? null };
   }
 
@@ -202,8 +202,8 @@ export class FreeCameraRenderer {
       gl.uniform2iv(program.uniform("uTables"), tables.plain);
       gl.uniform4iv(program.uniform("uHighlights"), tables.highlights);
       gl.uniform1i(program.uniform("uLobe"), lobe);
-      gl.uniform1i(program.uniform("uSeenTexels"), this.texels.count("seen_lights") / Math.max(1, surface.first_probes[surface.first_probes.length - 1] as number));
-      gl.uniform3fv(program.uniform("uEye"), positionOf(camera));
+      gl.uniform1i(program.uniform("uVisibilityTexels"), this.texels.count("visible_lights") / Math.max(1, surface.first_probes[surface.first_probes.length - 1] as number));
+      gl.uniform3fv(program.uniform("uCameraPosition"), positionOf(camera));
       this.setEnvironmentUniforms(program, numbers);
       for (const rectangle of rectanglesOf(first, end)) {
         gl.scissor(...rectangle);
@@ -250,7 +250,7 @@ export class FreeCameraRenderer {
       this.setBackgroundUniforms(program, numbers);
       gl.uniform4f(program.uniform("uFrustum"), 1 / across, 1 / up, (far + near) / (near - far), (2 * far * near) / (near - far));
       gl.uniformMatrix3fv(program.uniform("uRotation"), false, [...right, ...above, ...back]);
-      gl.uniform3fv(program.uniform("uEye"), positionOf(camera));
+      gl.uniform3fv(program.uniform("uCameraPosition"), positionOf(camera));
       gl.uniform1f(program.uniform("uPixelAngle"), camera.yfov / height);
       gl.uniform3fv(program.uniform("uGain"), numbers.gain);
       this.setEnvironmentUniforms(program, numbers);
@@ -266,12 +266,12 @@ export class FreeCameraRenderer {
     gl.disable(gl.DEPTH_TEST);
   }
 
-  /** The program that draws faces of a kind. */
+  /** The program for faces with the same features. */
   private useProgramFor({ shows }: FaceClass, imageFeatures: ImageFeatures): Program {
     const { gl, surface } = this;
     const features = { ...shows, ...imageFeatures };
     const compiled = this.program({ features }, () => new Program(gl, cornerShader(shows), surfaceShader(surface, features)));
-    const program = this.use(compiled, ["corners", "sides", "facing", "normals", "points", "weights", "unhidden", "materials", "lobes", "sky", "levels", "texels", "uvs", "background", "positions"]);
+    const program = this.use(compiled, ["corners", "sides", "facing", "normals", "points", "weights", "unoccluded", "materials", "lobes", "environment", "levels", "texels", "uvs", "background", "positions"]);
     this.bindValues(program, this.slotValues, 15);
     return program;
   }
@@ -289,7 +289,7 @@ export class FreeCameraRenderer {
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  /** A variant of a program, compiled when it is first needed. */
+  /** A program variant, compiled when first needed. */
   private program(features: object, make: () => Program): Program {
     const key = JSON.stringify(features);
     const existing = this.compiled.get(key) ?? make();
@@ -315,15 +315,15 @@ export class FreeCameraRenderer {
 
   private setEnvironmentUniforms(program: Program, numbers: Tables): void {
     const { gl } = this;
-    gl.uniform3fv(program.uniform("uSkyGain"), numbers.environment_gain);
-    gl.uniform3iv(program.uniform("uSkyLevels"), numbers.environment_mips.slice(0, ENVIRONMENT_LEVELS).flat());
-    gl.uniform1i(program.uniform("uNumSkyLevels"), Math.min(ENVIRONMENT_LEVELS, numbers.environment_mips.length));
+    gl.uniform3fv(program.uniform("uEnvironmentGain"), numbers.environment_gain);
+    gl.uniform3iv(program.uniform("uEnvironmentLevels"), numbers.environment_mips.slice(0, ENVIRONMENT_LEVELS).flat());
+    gl.uniform1i(program.uniform("uNumEnvironmentLevels"), Math.min(ENVIRONMENT_LEVELS, numbers.environment_mips.length));
     gl.uniform1f(program.uniform("uTurn"), numbers.environment_rotation);
-    const brightLights = numbers.bright_lights.slice(0, MAX_SKY_LAMPS);
-    gl.uniform1i(program.uniform("uNumLamps"), brightLights.length);
+    const brightLights = numbers.bright_lights.slice(0, MAX_BRIGHT_LIGHTS);
+    gl.uniform1i(program.uniform("uNumBrightLights"), brightLights.length);
     if (brightLights.length === 0) return;
-    gl.uniform4fv(program.uniform("uLampDirections"), brightLights.flatMap(([x, y, z, , , , spread]) => [x, y, z, spread]));
-    gl.uniform3fv(program.uniform("uLampLights"), brightLights.flatMap(([, , , ...light]) => light.slice(0, 3)));
+    gl.uniform4fv(program.uniform("uBrightLightDirections"), brightLights.flatMap(([x, y, z, , , , spread]) => [x, y, z, spread]));
+    gl.uniform3fv(program.uniform("uBrightLightRadiances"), brightLights.flatMap(([, , , ...light]) => light.slice(0, 3)));
   }
 
   private setBackgroundUniforms(program: Program, numbers: Tables): void {
@@ -341,7 +341,7 @@ const positionOf = ({ to_world }: RenderCamera): [number, number, number] => [to
 
 const encodedBytesOf = (bytes: Uint8Array): Uint32Array => new Uint32Array(bytes.slice().buffer);
 
-/** The diagonal of the box about all corners. */
+/** Diagonal of the bounding box. */
 function diagonalOf(positions: Uint8Array): number {
   const all = new Float32Array(positions.buffer, positions.byteOffset, positions.byteLength / 4);
   const [lowest, highest] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];

@@ -1,12 +1,12 @@
-/** What each material of a look makes use of, from the rows that `relume.live.free_camera.browser.material_arrays` writes of it. */
+/** Features of each material of a look, from the rows written by `relume.live.free_camera.browser.material_arrays`. */
 import { NUM_GROUPS, type TableKinds, MATERIAL_TEXELS } from "./dataLayout";
 import type { ProbeFeatures } from "./probeShader";
 
-/** What pixels of a material make use of. */
+/** Features of a material in the surface shader. */
 export interface MaterialFeatures {
-  /** A group of textured terms has outgoing radiance. */
+  /** A textured group has outgoing radiance. */
   groups: boolean;
-  /** A texture, a normal map or an image of what it shines. */
+  /** A texture, a normal map or an emission map. */
   textures: boolean;
   lobes: boolean;
   catchesShadows: boolean;
@@ -15,12 +15,12 @@ export interface MaterialFeatures {
 export interface RendererMaterial {
   points: ProbeFeatures;
   pixels: MaterialFeatures;
-  /** The isotropic and the anisotropic table of each group; of the environment in its highlights, and of other light in these. */
+  /** Isotropic and anisotropic table of each group; the same for the environment and for other light in highlights. */
   tables: { plain: readonly number[]; highlights: readonly number[] };
   lobe: number;
 }
 
-/** How many functions the incident radiance coefficients of a material have: of all light, and beside the environment. */
+/** Number of basis functions of a material's incident radiance coefficients: all light, and light except the environment. */
 export type FunctionCounts = (name: "vectors" | "others", material: number) => number;
 
 const ISOTROPIC_TABLE = 0;
@@ -64,20 +64,20 @@ export function readMaterials(rows: Int32Array, functions: FunctionCounts): Rend
   });
 }
 
-/** The layers of values that any material needs: see `probeShader`. */
+/** The value layers that some material needs: see `probeShader`. */
 export function layersOfMaterials(materials: readonly RendererMaterial[]): number[] {
   const any = (is: (material: RendererMaterial) => boolean) => materials.some(is);
   const [groups, map, lobes] = [any(({ pixels }) => pixels.groups), any(({ points }) => points.map), any(({ pixels }) => pixels.lobes)];
   return [0, ...(groups ? [1] : []), ...(groups || map ? [2] : []), ...(lobes ? [3, 4] : [])];
 }
 
-/** Faces that show the same features, as the numbers of their corners; in the order of the faces. */
+/** Faces with the same features, as corner numbers in face order. */
 export interface FaceClass {
   shows: MaterialFeatures;
   corners: Uint32Array;
 }
 
-/** Sort faces by what their materials show. `materialOf`: of each face. */
+/** Group faces by the features of their materials. `materialOf`: material per face. */
 export function groupFaces(materials: readonly RendererMaterial[], materialOf: Uint32Array): FaceClass[] {
   const keys = materials.map(({ pixels }) => JSON.stringify(pixels));
   return [...new Set(keys)].map((key) => {

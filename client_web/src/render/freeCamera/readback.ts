@@ -13,7 +13,7 @@ async function waitForFence(gl: Gl): Promise<void> {
   gl.deleteSync(fence);
 }
 
-/** The pixels of some attachments of a framebuffer, four bytes each; resolves when they are there. */
+/** Read the pixels of some framebuffer attachments, four bytes each; resolves when they are available. */
 export async function readPixels(
   gl: Gl,
   framebuffer: WebGLFramebuffer,

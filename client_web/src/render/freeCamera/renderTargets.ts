@@ -1,4 +1,4 @@
-/** What the passes of a free-camera view are drawn into. */
+/** Render targets of the free-camera passes. */
 import { TEXELS_PER_ROW } from "./dataLayout";
 
 type Gl = WebGL2RenderingContext;
@@ -15,11 +15,11 @@ function createFramebuffer(gl: Gl, make: () => number[]): WebGLFramebuffer {
 
 function checkFramebuffer(gl: Gl): void {
   if (gl.checkFramebufferStatus(gl.FRAMEBUFFER) !== gl.FRAMEBUFFER_COMPLETE && !gl.isContextLost()) {
-    throw new Error("this browser cannot draw into floating-point images");
+    throw new Error("This browser cannot render floating-point images");
   }
 }
 
-/** Twenty numbers for each of many points or slots: five layers of texels. */
+/** Twenty numbers per probe or lattice node: five layers of texels. */
 export class ValueTarget {
   readonly texture: WebGLTexture;
   readonly rows: number;
@@ -41,7 +41,7 @@ export class ValueTarget {
     this.buffer = gl.createFramebuffer();
   }
 
-  /** Draw into these layers from now on; outputs are numbered through them. */
+  /** Bind these layers for drawing, as consecutive outputs. */
   begin(layers: readonly number[]): void {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.buffer);
@@ -65,12 +65,12 @@ function createImage(gl: Gl, format: number, width: number, height: number): Web
   return texture;
 }
 
-/** Targets of one image size, encoded as RGB9_E5; with several samples a pixel radiance is drawn first. */
+/** Targets of one image size, encoded as RGB9_E5; with multisampling, radiance is drawn first. */
 export class ImageTargets {
-  /** What surfaces are drawn into: with depth. */
+  /** Framebuffer of the surface pass, with depth. */
   readonly drawn: WebGLFramebuffer;
   readonly encoded: WebGLFramebuffer;
-  /** Radiance, one sample a pixel, where there were several. */
+  /** The resolved radiance; null without multisampling. */
   readonly radiance: WebGLTexture | null = null;
   private readonly framebuffer: WebGLFramebuffer | null = null;
   private readonly made: { renderbuffers: WebGLRenderbuffer[]; textures: WebGLTexture[] } = { renderbuffers: [], textures: [] };
@@ -80,7 +80,7 @@ export class ImageTargets {
     readonly width: number,
     readonly height: number,
     private readonly samples: number,
-    /** How much each pixel hides is drawn too. */
+    /** Coverage is drawn too. */
     readonly hasAlpha: boolean,
   ) {
     const createEncoded = () => this.textures(...Array.from({ length: hasAlpha ? 2 : 1 }, () => createImage(gl, gl.RGBA8, width, height)));
@@ -119,7 +119,7 @@ export class ImageTargets {
     });
   }
 
-  /** One sample a pixel from several. */
+  /** Resolve the multisampled radiance. */
   resolve(): void {
     const { gl, width, height } = this;
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.drawn);

@@ -44,17 +44,17 @@ export class ApiError extends Error {
   }
 }
 
-/** Nobody answered. */
+/** The server did not respond. */
 export class UnreachableError extends ApiError {
   constructor() {
-    super("The server cannot be reached. Nothing was lost; try again when it is back.", 0);
+    super("Can't reach the server. Nothing is lost. Try again when the connection is back.", 0);
   }
 }
 
-/** What a problem document says, in one sentence. */
+/** A problem document as one sentence. */
 export function problemText(
   problem: Problem | string | null | undefined,
-  fallback = "The server could not do that.",
+  fallback = "The server could not complete this request.",
 ): string {
   if (problem == null) return fallback;
   if (typeof problem === "string") return problem;
@@ -62,7 +62,7 @@ export function problemText(
 }
 
 async function errorFromResponse(response: Response): Promise<ApiError> {
-  const fallback = `The server answered ${response.status} ${response.statusText}.`;
+  const fallback = `Server error ${response.status} ${response.statusText}.`;
   const problem = (await response.json().catch(() => null)) as Problem | null;
   const detail = typeof problem?.detail === "string" ? problem.detail : problem?.title;
   return new ApiError(detail ?? fallback, response.status);
@@ -90,7 +90,7 @@ export async function request(path: string, init: RequestInit = {}): Promise<Res
 
 const UNAVAILABLE_STATUSES = [0, 502, 503, 504];
 
-/** What the server answers; null where it is away, or a proxy says so: it goes on with its work when it is back. */
+/** The response to a poll; null if the server is unreachable, also behind a proxy: its job continues when it is back. */
 export async function nullIfUnavailable<T>(answer: Promise<T>): Promise<T | null> {
   return answer.catch((error: unknown) => {
     if (error instanceof ApiError && UNAVAILABLE_STATUSES.includes(error.status)) return null;
@@ -109,7 +109,7 @@ export async function getJson<T>(path: string): Promise<T> {
 export const listScenes = () => getJson<SceneBody[]>("/api/scenes");
 export const getScene = (id: string) => getJson<SceneBody>(`/api/scenes/${encodeURIComponent(id)}`);
 export const listBuiltIns = () => getJson<ExampleSceneBody[]>("/api/example-scenes");
-/** Make a built-in scene; a second time it is the same one. */
+/** Create a built-in scene; repeated calls return the same one. */
 export async function createBuiltInScene(name: string): Promise<SceneBody> {
   return (await (await request(`/api/example-scenes/${encodeURIComponent(name)}`, { method: "POST" })).json()) as SceneBody;
 }
@@ -122,7 +122,7 @@ export const listBtfJobs = () => getJson<BtfJobBody[]>("/api/materials/btf/jobs"
 export async function startBtfJob(body: SyntheticBtfRequest): Promise<BtfJobBody> {
   return (await (await request("/api/materials/btf/jobs/synthetic", json("POST", body))).json()) as BtfJobBody;
 }
-/** The results so far are kept. */
+/** Stop a job; its results so far remain. */
 export async function stopBtfJob(id: string): Promise<void> {
   await request(btfJobPath(id), { method: "DELETE" });
 }
@@ -135,10 +135,10 @@ export async function deleteBtfJob(id: string): Promise<void> {
 export const listMeasured = () => getJson<MeasuredBody[]>("/api/materials/measured");
 export const getMaterialMap = () => getJson<MaterialMapBody>("/api/materials/map");
 export const getMaterialAt = (f0: number, sigma: number) => getJson<Term[]>(`/api/materials/map/at?f0=${f0}&sigma=${sigma}`);
-/** Of a library material, whose id is "table/material". */
+/** Thumbnail of a library material with id "table/material". */
 export const materialThumbnailUrl = (id: string) =>
   `/api/materials/${id.split("/").map(encodeURIComponent).join("/")}/thumbnail.png`;
-/** Of what was measured, by its name in looks: "btf:id", "merl:id". */
+/** Thumbnail of a measured material, by its reference in looks: "btf:id", "merl:id". */
 export const measuredThumbnailUrl = (data: string) => {
   const [kind, id = ""] = data.split(":");
   return `/api/materials/${kind === "btf" ? "btf" : "measured"}/${encodeURIComponent(id)}/thumbnail.png`;
@@ -148,7 +148,7 @@ export async function deleteEnvironment(id: string): Promise<void> {
   await request(`/api/environments/${encodeURIComponent(id)}`, { method: "DELETE" });
 }
 export const getColor = () => getJson<ColorBody>("/api/color");
-/** A view of a config as a table. */
+/** A view of an OpenColorIO config as a table. */
 export async function getLut(config: string, { display, view }: OcioView): Promise<ArrayBuffer> {
   const query = new URLSearchParams({ display, view });
   return (await request(`/api/color/${encodeURIComponent(config)}/lut?${query}`)).arrayBuffer();
@@ -157,17 +157,17 @@ export const listImages = () => getJson<ImageBody[]>("/api/images");
 export async function deleteImage(id: string): Promise<void> {
   await request(`/api/images/${encodeURIComponent(id)}`, { method: "DELETE" });
 }
-/** What a material's terms become where an image says that it is metal. */
+/** A material's terms with a metalness map. */
 export async function addMetalness(image: string, scene: string, material: string, terms: readonly Term[]): Promise<Term[]> {
   const path = `/api/images/${encodeURIComponent(image)}/metalness`;
   return ((await (await request(path, json("POST", { scene, material, terms }))).json()) as MetalnessBody).terms;
 }
-/** A ball of a material with these terms, in their images. */
+/** Preview ball of a material with these terms and their textures. */
 export async function renderMaterialBall(scene: string, material: string, terms: readonly Term[]): Promise<Blob> {
   const path = `/api/scenes/${encodeURIComponent(scene)}/ball`;
   return (await request(path, json("POST", { material, terms }))).blob();
 }
-/** The light that a bake's scene came with. */
+/** Thumbnail of a bake's original environment. */
 export const bakedEnvironmentThumbnailUrl = (bake: string) => `/api/bakes/${encodeURIComponent(bake)}/environment.png`;
 export const getBake = (id: string) => getJson<BakeBody>(`/api/bakes/${encodeURIComponent(id)}`);
 
@@ -177,7 +177,7 @@ export async function deleteScene(id: string): Promise<void> {
   await request(`/api/scenes/${encodeURIComponent(id)}`, { method: "DELETE" });
 }
 
-/** The same scene on a ground, as a new one. */
+/** Create a copy of a scene with a ground plane. */
 export async function addGround(id: string): Promise<SceneBody> {
   return (await (await request(`/api/scenes/${encodeURIComponent(id)}/ground`, { method: "POST" })).json()) as SceneBody;
 }
@@ -190,19 +190,19 @@ export async function startBake(body: BakeRequest): Promise<BakeBody> {
   return (await (await request("/api/bakes", json("POST", body))).json()) as BakeBody;
 }
 
-/** Cancel a bake; one that has ended a moment before needs it no more. */
+/** Cancel a bake; ignored if it has just ended. */
 export async function cancelBake(id: string): Promise<void> {
   await request(`/api/bakes/${encodeURIComponent(id)}`, { method: "DELETE" }).catch((error: unknown) => {
     if (!(error instanceof ApiError && error.status === 409)) throw error;
   });
 }
 
-/** Directional albedo of a material of these terms. */
+/** Directional albedo of a material with these terms. */
 export async function getAlbedo(terms: Term[]): Promise<AlbedoBody> {
   return (await (await request("/api/models/albedo", json("POST", { terms }))).json()) as AlbedoBody;
 }
 
-/** How terms are sent in views with a free camera. */
+/** Fit of terms in the Zernike basis of free-camera views. */
 export async function getInOut(terms: Term[]): Promise<ZernikeFitBody[]> {
   return (await (await request("/api/models/zernike-fit", json("POST", { terms }))).json()) as ZernikeFitBody[];
 }
@@ -246,11 +246,11 @@ export async function startComparison(body: ComparisonRequest): Promise<Comparis
   return (await (await request("/api/comparisons", json("POST", body))).json()) as ComparisonBody;
 }
 export const getComparison = (id: string) => getJson<ComparisonBody>(comparisonPath(id));
-/** How long a comparison would take; nothing is begun. */
+/** Estimated cost of a comparison, without starting it. */
 export async function planComparison(body: ComparisonRequest): Promise<ComparisonPlanBody> {
   return (await (await request("/api/comparisons", json("POST", { ...body, dry_run: true }))).json()) as ComparisonPlanBody;
 }
-/** Its passes so far are stored. */
+/** Stop a comparison; its passes so far remain. */
 export async function stopComparison(id: string): Promise<void> {
   await request(comparisonPath(id), { method: "DELETE" });
 }
@@ -260,6 +260,6 @@ export async function resumeComparison(id: string): Promise<ComparisonBody> {
 export async function deleteComparison(id: string): Promise<void> {
   await request(`${comparisonPath(id)}?delete_files=true`, { method: "DELETE" });
 }
-/** The address of a comparison's image as it is after so many passes. */
+/** URL of a comparison's image after a number of passes. */
 export const comparisonImageUrl = (id: string, name: ComparisonImage, passes: number) =>
   `${comparisonPath(id)}/${name}.png?passes=${passes}`;

@@ -1,4 +1,4 @@
-/** A bake's progress, as server-sent events; polls where the stream breaks. */
+/** A bake's progress as server-sent events; falls back to polling if the stream breaks. */
 import type { BakeBody } from "../../protocol";
 import { getBake } from "./api";
 
@@ -8,7 +8,7 @@ function isFinished(bake: BakeBody): boolean {
   return bake.state === "ready" || bake.state === "failed" || bake.state === "cancelled";
 }
 
-/** Calls `onUpdate` with every state until the bake is over; the function returned stops it. */
+/** Call `onUpdate` with every state until the bake ends. Returns a function that stops this. */
 export function subscribeToBake(id: string, onUpdate: (bake: BakeBody) => void): () => void {
   let stopped = false;
   let timer = 0;
@@ -38,7 +38,7 @@ export function subscribeToBake(id: string, onUpdate: (bake: BakeBody) => void):
   return stop;
 }
 
-/** Resolves with the bake when it is over. */
+/** Resolves with the bake when it ends. */
 export function waitForBake(id: string, progress: (bake: BakeBody) => void): Promise<BakeBody> {
   return new Promise((resolve) => {
     subscribeToBake(id, (bake) => {

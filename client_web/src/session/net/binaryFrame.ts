@@ -1,4 +1,4 @@
-/** Binary frames: uint32 little-endian header length, JSON header, payload. Nothing of it is trusted. */
+/** Binary frames: uint32 little-endian header length, JSON header, payload. All of it is validated. */
 import type { FrameHeader, Tile } from "../../protocol";
 
 const MAX_HEADER_BYTES = 1 << 20;
@@ -21,7 +21,7 @@ function isIntegerUpTo(value: unknown, maximum: number): value is number {
 }
 
 function validateTiles(tiles: unknown, width: number, height: number): asserts tiles is Tile[] {
-  if (!Array.isArray(tiles)) throw new FrameError("a frame came without its list of tiles");
+  if (!Array.isArray(tiles)) throw new FrameError("a frame has no list of tiles");
   for (const tile of tiles) {
     const [x, y, w, h] = Array.isArray(tile) && tile.length === 4 ? (tile as unknown[]) : [];
     const inside =
@@ -31,23 +31,23 @@ function validateTiles(tiles: unknown, width: number, height: number): asserts t
       isIntegerUpTo(h, height) &&
       x + w <= width &&
       y + h <= height;
-    if (!inside) throw new FrameError("a frame came with a tile outside the picture");
+    if (!inside) throw new FrameError("a frame has a tile outside the picture");
   }
 }
 
 function validateArrays(tables: FrameHeader["scene_update"] | undefined, size: number): void {
   if (typeof tables !== "object" || tables === null || !Array.isArray(tables.arrays)) {
-    throw new FrameError("a frame came without its list of arrays");
+    throw new FrameError("a frame has no list of arrays");
   }
   let bytes = 0;
   for (const { dtype, shape } of tables.arrays) {
     const itemBytes = DTYPE_BYTES[dtype];
     if (itemBytes === undefined || !isIntegerUpTo(shape?.[0], MAX_TEXELS) || ![1, 2, 4].includes(shape[1])) {
-      throw new FrameError("a frame came with an array of an unknown form");
+      throw new FrameError("a frame has an array of an unknown format");
     }
     bytes += itemBytes * shape[0] * shape[1];
   }
-  if (bytes !== size) throw new FrameError("a frame's arrays and its bytes do not agree");
+  if (bytes !== size) throw new FrameError("a frame's arrays do not match its bytes");
 }
 
 function parseHeader(text: string): FrameHeader {
@@ -68,7 +68,7 @@ function parseHeader(text: string): FrameHeader {
   return header as FrameHeader;
 }
 
-/** Raises FrameError where the bytes are not a frame; reads nothing outside `buffer`. */
+/** Parse a frame. Throws FrameError for invalid bytes; reads nothing outside `buffer`. */
 export function parseFrame(buffer: ArrayBuffer): Frame {
   if (buffer.byteLength < 4) throw new FrameError("a frame is too short");
   const headerBytes = new DataView(buffer).getUint32(0, true);
@@ -87,7 +87,7 @@ export function parseFrame(buffer: ArrayBuffer): Frame {
   const pixels = header.tiles.reduce((sum, [, , w, h]) => sum + w * h, 0);
   const size = pixels * perPixel;
   if (size + (header.alpha ? pixels : 0) !== body.byteLength) {
-    throw new FrameError("a frame's tiles and its bytes do not agree");
+    throw new FrameError("a frame's tiles do not match its bytes");
   }
   return { header, payload: body.subarray(0, size), alpha: header.alpha ? body.subarray(size) : null };
 }

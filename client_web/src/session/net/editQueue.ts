@@ -1,20 +1,20 @@
-/** Queue of edits to the server: only the newest look counts, each message has its revision. What an edit changed is
- * known from where it was made; looks are compared only where no edit leads from what the server holds. */
+/** Queue of edits to the server: only the newest look counts, and each message has a revision. Changes are recorded with
+ * the edits; looks are compared only if no recorded edits lead from the server's look. */
 import { changeByPatch, rebasePatch, type LookChange } from "../../state/document/jsonPatch";
 import { diffLooks } from "../../state/document/difference";
 import { escapeToken } from "../../state/document/pointer";
 import { MAX_OPERATIONS } from "../../look.gen";
 import { MAX_MESSAGE_BYTES, type Look, type PatchOp } from "../../protocol";
 
-/** A little room is left for the message around the patch. */
+/** Maximum patch length, with room for the rest of the message. */
 export const MAX_PATCH_BYTES = MAX_MESSAGE_BYTES - 1024;
 
-/** What the user wants to see. */
+/** The state that the user wants to see. */
 export interface TargetState {
   look: Look;
   /** Path of the active control. */
   activeControl: string | null;
-  /** Sources of light that alone are shown; null: all. */
+  /** Solo light sources; null: all. */
   solo: readonly string[] | null;
   /** Time of the input (performance.now clock). */
   inputTime: number;
@@ -29,7 +29,7 @@ function messageBytes(patch: readonly PatchOp[]): number {
   return new TextEncoder().encode(JSON.stringify(patch)).length;
 }
 
-/** An edit that the server has yet to show, or in a room to tell of. */
+/** An edit that the server has yet to show, or in a room to broadcast. */
 interface OutstandingEdit {
   revision: number;
   look: Look;
@@ -42,7 +42,7 @@ function chunkPatch(patch: readonly PatchOp[]): PatchOp[][] {
   return chunks;
 }
 
-/** Split a patch that is too long for one message: the whole look goes material by material. */
+/** Split a patch that is too long for one message: a whole look is sent material by material. */
 function splitPatch(patch: readonly PatchOp[]): PatchOp[][] {
   if (messageBytes(patch) <= MAX_PATCH_BYTES) return chunkPatch(patch);
   return patch.flatMap((operation) => {
@@ -58,7 +58,7 @@ function splitPatch(patch: readonly PatchOp[]): PatchOp[][] {
   });
 }
 
-/** The whole look where nothing is known of the server's. */
+/** The patch of a whole look, if the server's look is unknown. */
 function patchToTarget(target: Look, sentLook: Look | null): PatchOp[] {
   return sentLook === null ? [{ op: "replace", path: "", value: target }] : diffLooks(sentLook, target);
 }
@@ -67,20 +67,20 @@ export class EditQueue {
   private sentLook: Look | null = null;
   private sentSolo: readonly string[] | null = null;
   private target: TargetState | null = null;
-  /** From `sentLook` to the target look; null if no edits lead there. */
+  /** Patch from `sentLook` to the target look; null if no recorded edits lead there. */
   private pendingPatch: readonly PatchOp[] | null = null;
   private outstandingEdits: OutstandingEdit[] = [];
-  /** The newest look that the server has shown a frame of; in a room, that it has announced. */
+  /** The newest look of which the server has sent a frame; in a room, the newest announced one. */
   private confirmedLook: Look | null = null;
-  /** Others edit the look as well: the server tells what has become of it, and frames say nothing of that. */
+  /** True in a room: the server announces the look separately, and frames confirm nothing. */
   private isShared = false;
-  /** Of the newest edit of all. */
+  /** Revision of the newest edit. */
   revision = 0;
-  /** Revision of the newest edit that this server has; a replacement server has had none. */
+  /** Revision of the newest edit sent to the current server; none for a new server. */
   serverRevision = 0;
 
-  /** Start afresh: the server holds `look` at `revision` (null: unknown, so the next edit is the whole look), and shows
-   * these sources of light. */
+  /** Reset: the server has `look` at `revision` (null: unknown, so the next edit is the whole look) and shows these light
+   * sources. */
   reset(look: Look | null, revision = 0, solo: readonly string[] | null = null, isShared = false): void {
     this.sentLook = look;
     this.sentSolo = solo;
@@ -92,27 +92,27 @@ export class EditQueue {
     this.isShared = isShared;
   }
 
-  /** Come, perhaps again, into a room that has this look: what was edited meanwhile goes on top of it. */
+  /** (Re)join a room with this look: edits made in the meantime are applied on top of it. */
   joinRoom(look: Look, revision: number, solo: readonly string[] | null): void {
     const patch = this.isShared ? this.unconfirmedPatch(revision) : [];
     this.reset(look, revision, solo, true);
     this.rebaseTarget(patch);
   }
 
-  /** What was edited and is not known to be in the room's look, after a revision. */
+  /** The edits after a revision that are not confirmed to be in the room's look. */
   unconfirmedPatch(after = 0): readonly PatchOp[] {
     const edits = this.outstandingEdits.filter(({ revision }) => revision > after);
     return [...edits.flatMap(({ patch }) => patch), ...this.unsentPatch];
   }
 
-  /** What leads from what was sent to what is wanted. */
+  /** The patch from the sent look to the target look. */
   private get unsentPatch(): readonly PatchOp[] {
     if (this.sentLook === null || this.target === null) return [];
     return this.pendingPatch ?? diffLooks(this.sentLook, this.target.look);
   }
 
-  /** The room's look has become another, with the own edits up to a revision in it; an empty patch: by those alone. Gives
-   * what is wanted now: the own edits after them stay on top. */
+  /** The room's look has changed and includes the own edits up to a revision; with an empty patch, only those. Returns the
+   * new target look: later own edits stay on top. */
   applyRemote(patch: readonly PatchOp[], revision: number): Look | null {
     const unsent = this.unsentPatch;
     const ownLook = this.outstandingEdits.findLast((edit) => edit.revision <= revision);
@@ -125,12 +125,12 @@ export class EditQueue {
     return this.look;
   }
 
-  /** The look that is wanted; until one is, that of the server. */
+  /** The target look; the server's look before the first edit. */
   get look(): Look | null {
     return this.target?.look ?? this.confirmedLook;
   }
 
-  /** Put what is not confirmed on top of what is, and what was not sent on top of that. */
+  /** Apply the unconfirmed edits on top of the confirmed look, and the unsent ones on top of them. */
   private rebaseTarget(unsentPatch: readonly PatchOp[]): void {
     let look = this.confirmedLook as Look;
     this.outstandingEdits = this.outstandingEdits.map((edit) => ({ ...edit, look: (look = rebasePatch(look, edit.patch)) }));
@@ -139,13 +139,13 @@ export class EditQueue {
     this.pendingPatch = unsentPatch;
   }
 
-  /** The user's newest target; `change` is the edit that made the look, where one did. */
+  /** Set the user's newest target; `change`: the edit that made the look, if any. */
   setTarget(target: TargetState, change: LookChange | null = null): void {
     this.pendingPatch = target.look === this.sentLook ? [] : this.extendPatch(change);
     this.target = target;
   }
 
-  /** The way to what was wanted last, and on by a change. */
+  /** Append a change to the recorded edits. */
   private extendPatch(change: LookChange | null): readonly PatchOp[] | null {
     if (this.sentLook === null || this.pendingPatch === null || change === null || change.before !== this.target?.look) return null;
     return this.pendingPatch.length === 0 ? change.patch : changeByPatch(this.sentLook, [...this.pendingPatch, ...change.patch]).patch;
@@ -159,7 +159,7 @@ export class EditQueue {
     return JSON.stringify(solo) === JSON.stringify(this.sentSolo);
   }
 
-  /** The messages that bring the server to the wanted look; empty where it is there already. */
+  /** The messages that bring the server to the target look; empty if it is there already. */
   takeEdits(): QueuedEdit[] {
     if (this.target === null || !this.hasPending) return [];
     const { look, activeControl, solo, inputTime } = this.target;
@@ -175,7 +175,7 @@ export class EditQueue {
     });
   }
 
-  /** A frame of this revision has come: everything up to it was accepted. */
+  /** A frame of this revision was received: everything up to it was accepted. */
   confirmRevision(revision: number): void {
     if (this.isShared) return;
     while (this.outstandingEdits[0] && this.outstandingEdits[0].revision <= revision) {
@@ -183,8 +183,8 @@ export class EditQueue {
     }
   }
 
-  /** The server refused a revision: what it holds is no longer known; returns the last look it accepted. In a room, the
-   * look without that edit. */
+  /** The server rejected a revision, so its look is unknown; returns the last accepted look. In a room, the look without
+   * that edit. */
   rejectRevision(revision: number): Look | null {
     const unsent = this.unsentPatch;
     this.outstandingEdits = this.outstandingEdits.filter((entry) => entry.revision !== revision);

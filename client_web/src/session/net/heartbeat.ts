@@ -1,20 +1,20 @@
-/** Notices that a server no longer answers. After some quiet it asks; a lost network closes no socket by itself. */
+/** Detects an unresponsive server by pings after a silence; a lost network does not close a socket. */
 
 const TICK_MS = 500;
-/** So long nothing may come before the server is asked. */
+/** Silence before a ping. */
 const QUIET_MS = 2000;
-/** Time without an answer before the silence is shown. */
+/** Time without a response before the silence is reported. */
 const SILENCE_MS = 2000;
-/** So long it may take at all: a large image on a slow line holds up the answer behind it. */
+/** Maximum time for a response: a large image on a slow connection delays it. */
 const TIMEOUT_MS = 20_000;
 
 export interface HeartbeatHandlers {
   sendPing(): void;
-  /** No answer for a while. */
+  /** No response for a while. */
   onSilent(): void;
-  /** An answer after a silence. */
+  /** A response after a reported silence. */
   onAnswered(): void;
-  /** No answer for so long that another connection is better. */
+  /** No response for so long that reconnecting is better. */
   onLost(): void;
 }
 
@@ -22,7 +22,7 @@ export class Heartbeat {
   private timer: ReturnType<typeof setInterval> | undefined;
   private lastActivityTime = 0;
   private pingTime: number | null = null;
-  /** Whether the silence was said. */
+  /** True if the silence was reported. */
   isSilent = false;
 
   constructor(private readonly handlers: HeartbeatHandlers) {}
@@ -40,7 +40,7 @@ export class Heartbeat {
     this.isSilent = false;
   }
 
-  /** Something came. */
+  /** Record an incoming message. */
   recordActivity(): void {
     this.lastActivityTime = performance.now();
     this.pingTime = null;
@@ -49,14 +49,14 @@ export class Heartbeat {
     this.handlers.onAnswered();
   }
 
-  /** Ask now: there is reason to doubt the connection. */
+  /** Ping now: the connection may be lost. */
   check(): void {
     if (this.timer === undefined || this.pingTime !== null) return;
     this.pingTime = performance.now();
     this.handlers.sendPing();
   }
 
-  /** Silence counts from the question, so that a timer that slept says nothing by itself. */
+  /** Silence counts from the ping, so that a suspended timer alone reports nothing. */
   private tick(): void {
     const now = performance.now();
     if (this.pingTime === null) {

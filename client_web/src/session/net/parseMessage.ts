@@ -1,15 +1,15 @@
-/** What comes over a live session's socket, typed: texts are messages, everything else is a binary frame. */
+/** Parses a live session's socket data: texts are messages, everything else is a binary frame. */
 import type { ServerMessage } from "../../protocol";
 
-/** For each kind of message what is done with it. */
+/** Handlers by message type. */
 export type MessageHandlers = {
   [Message in ServerMessage as Message["type"]]: (message: Message) => void;
 };
 
 export class MessageError extends Error {}
 
-/** Dispatch a message to the handler of its kind; kinds that this editor does not know are left alone. Raises MessageError
- * where the text is no message. */
+/** Dispatch a message to the handler of its type; unknown types are ignored. Throws MessageError if the text is not a
+ * message. */
 export function dispatchMessage(text: string, handlers: MessageHandlers): void {
   let message: ServerMessage | null;
   try {

@@ -22,8 +22,8 @@ import { SessionSocket, type OpenParameters, type Connection } from "./socket";
 
 const MAX_BUFFERED_BYTES = 1 << 20;
 
-/** While so many edits wait for a frame that shows them, the next one grows newer instead, for so long at most: a server
- * that is busy with many users need not read what it will never show. */
+/** While this many edits wait for their frames, the next edit is delayed and merged, at most for this time: a busy server
+ * need not read looks that it will never show. */
 const MAX_UNSHOWN_REVISIONS = 2;
 const MAX_WAIT_MS = 100;
 
@@ -38,14 +38,14 @@ export interface SessionHandlers {
   curve(message: CurveMessage): void;
   bake(message: BakeMessage): void;
   room(message: RoomMessage): void;
-  /** Somebody has commented on the scene. */
+  /** The scene's comments have changed. */
   comments(): void;
-  /** Others have edited the look; it has become this one, where there is one yet. */
+  /** Other members have edited the look, which is now this one. */
   roomUpdate(message: RoomUpdate, look: Look | null): void;
   onEditSent(revision: number, inputTime: number): void;
-  /** The look cannot be changed: the server lets this one only look. */
+  /** Editing was rejected: the session is read-only. */
   readOnly(): void;
-  /** The server will not have this session again; no use in trying. */
+  /** The server rejects this session for good; reconnecting is useless. */
   ended(reason: string, code: number): void;
   invalidMessage(message: string): void;
 }
@@ -56,12 +56,12 @@ export class Session {
   private readonly messages: MessageHandlers;
   private isScheduled = false;
   private hasSentThisFrame = false;
-  /** Newest revision that a frame has shown, and when the last edit went. */
+  /** Newest revision shown by a frame, and the time of the last sent edit. */
   private shownRevision = 0;
   private sentTime = 0;
-  /** The look that there is for one who may change only ways of looking at it; null for who may edit. */
+  /** The look of a read-only session, which may only change view settings; null if editing is allowed. */
   private readOnlyLook: Look | null = null;
-  /** How often the room's look had changed when others changed it last. */
+  /** The room's look version at the last change by others. */
   sharedRevision = 0;
 
   constructor(
@@ -85,16 +85,16 @@ export class Session {
       comments: () => handlers.comments(),
       room_update: (message) => this.onRoomUpdate(message),
       server_draining: () => this.socket.abandonConnection(),
-      pong: () => undefined, // that it came is all it says
+      pong: () => undefined, // only its arrival matters
     };
   }
 
-  /** Of the newest edit that was sent to the server that is there. */
+  /** Revision of the newest edit sent to the current server. */
   get revision(): number {
     return this.queue.serverRevision;
   }
 
-  /** Whether the server has yet to hear of the newest edit. */
+  /** True if the newest edit has not been sent yet. */
   get hasPendingEdits(): boolean {
     return this.queue.hasPending;
   }
@@ -103,12 +103,12 @@ export class Session {
     this.socket.connect();
   }
 
-  /** Try at once instead of waiting for the backoff. */
+  /** Reconnect immediately instead of waiting for the backoff. */
   reconnectNow(): void {
     this.socket.reconnectNow();
   }
 
-  /** Ask the server whether it is still there. */
+  /** Ping the server. */
   checkConnection(): void {
     this.socket.checkConnection();
   }
@@ -162,17 +162,17 @@ export class Session {
     if (message.patch.length > 0) this.handlers.roomUpdate(message, look);
   }
 
-  /** The look that is wanted, with what others made of it. */
+  /** The target look, including edits by others. */
   get look(): Look | null {
     return this.queue.look;
   }
 
-  /** What was edited and may not have come to the room. */
+  /** Edits that the room may not have received. */
   get unconfirmedPatch(): readonly PatchOp[] {
     return this.queue.unconfirmedPatch();
   }
 
-  /** What to show from now on, and the edit that made it; sent at once, then at most once per animation frame. */
+  /** Set the target state and the edit that made it; sent immediately, then at most once per animation frame. */
   setTarget(target: TargetState, change: LookChange | null = null): void {
     if (this.readOnlyLook !== null && !diffLooks(this.readOnlyLook, target.look).every(({ path }) => isViewSetting(path))) {
       return this.handlers.readOnly();
@@ -212,16 +212,16 @@ export class Session {
     this.sentTime = performance.now();
   }
 
-  /** Send a question about the look; the edits made before it go first. */
+  /** Send a request about the look, after all earlier edits. */
   sendAfterEdits(message: ClientMessage): boolean {
     if (this.queue.hasPending && this.socket.isOpen) this.sendEdits();
     return this.send(message);
   }
 
-  /** Whether the message went. */
+  /** Send a message; true if it was sent. */
   send(message: ClientMessage): boolean {
     const isHold = message.type === "prepare" && message.curve == null;
-    if (this.readOnlyLook !== null && isHold) return false; // nothing of it is edited
+    if (this.readOnlyLook !== null && isHold) return false; // a read-only session edits nothing
     return this.socket.send(message);
   }
 }

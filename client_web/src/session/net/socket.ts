@@ -1,40 +1,40 @@
-/** The transport of a live session: a WebSocket that connects again by itself, with the token that finds its look. */
+/** Transport of a live session: a WebSocket that reconnects automatically, with the token that identifies its look. */
 import { ROOM_PREFIX, SUBPROTOCOL, type ClientMessage, type OpenMessage } from "../../protocol";
 import { backoffMs } from "./backoff";
 import { Heartbeat } from "./heartbeat";
 
-/** Nobody has logged in, or may no longer be here. */
+/** Login missing or no longer valid. */
 export const LOGIN_CODE = 4401;
-/** Another version of the protocol, no such bake, not ready, damaged: trying again gives the same. */
+/** Different protocol version, or a missing, unfinished or damaged bake: retrying is useless. */
 const FINAL_CODES = new Set([1002, LOGIN_CODE, 4403, 4404, 4409, 4410]);
-/** Too many sessions or members, or nobody in a room yet: a later attempt may succeed. */
+/** Too many sessions or members, or an empty room: a later attempt may succeed. */
 const BUSY_CODE = 1013;
-/** A token that was refused so often is not tried for ever. */
+/** Maximum number of attempts with a rejected token. */
 const MAX_RESUMES = 3;
 
-/** `silent`: the connection is there, and nothing comes over it. */
+/** `silent`: connected, but the server does not respond. */
 export type Connection = "connecting" | "open" | "silent" | "reconnecting" | "closed";
 
-/** With what a session is to begin, and in which room. */
+/** The session's initial look, and its room. */
 export type OpenParameters = () => Readonly<Omit<OpenMessage, "type" | "resume">>;
 
 export interface SocketHandlers {
-  /** `reason`: what the server said where it has no room now. */
+  /** `reason`: the server's message if it is full. */
   connection(state: Connection, retryInMs: number, reason?: string): void;
   received(data: string | ArrayBuffer): void;
-  /** The server will not have this session again; no use in trying. */
+  /** The server rejects this session for good; reconnecting is useless. */
   ended(reason: string, code: number): void;
 }
 
 export class SessionSocket {
   private socket: WebSocket | null = null;
-  /** How many connections there have been: what came over one is no longer known over the next. */
+  /** Number of connections so far: server state does not carry over between them. */
   connectionCount = 0;
   private attempt = 0;
   private retry = 0;
   private isGreeted = false;
   private isClosed = false;
-  /** Names this session to the server, so that a lost connection finds its look again. */
+  /** Token that identifies this session, so that a reconnection resumes its look. */
   private resume: string | null = null;
   private readonly heartbeat = new Heartbeat({
     sendPing: () => void this.send({ type: "ping" }),
@@ -46,7 +46,7 @@ export class SessionSocket {
   constructor(
     readonly bake: string,
     private readonly handlers: SocketHandlers,
-    /** What is asked of the server with each connection. */
+    /** Parameters sent with each connection. */
     private readonly openParameters: OpenParameters = () => ({}),
   ) {}
 
@@ -54,16 +54,16 @@ export class SessionSocket {
     this.handlers.connection(this.attempt === 0 ? "connecting" : "reconnecting", 0);
     const url = new URL(`/api/bakes/${encodeURIComponent(this.bake)}/session`, location.href);
     url.protocol = url.protocol.replace("http", "ws");
-    // all else is in a message: addresses are written into logs
+    // everything else is in a message: URLs are logged
     const opening: OpenMessage = { type: "open", ...this.openParameters(), resume: this.resume };
     const room = opening.room ?? opening.view_token;
     if (room != null) url.searchParams.set("room_prefix", room.slice(0, ROOM_PREFIX));
-    this.socket?.close(1000); // one that hangs while it connects
+    this.socket?.close(1000); // a previous attempt may hang while connecting
     const socket = new WebSocket(url, SUBPROTOCOL);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => socket.send(JSON.stringify(opening));
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => {
-      if (socket !== this.socket) return; // it was left for another one
+      if (socket !== this.socket) return; // replaced by another socket
       this.heartbeat.recordActivity();
       this.handlers.received(event.data);
     };
@@ -72,7 +72,7 @@ export class SessionSocket {
     this.connectionCount += 1;
   }
 
-  /** The server has said hello: messages may go, and `resume` names the session from now on. */
+  /** After the server's hello: messages may be sent, and `resume` identifies the session. */
   onHello(resume: string): void {
     this.attempt = 0;
     this.isGreeted = true;
@@ -96,7 +96,7 @@ export class SessionSocket {
     this.retry = window.setTimeout(() => this.connect(), wait);
   }
 
-  /** Abandon the connection, and retry until the server, or a replacement, is there. */
+  /** Abandon the connection, and retry until a server is available. */
   abandonConnection(): void {
     const abandoned = this.socket;
     if (abandoned === null || this.isClosed) return;
@@ -104,7 +104,7 @@ export class SessionSocket {
     this.onClose(abandoned, { code: 1012, reason: "" });
   }
 
-  /** Try at once instead of waiting for the backoff. */
+  /** Reconnect immediately instead of waiting for the backoff. */
   reconnectNow(): void {
     if (this.isClosed) return;
     if (this.heartbeat.isSilent) this.abandonConnection();
@@ -113,7 +113,7 @@ export class SessionSocket {
     this.connect();
   }
 
-  /** Ask the server whether it is still there. */
+  /** Ping the server. */
   checkConnection(): void {
     this.heartbeat.check();
   }
@@ -122,12 +122,12 @@ export class SessionSocket {
     return this.isGreeted && this.socket?.readyState === WebSocket.OPEN;
   }
 
-  /** Bytes that wait in the browser. */
+  /** Bytes waiting in the browser's send buffer. */
   get bufferedBytes(): number {
     return this.socket?.bufferedAmount ?? 0;
   }
 
-  /** Whether the message went. */
+  /** Send a message; true if it was sent. */
   send(message: ClientMessage): boolean {
     if (!this.isOpen) return false;
     this.socket?.send(JSON.stringify(message));

@@ -1,11 +1,11 @@
-/** Imports: multipart uploads with progress, which fetch cannot report. */
+/** Multipart uploads with progress, which fetch cannot report. */
 import type { DroppedFile } from "../../start/files/dropTypes";
 import type { BtfJobBody, EnvironmentBody, ImageBody, MeasuredBody, SceneBody } from "../../protocol";
 import { ApiError } from "./api";
 
 export interface SceneUpload {
   scene: DroppedFile;
-  /** The files that it names. */
+  /** The files that the scene refers to. */
   companions: readonly DroppedFile[];
   environment: File | null;
   name: string;
@@ -17,12 +17,12 @@ function parseResponse(request: XMLHttpRequest): unknown {
   if (request.status === 201 || request.status === 202) return body;
   const { detail, title } = (body ?? {}) as { detail?: unknown; title?: string };
   throw new ApiError(
-    typeof detail === "string" ? detail : (title ?? `The server answered ${request.status}.`),
+    typeof detail === "string" ? detail : (title ?? `Server error ${request.status}.`),
     request.status,
   );
 }
 
-/** `progress` gets 0…1 of the bytes sent; raises ApiError with the server's message. */
+/** Upload a form; `progress` receives the sent fraction, 0…1. Throws ApiError with the server's message. */
 function postForm(path: string, form: FormData, progress: (fraction: number) => void): Promise<unknown> {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
@@ -34,7 +34,7 @@ function postForm(path: string, form: FormData, progress: (fraction: number) => 
         reject(error as Error);
       }
     };
-    request.onerror = () => reject(new ApiError("The upload was interrupted; nothing was imported. Try again.", 0));
+    request.onerror = () => reject(new ApiError("Upload interrupted. Nothing was imported; try again.", 0));
     request.open("POST", path);
     request.send(form);
   });
@@ -50,28 +50,28 @@ export function uploadScene(upload: SceneUpload, progress: (fraction: number) =>
   return postForm("/api/scenes", form, progress) as Promise<SceneBody>;
 }
 
-/** An environment that looks may name; it is called as its file is. */
+/** Upload an environment, named after its file. */
 export function uploadEnvironment(file: File, progress: (fraction: number) => void): Promise<EnvironmentBody> {
   const form = new FormData();
   form.append("environment", file);
   return postForm("/api/environments", form, progress) as Promise<EnvironmentBody>;
 }
 
-/** An image that terms of looks may name; it is called as its file is. */
+/** Upload a texture image, named after its file. */
 export function uploadImage(file: File, progress: (fraction: number) => void): Promise<ImageBody> {
   const form = new FormData();
   form.append("image", file);
   return postForm("/api/images", form, progress) as Promise<ImageBody>;
 }
 
-/** A MERL file; what it is called in the library is its file's name. */
+/** Upload a MERL file; the library lists it under its file name. */
 export function uploadMeasured(file: File, progress: (fraction: number) => void): Promise<MeasuredBody> {
   const form = new FormData();
   form.append("material", file);
   return postForm("/api/materials/measured", form, progress) as Promise<MeasuredBody>;
 }
 
-/** A mesh of one period, to be rendered; `period`: its side in meters, where it is not that of the box about it. */
+/** Upload a mesh of one repeat to render a BTF from; `period`: its width in meters if not the bounding box's. */
 export function uploadGeometry(
   file: File,
   period: number | null,
@@ -83,7 +83,7 @@ export function uploadGeometry(
   return postForm("/api/materials/btf/jobs/geometry", form, progress) as Promise<BtfJobBody>;
 }
 
-/** A zip of images of a texture from all sides, or a .btf container; the server compresses them from then on. */
+/** Upload a BTF, as a ZIP of images or a .btf file; the server then compresses it. */
 export function uploadBtf(file: File, progress: (fraction: number) => void): Promise<BtfJobBody> {
   const form = new FormData();
   form.append("images", file);

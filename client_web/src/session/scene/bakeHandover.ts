@@ -1,4 +1,4 @@
-/** Pending bakes that replace the shown one when they are ready. */
+/** Pending bakes, which replace the shown one when ready. */
 import { connectToBake } from "../connect";
 import { setBakeReadyListener } from "../sessionHandlers";
 import * as api from "../net/api";
@@ -14,18 +14,18 @@ let stopUpdates: () => void = () => undefined;
 /** The bake that a session was opened on last. */
 let openedBake: string | null = null;
 
-/** Show a bake, once its first image is there. */
+/** Show a bake once its first image is available. */
 export function openBake(id: string): void {
   openedBake = id;
   connectToBake(id);
 }
 
-/** Open a session on a finer bake once; it takes over when its first image is there. */
+/** Open a session on a new bake once; it replaces the shown one when its first image is available. */
 function swapToBake(id: string): void {
   if (page.peek() === "editor" && id !== bake.peek() && id !== openedBake) openBake(id);
 }
 
-/** Follow a bake that is meant to replace the one shown. */
+/** Track a bake that will replace the shown one. */
 export function trackBake(startedBake: BakeBody): void {
   stopUpdates();
   pendingBake.value = startedBake;
@@ -33,7 +33,7 @@ export function trackBake(startedBake: BakeBody): void {
     pendingBake.value = update;
     if (update.state === "ready") swapToBake(update.id);
     if (update.state === "failed")
-      showError(`The bake failed: ${api.problemText(update.problem)} The picture stays as it is.`);
+      showError(`Bake failed: ${api.problemText(update.problem)} Your picture and edits are unchanged.`);
   });
 }
 
@@ -41,8 +41,8 @@ export function stopTrackingBake(): void {
   stopUpdates();
 }
 
-// a bake of this scene that comes to be ready takes over only where it is finer, of the same light; one that was ready when
-// the scene was opened does not: the address, or the user, named the one that is shown
+// a bake of this scene that becomes ready replaces the shown one only if it is finer and has the same method; a bake that was
+// ready when the scene was opened does not: the URL or the user chose the shown one
 setBakeReadyListener((id) => {
   const current = bake.peek();
   if (current === null || id === current) return;
@@ -53,7 +53,7 @@ setBakeReadyListener((id) => {
   });
 });
 
-/** Bake what is soon there to be shown, and wait for it; gives its id. */
+/** Bake a preview and wait for it; returns its id. */
 export async function bakePreview(scene: SceneBody, choice: BakeSettings): Promise<string> {
   const { size, lights: _, patches: __, gather_rays: ___, ...settings } = choice;
   const sizeOverride = size === undefined ? {} : { size: previewSize(size) };
@@ -61,10 +61,10 @@ export async function bakePreview(scene: SceneBody, choice: BakeSettings): Promi
   pendingBake.value = preview;
   const finished = preview.state === "ready" ? preview : await waitForBake(preview.id, (update) => (pendingBake.value = update));
   if (finished.state === "ready") return finished.id;
-  throw new api.ApiError(`The preview could not be baked: ${api.problemText(finished.problem, finished.state)}`, 0);
+  throw new api.ApiError(`Preview failed: ${api.problemText(finished.problem, finished.state)}`, 0);
 }
 
-/** Bake a scene and take the result over when it is ready. */
+/** Bake a scene and show the result when ready. */
 export async function startFullBake(scene: SceneBody, choice: BakeSettings): Promise<void> {
   const fullBake = await api.startBake({ scene: scene.id, ...choice });
   if (fullBake.state === "ready") swapToBake(fullBake.id);

@@ -1,13 +1,13 @@
 /** Labels of the bake methods. */
 export type BakeMethod = "direct" | "gather" | "probes";
 
-/** What is baked where nobody chooses: without indirect light metal and glass mirror no objects. */
+/** The default method: without indirect light, metal and glass do not reflect objects. */
 export const DEFAULT_BAKE_METHOD: BakeMethod = "gather";
 
 interface MethodLabels {
   name: BakeMethod;
   label: string;
-  /** Beside a size, where room is small. */
+  /** Short form, shown beside a size. */
   short: string;
   help: string;
 }
@@ -15,25 +15,25 @@ interface MethodLabels {
 export const BAKE_METHODS: readonly MethodLabels[] = [
   {
     name: "direct",
-    label: "Direct light",
-    short: "direct",
-    help: "Light from its sources with its shadows. Quick to bake, and to edit.",
+    label: "Direct light only",
+    short: "direct light",
+    help: "Lights and shadows, no bounces. Fast. Objects don’t appear in reflections.",
   },
   {
     name: "gather",
-    label: "With reflected light",
-    short: "reflected",
-    help: "Surfaces light each other too, and take on each other’s colours. Takes longer and more memory.",
+    label: "Global illumination",
+    short: "global illumination",
+    help: "Adds bounce light and color bleeding. Slower, needs more memory.",
   },
   {
     name: "probes",
-    label: "Moving view",
-    short: "moving",
-    help: "Look from anywhere while you edit, with reflected light. Fine shadows and sharp highlights are approximate.",
+    label: "Free camera (approximate)",
+    short: "free camera",
+    help: "Move the camera while you edit, with global illumination. Fine shadows and sharp highlights are approximate.",
   },
 ];
 
-/** The labels of a bake's method; those of direct light for an unknown method. */
+/** Labels of a bake method; those of direct light for an unknown one. */
 export function methodLabelsOf(method: string | null): MethodLabels {
   return BAKE_METHODS.find(({ name }) => name === method) ?? (BAKE_METHODS[0] as MethodLabels);
 }

@@ -1,4 +1,4 @@
-/** Opening a scene: the finest bake there is, or a preview at once and the full bake behind it. */
+/** Opens a scene: its finest bake, or a preview while the full bake runs. */
 import { previewedStep } from "../../edit/edit";
 import { history } from "../../edit/history";
 import { disconnectAll } from "../connections";
@@ -24,7 +24,7 @@ import { loadSceneState, loadHistory, saveSceneState } from "./persistence";
 import { bakePreview, trackBake, openBake, startFullBake, stopTrackingBake } from "./bakeHandover";
 import { parseUrl, type UrlState } from "./url";
 
-/** Forget the scene that was open; this one is, from now on. */
+/** Replace the open scene. */
 function resetEditor(newScene: SceneBody): void {
   saveSceneState();
   disconnectAll();
@@ -49,12 +49,12 @@ function resetEditor(newScene: SceneBody): void {
   page.value = "editor";
 }
 
-/** The room that an address names. */
+/** The room in a URL. */
 function joinStateOf(scene: string, { room, watch, share }: UrlState): JoinState | null {
   return room === null && watch === null ? null : { scene, room, watch: room === null ? watch : null, share };
 }
 
-/** Restore the state of a scene that this tab stored. */
+/** Restore a scene's state stored in this tab. */
 function restoreSavedState(id: string): void {
   const saved = loadSceneState(id);
   if (saved === null) return;
@@ -67,7 +67,7 @@ function restoreSavedState(id: string): void {
   gridTransforms.value = new Map(saved.grid);
 }
 
-/** Show and select what an address says, as far as the scene has it. */
+/** Apply the views and selection of a URL, as far as they exist in the scene. */
 function restoreUrlState({ views, materials }: SceneBody, urlState: UrlState): void {
   const names = views.map((view) => view.name);
   const active = urlState.view ?? names[0] ?? "";
@@ -81,7 +81,7 @@ function restoreUrlState({ views, materials }: SceneBody, urlState: UrlState): v
   } else selectedLight.value = urlState.light;
 }
 
-/** Call back when there is a look of the scene: a stored one at once, the scene's own with the first hello. */
+/** Call back when the scene has a look: a stored one immediately, the scene's own with the first hello. */
 function whenLookAvailable(expectedScene: SceneBody, callback: () => void): void {
   let waits = true;
   const stop = look.subscribe((current) => {
@@ -96,7 +96,7 @@ export async function openScene(
   id: string,
   urlState: UrlState = parseUrl(`?scene=${id}`),
   choice?: BakeSettings,
-  /** Called once, when there is a look to be changed. */
+  /** Called once, when there is a look to change. */
   onLook?: () => void,
 ): Promise<void> {
   await reportErrors(async () => {
@@ -112,7 +112,7 @@ export async function openScene(
   });
 }
 
-/** Show the bake of this id, or else the finest; where there is none, or a choice was made, one is started. */
+/** Show the bake of this id, else the finest; start one if there is none or settings were chosen. */
 async function openBestBake(openedScene: SceneBody, id: string | null, choice: BakeSettings | undefined): Promise<void> {
   const ready = bakes.peek().filter((each) => each.state === "ready");
   const bestBake = ready.find((each) => each.id === id) ?? ready[0];

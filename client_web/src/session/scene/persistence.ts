@@ -1,5 +1,5 @@
-/** The user's state, stored over a reload: scene, bake, views and selection in the URL; look, zoom and
- * history in the tab's own storage. */
+/** Stores the user's state for a reload: scene, bake, views and selection in the URL; look, zoom and history in the tab's
+ * storage. */
 import { effect } from "@preact/signals";
 import { previewedStep } from "../../edit/edit";
 import { history } from "../../edit/history";
@@ -20,10 +20,10 @@ import { formatUrl } from "./url";
 
 interface SavedState {
   look: Look;
-  /** Where each view's image lies, alone and beside others. */
+  /** Zoom transforms of each view, alone and in the grid. */
   single: [view: string, transform: ZoomTransform][];
   grid: [view: string, transform: ZoomTransform][];
-  /** The material and the source of light that are shown alone, and the light paths that are looked at. */
+  /** The solo material and light, and the light-path filter. */
   solo?: string | null;
   soloLight?: string | null;
   paths?: Transport | null;
@@ -31,7 +31,7 @@ interface SavedState {
 
 const sceneKey = (scene: string) => `relume.scene.${scene}`;
 const HISTORY_KEY_PREFIX = "relume.history.";
-/** Of a scene's history; a browser gives a tab some millions of characters. */
+/** Maximum length of a scene's history; browsers limit a tab's storage to a few million characters. */
 const MAX_HISTORY_LENGTH = 1 << 20;
 
 export function loadSceneState(scene: string): SavedState | null {
@@ -42,18 +42,18 @@ export function loadSceneState(scene: string): SavedState | null {
   }
 }
 
-/** Restore the history of this look of a scene, if it was stored. */
+/** Restore the stored history of a scene's look, if any. */
 export function loadHistory(scene: string, look: Look): void {
   try {
     const text = sessionStorage.getItem(HISTORY_KEY_PREFIX + scene);
     const snapshot = text === null ? null : parseHistory(text, joinState.peek() === null ? look : null, storeThumbnail);
     if (snapshot !== null) history.restore(snapshot.steps, snapshot.cursor);
   } catch {
-    // of an older editor, or forbidden: a new one begins
+    // from an older editor, or storage is forbidden: start a new history
   }
 }
 
-/** Store a text; where there is no room, histories of other scenes make some. */
+/** Store a text; if storage is full, drop histories of other scenes. */
 function storeText(key: string, text: string): void {
   try {
     sessionStorage.setItem(key, text);
@@ -79,11 +79,11 @@ export function saveSceneState(): void {
     storeText(sceneKey(id), JSON.stringify(saved));
     storeText(HISTORY_KEY_PREFIX + id, serializeHistory(snapshot, MAX_HISTORY_LENGTH, lookThumbnail));
   } catch {
-    // storage is full or forbidden: a reload then starts from the scene's own look
+    // storage is full or forbidden: a reload starts from the scene's own look
   }
 }
 
-/** Keep URL and storage in step with the editor. */
+/** Keep URL and storage in sync with the editor. */
 export function trackUrl(): void {
   effect(() => {
     if (page.value !== "editor" || scene.value === null) return;

@@ -1,7 +1,7 @@
-/** Custom recipes: sizes, and the preview that goes before one. */
+/** Custom bake recipes: limits, aspect ratios, and the matching preview. */
 export type BakeSize = [width: number, height: number];
 
-/** The server takes no others. */
+/** The server's limits. */
 export const SIDE_RANGE = { minimum: 16, maximum: 16384 };
 export const LIGHTS_RANGE = { minimum: 1, maximum: 100_000 };
 export const PATCHES_RANGE = { minimum: 64, maximum: 65_535 };
@@ -11,18 +11,18 @@ export const PREVIEW_PIXELS = 320 * 240;
 export interface CustomBakeRecipe {
   size: BakeSize;
   lights: number;
-  /** Surface patches for indirect light, and gather rays; without a number the method chooses. */
+  /** Surface patches for indirect light, and gather rays; unset: chosen by the method. */
   patches?: number;
   gather_rays?: number;
 }
 
-/** A size of the same shape that a preview can have: about as many pixels as the preset's, never more than asked. */
+/** A preview's size with the same aspect ratio: about as many pixels as the preset's, never more than requested. */
 export function previewSize([width, height]: BakeSize): BakeSize {
   const factor = Math.min(1, Math.sqrt(PREVIEW_PIXELS / (width * height)));
   return [Math.max(1, Math.round(width * factor)), Math.max(1, Math.round(height * factor))];
 }
 
-/** An image's shape: width ÷ height, and how it is called. */
+/** An aspect ratio and its label. */
 export interface AspectChoice {
   label: string;
   aspect: number;
@@ -35,10 +35,10 @@ const STANDARD_ASPECTS: readonly AspectChoice[] = [
   { label: "4:5", aspect: 4 / 5 },
 ];
 const ASPECT_TOLERANCE = 0.01;
-/** The server takes no others. */
+/** The server's limits. */
 const ASPECT_RANGE = { minimum: 0.125, maximum: 8 };
 
-/** The shapes to choose from, a camera's own first where it is none of the usual ones; and which one that camera has. */
+/** The aspect ratios to choose from, with the camera's first if it is not a standard one; and the camera's own. */
 export function aspectChoicesFor(cameraAspect: number): { shapes: readonly AspectChoice[]; selected: AspectChoice } {
   const standard = STANDARD_ASPECTS.find(({ aspect }) => Math.abs(aspect / cameraAspect - 1) < ASPECT_TOLERANCE);
   if (standard !== undefined) return { shapes: STANDARD_ASPECTS, selected: standard };
@@ -47,7 +47,7 @@ export function aspectChoicesFor(cameraAspect: number): { shapes: readonly Aspec
   return { shapes: [initial, ...STANDARD_ASPECTS], selected: initial };
 }
 
-/** About as many pixels in another shape. */
+/** A size with another aspect ratio and about as many pixels. */
 export function resizeToAspect([width, height]: BakeSize, aspect: number): BakeSize {
   const newWidth = Math.max(1, Math.round(Math.sqrt(width * height * aspect)));
   return [newWidth, Math.max(1, Math.round(newWidth / aspect))];
@@ -58,13 +58,13 @@ const isIntegerInRange = (value: number, { minimum, maximum }: { minimum: number
 
 const isUnsetOrInRange = (value: number | undefined, range: { minimum: number; maximum: number }) => value === undefined || isIntegerInRange(value, range);
 
-const rangeText = ({ minimum, maximum }: { minimum: number; maximum: number }) => `${minimum} to ${maximum.toLocaleString("en")}`;
+const rangeText = ({ minimum, maximum }: { minimum: number; maximum: number }) => `${minimum}–${maximum.toLocaleString("en")}`;
 
-/** The error message of a recipe; null if it is valid. */
+/** Error message of a recipe; null if valid. */
 export function validateRecipe({ size, lights, patches, gather_rays }: CustomBakeRecipe): string | null {
-  if (!size.every((side) => isIntegerInRange(side, SIDE_RANGE))) return `Give width and height in whole pixels, ${rangeText(SIDE_RANGE)}.`;
-  if (!isIntegerInRange(lights, LIGHTS_RANGE)) return `Give ${rangeText(LIGHTS_RANGE)} light triangles.`;
-  if (!isUnsetOrInRange(patches, PATCHES_RANGE)) return `Give ${rangeText(PATCHES_RANGE)} patches, or none: as many as fit.`;
-  if (!isUnsetOrInRange(gather_rays, GATHER_RAYS_RANGE)) return `Give ${rangeText(GATHER_RAYS_RANGE)} rays a sample, or none: as many as fit.`;
+  if (!size.every((side) => isIntegerInRange(side, SIDE_RANGE))) return `Enter a width and height in pixels (${rangeText(SIDE_RANGE)}).`;
+  if (!isIntegerInRange(lights, LIGHTS_RANGE)) return `Enter an environment detail of ${rangeText(LIGHTS_RANGE)}.`;
+  if (!isUnsetOrInRange(patches, PATCHES_RANGE)) return `Enter ${rangeText(PATCHES_RANGE)} bounce samples, or leave empty for auto.`;
+  if (!isUnsetOrInRange(gather_rays, GATHER_RAYS_RANGE)) return `Enter ${rangeText(GATHER_RAYS_RANGE)} rays per sample, or leave empty for auto.`;
   return null;
 }

@@ -4,17 +4,16 @@ export interface UrlState {
   scene: string | null;
   bake: string | null;
   view: string | null;
-  /** The views that are shown side by side; empty where one is shown alone. */
+  /** The views shown side by side; empty if one is shown alone. */
   sideBySide: string[];
   material: string | null;
   term: number;
   curve: string | null;
   light: string | null;
-  /** What opens the room that the look is shared in, to edit or only to watch. It stands in the fragment, which browsers
-   * send to nobody. */
+  /** Key of the room, to edit or only to watch. In the URL's fragment, which browsers do not send to servers. */
   room: string | null;
   watch: string | null;
-  /** The shared look that it begins with. */
+  /** The shared look that the room starts with. */
   share: string | null;
 }
 

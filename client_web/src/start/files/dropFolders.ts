@@ -1,4 +1,4 @@
-/** Files of what was dropped, folders and the folders in them included. */
+/** The files of a drop, including nested folders. */
 import type { DroppedFile } from "./dropTypes";
 
 const MAX_FILES = 3000;
@@ -6,7 +6,7 @@ const MAX_DEPTH = 12;
 
 class TooManyFilesError extends Error {
   constructor() {
-    super(`The folder holds more than ${MAX_FILES.toLocaleString("en")} files, or folders ${MAX_DEPTH} deep; drop only the scene's.`);
+    super(`This folder has more than ${MAX_FILES.toLocaleString("en")} files or ${MAX_DEPTH} levels. Drop only the scene's folder.`);
   }
 }
 
@@ -16,7 +16,7 @@ function readFile(entry: FileSystemFileEntry): Promise<File> {
   return new Promise((resolve, reject) => entry.file(resolve, reject));
 }
 
-/** A folder's entries; a reader gives a hundred at a time, and then none. */
+/** A folder's entries; the reader returns them in batches, and an empty one at the end. */
 async function readEntries(folder: FileSystemDirectoryEntry): Promise<FileSystemEntry[]> {
   const reader = folder.createReader();
   const entries: FileSystemEntry[] = [];
@@ -37,7 +37,7 @@ async function collectFiles(entry: FileSystemEntry, into: DroppedFile[], depth: 
     for (const inner of await readEntries(entry as FileSystemDirectoryEntry)) await collectFiles(inner, into, depth + 1);
 }
 
-/** What a drop brought. Call it in the event itself: its entries are gone afterwards. */
+/** The dropped files. Call it inside the event handler: the entries are invalid afterwards. */
 export async function listDroppedFiles(transfer: DataTransfer): Promise<DroppedFile[]> {
   const items = [...transfer.items].filter((item) => item.kind === "file");
   const entries = items.map((item) => item.webkitGetAsEntry() ?? item.getAsFile());

@@ -1,4 +1,4 @@
-/** A file and its name with the folders that it was dropped in. */
+/** A file and its path within the dropped folders. */
 export interface DroppedFile {
   path: string;
   file: File;

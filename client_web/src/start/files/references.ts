@@ -1,4 +1,4 @@
-/** The files that a scene file names, looked for among those that were dropped with it. */
+/** The files that a scene file refers to, resolved among the dropped ones. */
 import type { DroppedFile } from "./dropTypes";
 
 interface References {
@@ -8,12 +8,12 @@ interface References {
 type FindFile = (path: string) => DroppedFile | undefined;
 
 const NO_REFERENCES: References = { companions: [], missing: [] };
-/** Longer lists of names are not looked at; the server says what it misses. */
+/** Longer lists are not resolved; the server reports missing files. */
 const MAX_TEXT_BYTES = 64 << 20;
 const OBJ_HEAD_BYTES = 4 << 20;
 const GLB_HEADER_BYTES = 20;
 
-/** A name in a scene file as a path among the dropped ones. */
+/** Resolve a reference in a scene file to a dropped path. */
 export function resolvePath(scenePath: string, name: string): string {
   const steps = scenePath.split("/").slice(0, -1);
   for (const step of name.replaceAll("\\", "/").split("/")) {
@@ -42,7 +42,7 @@ function resolveReferences(scene: DroppedFile, names: readonly string[], findFil
   return { companions: [...companions], missing: [...missing] };
 }
 
-/** Addresses in the JSON of a glTF file; none where it cannot be read, which the server will say. */
+/** URIs in a glTF file's JSON; none if it is unreadable, which the server will report. */
 export function parseUris(text: string): string[] {
   try {
     const { buffers = [], images = [] } = JSON.parse(text) as Record<string, { uri?: unknown }[] | undefined>;
@@ -61,7 +61,7 @@ async function readGlbJson(file: File): Promise<string> {
   return file.slice(GLB_HEADER_BYTES, GLB_HEADER_BYTES + length).text();
 }
 
-/** Material files that an .obj names, and of the images those whose names stand in them. */
+/** Material files that an .obj refers to, and the images whose names occur in them. */
 async function findObjReferences(scene: DroppedFile, findFile: FindFile, images: readonly DroppedFile[]): Promise<References> {
   const head = await scene.file.slice(0, OBJ_HEAD_BYTES).text();
   const names = [...head.matchAll(/^mtllib[ \t]+(.+?)[ \t]*\r?$/gm)].map((match) => match[1] as string);

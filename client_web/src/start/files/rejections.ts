@@ -1,43 +1,43 @@
-/** Rejected files: why, and where they belong. */
+/** Messages about rejected files: the reason, and where they can be used. */
 import type { DroppedFile } from "./dropTypes";
-import { endsWith, ENVIRONMENT_SUFFIXES, isImportable, isSceneFile, MEASURED_SUFFIXES, SCENE_SUFFIXES } from "./sceneFiles";
+import { endsWith, isImportable, isSceneFile, MEASURED_SUFFIXES } from "./sceneFiles";
 
-/** Measurements in formats that nothing here reads. */
+/** Unsupported formats of measured materials. */
 const OTHER_MEASURED_SUFFIXES = [".brdf", ".bsdf", ".merl", ".mbdf"];
 const UNSUPPORTED_SCENE_SUFFIXES = [".fbx", ".blend", ".usd", ".usda", ".usdc", ".usdz", ".dae", ".stl", ".3ds", ".max", ".abc"];
 
 const MAX_LISTED_FILES = 5;
 
-/** The names of some files, the first few. */
+/** The first few file names. */
 function listFileNames(files: readonly DroppedFile[]): string {
   const more = files.length > MAX_LISTED_FILES ? ` and ${files.length - MAX_LISTED_FILES} more` : "";
   return files.slice(0, MAX_LISTED_FILES).map(({ path }) => path).join(", ") + more;
 }
 
-const MEASURED_MESSAGE = "Measured materials go into the Library of an open scene, as MERL (.binary) or BTF (.btf, .zip).";
-const SCENES_MESSAGE = `A scene is one of ${SCENE_SUFFIXES.join(" ")}.`;
+const MEASURED_MESSAGE = "Open a scene and drop measured materials on the Library: MERL (.binary) or BTF (.btf, .zip).";
+const SCENES_MESSAGE = "Scenes: GLB, glTF, OBJ, PLY or ZIP.";
 
-/** Where files belong that nothing here takes, by the kind of the first. */
+/** Advice for rejected files, by the type of the first. */
 function rejectionReason([first]: readonly DroppedFile[], fallback: string): string {
   const name = first?.path ?? "";
   if (endsWith(name, [...MEASURED_SUFFIXES, ...OTHER_MEASURED_SUFFIXES])) return MEASURED_MESSAGE;
-  if (endsWith(name, UNSUPPORTED_SCENE_SUFFIXES)) return `${SCENES_MESSAGE} Export it as .glb, and drop that on the start page.`;
+  if (endsWith(name, UNSUPPORTED_SCENE_SUFFIXES)) return `${SCENES_MESSAGE} Export a GLB and drop it on the start page.`;
   return fallback;
 }
 
-/** Why the editor takes none of these files. */
+/** Message about files that the editor cannot use. */
 export function editorRejection(files: readonly DroppedFile[]): string {
   const isForStart = files.some(isSceneFile);
   const otherwise = isForStart
-    ? "Scenes are imported on the start page; a BTF in a .zip goes into the Library."
-    : "The editor takes images (.png, .jpg, .webp), environments (.hdr, .exr) and measured materials (.binary, .btf).";
-  return `${listFileNames(files)}: ${rejectionReason(files, otherwise)}`;
+    ? "Import scenes on the start page. For a BTF in a ZIP, drop it on the Library."
+    : "HDRIs: HDR or EXR. Textures: PNG, JPG or WebP. Measured materials: drop them on the Library.";
+  return `Can't use ${listFileNames(files)} here. ${rejectionReason(files, otherwise)}`;
 }
 
-/** Why the start page can import nothing of a drop, or not all of it; null where it can. A folder may hold anything. */
+/** Message if the start page cannot import some dropped files; null if it can. A folder may contain unrelated files. */
 export function startPageRejection(files: readonly DroppedFile[]): string | null {
-  const formats = `${SCENES_MESSAGE} An environment is one of ${ENVIRONMENT_SUFFIXES.join(" ")}.`;
+  const formats = `${SCENES_MESSAGE} HDRIs: HDR or EXR.`;
   const rejected = files.filter((each) => !isImportable(each) && !each.path.includes("/"));
-  if (rejected.length > 0) return `${listFileNames(rejected)}: ${rejectionReason(rejected, formats)}`;
-  return files.some(isImportable) ? null : `There is nothing to import in it. ${formats}`;
+  if (rejected.length > 0) return `Can't open ${listFileNames(rejected)}. ${rejectionReason(rejected, formats)}`;
+  return files.some(isImportable) ? null : `Nothing to import in this folder. ${formats}`;
 }

@@ -1,21 +1,21 @@
-/** Which of the dropped files are scenes, which belong to one, and which is the environment. */
+/** Sorts dropped files into scenes, their companion files, and the environment. */
 import type { DroppedFile } from "./dropTypes";
 import { findReferences } from "./references";
 
-/** As the server reads them. */
+/** Scene formats of the server. */
 export const SCENE_SUFFIXES = [".glb", ".gltf", ".obj", ".ply", ".zip"];
 export const ENVIRONMENT_SUFFIXES = [".hdr", ".exr"];
 const IMAGE_SUFFIXES = [".png", ".jpg", ".jpeg", ".webp", ".tga", ".bmp", ".tif", ".tiff", ".gif"];
-/** What may belong to a scene. */
+/** Suffixes of companion files. */
 export const COMPANION_SUFFIXES = [".bin", ".mtl", ...IMAGE_SUFFIXES];
 
-/** Measured materials, which the library takes; a .zip may be one, too. */
+/** Measured materials, for the library; a .zip may be one, too. */
 export const MEASURED_SUFFIXES = [".binary", ".btf"];
 
 export interface SceneFile extends DroppedFile {
-  /** The files that it names. */
+  /** The files that the scene refers to. */
   companions: DroppedFile[];
-  /** Names in it that no file here goes by. */
+  /** References without a matching file. */
   missing: string[];
 }
 
@@ -33,27 +33,27 @@ export function isEnvironment(file: File): boolean {
 }
 
 export const isMeasuredFile = ({ name }: File): boolean => endsWith(name, MEASURED_SUFFIXES);
-/** Whether a file is an image, if not always of a kind that a material can show. */
+/** True if a file is an image, even of an unsupported kind. */
 export const isTextureLike = ({ name }: File): boolean => endsWith(name, IMAGE_SUFFIXES);
 
 export const isSceneFile = ({ path }: DroppedFile) => endsWith(path, SCENE_SUFFIXES);
 
-/** A file's name without its folders and what it ends with. */
+/** A file's name without folders and suffix. */
 export function fileBaseName(name: string): string {
   return name.replace(/^.*\//, "").replace(/\.[^.]+$/, "");
 }
 
-/** Files that were chosen with a button; those of a folder know where they lay in it. */
+/** Files chosen with a file input; those of a folder have their relative paths. */
 export function listSelectedFiles(files: Iterable<File>): DroppedFile[] {
   return [...files].map((file) => ({ path: file.webkitRelativePath || file.name, file }));
 }
 
-/** Whether the import has a use for a file. */
+/** True if the import can use a file. */
 export function isImportable({ path }: DroppedFile): boolean {
   return endsWith(path, [...SCENE_SUFFIXES, ...ENVIRONMENT_SUFFIXES, ...COMPANION_SUFFIXES]);
 }
 
-/** What was there and what came; of two files of one name the new one. */
+/** The previous files and the new ones, which replace files of the same path. */
 export function mergeFiles(current: readonly DroppedFile[], added: readonly DroppedFile[]): DroppedFile[] {
   return [...new Map([...current, ...added].map((each) => [each.path, each])).values()];
 }

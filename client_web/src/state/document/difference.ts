@@ -1,4 +1,4 @@
-/** The difference of two looks that no edit connects, such as a replaced look, or the server's. */
+/** Difference of two looks without recorded edits between them, such as a replaced look or the server's. */
 import type { Look, PatchOp } from "../../protocol";
 import { escapeToken } from "./pointer";
 
@@ -8,7 +8,7 @@ function isObject(value: unknown): value is JsonObject {
   return typeof value === "object" && value !== null && !Array.isArray(value);
 }
 
-/** Lists of objects of equal length are compared one by one; everything else in a list is replaced whole. */
+/** Lists of objects of equal length are compared element by element; other lists are replaced as a whole. */
 function areObjectLists(a: unknown, b: unknown): boolean {
   return Array.isArray(a) && Array.isArray(b) && a.length === b.length && a.every(isObject) && b.every(isObject);
 }
@@ -30,7 +30,7 @@ function collectDifferences(path: string, from: unknown, to: unknown, patch: Pat
   } else replaceDocument(path, from, to, patch);
 }
 
-/** A curve's edits are one value: half of a drawn curve never travels alone. */
+/** A curve's edits are one value, never sent in parts. */
 function isCurveTable(path: string): boolean {
   return /^\/materials\/[^/]+\/terms\/\d+\/curves$/.test(path);
 }
@@ -39,14 +39,14 @@ function replaceDocument(path: string, from: unknown, to: unknown, patch: PatchO
   if (!isDeepEqual(from, to)) patch.push({ op: "replace", path, value: to });
 }
 
-/** The operations of a JSON Patch that lead from a look to another. */
+/** JSON Patch from one look to another. */
 export function diffLooks(from: Look, to: Look): PatchOp[] {
   const patch: PatchOp[] = [];
   collectDifferences("", from, to, patch);
   return patch;
 }
 
-/** Whether two values of a look say the same, in whatever order their members are. */
+/** True if two values of a look are equal, regardless of member order. */
 export function isDeepEqual(a: unknown, b: unknown): boolean {
   if (a === b) return true;
   if (Array.isArray(a) && Array.isArray(b)) return a.length === b.length && a.every((value, k) => isDeepEqual(value, b[k]));

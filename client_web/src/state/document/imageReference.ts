@@ -1,6 +1,6 @@
-/** What terms of a look name as their texture, or as their map of roughness. */
+/** References of terms to textures and roughness maps. */
 const IMAGE_PREFIX = "image:";
 
-/** Whether that is an image that a look names, none of the material's own. */
+/** True if a reference is an uploaded image, not one of the material's own maps. */
 export const isImageReference = (texture: string | boolean | null | undefined): texture is string =>
   typeof texture === "string" && texture.startsWith(IMAGE_PREFIX);

@@ -1,4 +1,4 @@
-/** Changes of the look: what it was and becomes, and the JSON Patches (RFC 6902) that lead there and back. */
+/** Changes of the look: before and after, and the JSON Patches (RFC 6902) in both directions. */
 import { applyPatches, enablePatches, produceWithPatches, type Draft, type Patch } from "immer";
 import type { Look, PatchOp } from "../../protocol";
 import { diffLooks, isDeepEqual } from "./difference";
@@ -9,9 +9,9 @@ enablePatches();
 export interface LookChange {
   before: Look;
   after: Look;
-  /** Leads from `before` to `after`. */
+  /** Patch from `before` to `after`. */
   patch: readonly PatchOp[];
-  /** Leads back. */
+  /** Patch from `after` to `before`. */
   inverse: readonly PatchOp[];
 }
 
@@ -24,14 +24,14 @@ function toPatchOp({ op, path, value }: Patch): PatchOp {
 
 type DraftRecipe = (draft: Draft<Look>) => void;
 
-/** What a recipe does to a look; what is not changed is shared. */
+/** The change made by an Immer recipe; unchanged parts are shared. */
 function makeChange(before: Look, recipe: DraftRecipe): LookChange {
   const [after, patch, inverse] = produceWithPatches(before, recipe);
   return { before, after, patch: patch.map(toPatchOp), inverse: inverse.map(toPatchOp) };
 }
 
-/** Set the value at a pointer (undefined removes it), and make the objects that are missing on the way. Nothing changes
- * where it is the same already. */
+/** Set the value at a pointer (undefined removes it), creating missing parent objects. An equal value changes
+ * nothing. */
 export function changeValue(look: Look, path: string, value: unknown): LookChange {
   return makeChange(look, (draft) => {
     if (isDeepEqual(getAt(look, path), value)) return;
@@ -47,7 +47,7 @@ export function changeValue(look: Look, path: string, value: unknown): LookChang
   });
 }
 
-/** The change by a patch; several operations on one path are merged. */
+/** The change made by a patch; several operations on one path are merged. */
 export function changeByPatch(look: Look, patch: readonly PatchOp[]): LookChange {
   const steps = patch.map(({ op, path, value }) => ({ op, path: pointerTokens(path), value }) as Patch);
   return makeChange(look, (draft) => void applyPatches(draft, steps));
@@ -58,18 +58,18 @@ export function changeToLook(look: Look, next: Look): LookChange {
   return { ...changeByPatch(look, diffLooks(look, next)), after: next };
 }
 
-/** Two changes in a row as one. */
+/** Merge two consecutive changes. */
 export function joinChanges(first: LookChange, second: LookChange): LookChange {
   return { ...changeByPatch(first.before, [...first.patch, ...second.patch]), after: second.after };
 }
 
-/** A look after a patch that was made for another state of it: operations whose path no longer exists are dropped. */
+/** Apply a patch made for another state of the look: operations whose path no longer exists are dropped. */
 export function rebasePatch(look: Look, patch: readonly PatchOp[]): Look {
   return patch.reduce((rebasedLook, operation) => {
     try {
       return changeByPatch(rebasedLook, [operation]).after;
     } catch {
-      return rebasedLook; // somebody else has removed what it is in
+      return rebasedLook; // removed by someone else
     }
   }, look);
 }

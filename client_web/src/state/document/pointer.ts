@@ -16,7 +16,7 @@ export function pointerTokens(path: string): string[] {
     .map((token) => token.replaceAll("~1", "/").replaceAll("~0", "~"));
 }
 
-/** The value at a pointer; undefined where there is none. */
+/** The value at a pointer; undefined if missing. */
 export function getAt(document: unknown, path: string): unknown {
   let value = document;
   for (const token of pointerTokens(path)) {
@@ -26,7 +26,7 @@ export function getAt(document: unknown, path: string): unknown {
   return value;
 }
 
-/** Whether a pointer is to a way of looking, which each has for themselves and who may not edit, too. */
+/** True if a pointer refers to a view setting, which is per user and allowed for read-only users. */
 export function isViewSetting(path: string): boolean {
   return /^\/(display|transport)(\/|$)/.test(path);
 }

@@ -1,4 +1,4 @@
-/** The visible state as a look: for images rendered outside the session. */
+/** The visible state as a look, for images rendered outside the session. */
 import type { Light, Look } from "../../protocol";
 import { withVisiblePaths } from "./lightPaths";
 import { ENVIRONMENT_SOURCE, hasLightSource, soloLight } from "./soloSources";
@@ -10,7 +10,7 @@ function withSingleLight(look: Look, source: string): Look {
   return { ...look, environment, lights };
 }
 
-/** A look with the light paths that are looked at, and while one source of light is alone, with that one. */
+/** A look with the light-path filter and the solo light applied. */
 export function visibleLookOf(look: Look): Look {
   const source = soloLight.peek();
   const soloLook = source !== null && hasLightSource(look, source) ? withSingleLight(look, source) : look;

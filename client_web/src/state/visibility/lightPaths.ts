@@ -1,14 +1,14 @@
-/** Which light paths are visible: a view setting, no edit. A look may name some of its own, as one from a file does. */
+/** The visible light paths: a view setting, not an edit. A look, as from a file, may have its own. */
 import { computed, signal } from "@preact/signals";
 import type { Look, Transport } from "../../protocol";
 import { look } from "../look";
 
-/** The light paths shown in place of the look's own. */
+/** Override of the look's light paths. */
 export const pathOverride = signal<Transport | null>(null);
 
 export const visiblePaths = computed<Transport | null>(() => pathOverride.value ?? look.value?.transport ?? null);
 
-/** Show some light paths; without an override those of the look are shown. */
+/** Set the visible light paths; null: those of the look. */
 export function setVisiblePaths(paths: Transport): void {
   const lookPaths = look.peek()?.transport;
   pathOverride.value = lookPaths?.show === paths.show && lookPaths.bounces === paths.bounces ? null : paths;
@@ -24,7 +24,7 @@ export function withVisiblePaths(fullLook: Look): Look {
   return visibleLook;
 }
 
-/** The full look of a visible look; any other is itself. */
+/** The unfiltered look of a visible look; other looks are returned as they are. */
 export function fullLookOf(visibleLook: Look): Look {
   return fullLooks.get(visibleLook) ?? visibleLook;
 }

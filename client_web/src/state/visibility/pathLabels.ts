@@ -4,7 +4,7 @@ import type { Transport } from "../../protocol";
 import type { RadioOption } from "../../ui/RadioRow";
 
 interface PathLabels extends RadioOption<Transport["show"]> {
-  /** Of an image that shows nothing else; null where it shows all. */
+  /** Description of the filtered image; null without a filter. */
   only: string | null;
 }
 
@@ -12,31 +12,31 @@ const MAX_BOUNCES = RANGES.transport.bounces.maximum;
 
 export const LIGHT_PATHS: readonly PathLabels[] = [
   { value: "all", label: "All", title: "All light", only: null },
-  { value: "direct", label: "Direct", title: "Light straight from its sources", only: "direct light" },
+  { value: "direct", label: "Direct", title: "Direct light from light sources", only: "Direct light only" },
   {
     value: "indirect",
-    label: "Reflected",
-    title: "Light that surfaces have passed on",
-    only: "reflected light",
+    label: "Indirect",
+    title: "Indirect light (1 or more bounces)",
+    only: "Indirect light only",
   },
   {
     value: "first_bounce",
-    label: "First",
-    title: "Light that one surface has passed on",
-    only: "the first bounce",
+    label: "1st bounce",
+    title: "Light after exactly one bounce",
+    only: "1st bounce only",
   },
   {
     value: "further_bounces",
-    label: "Rest",
-    title: "Light that two surfaces or more have passed on",
-    only: "light after the first bounce",
+    label: "2+ bounces",
+    title: "Light after two or more bounces",
+    only: "2+ bounces only",
   },
 ];
 
 /** Label of the active light-path filter; null without one. */
 export function pathFilterText({ show, bounces }: Transport): string | null {
   const only = LIGHT_PATHS.find((path) => path.value === show)?.only ?? null;
-  if (only !== null) return `Only ${only}`;
+  if (only !== null) return only;
   if (bounces >= MAX_BOUNCES) return null;
-  return bounces === 0 ? "Only direct light" : `At most ${bounces} ${bounces === 1 ? "bounce" : "bounces"}`;
+  return bounces === 0 ? "Direct light only" : `At most ${bounces} ${bounces === 1 ? "bounce" : "bounces"}`;
 }

@@ -1,14 +1,14 @@
-/** Solo: one material as it is, the others in dim gray; one light alone, the others dark. A view setting, no edit. */
+/** Solo: one material in color, the others in dim gray; one light on, the others off. A view setting, not an edit. */
 import { signal } from "@preact/signals";
 import type { Look } from "../../protocol";
 import { selectedLight, selectedMaterial } from "../selection";
 
-/** The material that is shown alone, the others in dim gray: the screen does that. */
+/** The solo material; a display effect. */
 export const soloMaterial = signal<string | null>(null);
-/** The light source shown alone. */
+/** The solo light source. */
 export const soloLight = signal<string | null>(null);
 
-/** What is alone after the switch was pressed with `selected` selected. */
+/** The solo object after the button was pressed with `selected` selected. */
 export function toggledSolo(current: string | null, selected: string | null): string | null {
   return selected === null || selected === current ? null : selected;
 }
@@ -17,7 +17,7 @@ export function toggleMaterialSolo(): void {
   soloMaterial.value = toggledSolo(soloMaterial.value, selectedMaterial.value);
 }
 
-/** What is selected, alone. */
+/** Toggle solo of the selection. */
 export function toggleSolo(): void {
   if (selectedLight.value === null) toggleMaterialSolo();
   else toggleLightSolo(selectedLight.value);
@@ -27,15 +27,15 @@ export function toggleLightSolo(source: string): void {
   soloLight.value = toggledSolo(soloLight.value, source);
 }
 
-/** The environment among the lights: no light has this name. */
+/** Name of the environment among the light sources; not a valid light name. */
 export const ENVIRONMENT_SOURCE = "";
 
-/** Whether a look has this source of light; one that was removed can come back by undo. */
+/** True if a look has this light source; a removed one can return by undo. */
 export function hasLightSource(look: Look, source: string): boolean {
   return source === ENVIRONMENT_SOURCE || look.lights[source] !== undefined;
 }
 
-/** Names of the sources that the server shall show alone; null: all. */
+/** Names of the solo sources for the server; null: all. */
 export function soloSources(look: Look): string[] | null {
   const source = soloLight.peek();
   if (source === null || !hasLightSource(look, source)) return null;

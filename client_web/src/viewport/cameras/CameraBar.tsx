@@ -1,4 +1,4 @@
-/** Over an image with a free camera: its controls as buttons, the renderer, and the camera. */
+/** Bar over a free-camera image: camera controls, renderer choice, and camera options. */
 import { computed } from "@preact/signals";
 import { useState } from "preact/hooks";
 import { setRenderer, rendererChoice, isClientRendering, type RendererMode } from "../../session/clientRendering";
@@ -10,17 +10,17 @@ import { freeCameraOf } from "./freeCamera";
 import { CAMERA_STEPS } from "./cameraSteps";
 import { orbitKeyStep } from "./useCameraControl";
 
-const BROWSER_TITLE = "This browser draws while the eye moves: nothing goes over the network for it. Bright rims a pixel thin are smoothed where the server draws";
-const SERVER_TITLE = "The server draws while the eye moves, and sends each picture";
-const CHOICES: Record<RendererMode, string> = { auto: "automatic", client: "this browser", server: "the server" };
+const BROWSER_TITLE = "This browser draws while the camera moves, without network traffic. Server drawing also smooths one-pixel highlights.";
+const SERVER_TITLE = "The server draws while the camera moves and streams each picture.";
+const CHOICES: Record<RendererMode, string> = { auto: "Automatic", client: "This browser", server: "Server" };
 
-/** Who draws while the camera moves. */
+/** Chooses the renderer of camera motion. */
 function RendererSelect() {
-  const serverTitle = usesTexelShading.value ? "The server draws while the eye moves: it shows textures from all sides, or images that are projected" : SERVER_TITLE;
+  const serverTitle = usesTexelShading.value ? "The server draws while the camera moves, because this look uses BTFs or tri-planar textures." : SERVER_TITLE;
   const title = isClientRendering.value ? BROWSER_TITLE : serverTitle;
   return (
-    <label class="drawn-by" title={title}>
-      Drawn by
+    <label class="renderer-choice" title={title}>
+      Renderer
       <select value={rendererChoice.value} onChange={(event) => setRenderer(event.currentTarget.value as RendererMode)}>
         {Object.entries(CHOICES).map(([value, label]) => (
           <option key={value} value={value}>
@@ -32,8 +32,8 @@ function RendererSelect() {
   );
 }
 
-/** Whose camera it is: one of several views has the focus. */
-export const cameraMessage = computed(() => (sideBySide.value ? `Eye of ${activeViewName.value}` : "Eye"));
+/** Label of the bar, with the active view's name if several are shown. */
+export const cameraMessage = computed(() => (sideBySide.value ? `Camera of ${activeViewName.value}` : "Camera"));
 
 export function CameraBar() {
   const [open, setOpen] = useState(true);
@@ -43,8 +43,8 @@ export function CameraBar() {
   const sceneId = scene.value?.id ?? null;
   if (freeCamera === null) return null;
   return (
-    <div class="eye-bar" role="group" aria-label="Move the eye">
-      <button aria-expanded={open} title="Drag turns, Shift or the right button slides, the wheel goes nearer" onClick={() => setOpen(!open)}>
+    <div class="camera-bar" role="group" aria-label="Camera">
+      <button aria-expanded={open} title="Drag: orbit · Shift or right-drag: pan · Wheel: dolly" onClick={() => setOpen(!open)}>
         {cameraMessage} {open ? "▾" : "▸"}
       </button>
       {open && (
@@ -54,8 +54,8 @@ export function CameraBar() {
               {sign}
             </button>
           ))}
-          <button title="Back to where the eye began (Home)" onClick={() => freeCamera.restart()}>
-            Back
+          <button title="Return to the initial camera (Home)" onClick={() => freeCamera.restart()}>
+          Reset view
           </button>
           <RendererSelect />
           {sceneId !== null && <CameraMenu scene={sceneId} freeCamera={freeCamera} name={name} />}

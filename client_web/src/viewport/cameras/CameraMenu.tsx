@@ -1,5 +1,4 @@
-/** Menu of a free camera: field of view, image size, and the cameras saved with the scene:
- * to look from, to rename, to delete. */
+/** Options of a free camera: field of view, image size, and the cameras saved with the scene. */
 import { useEffect, useRef, useState } from "preact/hooks";
 import { MAX_CAMERA_PIXELS, type CameraEntry } from "../../protocol";
 import { activeView } from "../../state/views";
@@ -18,7 +17,7 @@ const MIN_SIDE = 16;
 const MAX_SIDE = 4096;
 const UPRIGHT = 1e-3; // radians
 
-/** Width and height; what would be too many pixels takes from the other side. */
+/** Width and height; too many pixels shrink the other side. */
 function ImageSizeFields({ freeCamera }: { freeCamera: FreeCamera }) {
   const [width, height] = freeCamera.size;
   const maxSide = (otherSide: number) => Math.floor(MAX_CAMERA_PIXELS / otherSide);
@@ -27,11 +26,11 @@ function ImageSizeFields({ freeCamera }: { freeCamera: FreeCamera }) {
   );
   return (
     <div class="camera-size">
-      <span>Picture</span>
-      {field("Width of the picture, pixels", width, (next) => freeCamera.resize([next, Math.min(height, maxSide(next))]))}×
-      {field("Height of the picture, pixels", height, (next) => freeCamera.resize([Math.min(width, maxSide(next)), next]))}
-      <button title="As large as was baked" onClick={() => freeCamera.resize(null)}>
-        As baked
+      <span>Size</span>
+      {field("Width, pixels", width, (next) => freeCamera.resize([next, Math.min(height, maxSide(next))]))}×
+      {field("Height, pixels", height, (next) => freeCamera.resize([Math.min(width, maxSide(next)), next]))}
+      <button title="Use the size of the bake" onClick={() => freeCamera.resize(null)}>
+        Original size
       </button>
     </div>
   );
@@ -52,10 +51,10 @@ function CameraList({ scene, freeCamera, name }: ListProps) {
   const remove = (camera: CameraEntry) => run(() => removeCamera(scene, camera, () => void reportErrors(read)));
   return (
     <>
-      <ul aria-label="Cameras of the scene">
+      <ul aria-label="Saved cameras">
         {cameras.map((camera) => (
           <li key={camera.name}>
-            <IconButton icon="eye" label={`Look from ${camera.name}`} onClick={() => moveFreeCamera(name, camera)} />
+            <IconButton icon="view" label={`Go to ${camera.name}`} onClick={() => moveFreeCamera(name, camera)} />
             {camera.is_placed ? (
               <EditableName
                 class="name"
@@ -72,8 +71,8 @@ function CameraList({ scene, freeCamera, name }: ListProps) {
           </li>
         ))}
       </ul>
-      <IconButton icon="plus" label="Keep this camera with the scene" onClick={save}>
-        Keep this camera
+      <IconButton icon="plus" label="Save this camera with the scene" onClick={save}>
+        Save this camera
       </IconButton>
     </>
   );
@@ -83,19 +82,19 @@ export function CameraMenu({ scene, freeCamera, name }: ListProps) {
   const [open, setOpen] = useState(false);
   const menu = useRef<HTMLDivElement>(null);
   useDismiss(open, menu, () => setOpen(false));
-  activeView.value; // the camera has moved
+  activeView.value; // re-render when the camera moves
   const escape = (event: KeyboardEvent) => event.key === "Escape" && setOpen(false);
   return (
     <div class="menu" ref={menu} onKeyDown={escape}>
-      <button aria-expanded={open} title="Angle, size, and cameras of the scene" onClick={() => setOpen(!open)}>
-        Camera ▾
+      <button aria-expanded={open} title="Field of view, size and saved cameras" onClick={() => setOpen(!open)}>
+        Options ▾
       </button>
       {open && (
-        <div class="menu-body camera-menu" role="dialog" aria-label="Camera">
-          <LabeledSlider
-            label="Angle"
+        <div class="menu-body camera-menu" role="dialog" aria-label="Camera options">
+        <LabeledSlider
+            label="Field of view"
             unit="°"
-            title="Vertical field of view"
+            title="Vertical"
             value={freeCamera.orbit.yfov}
             minimum={MIN_YFOV}
             maximum={MAX_YFOV}
@@ -103,8 +102,8 @@ export function CameraMenu({ scene, freeCamera, name }: ListProps) {
             onChange={(yfov) => freeCamera.change((now) => withFieldOfView(now, yfov))}
           />
           {Math.abs(freeCamera.orbit.roll) > UPRIGHT && (
-            <button title="Stand the picture upright" onClick={() => freeCamera.change(levelOrbit)}>
-              Level
+            <button title="Remove the camera's roll" onClick={() => freeCamera.change(levelOrbit)}>
+            Level horizon
             </button>
           )}
           <ImageSizeFields freeCamera={freeCamera} />

@@ -1,4 +1,4 @@
-/** Places a camera: the scene in plain colors, moved until it shows what the image shall show. */
+/** The camera placement viewport: navigate the scene in plain colors, then save the camera. */
 import { useEffect, useId, useRef, useState } from "preact/hooks";
 import type { SceneBody, Triple } from "../../protocol";
 import type { BakeSize } from "../../session/scene/recipe";
@@ -18,9 +18,9 @@ const IDLE_SIZE: BakeSize = [960, 720];
 
 interface Props {
   scene: SceneBody;
-  /** Where it begins; null: where the scene's first camera is. */
+  /** Initial pose; null: the scene's first camera. */
   from: CameraPose | null;
-  /** The camera that is moved, and may be renamed; null: a new one. */
+  /** The camera being moved, and maybe renamed; null: a new one. */
   name: string | null;
   onSave(name: string): void;
   onClose(): void;
@@ -29,12 +29,12 @@ interface Props {
 interface PlacementStart {
   bounds: Bounds;
   first: Orbit;
-  /** Sees all of the scene. */
+  /** An orbit that shows the whole scene. */
   overview: Orbit;
 }
 
-/** The scene's bounds, and the initial orbit, else of its first camera: it turns about what the middle of the image
- * shows. */
+/** The scene's bounds, and the initial orbit, by default of its first camera: it orbits the point in the image's
+ * center. */
 async function startPlacement(scene: string, from: CameraPose | null): Promise<PlacementStart> {
   const [{ bounds_min, bounds_max, default_camera }, cameras] = await Promise.all([getPlacementView(scene), listCameras(scene)]);
   const bounds: Bounds = { lowest: bounds_min as Triple, highest: bounds_max as Triple };
@@ -51,15 +51,15 @@ export function CameraPlacement({ scene, from, name, onSave, onClose }: Props) {
     dialog.current?.showModal();
     startPlacement(scene.id, from).then(setStart, (error: Error) => setProblem(error.message));
   }, [scene.id]);
-  const title = name === null ? `Place a camera in “${scene.name}”` : `Move “${name}”`;
+  const title = name === null ? `New camera in “${scene.name}”` : `Move “${name}”`;
   return (
-    <dialog class="finder" ref={dialog} aria-label={title} onClose={onClose} onKeyDown={(event) => event.stopPropagation()}>
+    <dialog class="placement" ref={dialog} aria-label={title} onClose={onClose} onKeyDown={(event) => event.stopPropagation()}>
       <header class="panel-head">
         <h2>{title}</h2>
         <IconButton icon="close" label="Close" onClick={() => dialog.current?.close()} />
       </header>
       {start === null ? (
-        <p class="finder-wait">{problem || "Reading the scene…"}</p>
+        <p class="placement-wait">{problem || "Loading the scene…"}</p>
       ) : (
         <PlacementView scene={scene} {...start} name={name} onSave={onSave} />
       )}
@@ -67,7 +67,7 @@ export function CameraPlacement({ scene, from, name, onSave, onClose }: Props) {
   );
 }
 
-/** The placed camera, and the image that follows it. */
+/** The placed camera and its image. */
 function usePlacementCamera(scene: string, canvas: { current: HTMLCanvasElement | null }, first: Orbit, fail: (text: string) => void) {
   const [orbit, setOrbit] = useState(first);
   const pipeline = useRef<{ motion: CameraMotion; images: PlacementImages } | null>(null);
@@ -110,7 +110,7 @@ interface PlacementProps extends PlacementStart {
 
 function PlacementView({ scene, bounds, first, overview, name, onSave }: PlacementProps) {
   const canvas = useRef<HTMLCanvasElement>(null);
-  const [imageError, setImageError] = useState(""); // an image that comes after says nothing about what was refused
+  const [imageError, setImageError] = useState(""); // a later image does not resolve a rejected save
   const [saveError, setSaveError] = useState("");
   const [cameraName, setCameraName] = useState(name ?? nextCameraName(scene.views.map((view) => view.name)));
   const { orbit, change } = usePlacementCamera(scene.id, canvas, first, setImageError);
@@ -145,7 +145,7 @@ function PlacementView({ scene, bounds, first, overview, name, onSave }: Placeme
         height={IDLE_SIZE[1]}
         tabIndex={0}
         role="img"
-        aria-label="What the camera sees. Arrows turn, with Shift they slide, + and − go nearer and farther, F shows everything"
+        aria-label="Camera view. Arrow keys: orbit. Shift+arrows: pan. + and −: dolly. F: show all."
         onKeyDown={(event) => {
           if (event.key === "f" || event.key === "F") seeAll();
           else if (!orbitKeyStep(change, bounds, event.key, event.shiftKey)) return;
@@ -153,37 +153,37 @@ function PlacementView({ scene, bounds, first, overview, name, onSave }: Placeme
         }}
         {...control}
       />
-      <p class="finder-help">
-        Drag turns. Shift or the right button slides. The wheel goes nearer. A click looks at what is there.
+      <p class="placement-help">
+        Drag to orbit, Shift- or right-drag to pan, scroll to zoom, click to focus.
       </p>
-      <div class="finder-steps" role="group" aria-label="Move the camera">
+      <div class="placement-steps" role="group" aria-label="Move the camera">
         {CAMERA_STEPS.map(({ key, sign, label }) => (
           <button key={key} type="button" title={label} aria-label={label} onClick={() => orbitKeyStep(change, bounds, key, false)}>
             {sign}
           </button>
         ))}
-        <button type="button" title="See everything (F)" onClick={seeAll}>
-          See everything
+        <button type="button" title="Show the whole scene (F)" onClick={seeAll}>
+          Show all
         </button>
       </div>
       <LabeledSlider
-        label="Angle"
+        label="Field of view"
         unit="°"
-        title="Vertical field of view"
+        title="Vertical"
         value={orbit.yfov}
         minimum={MIN_YFOV}
         maximum={MAX_YFOV}
         scale="log"
         onChange={(yfov) => change((now) => withFieldOfView(now, yfov))}
       />
-      <div class="finder-keep">
+      <div class="placement-keep">
         <label for={field}>Name</label>
         <input id={field} value={cameraName} maxLength={MAX_NAME} onInput={(event) => setCameraName(event.currentTarget.value)} />
         <button class="primary" disabled={cameraName.trim() === ""}>
-          Keep camera
+          Save camera
         </button>
       </div>
-      <p class="finder-problem" role="alert">
+      <p class="placement-problem" role="alert">
         {saveError || imageError}
       </p>
     </form>

@@ -1,15 +1,15 @@
-/** Damped camera motion: the displayed orbit follows the goal, and stops on it. */
+/** Damped camera motion: the displayed orbit eases towards the goal. */
 import { interpolateOrbits, isClose, type Orbit } from "./orbit";
 
-const EASING_MS = 70; // a third of the way is left after this
-const LONGEST_MS = 50; // a page that was in the background makes no leap
+const EASING_MS = 70; // time constant: 1/e of the distance is left after this
+const LONGEST_MS = 50; // no jump after the page was in the background
 
 export class CameraMotion {
   private goal: Orbit;
   private frame = 0;
   private lastTime = 0;
 
-  /** `show` is called with each orbit on the way; `isLast` with the goal. */
+  /** `show` is called with each intermediate orbit, and with `isLast` at the goal. */
   constructor(
     private displayed: Orbit,
     private readonly show: (orbit: Orbit, isLast: boolean) => void,
@@ -18,12 +18,12 @@ export class CameraMotion {
     this.goal = displayed;
   }
 
-  /** Where it goes. */
+  /** The goal. */
   get target(): Orbit {
     return this.goal;
   }
 
-  /** Go on from where it was placed. */
+  /** Continue from a placed orbit. */
   change(update: (orbit: Orbit) => Orbit): void {
     this.goal = update(this.goal);
     if (this.frame !== 0) return;
@@ -31,7 +31,7 @@ export class CameraMotion {
     this.frame = requestAnimationFrame((now) => this.step(now));
   }
 
-  /** Describe where it is and where it goes otherwise; nothing moves. */
+  /** Reparametrize the current and the goal orbit; nothing moves. */
   replace(update: (orbit: Orbit) => Orbit): void {
     this.displayed = update(this.displayed);
     this.goal = update(this.goal);

@@ -1,4 +1,4 @@
-/** Cameras of a scene over REST, and its image in plain colors from anywhere. */
+/** REST calls for a scene's cameras and its placement viewport. */
 import { getJson, json, request } from "../../session/net/api";
 import type { CameraEntry, ViewportBody, PickBody, Triple } from "../../protocol";
 import type { BakeSize } from "../../session/scene/recipe";
@@ -36,7 +36,7 @@ export async function pickTarget(
   return ((await answer.json()) as PickBody).position as Triple | null;
 }
 
-/** The first of "View 1", "View 2" … that no camera has. */
+/** The first unused name of "View 1", "View 2", … */
 export function nextCameraName(usedNames: readonly string[]): string {
   for (let number = 1; ; number++) if (!usedNames.includes(`View ${number}`)) return `View ${number}`;
 }

@@ -1,9 +1,9 @@
-/** Buttons that move a camera, by the keys that do the same. */
+/** Camera buttons and their equivalent keys. */
 export const CAMERA_STEPS = [
-  { key: "ArrowLeft", sign: "◂", label: "Turn left" },
-  { key: "ArrowRight", sign: "▸", label: "Turn right" },
-  { key: "ArrowUp", sign: "▴", label: "Turn up" },
-  { key: "ArrowDown", sign: "▾", label: "Turn down" },
-  { key: "+", sign: "+", label: "Nearer" },
-  { key: "-", sign: "−", label: "Farther" },
+  { key: "ArrowLeft", sign: "◂", label: "Orbit left" },
+  { key: "ArrowRight", sign: "▸", label: "Orbit right" },
+  { key: "ArrowUp", sign: "▴", label: "Orbit up" },
+  { key: "ArrowDown", sign: "▾", label: "Orbit down" },
+  { key: "+", sign: "+", label: "Dolly in" },
+  { key: "-", sign: "−", label: "Dolly out" },
 ];

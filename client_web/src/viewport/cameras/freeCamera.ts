@@ -1,4 +1,4 @@
-/** Free cameras of views: placed by the user, sent to the server, stored over a reload. */
+/** Free cameras of views: moved by the user, sent to the server, stored for a reload. */
 import { effect } from "@preact/signals";
 import { sendToShown } from "../../session/connections";
 import { renderIfPossible, limitRenderSize, isMoving, setMoving, setCameraSeq } from "../../session/clientRendering";
@@ -18,7 +18,7 @@ const DEGREES = 180 / Math.PI;
 
 export type ViewSize = [width: number, height: number];
 
-/** Of one view of one bake. */
+/** The free camera of one view of one bake. */
 export class FreeCamera {
   readonly first: CameraPose;
   readonly bounds: Bounds;
@@ -26,9 +26,9 @@ export class FreeCamera {
   private motion: CameraMotion;
   private number = 0;
   private hasMoved = false;
-  /** Its pose during playback. */
+  /** Pose during playback. */
   private playbackPose: CameraPose | null = null;
-  /** Of its images; null: as large as was baked. */
+  /** Chosen image size; null: the baked size. */
   private sizeOverride: ViewSize | null = null;
 
   constructor(
@@ -52,7 +52,7 @@ export class FreeCamera {
     return this.motion.target;
   }
 
-  /** Of its images, where somebody chose it. */
+  /** The chosen image size, if any. */
   get customSize(): ViewSize | null {
     return this.sizeOverride;
   }
@@ -61,7 +61,7 @@ export class FreeCamera {
     return this.sizeOverride ?? [this.view.width, this.view.height];
   }
 
-  /** Make images of this size, or, of null, as large as was baked. */
+  /** Set the image size; null: the baked size. */
   resize(size: ViewSize | null): void {
     this.sizeOverride = size;
     this.save();
@@ -75,7 +75,7 @@ export class FreeCamera {
     this.save();
   };
 
-  /** From now on turn about what the middle of the image shows; where nobody says what that is, about what it was. */
+  /** Orbit around the point in the image's center; if unknown, keep the target. */
   async grab(): Promise<void> {
     const [width, height] = limitRenderSize(...this.size);
     const middle = requestPixelProbe(this.view.name, Math.floor(width / 2), Math.floor(height / 2));
@@ -83,12 +83,12 @@ export class FreeCamera {
     if (position !== null) this.motion.replace((orbit) => orbitOf(poseOf(orbit), this.bounds, position as Triple));
   }
 
-  /** Look at a point. */
+  /** Focus on a point. */
   lookAt(target: Triple): void {
     this.change((now) => ({ ...now, target }));
   }
 
-  /** Go back to where it began; its first camera may look straight down, which no orbit does. */
+  /** Return to the initial camera, which may look straight down, unlike an orbit. */
   restart(): void {
     this.motion.end();
     this.motion = this.createMotion(this.initialOrbit);
@@ -97,7 +97,7 @@ export class FreeCamera {
     this.report(this.first);
   }
 
-  /** Move to a pose of a playback. */
+  /** Move to a playback pose. */
   play(playedPose: CameraPose): void {
     this.motion.end();
     this.motion = this.createMotion(orbitOf(playedPose, this.bounds));
@@ -106,7 +106,7 @@ export class FreeCamera {
     this.report(playedPose, false);
   }
 
-  /** That way has ended. */
+  /** End the playback motion. */
   stop(): void {
     if (this.playbackPose === null) return;
     this.save();
@@ -114,12 +114,12 @@ export class FreeCamera {
     this.playbackPose = null;
   }
 
-  /** Tell the server again, which may know nothing of it. */
+  /** Send the camera again, as after a reconnection. */
   resend(): void {
     if (this.hasMoved || this.sizeOverride !== null) this.report(this.pose);
   }
 
-  /** Its pose, or the pose in which it will stop. */
+  /** The current pose, or the pose where it will stop. */
   get pose(): CameraPose {
     return this.hasMoved ? poseOf(this.motion.target) : this.first;
   }
@@ -137,13 +137,13 @@ export class FreeCamera {
     const { name } = this.view;
     const camera = { to_world, yfov: yfov / DEGREES };
     const [width, height] = this.size;
-    // what is laid over the image, as the handles of lights are, follows
+    // overlays such as light handles follow
     views.value = views.peek().map((current) => (current.name === name ? { ...current, camera, width, height } : current));
     const hasOwnPose = this.hasMoved || this.sizeOverride !== null;
     storeCamera(name, hasOwnPose ? { camera, size: limitRenderSize(width, height) } : null);
     const isRenderedHere = !isLast && renderIfPossible(name);
     if (!isRenderedHere) this.sendPose(camera, "exact");
-    else if (!isMoving(name)) this.sendPose(camera, "none"); // nothing is to be traced of where it is passing
+    else if (!isMoving(name)) this.sendPose(camera, "none"); // intermediate poses need no exact image
     setMoving(name, isRenderedHere);
     if (isLast) renderIfPossible(name);
   }
@@ -156,7 +156,7 @@ export class FreeCamera {
   }
 
   private get key(): string {
-    return `relume.camera.${scene.peek()?.id}.${this.view.name}`; // other bakes of the scene use it, too
+    return `relume.camera.${scene.peek()?.id}.${this.view.name}`; // shared by all bakes of the scene
   }
 
   private save(): void {
@@ -164,7 +164,7 @@ export class FreeCamera {
     try {
       sessionStorage.setItem(this.key, JSON.stringify(stored));
     } catch {
-      // storage is full or forbidden: a reload then goes back to where it began
+      // storage is full or forbidden: a reload starts at the initial camera
     }
   }
 
@@ -205,7 +205,7 @@ export function cameraOf(name: string): CameraPose | null {
   return view?.camera_mode === "free" ? { to_world: view.camera.to_world, yfov: view.camera.yfov * DEGREES } : null;
 }
 
-/** See a view from there, if its camera is free, in an image of a size; null: as large as was baked, undefined: as it is. */
+/** Move a view's camera, if it is free, and set its image size; null: the baked size, undefined: unchanged. */
 export function moveFreeCamera(name: string, camera: CameraPose, size?: ViewSize | null): void {
   const freeCamera = freeCameraOf(name);
   if (size !== undefined) freeCamera?.resize(size);
@@ -218,7 +218,7 @@ export interface CameraSet {
   sizes: Record<string, ViewSize>;
 }
 
-/** Of the shown views; those with a fixed camera have none. */
+/** Cameras of the shown views with a free camera. */
 export function currentCameras(): CameraSet {
   const [poses, sizes]: [Record<string, CameraPose>, Record<string, ViewSize>] = [{}, {}];
   for (const name of shownViews.value) {
@@ -229,7 +229,7 @@ export function currentCameras(): CameraSet {
   return { poses, sizes };
 }
 
-/** See views from there; a camera that is there already stays as it is. */
+/** Move the views' cameras; a camera already there is left unchanged. */
 export function applyCameras({ poses, sizes }: CameraSet): void {
   const current = currentCameras();
   const keyOf = (cameras: CameraSet, name: string) => JSON.stringify([cameras.poses[name], cameras.sizes[name]]);

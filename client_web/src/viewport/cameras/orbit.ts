@@ -5,18 +5,18 @@ import { add, cross, dot, length, scale, subtract, normalize } from "../../panel
 export interface Orbit {
   target: Triple;
   distance: number;
-  /** About +Y, from +Z towards +X. */
+  /** Azimuth around +Y, from +Z towards +X. */
   azimuth: number;
-  /** Above the horizon. */
+  /** Elevation above the horizon. */
   elevation: number;
-  /** About the line of sight, counter-clockwise as the camera sees itself turn; 0 stands upright. */
+  /** Roll around the view direction, counterclockwise; 0 is upright. */
   roll: number;
   /** Vertical field of view, degrees. */
   yfov: number;
 }
 
 export interface CameraPose {
-  /** Camera to world, 16 numbers by row; it looks along -Z. */
+  /** Camera to world, 16 numbers in row-major order; the camera looks along -Z. */
   to_world: number[];
   yfov: number;
 }
@@ -28,8 +28,8 @@ export interface Bounds {
 
 export const MIN_YFOV = 1;
 export const MAX_YFOV = 120;
-const HIGHEST = (89.9 * Math.PI) / 180; // straight down there is no upper side
-const NEAREST = 1e-4; // of the scene's size
+const HIGHEST = (89.9 * Math.PI) / 180; // straight down, the up direction is undefined
+const NEAREST = 1e-4; // fraction of the scene's size
 const FARTHEST = 50;
 
 const clamp = (value: number, low: number, high: number) => Math.min(high, Math.max(low, value));
@@ -60,8 +60,7 @@ export function poseOf(orbit: Orbit): CameraPose {
   return { to_world: [...rows, 0, 0, 0, 1], yfov: orbit.yfov };
 }
 
-/** The orbit with a camera's view, about `target` in the middle of its image; null where that is empty:
- * about the middle of the scene's depth. */
+/** The orbit of a camera around `target`, the point in its image's center; null: the middle of the scene's depth. */
 export function orbitOf({ to_world: m, yfov }: CameraPose, bounds: Bounds, target: Triple | null = null): Orbit {
   const column = (k: number): Triple => [m[k] as number, m[4 + k] as number, m[8 + k] as number];
   const position = column(3);
@@ -80,7 +79,7 @@ export function rotateOrbit(orbit: Orbit, azimuth: number, elevation: number): O
   return { ...orbit, azimuth: orbit.azimuth + azimuth, elevation: next };
 }
 
-/** Moved with the image: by fractions of its height to the right and down, at the target's depth. */
+/** Pan with the image: by fractions of its height to the right and down, at the target's depth. */
 export function panOrbit(orbit: Orbit, across: number, down: number): Orbit {
   const { right, up } = cameraAxes(orbit);
   const height = 2 * orbit.distance * Math.tan((orbit.yfov * Math.PI) / 360);
@@ -97,11 +96,11 @@ export const levelOrbit = (orbit: Orbit): Orbit => ({ ...orbit, roll: 0 });
 
 export const withFieldOfView = (orbit: Orbit, yfov: number): Orbit => ({ ...orbit, yfov: clamp(yfov, MIN_YFOV, MAX_YFOV) });
 
-/** From one angle to another, the short way round. */
+/** The shortest signed difference between two angles. */
 const interpolateAngle = (from: number, to: number) =>
   ((((to - from + Math.PI) % (2 * Math.PI)) + 2 * Math.PI) % (2 * Math.PI)) - Math.PI;
 
-/** A fraction of the way from one to another. */
+/** Interpolate between two orbits. */
 export function interpolateOrbits(from: Orbit, to: Orbit, fraction: number): Orbit {
   const mix = (a: number, b: number) => a + fraction * (b - a);
   return {
@@ -114,7 +113,7 @@ export function interpolateOrbits(from: Orbit, to: Orbit, fraction: number): Orb
   };
 }
 
-/** Whether both show the same, to a fraction of a pixel. */
+/** True if two orbits give the same image, to a fraction of a pixel. */
 export function isClose(a: Orbit, b: Orbit): boolean {
   const separation = length(subtract(a.target, b.target)) / a.distance + Math.abs(Math.log(a.distance / b.distance));
   const half = (angle: number) => Math.abs(Math.sin(angle / 2));

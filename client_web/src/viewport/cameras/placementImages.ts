@@ -1,4 +1,4 @@
-/** Images of where a camera is: one is asked for at a time, and then the newest. */
+/** Loads images of a moving camera: one request at a time, then one for the newest pose. */
 import type { BakeSize } from "../../session/scene/recipe";
 import type { CameraPose } from "./orbit";
 

@@ -1,17 +1,16 @@
-/** Fingers, or a pointer, that are down on an element: how far a move took what is under them, and how far two of them
- * spread it. */
+/** Tracks the pointers pressed on an element: pan of their center, and pinch of two of them. */
 type ScreenPoint = { x: number; y: number };
 type PointerSample = Pick<PointerEvent, "pointerId" | "clientX" | "clientY">;
 
 export interface PinchMove {
-  /** How many are down. */
+  /** Number of pressed pointers. */
   count: number;
-  /** How far the middle of them went, pixels. */
+  /** Movement of their center, pixels. */
   across: number;
   down: number;
-  /** Where the middle of them is. */
+  /** Position of their center. */
   center: ScreenPoint;
-  /** How many times as far apart two of them are as before. */
+  /** Ratio of two pointers' distance to the previous one. */
   spread: number;
 }
 
@@ -29,7 +28,7 @@ export class TouchGestures {
     return this.points.size;
   }
 
-  /** Where it is, of one; null of none or several. */
+  /** Position of a single pointer; null with none or several. */
   get only(): ScreenPoint | null {
     const [first, second] = [...this.points.values()];
     return second === undefined ? (first ?? null) : null;
@@ -39,12 +38,12 @@ export class TouchGestures {
     this.points.set(pointerId, { x: clientX, y: clientY });
   }
 
-  /** False where it was not down. */
+  /** False if it was not pressed. */
   lift({ pointerId }: PointerSample): boolean {
     return this.points.delete(pointerId);
   }
 
-  /** One of them has moved; null where it is not down. */
+  /** Update a moved pointer; null if it is not pressed. */
   move({ pointerId, clientX, clientY }: PointerSample): PinchMove | null {
     if (!this.points.has(pointerId)) return null;
     const previous = [...this.points.values()];

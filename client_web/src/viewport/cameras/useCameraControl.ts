@@ -1,4 +1,4 @@
-/** Controls of the camera placement viewport: drag, slide, wheel, pinch, click and keys. */
+/** Controls of the camera placement viewport: orbit, pan, wheel, pinch, click and keys. */
 import { useRef } from "preact/hooks";
 import { TouchGestures } from "./touchGestures";
 import { dollyOrbit, panOrbit, rotateOrbit, type Bounds, type Orbit } from "./orbit";
@@ -6,8 +6,8 @@ import { dollyOrbit, panOrbit, rotateOrbit, type Bounds, type Orbit } from "./or
 type PointerTarget = PointerEvent & { readonly currentTarget: HTMLElement };
 type OrbitChange = (by: (orbit: Orbit) => Orbit) => void;
 
-export const RADIANS_PER_PIXEL = Math.PI; // over the height of the image
-const WHEEL = 0.0015; // of the logarithm of the distance, for each pixel
+export const RADIANS_PER_PIXEL = Math.PI; // per image height
+const WHEEL = 0.0015; // change of log distance per pixel
 const LINE_PX = 30;
 const CLICK_PX = 4;
 const KEY_TURN = Math.PI / 24;
@@ -21,7 +21,7 @@ const ARROWS: Record<string, [across: number, down: number]> = {
   ArrowDown: [0, 1],
 };
 
-/** A step as a key or a button makes it; false where the name is none's. */
+/** Apply the camera step of a key or button; false for other keys. */
 export function orbitKeyStep(change: OrbitChange, bounds: Bounds, key: string, slides: boolean): boolean {
   const arrow = ARROWS[key];
   if (arrow !== undefined) {
@@ -35,11 +35,11 @@ export function orbitKeyStep(change: OrbitChange, bounds: Bounds, key: string, s
   return true;
 }
 
-/** How many times as far a camera is after a turn of the wheel. */
+/** Distance factor of a wheel turn. */
 export const zoomIn = (event: WheelEvent): number =>
   Math.exp(WHEEL * event.deltaY * (event.deltaMode === 1 ? LINE_PX : 1));
 
-/** Properties of the element that shows the image. `click` gets fractions of its sides. */
+/** Event handlers of the image's element. `click` receives fractions of its sides. */
 export function useCameraControl(change: OrbitChange, bounds: Bounds, click: (u: number, v: number) => void) {
   const fingers = useRef(new TouchGestures());
   const traveled = useRef(0);

@@ -68,8 +68,8 @@ def array_factories(transfer: FreeCameraTransfer) -> Mapping[str, Callable[[], T
     Returns:
         (texels, 1, 2 or 4) each, float32, float16 or uint32:
         corners: of faces, three and the material. sides: two of each face, see `node_arrays`. facing: normals of faces,
-        `uv_scale`. positions: of corners. normals, points, weights: of slots. places, point_normals, tangents: of
-        points. seen_lights: bits of the lights that each sees, 128 a texel, which lobes alone need.
+        `uv_scale`. positions: of corners. normals, points, weights: of slots. probe_positions, probe_normals,
+        tangents: of probes. visible_lights: visibility bits of each probe's lights, 128 a texel, needed only for lobes.
         Of scenes with textures besides: texels; levels: of each texture (first level's row, how many, both wraps),
         then of each level (first texel, height, width, 0); uvs: two of each corner, (u, v, sign of the bitangent, 0)
         and its tangent.
@@ -85,10 +85,10 @@ def array_factories(transfer: FreeCameraTransfer) -> Mapping[str, Callable[[], T
         "normals": lambda: _to_vec4(lattice_nodes.normal[shader_nodes.lattice_node], 0).astype(np.float16),
         "points": lambda: lattice_nodes.probe[shader_nodes.lattice_node].astype(np.uint32),
         "weights": lambda: lattice_nodes.weight[shader_nodes.lattice_node].astype(np.float16),
-        "places": lambda: _to_vec4(probes.position, 0),
-        "point_normals": lambda: _to_vec4(probes.normal, 0).astype(np.float16),
+        "probe_positions": lambda: _to_vec4(probes.position, 0),
+        "probe_normals": lambda: _to_vec4(probes.normal, 0).astype(np.float16),
         "tangents": lambda: _to_vec4(probes.tangent, 0).astype(np.float16),
-        "seen_lights": lambda: _bits(transfer.light_visibility_bits),
+        "visible_lights": lambda: _bits(transfer.light_visibility_bits),
     }
     if len(stored_scene.textures.wraps):
         factories |= _texture_factories(stored_scene, stored_scene.textures)

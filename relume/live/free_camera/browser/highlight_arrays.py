@@ -30,7 +30,7 @@ def environment_light_array(lights: EnvironmentLights) -> dict[str, Texels]:
     width = (lights.table // NUM_GRID_DIRECTIONS).astype(np.float32)
     towards, irradiance = np.split(lights.lights, 2, axis=1)
     rows = np.column_stack([towards, width, irradiance, np.zeros_like(width)])
-    return {"sky_lights": np.ascontiguousarray(rows.reshape(-1, 4))}
+    return {"environment_lights": np.ascontiguousarray(rows.reshape(-1, 4))}
 
 
 def lobe_shape_array(lobes: Lobes, material: int, normal_variation: F32) -> dict[str, Texels]:

@@ -91,8 +91,9 @@ def array_blocks(
             )
     blocks |= _highlight_blocks(transfer, state)
     if len(lobes.max_ratio) or background.kind == "map":
-        blocks["sky"] = ArrayBlock(
-            light.environment.map, lambda: {"sky": _encode_rgb9e5(transfer.prefiltered(light.environment.map).texels)}
+        blocks["environment"] = ArrayBlock(
+            light.environment.map,
+            lambda: {"environment": _encode_rgb9e5(transfer.prefiltered(light.environment.map).texels)},
         )
     if widths := lobe_widths(lobes):
         blocks["lobe_lights"] = ArrayBlock(
@@ -104,8 +105,8 @@ def array_blocks(
             blurred, lambda: {"background": _encode_rgb9e5(transfer.environment_map(*blurred).reshape(-1, 3))}
         )
     if catchers:
-        blocks["unhidden"] = ArrayBlock(
-            (light, catchers, state.is_coarse), lambda: {"unhidden": _unoccluded(transfer, state, catchers)}
+        blocks["unoccluded"] = ArrayBlock(
+            (light, catchers, state.is_coarse), lambda: {"unoccluded": _unoccluded(transfer, state, catchers)}
         )
     return blocks
 
@@ -132,8 +133,8 @@ def shader_constants(transfer: FreeCameraTransfer, state: FrameRequestState) -> 
 def _materials(transfer: FreeCameraTransfer, state: FrameRequestState) -> dict[str, Texels]:
     tables, lobes = state.materials.tables, state.materials.lobes
     return {
-        "even": tables.isotropic.reshape(-1, 4),
-        "uneven": tables.anisotropic.reshape(-1, 4),
+        "isotropic": tables.isotropic.reshape(-1, 4),
+        "anisotropic": tables.anisotropic.reshape(-1, 4),
         "lobes": _lobes(lobes),
         "materials": _material_rows(transfer, state, state.materials),
     }
@@ -160,7 +161,7 @@ def _highlight_blocks(transfer: FreeCameraTransfer, state: FrameRequestState) ->
         (environment, is_coarse),
         lambda: environment_light_array(transfer.environment_lights(environment, is_preview=is_coarse)),
     )
-    return {**shapes, "sky_lights": lights}
+    return {**shapes, "environment_lights": lights}
 
 
 def _lobes(lobes: Lobes) -> F32:
@@ -188,7 +189,7 @@ def _lobe_light_arrays(lobe_lights: LobeLightLists) -> dict[str, Texels]:
         "lobe_lights": lights.reshape(-1, 4),
         "lobe_lists": lobe_lights.lists.reshape(-1, 4),
         "lobe_firsts": lobe_lights.first[:, None],
-        "lights_of_lamps": np.ascontiguousarray(bright_lights.reshape(-1, 2))
+        "bright_light_members": np.ascontiguousarray(bright_lights.reshape(-1, 2))
         if bright_lights.size
         else np.zeros((1, 2), np.float32),
     }

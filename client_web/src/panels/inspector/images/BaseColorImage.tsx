@@ -1,4 +1,4 @@
-/** The base-color image of a material: choose, upload, remove. */
+/** The base-color texture of a material: choose, upload, remove. */
 import { useEffect } from "preact/hooks";
 import { isImageReference } from "../../../state/document/imageReference";
 import type { Term } from "../../../protocol";
@@ -8,22 +8,22 @@ import { baseOf, loadImages, assignImage, imageUploadProgress, unassign } from "
 
 export function BaseColorImage({ material, terms }: { material: string; terms: readonly Term[] }) {
   const textureName = baseTexture(terms);
-  useEffect(() => void loadImages(), [textureName]); // another may have sent it, or had it made
+  useEffect(() => void loadImages(), [textureName]); // it may have been uploaded or generated elsewhere
   const texture = baseOf(terms);
   const displayedImage = isImageReference(texture) ? texture : null;
   return (
-    <section class="base-image" aria-label="Image">
+    <section class="base-image" aria-label="Base color">
       <ImageChoice
-        label="Image of the base colour"
-        title="An image in the place of the base colour. An image file can be dropped on the object, too."
-        file="File of an image"
+        label="Base color texture"
+        title="Replaces the base color. You can also drop an image on the object."
+        file="Load texture…"
         material={material}
         displayedImage={displayedImage}
         assign={assignImage}
         unassign={unassign}
         onOther={() => void unassign(material)}
       >
-        <option value="">{displayedImage === null && texture !== null ? "The scene’s own image" : "No image"}</option>
+        <option value="">{displayedImage === null && texture !== null ? "Original texture" : "No texture"}</option>
       </ImageChoice>
       <p class="aside" role="status">
         {imageUploadProgress.value}

@@ -1,4 +1,4 @@
-/** Chooses an image for a material map, from the imported ones or from a file; also deletes images. */
+/** Chooses the image of a material map from uploaded ones or a file; also deletes images. */
 import type { ComponentChildren } from "preact";
 import { IconButton } from "../../../ui/IconButton";
 import { ImageFileField } from "./ImageFileField";
@@ -8,17 +8,17 @@ import { imageOf, offerToDeleteImage, uploadAndAssign, type AssignImage } from "
 export interface ImageChoiceProps {
   label: string;
   title: string;
-  /** What the button for a file is called. */
+  /** Label of the upload button. */
   file: string;
   material: string;
-  /** What is named in the look; null: no image. */
+  /** The image's name in the look; null: no image. */
   displayedImage: string | null;
-  /** The option that is chosen where that is none; those are the children. */
+  /** The selected one of the other options, the children, if there is no image. */
   fallbackLabel?: string;
   children: ComponentChildren;
   assign: AssignImage;
   unassign(material: string): void | Promise<void>;
-  /** Another option than an image was chosen. */
+  /** An option other than an image was chosen. */
   onOther(value: string): void;
 }
 
@@ -38,7 +38,7 @@ export function ImageChoice({ label, title, file, material, displayedImage, fall
       </select>
       <ImageFileField label={file} onFile={(selectedFile) => void uploadAndAssign(material, selectedFile, assign)} />
       {image !== undefined && (
-        <IconButton icon="trash" label={`Delete the image ${image.name}`} onClick={() => offerToDeleteImage(material, image, unassign)} />
+        <IconButton icon="trash" label={`Delete ${image.name}`} onClick={() => offerToDeleteImage(material, image, unassign)} />
       )}
     </div>
   );

@@ -1,11 +1,11 @@
-/** A button that asks for the file of an image. */
+/** A button that uploads an image file. */
 import { useRef } from "preact/hooks";
 import { imageUploadProgress } from "./imageStore";
 
 const TYPES = ".png,.jpg,.jpeg,.webp,.exr";
 
 interface Props {
-  /** Label of the image's purpose. */
+  /** The tooltip: purpose of the image. */
   label: string;
   onFile(file: File): void;
 }
@@ -15,7 +15,7 @@ export function ImageFileField({ label, onFile }: Props) {
   return (
     <>
       <button type="button" title={label} disabled={imageUploadProgress.value !== null} onClick={() => file.current?.click()}>
-        Image…
+      Load…
       </button>
       <input
         ref={file}

@@ -1,18 +1,18 @@
-/** The images that a list offers, and the one that is shown where it is not here. */
+/** Options for the uploaded images, plus the current one if it is missing. */
 import type { ImageBody } from "../../../protocol";
 import { areListed, uploadedImages } from "./imageStore";
 
 interface Props {
-  /** What is named in the look; null: no image. */
+  /** The image's name in the look; null: no image. */
   displayedImage: string | null;
-  /** That image, where it is here. */
+  /** The current image, if it exists. */
   image: ImageBody | undefined;
 }
 
 export function ImageOptions({ displayedImage, image }: Props) {
   return (
     <>
-      {displayedImage !== null && image === undefined && <option value={displayedImage}>{areListed.value ? "An image that is not here" : "Loading…"}</option>}
+      {displayedImage !== null && image === undefined && <option value={displayedImage}>{areListed.value ? "Missing image" : "Loading…"}</option>}
       {uploadedImages.value.map((imageOption) => (
         <option key={imageOption.id} value={imageOption.texture}>
           {imageOption.name}

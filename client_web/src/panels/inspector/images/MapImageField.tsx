@@ -7,7 +7,7 @@ export function MapImageField(props: ImageChoiceProps) {
   return (
     <div class="map-image" onDrop={() => onDrop(Promise.resolve(material), assign)}>
       <span class="param-label">{label}</span>
-      <ImageChoice {...props} title={`${title} An image file can be dropped here, too.`} />
+      <ImageChoice {...props} title={`${title} You can also drop an image here.`} />
     </div>
   );
 }

@@ -9,15 +9,15 @@ export function MetalnessImage({ material, terms }: { material: string; terms: r
   return (
     <MapImageField
       label="Metalness map"
-      title="An image whose blue says where the surface is metal."
-      file="File of a map of metalness"
+      title="Metalness from the blue channel."
+      file="Load metalness map…"
       material={material}
       displayedImage={metalnessOf(terms, imageOf)}
       assign={assignMetalness}
       unassign={removeMetalnessMap}
       onOther={() => removeMetalnessMap(material)}
     >
-      <option value="">As in the scene</option>
+      <option value="">Original</option>
     </MapImageField>
   );
 }

@@ -9,42 +9,42 @@ import { MapImageField } from "./MapImageField";
 interface Props {
   material: string;
   materialLook: MaterialLook;
-  /** Whether it is a mirror in the scene. */
+  /** True if the scene has it as a mirror. */
   mirrors: boolean;
 }
 
 export function NormalImage({ material, materialLook, mirrors }: Props) {
   const map = materialLook.normal_map ?? null;
   return (
-    <section class="normal-image" aria-label="Normals">
+    <section class="normal-image" aria-label="Normal map">
       <MapImageField
         label="Normal map"
-        title="An image whose colours say how the surface leans, its green upwards, as in glTF."
-        file="File of a normal map"
+        title="Tangent-space normals, OpenGL convention (green up)."
+        file="Load normal map…"
         material={material}
         displayedImage={map?.image ?? null}
         assign={assignNormals}
         unassign={removeNormalMap}
         onOther={() => removeNormalMap(material)}
       >
-        <option value="">As in the scene</option>
+        <option value="">Original</option>
       </MapImageField>
       {map !== null && (
         <LabeledSlider
-          label="Strength of the normal map"
+          label="Normal map strength"
           shortLabel="Strength"
-          title="How far bumps lean; glTF calls it scale."
+          title="Called scale in glTF"
           value={map.scale ?? 1}
           initial={1}
           minimum={0}
           maximum={4}
           step={0.01}
           scale="linear"
-          onChange={(scale) => editValue("Strength of bumps", jsonPointer("materials", material, "normal_map", "scale"), scale)}
+          onChange={(scale) => editValue("Normal map strength", jsonPointer("materials", material, "normal_map", "scale"), scale)}
         />
       )}
       {map !== null && mirrors && (
-        <p class="aside">What is seen in this mirror stays as it was baked: the image does not bend it.</p>
+        <p class="aside">Mirror reflections stay as baked: the normal map does not distort them.</p>
       )}
     </section>
   );

@@ -1,4 +1,4 @@
-/** The roughness map of a term: the scene's own, an image, or none. */
+/** The roughness map of a term: the original one, an image, or none. */
 import { useEffect } from "preact/hooks";
 import { isImageReference } from "../../../state/document/imageReference";
 import { MapImageField } from "./MapImageField";
@@ -9,7 +9,7 @@ interface Props {
   material: string;
   index: number;
   value: string | null;
-  /** Whether the scene has a map of its own. */
+  /** True if the scene has a roughness map. */
   hasOwn: boolean;
   onChange(value: string | null): void;
 }
@@ -20,8 +20,8 @@ export function RoughnessImage({ material, index, value, hasOwn, onChange }: Pro
   return (
     <MapImageField
       label="Roughness map"
-      title="An image whose green says how rough the surface is."
-      file="File of a map of roughness"
+      title="Roughness from the green channel."
+      file="Load roughness map…"
       material={material}
       displayedImage={displayedImage}
       fallbackLabel={value === ROUGHNESS_MAP ? "map" : ""}
@@ -33,7 +33,7 @@ export function RoughnessImage({ material, index, value, hasOwn, onChange }: Pro
       }}
     >
       <option value="">None</option>
-      {(hasOwn || value === ROUGHNESS_MAP) && <option value="map">{hasOwn ? "As in the scene" : "By finer bumps"}</option>}
+      {(hasOwn || value === ROUGHNESS_MAP) && <option value="map">{hasOwn ? "Original" : "From normal map"}</option>}
     </MapImageField>
   );
 }

@@ -1,4 +1,4 @@
-/** Files held over the picture: the object below is outlined, and takes the images among those that are dropped on it. */
+/** Files dragged over the image: the object below is outlined, and receives the dropped images. */
 import { freeCameraOf } from "../../../viewport/cameras/freeCamera";
 import { requestPixelProbe } from "../../../session/pixelProbe";
 import { pickMaterial } from "../../../render/materialPicking";
@@ -8,7 +8,7 @@ import { IMAGE_TYPES, onDrop } from "./importImages";
 
 const hasFiles = ({ dataTransfer }: DragEvent): boolean => dataTransfer?.types.includes("Files") ?? false;
 
-/** Whether there may be images among them: a folder has no type, and shows its files only when it is dropped. */
+/** True if images may be among the dragged files: a folder has no type, and reveals its files only on drop. */
 function mayHoldImages({ dataTransfer }: DragEvent): boolean {
   return [...(dataTransfer?.items ?? [])].some(({ kind, type }) => kind === "file" && (type === "" || IMAGE_TYPES.includes(type)));
 }
@@ -23,7 +23,7 @@ export function acceptImageDrops(screen: ImageCanvas): () => void {
     const { px, py, material } = pickMaterial(screen, event);
     const { view } = screen.image;
     hoveredMaterial.value = null;
-    // where the camera moves, the server knows; the page takes the files when the event comes to it
+    // in free-camera views the server picks the material; the page handles the files when the event bubbles up
     onDrop(freeCameraOf(view) === null ? Promise.resolve(material) : requestPixelProbe(view, px, py).then((answer) => answer.material));
   };
   canvas.addEventListener("dragover", target);

@@ -1,4 +1,4 @@
-/** Dropped images: applied to the material, and to the map that fits. */
+/** Applies dropped images to the matching maps of a material. */
 import { selectMaterial, selectedMaterial } from "../../../state/selection";
 import { reportErrors, showNote, showError } from "../../../ui/toasts";
 import { uploadImage } from "../../../session/net/upload";
@@ -9,7 +9,7 @@ import { planSet, setName, setMessage, type Slot } from "./textureSet";
 
 export const IMAGE_TYPES = ["image/png", "image/jpeg", "image/webp"];
 
-/** The drop target of files: a material, and its map if that is known. */
+/** The drop target of files: a material, and the map if known. */
 export interface DropTarget {
   material: Promise<string | null>;
   assign: AssignImage | undefined;
@@ -17,19 +17,19 @@ export interface DropTarget {
 
 let dropTarget: DropTarget | null = null;
 
-/** Files were dropped on a material, which is known now or soon; on the field of `assign`, or anywhere on it. */
+/** Record a drop on a material, which may resolve later; on the field of `assign`, or anywhere on the object. */
 export function onDrop(material: Promise<string | null>, assign?: AssignImage): void {
   dropTarget = { material, assign };
 }
 
-/** The target of the files that are dropped now; null if that is no material. */
+/** Take the target of the current drop; null if it is not a material. */
 export function consumeDropTarget(): DropTarget | null {
   const target = dropTarget;
   dropTarget = null;
   return target;
 }
 
-/** Whether a file is an image that a material can show. An EXR is one where its name says what it is a map of. */
+/** True if a file can be a texture. An EXR is one if its name gives the kind of map; others are environments. */
 export function isTextureFile(file: File): boolean {
   const isExr = file.name.toLowerCase().endsWith(".exr");
   return IMAGE_TYPES.includes(file.type) || (isExr && (detectMap(file.name) !== null || isColorName(file.name)));
@@ -37,21 +37,21 @@ export function isTextureFile(file: File): boolean {
 
 /** How each kind of map is assigned, and its label. */
 const ASSIGNMENTS: Record<string, { assign: AssignImage; as: string }> = {
-  roughness: { assign: assignRoughness, as: "as roughness" },
-  metal: { assign: assignMetalness, as: "as metalness" },
-  normals: { assign: assignNormals, as: "as normals" },
-  "roughness and metal": { assign: assignRoughnessAndMetalness, as: "as roughness by its green and as metalness by its blue" },
+  roughness: { assign: assignRoughness, as: "roughness map" },
+  metal: { assign: assignMetalness, as: "metalness map" },
+  normals: { assign: assignNormals, as: "normal map" },
+  "roughness and metal": { assign: assignRoughnessAndMetalness, as: "roughness (green) and metalness (blue) map" },
 };
 
-/** Why a kind of map is not supported. */
+/** Unsupported kinds of maps, with the alternative. */
 const UNSUPPORTED_MAPS: Record<string, string> = {
-  gloss: "Turn it round into one of roughness, and drop that.",
-  heights: "Drop the normal map that was made of it.",
-  "normals for DirectX": "Its green points down: drop the one for OpenGL, as glTF has it.",
-  occlusion: "What hides light is traced here.",
-  "what shines": "Light is part of a bake: import the scene with it, and bake again.",
-  opacity: "What is cut out comes with the scene.",
-  reflectance: "Set it with f0.",
+  gloss: "Gloss maps aren't supported; invert it to a roughness map.",
+  height: "Height maps aren't supported; use a normal map instead.",
+  "DirectX normals": "DirectX normal maps aren't supported; use the OpenGL version (green up).",
+  occlusion: "AO maps aren't needed: occlusion is ray-traced.",
+  emission: "Emission is part of a bake: import the scene with its emission map and bake again.",
+  opacity: "Opacity comes with the scene file.",
+  specular: "Specular maps aren't supported; set Specular F0 instead.",
 };
 
 /** Upload the images of a set sequentially; returns the uploaded ones, and rejects the others with the reason. */
@@ -61,7 +61,7 @@ async function uploadSet(slots: ReadonlyMap<Slot, File>, reject: (name: string, 
   for (const [k, file] of files.entries()) {
     const progressLabel = `${k + 1} of ${files.length}: ${file.name}`;
     const onProgress = (fraction: number) =>
-      (imageUploadProgress.value = fraction < 1 ? `Sending ${progressLabel}, ${Math.round(100 * fraction)} %` : `Reading ${progressLabel}…`);
+      (imageUploadProgress.value = fraction < 1 ? `Uploading ${progressLabel}, ${Math.round(100 * fraction)} %` : `Processing ${progressLabel}…`);
     onProgress(0);
     try {
       uploaded.set(file, await uploadImage(file, onProgress));
@@ -74,9 +74,9 @@ async function uploadSet(slots: ReadonlyMap<Slot, File>, reject: (name: string, 
 
 /** Apply a set of images to a material, in one step; one message reports the result. */
 async function applySet(material: string, files: readonly File[]): Promise<void> {
-  if (imageUploadProgress.value !== null) return showNote("Images are on their way already; drop these when they are there.");
+  if (imageUploadProgress.value !== null) return showNote("Still uploading; try again in a moment.");
   const { slots, rejected } = planSet(files, isTextureFile);
-  selectMaterial(material); // its inspector says how far the images are
+  selectMaterial(material); // the inspector shows the upload progress
   try {
     const uploaded = await uploadSet(slots, (name, reason) => rejected.push({ name, reason }));
     await loadImages();
@@ -95,17 +95,17 @@ async function applySet(material: string, files: readonly File[]): Promise<void>
   }
 }
 
-/** Apply one image: to the map that its name says, else as the base color. */
+/** Apply one image to the map given by its name, else as the base color. */
 async function applyFile(material: string, file: File): Promise<void> {
   const map = detectMap(file.name);
   if (map === null) return uploadAndAssign(material, file);
-  const useAsColor = { label: "Use as colour", run: () => void uploadAndAssign(material, file) };
+  const useAsColor = { label: "Use as base color", run: () => void uploadAndAssign(material, file) };
   const assignment = ASSIGNMENTS[map];
   if (assignment !== undefined) {
-    showNote(`“${file.name}” is shown ${assignment.as}.`, useAsColor);
+    showNote(`“${file.name}” applied as ${assignment.as}.`, useAsColor);
     return uploadAndAssign(material, file, assignment.assign);
   }
-  showNote(`“${file.name}” looks like a map of ${map}. ${UNSUPPORTED_MAPS[map] ?? ""}`, useAsColor);
+  showNote(`“${file.name}” was not applied. ${UNSUPPORTED_MAPS[map] ?? ""}`, useAsColor);
 }
 
 /** Apply images dropped on the page: to the drop target, else to the selection. */
@@ -113,7 +113,7 @@ export async function applyImageFiles(files: readonly File[], target: DropTarget
   const material = (await reportErrors(async () => target?.material)) ?? selectedMaterial.value;
   const [first] = files;
   if (first === undefined) return;
-  if (material === null) return showNote("Drop the image on an object, or choose a material first; it takes what comes next.");
+  if (material === null) return showNote("Drop the image on an object, or select a material first.");
   if (files.length > 1) return applySet(material, files);
   await (target?.assign === undefined ? applyFile(material, first) : uploadAndAssign(material, first, target.assign));
 }

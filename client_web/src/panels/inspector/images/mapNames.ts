@@ -1,22 +1,22 @@
-/** What an image is a map of, by its file's name, as libraries of textures write it. */
+/** Detects the kind of a texture map from its file name, by the conventions of texture libraries. */
 
-/** Endings of file names, and the kinds of map they mean. */
+/** File name endings and their kinds of map. */
 const MAPS: readonly (readonly [RegExp, string])[] = [
   [/^rough(ness)?$/, "roughness"],
   [/^gloss(iness)?$/, "gloss"],
   [/^(arm|orm|rma|metallicroughness|roughnessmetal(lic|ness)?)$/, "roughness and metal"],
   [/^(metal(lic|ness)?)$/, "metal"],
-  [/^(nor|nrm|normals?)dx$/, "normals for DirectX"],
+  [/^(nor|nrm|normals?)dx$/, "DirectX normals"],
   [/^(nor|nrm|normals?)(gl)?$/, "normals"],
-  [/^(bump|height|disp(lacement)?)$/, "heights"],
-  [/^(emission|emissive|emit|glow)$/, "what shines"],
+  [/^(bump|height|disp(lacement)?)$/, "height"],
+  [/^(emission|emissive|emit|glow)$/, "emission"],
   [/^(ao|ambientocclusion|occlusion)$/, "occlusion"],
   [/^(opacity|alpha|mask|transparency)$/, "opacity"],
-  [/^(spec(ular)?|reflection|reflectivity)$/, "reflectance"],
+  [/^(spec(ular)?|reflection|reflectivity)$/, "specular"],
 ];
 const COLORS = /^(base|albedo|diff(use)?|col(ou?r)?|basecolou?r)$/;
 
-/** Endings of a file name: the last word, and the last two as one; sizes such as 2k are skipped. */
+/** Endings of a file name: the last word, and the last two joined; sizes such as 2k are skipped. */
 function nameEndings(file: string): string[] {
   const plain = file.replace(/\.\w+$/, "").replace(/([a-z])([A-Z])/g, "$1 $2");
   const nameWords = plain
@@ -26,13 +26,13 @@ function nameEndings(file: string): string[] {
   return nameWords.length < 2 ? [] : [nameWords.slice(-1), nameWords.slice(-2)].map((last) => last.join(""));
 }
 
-/** What an image is a map of, where that is no color. */
+/** The kind of map of an image; null for colors. */
 export function detectMap(file: string): string | null {
   const ends = nameEndings(file);
   return MAPS.find(([name]) => ends.some((end) => name.test(end)))?.[1] ?? null;
 }
 
-/** Whether an image is named as one of the base color. */
+/** True if the file name marks a base color texture. */
 export function isColorName(file: string): boolean {
   return nameEndings(file).some((end) => COLORS.test(end));
 }

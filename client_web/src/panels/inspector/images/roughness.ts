@@ -1,26 +1,26 @@
-/** Terms that follow a roughness map, and the same terms with an image as roughness map. */
+/** Terms with a roughness map, and the same terms with an image as roughness map. */
 import { isImageReference } from "../../../state/document/imageReference";
 import type { ImageBody, ModelBody, ParamValue, Term } from "../../../protocol";
 import { modelOf } from "../../../state/scene";
 
-/** A term's `roughness_map` that is the material's own. */
+/** The `roughness_map` value for the material's original map. */
 export const ROUGHNESS_MAP = "roughness";
 
 const followsMap = (term: Term): boolean => term.roughness_map != null;
 
-/** The image used as the material's roughness map; all terms that follow one follow the same. */
+/** The image used as the material's roughness map; all terms with a map share it. */
 export function roughnessImage(terms: readonly Term[]): string | null {
   return terms.map((term) => term.roughness_map).find(isImageReference) ?? null;
 }
 
-/** The terms that an image dropped on the object is for: those that follow a map or may, else all that have a width. */
+/** Indices of the terms that a dropped roughness map applies to: those with a map or able to have one, else all with a width. */
 export function roughTermIndices(terms: readonly Term[]): number[] {
   const indicesWhere = (predicate: (term: Term) => boolean) => terms.flatMap((term, k) => (modelOf(term)?.width_parameter != null && predicate(term) ? [k] : []));
   const following = indicesWhere((term) => term.roughness_map !== undefined);
   return following.length > 0 ? following : indicesWhere(() => true);
 }
 
-/** The width of a term whose material is so rough; null where the model measures it otherwise. */
+/** The width parameter for a roughness; null if the model defines it differently. */
 function lobeWidth(model: ModelBody, roughness: number): ParamValue | null {
   const info = model.parameters.find(({ name }) => name === model.width_parameter);
   if (info === undefined || !((model.width_power ?? 0) > 0)) return null;
@@ -28,7 +28,7 @@ function lobeWidth(model: ModelBody, roughness: number): ParamValue | null {
   return Math.round(value * 1e4) / 1e4;
 }
 
-/** Let a term follow a map, an image, or none; others that follow one follow the same. */
+/** Set a term's roughness map: the original, an image, or none; other terms with a map share it. */
 export function withMap(terms: readonly Term[], index: number, follows: string | null): Term[] {
   const image = isImageReference(follows) || roughnessImage(terms) !== null;
   return terms.map((term, k) => {
@@ -37,7 +37,7 @@ export function withMap(terms: readonly Term[], index: number, follows: string |
   });
 }
 
-/** Let terms follow an image, as rough as it says: sliders show its mean, and scale it from there. */
+/** Set an image as the terms' roughness map: the sliders start at its mean and scale it. */
 export function withRoughnessImage(terms: readonly Term[], indices: readonly number[], image: ImageBody): Term[] {
   const following = indices.reduce<Term[]>((result, index) => withMap(result, index, image.texture), [...terms]);
   return following.map((term) => {
@@ -48,7 +48,7 @@ export function withRoughnessImage(terms: readonly Term[], indices: readonly num
   });
 }
 
-/** Terms without the image, as rough as the scene's own are. */
+/** Terms without the image, with the original roughness. */
 export function withoutRoughnessImage(terms: readonly Term[], originals: readonly Term[]): Term[] {
   return terms.map((term, k) => {
     if (!isImageReference(term.roughness_map)) return term;
