@@ -23,7 +23,7 @@ def open_bake(path: Path, cache: Cache) -> OpenBake:
     """Open a published store by the method that baked it.
 
     Args:
-        cache: of all that is made from the bake and may be made again.
+        cache: of results computed from the bake.
     Raises:
         StoreNotFoundError, SchemaVersionError, ChunkDamagedError, StoreError: see `relume.store.open_store`.
     """
@@ -38,9 +38,9 @@ def open_transfer(path: Path, cache: Cache) -> FixedViewTransfer:
     """Open a published store of fixed views.
 
     Args:
-        cache: of all that is made from the bake and may be made again.
+        cache: of results computed from the bake.
     Raises:
-        StoreError: its eyes move. Else as `open_bake`.
+        StoreError: it has a free camera. Otherwise as `open_bake`.
     """
     bake = open_bake(path, cache)
     if bake.camera_mode is not CameraMode.FIXED:

@@ -3,8 +3,8 @@
     a_l = Σ_s w_s hat_l(ω_s)
 
 A BTF is interpolated linearly between the directions l (`relume.assets.btf.direction_rings`), so that sums over light
-are exact. The weights w have no cosine: the BTF's values include it. a depends neither on the texel nor on the tiling of
-the texture.
+are exact. The weights w have no cosine: the BTF's values include it. a depends neither on the texel nor on the
+tiling of the texture.
 """
 
 from __future__ import annotations
