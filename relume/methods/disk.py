@@ -3,8 +3,8 @@
 A bound assumes the worst case for each pixel and number. Fixed views are therefore measured: the method bakes small
 images of the scene with few lights, and the bytes of its arrays are scaled to the requested rows and columns. Rows of
 small images are less alike and compress worse, and more of their pixels lie on edges, so that the estimate is rather
-too high. Surface probes take longer to place than to trace; each part of their store is planned as the largest fraction of
-its bound that was measured. `relume bench plan` compares plans with stores.
+too high. Surface probes take longer to place than to trace; each part of their store is planned as the largest
+fraction of its bound that was measured. `relume bench plan` compares plans with stores.
 The estimate is not a bound: a small image may miss details of a scene. A bake checks the disk while it writes.
 """
 

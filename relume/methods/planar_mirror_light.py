@@ -1,7 +1,7 @@
 """Virtual lights of planar mirrors: exact, sharp reflections of the lights whose mirrored shadow rays were traced.
 
-A patch on a mirror reflects light in a low-degree basis, some 30° wide, even that of a small sun. It reflects nothing of
-the traced lights to samples that store their mirrored visibility: these receive
+A patch on a mirror reflects light in a low-degree basis, some 30° wide, even that of a small sun. It excludes the
+light of the traced lights to samples that store their mirrored visibility: these receive
 
     E m c F(θ)   from the direction v = d − 2 (d · n) n,   cos θ = |d · n|,
 
