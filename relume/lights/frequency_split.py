@@ -1,8 +1,8 @@
 """Low-/high-frequency split of an environment: spherical harmonics, and the triangles that these would blur.
 
-Harmonics of an environment with a sun represent neither the sky nor the sun. The fit therefore minimizes the absolute
-differences of all triangles instead of their squares: few triangles then differ by much (lamps and the sun), all others
-by little. Those few are kept as residual lights, with all of their shadows.
+Harmonics of an environment with a sun represent neither the sun nor the rest. The fit therefore minimizes the absolute
+differences of all triangles instead of their squares: then few triangles differ by much (the sun and other bright
+regions), all others by little. Those few are kept as residual lights, with all of their shadows.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ class LightStrata(NamedTuple):
     """
 
     corner: Shaped[F32, "N 2"]
-    size: Shaped[F32, 2]
+    size: Shaped[F32, " 2"]
     uv: Shaped[F32, "N 2"]
     seed: int
 
@@ -111,7 +111,12 @@ def _reverse_bits(number: NDArray[np.int64], bits: int) -> NDArray[np.int64]:
 
 
 def subdivide_emitter(
-    split_axis: tuple[int, ...], corner: F32, edges: F32, power_cdf: F32, *, is_rectangle: bool
+    split_axis: tuple[int, ...],
+    corner: Shaped[F32, "T 3"],
+    edges: Shaped[F32, "T 2 3"],
+    power_cdf: Shaped[F32, " T"],
+    *,
+    is_rectangle: bool,
 ) -> EmitterParts:
     """Compute the parts of a surface: level by level of quarters, each in the order of its samples.
 

@@ -57,8 +57,8 @@ class LocalLight(NamedTuple):
     """
 
     kind: int
-    position: Shaped[F32, 3]
-    axis: Shaped[F32, 3]
+    position: Shaped[F32, " 3"]
+    axis: Shaped[F32, " 3"]
     cone_scale: np.float32
     cone_offset: np.float32
     corner: Shaped[F32, "T 3"]
@@ -143,7 +143,7 @@ def _outline(geometry: LightGeometry, triangles: LightTriangles | None) -> tuple
     return corners[:, 0], corners[:, 1:] - corners[:, :1]
 
 
-def rectangle(geometry: LightGeometry) -> tuple[Shaped[F64, 3], Shaped[F64, "2 3"]]:
+def rectangle(geometry: LightGeometry) -> tuple[Shaped[F64, " 3"], Shaped[F64, "2 3"]]:
     """Return a corner and the edges of a rectangle, whose cross product points to its emitting side; meters."""
     facing = _unit(geometry.direction)
     up_hint = np.array([0.0, 1.0, 0.0]) if abs(facing[1]) < 1 - _PARALLEL_TOLERANCE else np.array([0.0, 0.0, 1.0])

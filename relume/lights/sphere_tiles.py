@@ -43,7 +43,7 @@ _OCTANTS = np.array([(5, 3, 1), (1, 3, 4), (1, 2, 5), (4, 2, 1), (0, 3, 5), (4, 
 _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
 
 
-def unit(v: Shaped[F64, ...]) -> Shaped[F64, ...]:
+def unit(v: Shaped[F64, " ..."]) -> Shaped[F64, " ..."]:
     """Normalize vectors along the last axis."""
     return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True), dtype=np.float64)
 

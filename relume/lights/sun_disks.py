@@ -53,8 +53,8 @@ class SunDisk(NamedTuple):
         directions: unit directions with equal fractions of the light.
     """
 
-    irradiance: Shaped[F64, 3]
-    mean: Shaped[F64, 3]
+    irradiance: Shaped[F64, " 3"]
+    mean: Shaped[F64, " 3"]
     directions: Shaped[F64, "sets targets 3"]
 
 

@@ -39,7 +39,7 @@ BYTES = 300 << 20  # of everything else: tables, environments, static views
 _DIGITS = 4
 
 
-def measure_error(store: StoreReader, scene: Scene, size: tuple[int, int]) -> Shaped[NDArray[np.float32], 2]:
+def measure_error(store: StoreReader, scene: Scene, size: tuple[int, int]) -> Shaped[NDArray[np.float32], " 2"]:
     """Return the error and its standard error; NaN if everything is dark or the memory budget is exceeded.
 
     Args:
@@ -47,7 +47,7 @@ def measure_error(store: StoreReader, scene: Scene, size: tuple[int, int]) -> Sh
         size: default width and height of the images; small ones are measured with fewer rays.
     """
     # no folder: images are not saved beside an unfinished bake
-    transfer = BakedFreeCamera.from_store(store, f"bake in making/{scene.id}", Cache(_BUDGET_BYTES))
+    transfer = BakedFreeCamera.from_store(store, f"unfinished bake/{scene.id}", Cache(_BUDGET_BYTES))
     try:
         rays = _SIZE if size[0] * size[1] >= _SIZE[0] * _SIZE[1] else _SMALL_SIZE
         estimate = _estimate_error(transfer, StaticViewBuilder(transfer.light_transport, scene), rays)

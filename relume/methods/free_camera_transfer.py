@@ -135,7 +135,7 @@ class BakedFreeCamera:
         """
         if all(override == NO_OVERRIDES for override in overrides):
             return self.stored_scene
-        key = self.key, "images on surfaces", overrides
+        key = self.key, "map overrides on surfaces", overrides
         textures = self.cache.get_value(key, lambda: overridden_textures(self.stored_scene, self.positions, overrides))
         return replace(self.stored_scene, **textures._asdict())
 
@@ -254,7 +254,7 @@ class BakedFreeCamera:
         return SunExtractor(self.light_transport)
 
     def hard_shadow_lights(
-        self, light: Illumination, probe_indices: NDArray[np.intp] | None
+        self, light: Illumination, probe_indices: Shaped[NDArray[np.intp], " m"] | None
     ) -> tuple[HardShadowLight, ...]:
         """Return sun disks and small area lights, with their unoccluded light at some probes (None: all)."""
         probes = self.stored_scene.probes if probe_indices is None else self.stored_scene.probes.rows(probe_indices)

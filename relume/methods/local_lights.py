@@ -125,7 +125,7 @@ class LocalLights:
         """Preview a light of unit emission at points, with few samples if it has an extent."""
         return trace_moving_light(self.embree, self._ray_offset, *self.sample_light(geometry, PREVIEW_SAMPLES), points)
 
-    def preview_rays(self, source: LightSource, visible: NDArray[np.uint8]) -> LocalRays:
+    def preview_rays(self, source: LightSource, visible: Shaped[NDArray[np.uint8], "n bytes"]) -> LocalRays:
         """Return rays of a previewed light, for directional terms. visible: `MovingLight.visible`"""
         return LocalRays(
             *self.sample_light(source.geometry, PREVIEW_SAMPLES), np.array(source.gain, np.float32), visible

@@ -182,7 +182,7 @@ class DirectPatchLight:
         patches, rows = self.patches, reflectance_operator.rows
         key = (
             self._key,
-            "environment on cells, by direction",
+            "environment on patches, directional",
             environment,
             reflectance_operator.has_lobe,
             *self._normal_overrides,
@@ -216,7 +216,7 @@ class DirectPatchLight:
                 points, rays = patches.points_of(rows), self._local.rays(geometry, rows)
             return patches.mean_coefficients(rows, points, ray_incident_coefficients(points, [rays], OUTGOING_DEGREE))
 
-        cache, label = self._cache.transient if is_preview else self._cache, "light on cells, by direction"
+        cache, label = self._cache.transient if is_preview else self._cache, "light on patches, directional"
         return cache.get_value(
             (self._key, label, geometry, reflectance_operator.has_lobe, is_preview, *self._normal_overrides), compute
         )

@@ -30,7 +30,7 @@ class PrefilteredEnvironments:
 
     def _split(self, name: str | None) -> SplitEnvironment:
         """Split an environment, None for the scene's own, into bright lights and the rest."""
-        key = self.light_transport.cache_owner(name), "lamps", name
+        key = self.light_transport.cache_owner(name), "bright lights", name
         return self.light_transport.cache.get_value(
             key, lambda: remove_sun_disks(self.light_transport.environment_radiance(name), BRIGHT_LIGHT_BOUNDS)
         )

@@ -30,7 +30,7 @@ def open_bake(path: Path, cache: Cache) -> OpenBake:
     store = open_store(path)
     method = METHODS.get(str(store.attributes.get("method")))
     if method is None:
-        raise StoreError(f"no method of this version bakes like {path.name}; delete the bake, bake again")
+        raise StoreError(f"no method of this version can open {path.name}; delete the bake and bake again")
     return method.open(store, str(path.resolve()), cache)
 
 
@@ -44,5 +44,5 @@ def open_transfer(path: Path, cache: Cache) -> FixedViewTransfer:
     """
     bake = open_bake(path, cache)
     if bake.camera_mode is not CameraMode.FIXED:
-        raise StoreError(f"{path.name} has no fixed views; bake the scene by another method")
+        raise StoreError(f"{path.name} has no fixed views; bake the scene with another method")
     return cast("FixedViewTransfer", bake)

@@ -89,7 +89,7 @@ class NormalRetracer:
         except ChunkDamagedError:
             raise
         except StoreError:
-            raise StoreError("this bake is too old to show images of normals; bake the scene again") from None
+            raise StoreError("this bake is too old to show normal map overrides; bake the scene again") from None
         empty = np.empty((0, 3), np.float32)
         return SceneBuffers(
             positions, empty, empty, empty, faces, material, mesh, self._local.embree, offset_point(positions)

@@ -108,7 +108,7 @@ def read_harmonic_light(store: StoreReader, patches: PatchLight) -> HarmonicLigh
     fits = fits and int(probe_transfer.cluster.max(initial=0)) < len(probe_transfer.basis)
     patch_shape = patches.num_patches, num_functions(PATCH_DEGREE), NUM_HARMONICS
     if not (fits and irradiance.shape == patch_shape[::2] and patch_coefficients.shape == patch_shape):
-        raise ChunkDamagedError("sh", "its arrays do not fit the probes and patches")
+        raise ChunkDamagedError("sh", "its arrays do not match the probes and patches")
     light_coefficients = (
         harmonics(read_shadow_ray_directions(store).astype(np.float64)) * read_tiles(store).solid_angles[:, None]
     )

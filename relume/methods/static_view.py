@@ -16,6 +16,7 @@ from functools import cached_property
 from typing import IO, Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import CancelledError
@@ -108,7 +109,7 @@ class StaticView(BakedIndirectViews):
         return self.light_transport.indirect
 
     def subset(
-        self, view: View, material: int, sample_indices: NDArray[np.integer], *, has_indirect: bool
+        self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " m"], *, has_indirect: bool
     ) -> SampledTransfer:
         """Select samples of a material, with gather rays if traced. See `FixedViewTransfer`."""
         return super().subset(view, material, sample_indices, has_indirect=has_indirect and self.reflects)

@@ -92,7 +92,9 @@ def has_alpha_tested_surfaces(store: StoreReader) -> bool:
     return bool(store.attributes.get("has_alpha_test"))
 
 
-def read_alpha_test(store: StoreReader, positions: F32, faces: NDArray[np.uint32]) -> AlphaTest | None:
+def read_alpha_test(
+    store: StoreReader, positions: Shaped[F32, "vertices 3"], faces: Shaped[NDArray[np.uint32], "triangles 3"]
+) -> AlphaTest | None:
     """Read the alpha test of a store; None if all triangles are opaque.
 
     Args:

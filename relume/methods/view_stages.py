@@ -96,7 +96,7 @@ class SampledViews:
         if unknown := [view for view in recipe.views if view not in view_names]:
             raise PlanError(f"the scene has no view {unknown[0]!r}; choose from {', '.join(view_names)}")
         if not recipe.views or len(set(recipe.views)) != len(recipe.views):
-            raise PlanError("name each view once, and at least one")
+            raise PlanError("name at least one view, and each only once")
         if not (min(width, height) >= MIN_SIDE and width * height <= MAX_PIXELS):
             able = f"give at least {MIN_SIDE}×{MIN_SIDE}, at most {MAX_PIXELS} in all"
             raise PlanError(f"{width}×{height} pixels were asked for; {able}")

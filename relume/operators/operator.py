@@ -19,12 +19,12 @@ class Operator(ABC):
     Attributes:
         is_whole: contains all samples, so that its sums are images; otherwise they are changes of an image.
         is_exact: its sums equal a full evaluation up to rounding.
-        importance: norm of each column over all samples. (3, J) float64, (L, 3, J) over those of each level
+        importance: norm of each column over all samples.
     """
 
     is_whole: ClassVar[bool]
     is_exact: ClassVar[bool]
-    importance: F64
+    importance: Shaped[F64, "*levels 3 J"]
 
     @property
     @abstractmethod

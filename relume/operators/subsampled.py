@@ -41,7 +41,7 @@ class SubsampledOperator(Operator):
     num_subset: int
     neighbors: Shaped[NDArray[np.int32], "n k"]
     weight: Shaped[F32, "n k"]
-    importance: F64 = field(init=False)
+    importance: Shaped[F64, "*levels 3 J"] = field(init=False)
 
     is_whole = False
     is_exact = False

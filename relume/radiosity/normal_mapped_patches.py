@@ -89,6 +89,11 @@ def _retrace(
         )
 
     parallel_for_cancellable(
-        trace, len(rows), _PATCHES_PER_STEP, lambda share: None, is_canceled, "tracing cells that lean"
+        trace,
+        len(rows),
+        _PATCHES_PER_STEP,
+        lambda fraction: None,
+        is_canceled,
+        "tracing patches with overridden normals",
     )
     return retraced

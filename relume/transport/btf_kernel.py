@@ -244,7 +244,7 @@ def texel_rows(
 
 
 def outgoing_rows(
-    btf_ref: BtfRef, tables: Shaped[F32, ...], incident: Shaped[F32, "m 3 L"], receivers: ShadingPoints, start: int
+    btf_ref: BtfRef, tables: Shaped[F32, " ..."], incident: Shaped[F32, "m 3 L"], receivers: ShadingPoints, start: int
 ) -> Shaped[F32, "m 3"]:
     """Compute the outgoing radiance of points from binned incident light.
 

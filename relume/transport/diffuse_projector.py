@@ -76,7 +76,7 @@ class DiffuseProjector:
         term: the term. constant: product of its curves. lights: of the environment.
     """
 
-    def __init__(self, term: Term, constant: Shaped[F32, 3], lights: TriangleLights) -> None:
+    def __init__(self, term: Term, constant: Shaped[F32, " 3"], lights: TriangleLights) -> None:
         self._term = term
         self._direction = np.ascontiguousarray(lights.direction.T)
         self._irradiance = np.ascontiguousarray((lights.irradiance * constant).T)

@@ -132,7 +132,7 @@ def _list_and_add(rays: RayList, receivers: ShadingPoints, degree: int, start: i
 def add_scaled(
     total: Shaped[F32, "n 3 K"],
     addend: Shaped[F32, "m 3 k"],
-    gain: Shaped[F32, 3],
+    gain: Shaped[F32, " 3"],
     rows: Shaped[NDArray[np.intp], " rows"] | None = None,
     *,
     has_all_rows: bool = False,

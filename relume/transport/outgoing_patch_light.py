@@ -31,7 +31,7 @@ from relume.patches.patch_kdtree import NO_PATCH
 F32 = NDArray[np.float32]
 
 NUM_OUTGOING = num_functions(OUTGOING_DEGREE)
-"""J, functions by which cells send."""
+"""J, basis functions of outgoing light."""
 
 _NARROWEST = 1 / (2 * 4.9**2)  # of highlight and window together: a metal of roughness 0.3
 _STEPS = 32_767  # of 16-bit radiance
@@ -89,7 +89,7 @@ def radiance_from_patch(
     def fill(start: int, stop: int) -> None:
         block = coefficients[start:stop]
         variants = [block] if decay is None else [block, block * np.exp(-np.outer(decay[start:stop], degrees))[:, None]]
-        values = np.stack(variants).astype(np.float32) @ means  # (tables, cells, 3, squares)
+        values = np.stack(variants).astype(np.float32) @ means  # (tables, patches, 3, bins)
         if extra_bins is not None:
             selection = slice(*np.searchsorted(extra_bins[0], [start, stop]))
             values[:, extra_bins[0][selection] - start] += extra_bins[1][selection]

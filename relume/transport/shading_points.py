@@ -40,7 +40,7 @@ class RayList(Protocol):
         """Maximum number of rays of a point."""
         ...
 
-    def unshared(self, rows: NDArray[np.integer]) -> RayList:
+    def unshared(self, rows: Shaped[NDArray[np.integer], " m"]) -> RayList:
         """Select the rays of some points, without sharing among neighbors."""
         ...
 
@@ -83,7 +83,7 @@ class GatherRays:
         """Maximum number of rays of a point."""
         return int(self.gather_hits.shape[1])
 
-    def unshared(self, rows: NDArray[np.integer]) -> GatherRays:
+    def unshared(self, rows: Shaped[NDArray[np.integer], " m"]) -> GatherRays:
         """Select the rays of some points, without sharing among neighbors."""
         return replace(self, gather_hits=self.gather_hits[rows], sharing=None)
 
@@ -113,7 +113,7 @@ class LocalRays:
 
     light: LocalLight
     strata: LightStrata
-    gain: Shaped[F32, 3]
+    gain: Shaped[F32, " 3"]
     visible: Shaped[NDArray[np.uint8], "n bytes"]
 
     @cached_property
@@ -126,7 +126,7 @@ class LocalRays:
         """Maximum number of rays of a point."""
         return len(self.strata.uv)
 
-    def unshared(self, rows: NDArray[np.integer]) -> LocalRays:
+    def unshared(self, rows: Shaped[NDArray[np.integer], " m"]) -> LocalRays:
         """Select the rays of some points; see `RayList`."""
         return replace(self, visible=self.visible[rows])
 
@@ -155,7 +155,7 @@ class MirrorRays:
         """Maximum number of rays of a point."""
         return len(self.direction)
 
-    def unshared(self, rows: NDArray[np.integer]) -> MirrorRays:
+    def unshared(self, rows: Shaped[NDArray[np.integer], " m"]) -> MirrorRays:
         """Select the rays of some points; see `RayList`."""
         return replace(self, visible=self.visible[rows])
 
@@ -202,14 +202,14 @@ class ShadingPoints:
         """Tangents of the points."""
         return self.points.tangent
 
-    def without_light(self, rows: NDArray[np.integer]) -> ShadingPoints:
+    def without_light(self, rows: Shaped[NDArray[np.integer], " m"]) -> ShadingPoints:
         """Select points without their visibility and rays."""
         uv = None if self.uv is None else self.uv[rows]
         level = None if self.level is None else self.level[rows]
         no_visibility = np.empty((len(rows), 0), np.uint8)
         return ShadingPoints(self.points.rows(rows), self.wo[rows], no_visibility, uv=uv, level=level)
 
-    def subset(self, rows: NDArray[np.integer]) -> ShadingPoints:
+    def subset(self, rows: Shaped[NDArray[np.integer], " m"]) -> ShadingPoints:
         """Select points with the visibility and rays of each, not shared among neighbors."""
         rays = tuple(rays.unshared(rows) for rays in self.rays)
         return replace(self.without_light(rows), visible=self.visible[rows], rays=rays)

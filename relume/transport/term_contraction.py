@@ -61,7 +61,7 @@ class Contraction:
     settings: Shaped[F32, "V padded columns"]
     setting_index: Shaped[NDArray[np.int64], " C"]
     support: Shaped[F32, " C"]
-    constant: Shaped[F32, 3]
+    constant: Shaped[F32, " 3"]
     active: int
     num_settings: int
 

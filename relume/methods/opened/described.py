@@ -46,6 +46,4 @@ def read_light_fields(store: StoreReader, key: str, cache: Cache) -> dict[str, A
             "views": {},
         }
     except (KeyError, TypeError, IndexError, ParameterError) as error:
-        raise StoreError(
-            f"the store's description is not of this form ({error}); delete the bake, bake again"
-        ) from error
+        raise StoreError(f"the store's description is invalid ({error}); delete the bake and bake again") from error

@@ -41,8 +41,8 @@ PREVIEW_WIDTH = 256
 _EDITED_BYTES = 256 << 20
 
 F32 = NDArray[np.float32]
-LightFinder = Callable[[EnvironmentKey], TriangleLights]
-"""Finds the triangles of an environment."""
+IntegrateEnvironment = Callable[[EnvironmentKey], TriangleLights]
+"""Returns the triangles of an environment."""
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,10 @@ class BakedFixedViews:
         """Trace missing rays of patches: there are none. See `FixedViewTransfer`."""
 
     def indirect_rays(
-        self, light: Illumination, gather_rays: GatherRays, mirror_visibility: NDArray[np.uint8] | None
+        self,
+        light: Illumination,
+        gather_rays: GatherRays,
+        mirror_visibility: Shaped[NDArray[np.uint8], "n bytes"] | None,
     ) -> tuple[RayList, ...]:
         """Return the rays that carry indirect illumination to samples.
 
@@ -222,7 +225,7 @@ class BakedFixedViews:
 
         return self.local.rays_to(light, view.surface_points(material), cached_shadows)
 
-    def mirror_lights_of(self, view: View, material: int) -> NDArray[np.uint8] | None:
+    def mirror_lights_of(self, view: View, material: int) -> Shaped[NDArray[np.uint8], "n bytes"] | None:
         """Return lights visible in planar mirrors: none without gather rays. See `FixedViewTransfer`."""
         return None
 
@@ -231,7 +234,7 @@ class BakedFixedViews:
         return None
 
     def subset(
-        self, view: View, material: int, sample_indices: NDArray[np.integer], *, has_indirect: bool
+        self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " m"], *, has_indirect: bool
     ) -> SampledTransfer:
         """Select samples of a material. See `FixedViewTransfer`."""
         shading_points = view.receivers(material, is_lit=False).without_light(sample_indices)
@@ -284,7 +287,7 @@ class BakedFixedViews:
             return downsampled(self.environment_radiance(name))
 
         def prefilter() -> F32:
-            return prefiltered(self.cache.get_value((owner, "reduced environment", name), downsample), degrees)
+            return prefiltered(self.cache.get_value((owner, "downsampled environment", name), downsample), degrees)
 
         return self.cache.transient.get_value((owner, "blurred environment", name, degrees), prefilter)
 

@@ -15,7 +15,7 @@ from relume.live.fixed_camera.illumination import Illumination, Normals
 from relume.live.fixed_camera.protocols import EditAxis
 from relume.methods.indirect_solver import IndirectSolver
 from relume.methods.local_lights import LocalLights
-from relume.methods.opened.fixed_views import BakedFixedViews, LightFinder, SampledTransfer
+from relume.methods.opened.fixed_views import BakedFixedViews, IntegrateEnvironment, SampledTransfer
 from relume.methods.patch_direct_light import DirectPatchLight
 from relume.methods.planar_mirror_light import AddedMirrorLights, MirrorLights, MirrorLightTransfer
 from relume.methods.retrace import NormalRetracer
@@ -66,7 +66,7 @@ class BakedIndirectViews(BakedFixedViews):
             self._normal_mapped_patches(normals, is_canceled)
 
     @property
-    def _direct_light_args(self) -> tuple[LocalLights, LightFinder, LightFinder, Cache, str]:
+    def _direct_light_args(self) -> tuple[LocalLights, IntegrateEnvironment, IntegrateEnvironment, Cache, str]:
         """Arguments of `DirectPatchLight`."""
         return self.local, self.light_of_environment, self.preview_light_of_environment, self.cache, self.key
 
@@ -96,7 +96,10 @@ class BakedIndirectViews(BakedFixedViews):
         return (*self.indirect_rays(light, rays, mirror_visibility), *local)
 
     def indirect_rays(
-        self, light: Illumination, gather_rays: GatherRays, mirror_visibility: NDArray[np.uint8] | None
+        self,
+        light: Illumination,
+        gather_rays: GatherRays,
+        mirror_visibility: Shaped[NDArray[np.uint8], "n bytes"] | None,
     ) -> tuple[RayList, ...]:
         """Return the rays that carry indirect illumination to samples. See `BakedFixedViews`."""
         mirror_light = self.mirror_light
@@ -121,7 +124,7 @@ class BakedIndirectViews(BakedFixedViews):
         return None if self.mirror_light is None else self.mirror_light.delta(before, after)
 
     def subset(
-        self, view: View, material: int, sample_indices: NDArray[np.integer], *, has_indirect: bool
+        self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " m"], *, has_indirect: bool
     ) -> SampledTransfer:
         """Select samples of a material. See `FixedViewTransfer`."""
         samples = super().subset(view, material, sample_indices, has_indirect=has_indirect)
