@@ -89,11 +89,6 @@ def _retrace(
         )
 
     parallel_for_cancellable(
-        trace,
-        len(rows),
-        _PATCHES_PER_STEP,
-        lambda fraction: None,
-        is_canceled,
-        "tracing patches with overridden normals",
+        trace, len(rows), _PATCHES_PER_STEP, lambda fraction: None, is_canceled, "tracing normal-mapped patches"
     )
     return retraced

@@ -17,7 +17,7 @@ from relume.transport.outgoing_patch_light import OutgoingLight, decay_of, radia
 
 F32 = NDArray[np.float32]
 OutgoingHighlights = tuple[HighlightTables, F32]
-"""Highlights of patches and their binned outgoing radiance. See `relume.radiosity.highlight_transport`. (F, 3, bins) float32"""
+"""Highlights of patches and their binned light. See `relume.radiosity.highlight_transport`. (F, 3, bins) float32"""
 
 
 class BinnedRadiance(NamedTuple):
