@@ -66,9 +66,7 @@ class IndirectSolver:
         return self._cache.get_value((self._key, "indirect light without mirror lights", indirect), compute)
 
     def preview(self, light: Illumination) -> Shaped[F32, "patches 3"]:
-        """Return isotropic light for incremental updates of an active edit; never waits for exact computations.
-
-        Row `NO_PATCH` is black."""
+        """Return isotropic light for incremental updates of an active edit; never waits for exact light."""
         indirect = _without_direct(light)
         key = self._key, "indirect light, preview", indirect
         return self._cache.transient.get_value(key, lambda: self._preview(indirect))
@@ -81,7 +79,8 @@ class IndirectSolver:
         """Return the change of isotropic radiance; both ends are approximated alike, so that errors cancel.
 
         If only materials have changed, light between patches keeps its directions through highlights, and the result is
-        averaged over directions at the end."""
+        averaged over directions at the end.
+        """
         if equal_up_to_reflectances(before, after):
             return self._delta(before, after).mean_to_others(self._patches)
         change = self.preview(after) - self.preview(before)

@@ -138,9 +138,7 @@ def read_mirror_lights(store: StoreReader) -> MirrorLights | None:
     ]
     are_valid = all(len(indices) == 0 or 0 <= indices.min() <= indices.max() < limit for indices, limit in limits)
     if not are_valid or mirror_lights.plane.shape != store.shape("patches/material"):
-        raise ChunkDamagedError(
-            "mirror_lights", "its arrays do not match the lights, materials and patches of the bake"
-        )
+        raise ChunkDamagedError("mirror_lights", "its arrays do not match the lights, materials or patches")
     return mirror_lights
 
 

@@ -240,8 +240,7 @@ class ProbesMethod:
 def _trace_visibility(
     geometry: SceneBuffers, points: SurfacePoints, targets: LightTargets, *, is_uniform: bool
 ) -> VisibilityBits:
-    """Trace the lights visible from points. is_uniform: points are dense enough to predict visibility from neighbors;
-    predictions between sparse points would be wrong."""
+    """Trace the lights visible from points. is_uniform: points are dense enough to predict it from neighbors."""
     if not is_uniform:
         return trace_visibility(geometry.embree, points.position, points.normal, targets.directions)
     visibility = trace_visibility_masks(geometry.embree, points.position, points.normal, targets)

@@ -124,8 +124,7 @@ def _trace_paths(
     rng: np.random.Generator,
     photon_sets: _PhotonSets,
 ) -> None:
-    """Trace paths through random positions of an image; add their hits, at most `max_contact` of short paths.
-    is_glossy: of each material"""
+    """Trace paths through random positions of an image; add their hits, at most `max_contact` of short paths."""
     width, height = size
     x, y = rng.random((2, num_paths), np.float32) * np.array([[width], [height]], np.float32)
     hits, directions = _trace_hits(

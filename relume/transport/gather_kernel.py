@@ -155,8 +155,7 @@ def list_gather_rays(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _list(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, first, wi, out, irradiance):  # type: ignore[no-untyped-def]
-    """Implement `list_gather_rays`. scratch: `rows` and `rays` of `_lobes_hit`, `local` and `weight` of
-    `_generate_rays`, and the list index of each ray. (rays,)"""
+    """Implement `list_gather_rays`. scratch: of `_lobes_hit` and `_generate_rays`, and the list index of each ray."""
     _, normal, tangent, seed, _ = points
     rows, rays, local, weights, entry_index = scratch
     has_lobes, num_rays, end = outgoing.table.shape[0] > 0, gather_hits.shape[1], 0

@@ -316,8 +316,10 @@ class SampledTransfer:
         )
 
     def incident_light(self, light: Illumination) -> LightsAndPoints:
-        """Return incident light for a preview: the environment from a small map, exact local lights, and indirect
-        light with the baked normals, since tracing it for overridden normals takes too long."""
+        """Return incident light for a preview: a small map of the environment, exact local lights, indirect light.
+
+        Indirect light uses the baked normals, since tracing it for overridden normals takes too long.
+        """
         transfer, indirect_rays = self.transfer, tuple[RayList, ...]()
         if self.gather_rays is not None:
             indirect_rays = transfer.indirect_rays(with_baked_normals(light), self.gather_rays, self.mirror_visibility)
