@@ -113,7 +113,7 @@ class GatherMethod:
         )
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
-        """Return the store's attributes, with `gather_rays` (cosine, glossy) per material and `gather_filter_passes`."""
+        """Return the store's attributes, with `gather_rays` (cosine, glossy) by material and filter passes."""
         rays, num_glossy = self._ray_counts(recipe)
         diffuse, glossy = [rays, 0], [rays - num_glossy, num_glossy]
         direct = self._views.attributes(scene, recipe)
