@@ -1,8 +1,8 @@
-"""Light of an environment, divided: what is smooth goes into harmonics, what these would blur stays on its triangles.
+"""Low-/high-frequency split of an environment: spherical harmonics, and the triangles that these would blur.
 
-Harmonics of a whole sky with a sun in it are neither the sky nor the sun. The absolute differences of all triangles are
-made as small as they get instead of their squares: then few triangles differ by much, lamps and the sun, and all others
-by little. Those few are told beside the harmonics, one by one, with all of their shadows.
+Harmonics of an environment with a sun represent neither the sun nor the rest. The fit therefore minimizes the absolute
+differences of all triangles instead of their squares: then few triangles differ by much (the sun and other bright
+regions), all others by little. Those few are kept as residual lights, with all of their shadows.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.lights.spherical_triangles import TriangleLights
@@ -18,33 +19,30 @@ from relume.math.spherical_harmonics import NUM_HARMONICS
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_MAX_RESIDUAL_FRACTION = 0.03  # of all light: what neither harmonics nor triangles tell
+_MAX_RESIDUAL_FRACTION = 0.03  # of all light, represented by neither harmonics nor triangles
 _NUM_ROUNDS = 8
-_MIN_DIFFERENCE_FRACTION = 0.003  # of the mean triangle's light: differences below it count as squares
+_MIN_DIFFERENCE_FRACTION = 0.003  # of the mean triangle's light: smaller differences are squared
 _DAMPING = 1e-6
 
 
 class FrequencySplit(NamedTuple):
-    """Light of M triangles.
+    """Light of M triangles, split.
 
     Attributes:
-        low_frequency: coefficients of its smooth part. (NUM_HARMONICS, 3) float32
-        residual_triangles: triangles that differ from it. (N,) intp
-        residual: these, with what they differ by, below nothing too.
+        low_frequency: coefficients of the low-frequency part.
+        residual_triangles: indices of N triangles with a residual. residual: these, with signed differences.
     """
 
-    low_frequency: F32
-    residual_triangles: NDArray[np.intp]
+    low_frequency: Shaped[F32, "harmonics 3"]
+    residual_triangles: Shaped[NDArray[np.intp], " N"]
     residual: TriangleLights
 
 
-def split_frequencies(lights: TriangleLights, basis: F64) -> FrequencySplit:
-    """Divide light into what is smooth and the triangles that differ from that.
+def split_frequencies(lights: TriangleLights, basis: Shaped[F64, "M harmonics"]) -> FrequencySplit:
+    """Split light into spherical harmonics and as few triangles as leave at most `_MAX_RESIDUAL_FRACTION`.
 
     Args:
-        lights: M triangles. basis: what they bring in light that is a harmonic. (M, NUM_HARMONICS)
-    Returns:
-        As few triangles as leave `_MAX_RESIDUAL_FRACTION` of all light or less untold.
+        lights: M triangles. basis: weights of the triangles for each harmonic.
     """
     light = lights.irradiance.astype(np.float64)
     total = float(np.abs(light).sum())
@@ -64,12 +62,12 @@ def split_frequencies(lights: TriangleLights, basis: F64) -> FrequencySplit:
 
 
 def _tail_sums(sizes: F64) -> F64:
-    """What is left of some sizes (n,) without the first 0, 1, … n of them. (n + 1,)"""
+    """Return the sums of sizes (n,) without the first 0, 1, … n. (n + 1,)"""
     return np.asarray(np.concatenate([np.cumsum(sizes[::-1])[::-1], [0.0]]))
 
 
 def _fit_harmonics(basis: F64, light: F64, total: float) -> F64:
-    """Make Σ |light − basis · c| small, by least squares whose weights follow the differences. (harmonics, 3)"""
+    """Minimize Σ |light − basis · c| by iteratively reweighted least squares. (harmonics, 3)"""
     min_difference = _MIN_DIFFERENCE_FRACTION * total / len(light)
     weight = np.full(len(light), 1 / min_difference)
     coefficients = np.zeros((basis.shape[1], light.shape[1]))

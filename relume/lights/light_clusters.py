@@ -1,7 +1,7 @@
-"""Light triangles merged into a few larger ones, for operators that are to be there soon.
+"""Merged light triangles, for operators that are computed quickly.
 
-Tiles are leaves of a hierarchy; merged are those under an inner node that a coarser division would not have split.
-What a point sees of a merged triangle is the share of its light that comes from the parts it sees
+Tiles are the leaves of a hierarchy; tiles under an inner node that a coarser division would not split are merged. The
+visible fraction of a merged triangle is the fraction of its light from visible parts
 (docs/direct-light.md#algorithm).
 """
 
@@ -22,20 +22,19 @@ from relume.lights.tile_hierarchy import highest_ancestors, sum_inner_nodes
 F64 = NDArray[np.float64]
 Codes = NDArray[np.uint64]
 
-_LIGHTS_PER_CLUSTER, _MIN_CLUSTERS = 8, 400  # lights that are merged into one; merged ones
+_LIGHTS_PER_CLUSTER, _MIN_CLUSTERS = 8, 400
 
 
 def num_clusters(num_lights: int) -> int:
-    """How many lights an operator is made of that is to be there soon. num_lights: of the bake."""
+    """Return the number of merged lights of a merged-light operator. num_lights: of the bake."""
     return max(_MIN_CLUSTERS, num_lights // _LIGHTS_PER_CLUSTER)
 
 
 def cluster_lights(lights: TriangleLights, tiles: Tiles, num_clusters: int) -> TriangleLights:
-    """Merge the light of tiles into about `num_clusters` triangles, which know their parts.
+    """Merge the light of tiles into about `num_clusters` triangles, with their parts.
 
     Args:
-        lights: of the tiles. tiles: M of them. num_clusters: of the merged ones (8 + 3k, the next below), if there are
-            more.
+        lights: of the tiles. tiles: M tiles. num_clusters: rounded down to 8 + 3k; not above M.
     """
     luminous = luminance(lights.irradiance).astype(np.float64)
     codes, group = np.unique(_coarser_codes(tiles, luminous, num_clusters), return_inverse=True)
@@ -46,25 +45,25 @@ def cluster_lights(lights: TriangleLights, tiles: Tiles, num_clusters: int) -> T
 
 
 def _coarser_codes(tiles: Tiles, luminous: F64, num_clusters: int) -> Codes:
-    """Find the tile of a division into about `num_clusters` that each tile is in. (M,)
+    """Return the tile of each tile in a division into about `num_clusters`. (M,)
 
-    A node's metric is never below that of its children, so the nodes that are split are those of the largest metrics.
+    A node's metric is never below that of its children, so the nodes with the largest metrics are split.
     """
     uniform = UNIFORM_FRACTION * float(luminous.sum()) / (4 * np.pi)
     inner, (light, extent) = sum_inner_nodes(tiles.codes, np.stack([luminous, tiles.solid_angles]))
-    metric = light * extent**SOLID_ANGLE_EXPONENT + uniform * extent  # by which `choose_tiles` splits them
+    metric = light * extent**SOLID_ANGLE_EXPONENT + uniform * extent  # as in `choose_tiles`
     num_split = min(len(inner), max(0, num_clusters - 8) // 3)
     return highest_ancestors(tiles.codes, inner[np.argsort(-metric, kind="stable")[:num_split]])
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def visible_fraction(visible, group, fraction, start, stop, visible_fractions):  # type: ignore[no-untyped-def]
-    """Sum up how much of each merged triangle's light comes from parts that points [start, stop) see.
+    """Sum the fraction of each merged triangle's light from parts that are visible from points [start, stop).
 
     Args:
         visible: part m of a point in bit m & 7 of byte m >> 3. (n, bytes) uint8
-        group, fraction: see `TriangleSubset`. visible_fractions: written, points last: they are done together. (C, ≥
-        stop - start) float32
+        group, fraction: see `TriangleSubset`. visible_fractions: written, points last, since these are vectorized.
+            (C, ≥ stop - start) float32
     """
     num_points = stop - start
     bits = np.empty(num_points, np.uint8)
@@ -74,7 +73,7 @@ def visible_fraction(visible, group, fraction, start, stop, visible_fractions): 
         for p in range(num_points):
             bits[p] = visible[start + p, byte]
             any_bit |= bits[p]
-        if any_bit == 0:  # many in a row are hidden from neighbours
+        if any_bit == 0:  # adjacent points are often all occluded
             continue
         for m in range(8 * byte, min(8 * byte + 8, group.shape[0])):
             cluster, part_fraction, shift = np.uint64(group[m]), fraction[m], np.uint8(m & 7)
@@ -84,11 +83,11 @@ def visible_fraction(visible, group, fraction, start, stop, visible_fractions): 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def weight_by_visibility(first, light, visible_fractions, shading):  # type: ignore[no-untyped-def]
-    """Weigh what listed merged lights bring by the share that is seen of them.
+    """Multiply the shading of listed merged lights by their visible fractions.
 
     Args:
-        first, light: from `relume.transport.light_culling.list_lights`. visible_fractions: from `visible_fraction`. (C,
-        ≥ points)
+        first, light: from `relume.transport.light_culling.list_lights`. visible_fractions: from `visible_fraction`.
+            (C, ≥ points)
         shading: of each entry, multiplied. (1 or 3, K) float32
     """
     for p in range(first.shape[0] - 1):

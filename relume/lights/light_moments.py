@@ -1,9 +1,9 @@
-"""First and second moments of the light in tiles, each in the plane that touches the sphere where the tile's light is.
+"""First and second moments of the light in tiles, each in the tangent plane of the sphere at the tile's light.
 
     x = d · t / (d · n),   m = Σ w x,   S = Σ w (x − m)(x − m)ᵀ + Σ w Ω / 12
 
-with d the direction of a texel, n the mean one of its tile, t two directions across n, and w the texel's share of the
-tile's light. A texel is no point: its own extent counts, as that of a square of its solid angle Ω.
+d is the direction of a texel, n the mean direction of its tile, t two tangents at n, and w the texel's fraction of the
+tile's light. A texel adds its own variance, that of a square of its solid angle Ω.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -20,20 +21,19 @@ F64 = NDArray[np.float64]
 
 
 class LightTexels(NamedTuple):
-    """The texels of an environment, or other small places, and the tiles they lie in.
+    """The texels of an environment, or other small areas, and their tiles.
 
     Attributes:
-        tile: that each lies in. (n,) luminous: luminance × solid angle. (n,) directions: unit. (n, 3)
-        solid_angles: (n,)
+        tile: of each texel. luminous: luminance × solid angle. directions: unit. solid_angles: of the texels, sr.
     """
 
-    tile: NDArray[np.int32]
-    luminous: F64
-    directions: F64
-    solid_angles: F64
+    tile: Shaped[NDArray[np.int32], " n"]
+    luminous: Shaped[F64, " n"]
+    directions: Shaped[F64, "n 3"]
+    solid_angles: Shaped[F64, " n"]
 
-    def sums(self, values: F64, num_tiles: int) -> F64:
-        """Sum values (n,) over the texels of each of M tiles. (M,)"""
+    def sums(self, values: Shaped[F64, " n"], num_tiles: int) -> Shaped[F64, " M"]:
+        """Sum values of texels over each of M tiles."""
         return np.asarray(np.bincount(self.tile, values, num_tiles), np.float64)
 
 
@@ -58,16 +58,17 @@ def _sum_moments(tile, luminous, directions, solid_angles, fitted_index, inverse
 
 
 def compute_moments(
-    texels: LightTexels, total: F64, mean: F64, frames: F64, fitted: NDArray[np.intp]
-) -> tuple[F64, F64]:
-    """Find m and S of some tiles.
+    texels: LightTexels,
+    total: Shaped[F64, " F"],
+    mean: Shaped[F64, "F 3"],
+    frames: Shaped[F64, "F 2 3"],
+    fitted: Shaped[NDArray[np.intp], " F"],
+) -> tuple[Shaped[F64, "F 2"], Shaped[F64, "F 2 2"]]:
+    """Return m and S of some tiles.
 
     Args:
-        texels: of all tiles. total: luminous light of each fitted tile. (F,)
-        mean: its direction n. (F, 3) frames: the two directions t across it. (F, 2, 3)
-        fitted: the tiles in question. (F,)
-    Returns:
-        m (F, 2) and S (F, 2, 2)
+        texels: of all tiles. total: luminous light of each fitted tile. mean: its direction n.
+        frames: the two tangents t. fitted: indices of the tiles.
     """
     fitted_index = np.full(int(max(texels.tile.max(initial=-1), fitted.max(initial=-1))) + 1, -1, np.int32)
     fitted_index[fitted] = np.arange(len(fitted))

@@ -1,13 +1,13 @@
-"""The strata of a lamp's surface: where its samples lie, and what quadrilaterals stand for many of them at once.
+"""Stratified samples of an area light's surface, and quadrilaterals that represent many of these at once.
 
-The unit square is halved again and again, along u or along v, into N = 4^m cells. One sample lies in each, at a place
-that each receiver shifts within the cell; together they are Hammersley's points, a net in base 2, so that whatever
-rows, columns or squares as large as a cell there are, each has one. Samples are numbered by halvings: those of a part
-of the surface that two halvings left follow each other, in fours, sixteens and so on. So a point that sees all of these
-needs the part alone.
+The unit square is halved repeatedly, along u or v, into N = 4^m cells. Each cell contains one sample, shifted in it per
+receiver; together they are a Hammersley set, a (0, m, 2)-net in base 2: every elementary interval of a cell's
+area contains one sample. Samples are numbered by the halvings: those of a part after some halvings are contiguous, in
+groups of 4, 16 and so on. If a point sees all samples of a part, it needs only the part.
 
-A lamp's pieces follow each other along u, by their share of its power. A part within one piece is that quadrilateral;
-one that spans several has their middle and spread (first and second moments), if they lie flat and side by side.
+The pieces of a light are lined up along u, by their fractions of its power. A part within one piece is a quadrilateral
+of it; a part of several pieces is represented by a parallelogram with their center and spread (first and second
+moments), if they are flat and adjacent.
 """
 
 from __future__ import annotations
@@ -15,53 +15,52 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-NOT_FLAT_RADIUS = 1e18  # metres
+NOT_FLAT_RADIUS = 1e18  # meters
 _TINY = 1e-300
-_MIN_MEAN_NORMAL_LENGTH = 0.97  # length of the mean of normals: they lie within some 14° of it
-_MAX_AREA_RATIO = 1.25  # times its pieces' area: so large is what stands for them at most
-_MORTON_SIDE = 1024  # a side
-_MOMENT_GRID = (32, 4)  # along u and v, of a part whose moments are asked
+_MIN_MEAN_NORMAL_LENGTH = 0.97  # of the mean normal: normals are within some 14° of it
+_MAX_AREA_RATIO = 1.25  # maximum area of a parallelogram over that of its pieces
+_MORTON_SIDE = 1024  # cells per axis
+_MOMENT_GRID = (32, 4)  # samples along u and v for the moments of a part
 
 
 class LightStrata(NamedTuple):
-    """Samples of a lamp, before they are shifted.
+    """Samples of an area light, before they are shifted.
 
     Attributes:
-        corner: of each sample's cell. (N, 2) float32. size: of all cells. (2,) float32
-        uv: where samples lie in their cells, in sizes of these. (N, 2) float32
-        seed: of the shifts.
+        corner: of each sample's cell. size: of all cells.
+        uv: samples within their cells, in units of the size. seed: of the shifts.
     """
 
-    corner: F32
-    size: F32
-    uv: F32
+    corner: Shaped[F32, "N 2"]
+    size: Shaped[F32, " 2"]
+    uv: Shaped[F32, "N 2"]
     seed: int
 
 
 class EmitterParts(NamedTuple):
-    """LampParts of a lamp's surface: all of it, its four quarters, their sixteen, … down to cells of samples.
+    """Hierarchy of parts of an area light's surface: all of it, its 4 quarters, 16, … down to cells of samples.
 
     Attributes:
-        corners: of each part, in turn. (P, 4, 3) float32, metres. normal: unit. (P, 3) float32
-        first_fraction: of the first of the two triangles 0 1 2 and 0 2 3 in the part's light. (P,) float32
-        center: of the part. (P, 3) radius: from there to the farthest corner, metres; `NOT_FLAT_RADIUS` where the part
-            is not flat. (P,) float32
+        corners: of each part, meters. normal: unit.
+        first_fraction: fraction of the part's light in the first of its triangles 0 1 2 and 0 2 3.
+        center: of the part. radius: from there to the farthest corner, meters; `NOT_FLAT_RADIUS` if it is not flat.
     """
 
-    corners: F32
-    normal: F32
-    first_fraction: F32
-    center: F32
-    radius: F32
+    corners: Shaped[F32, "P 4 3"]
+    normal: Shaped[F32, "P 3"]
+    first_fraction: Shaped[F32, " P"]
+    center: Shaped[F32, "P 3"]
+    radius: Shaped[F32, " P"]
 
 
-def morton_order(centers: F64) -> NDArray[np.intp]:
-    """Order pieces along a Morton curve, so that those of a part lie together. middles: (T, 3)"""
+def morton_order(centers: Shaped[F64, "T 3"]) -> Shaped[NDArray[np.intp], " T"]:
+    """Order pieces along a Morton curve, so that the pieces of a part are close to each other."""
     if len(centers) < 3:
         return np.arange(len(centers))
     extent = np.ptp(centers, axis=0).max()
@@ -74,7 +73,7 @@ def morton_order(centers: F64) -> NDArray[np.intp]:
 
 
 def split_axes(num_pieces: int, num_samples: int) -> tuple[int, ...]:
-    """Choose which side each halving is along, 0 for u and 1 for v: more of them along u where pieces are many.
+    """Choose the axis of each halving, 0 for u and 1 for v: more of them along u for many pieces.
 
     Args:
         num_pieces: of the surface. num_samples: a power of four
@@ -85,17 +84,17 @@ def split_axes(num_pieces: int, num_samples: int) -> tuple[int, ...]:
 
 
 def make_strata(split_axis: tuple[int, ...], seed: int) -> LightStrata:
-    """Place samples. along: from `split_axes`. seed: of the shifts"""
+    """Create samples. split_axis: from `split_axes`. seed: of the shifts"""
     cell, (bits_u, bits_v) = _list_cells(split_axis), (split_axis.count(0), split_axis.count(1))
     size = np.array([0.5**bits_u, 0.5**bits_v])
-    # of Hammersley's points i/N and i's bits backwards, the one in the cell
+    # of the Hammersley points (i/N, radical inverse of i), the one in the cell
     bit_reversed = [_reverse_bits(cell[:, 1], bits_v), _reverse_bits(cell[:, 0], bits_u)]
     offsets = (np.stack(bit_reversed, axis=1) + 0.5) * size[::-1]
     return LightStrata((cell * size).astype(np.float32), size.astype(np.float32), offsets.astype(np.float32), seed)
 
 
 def _list_cells(split_axis: tuple[int, ...]) -> NDArray[np.int64]:
-    """Number the columns and rows of the cells that halvings make, in their order. (2^halvings, 2)"""
+    """Return columns and rows of the cells after all halvings, in their order. (2^halvings, 2)"""
     number = np.arange(1 << len(split_axis))
     cell = np.zeros((len(number), 2), np.int64)
     for k, axis in enumerate(split_axis):
@@ -112,9 +111,14 @@ def _reverse_bits(number: NDArray[np.int64], bits: int) -> NDArray[np.int64]:
 
 
 def subdivide_emitter(
-    split_axis: tuple[int, ...], corner: F32, edges: F32, power_cdf: F32, *, is_rectangle: bool
+    split_axis: tuple[int, ...],
+    corner: Shaped[F32, "T 3"],
+    edges: Shaped[F32, "T 2 3"],
+    power_cdf: Shaped[F32, " T"],
+    *,
+    is_rectangle: bool,
 ) -> EmitterParts:
-    """Find the parts of a surface: level after level of quarters, each in the order of its samples.
+    """Compute the parts of a surface: level by level of quarters, each in the order of its samples.
 
     Args:
         split_axis: from `split_axes`.
@@ -126,7 +130,7 @@ def subdivide_emitter(
 
 
 class _Pieces(NamedTuple):
-    """A surface, from the unit square: triangles T, or one parallelogram. As in `LocalLight`, float64."""
+    """A surface parameterized by the unit square: T triangles, or one parallelogram. As in `LocalLight`, float64."""
 
     corner: F64
     edges: F64
@@ -134,13 +138,13 @@ class _Pieces(NamedTuple):
     is_rectangle: bool
 
     def subdivide(self, split_axis: tuple[int, ...]) -> tuple[F64, ...]:
-        """Find the parts that some halvings leave, as `EmitterParts` has them."""
+        """Return the parts after some halvings, as in `EmitterParts`."""
         size = np.array([0.5 ** split_axis.count(0), 0.5 ** split_axis.count(1)])
         low = _list_cells(split_axis) * size
         centers = low + size / 2
         piece = self.find_piece(centers[:, 0])
         piece_start = self.power_cdf[piece] - np.diff(self.power_cdf, prepend=0)[piece]
-        tolerance = 1e-6  # shares are float32
+        tolerance = 1e-6  # power_cdf is float32
         is_within = (low[:, 0] >= piece_start - tolerance) & (low[:, 0] + size[0] <= self.power_cdf[piece] + tolerance)
         outline = low[:, None] + size * [[0, 0], [1, 0], [1, 1], [0, 1]]
         corners = self.evaluate_position(outline, piece[:, None])
@@ -159,11 +163,11 @@ class _Pieces(NamedTuple):
         return corners, normal, first / np.maximum(first + second, _TINY), center, radius
 
     def find_piece(self, u: F64) -> NDArray[np.int64]:
-        """Find the piece that each u lies in."""
+        """Return the piece of each u."""
         return np.minimum(np.searchsorted(self.power_cdf, u, side="right"), len(self.power_cdf) - 1)
 
     def evaluate_position(self, uv: F64, piece: NDArray[np.int64]) -> F64:
-        """Find the place of uv (..., 2) on pieces, outside of which it is held at their ends. (..., 3)"""
+        """Return positions of uv (..., 2) on pieces, clamped to their ends. (..., 3)"""
         u, v = np.moveaxis(uv, -1, 0)
         piece = np.broadcast_to(piece, u.shape)
         if not self.is_rectangle:
@@ -179,7 +183,7 @@ class _Pieces(NamedTuple):
         return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY))
 
     def _fit_parallelograms(self, low: F64, size: F64) -> tuple[F64, F64, F64]:
-        """Find parallelograms (P, 4, 3) with the moments of parts; means of their normals (P, 3), their areas (P,)."""
+        """Return parallelograms (P, 4, 3) with the moments of parts; mean normals (P, 3); piece areas (P,)."""
         step = (np.stack(np.meshgrid(*map(np.arange, _MOMENT_GRID)), axis=-1).reshape(-1, 2) + 0.5) / _MOMENT_GRID
         uv = low[:, None] + size * step
         piece = self.find_piece(uv[..., 0])

@@ -1,14 +1,14 @@
-"""Local lights: what a light of unit emission gives to a point, along one or several samples of it.
+"""Local lights: irradiance from a light of unit emission, by one or several samples of it.
 
     E(x) = Σ_k V_k · w_k · cos θi,k
 
     point        w = 1 / d²                                        emission W/sr
     spot         w = s² / d²,  s = clamp((cos θ − cos outer) / (cos inner − cos outer), 0, 1)   (KHR_lights_punctual)
     directional  w = 1                                             emission W/m²
-    surface      w = A cos θl / (N d²),  N samples spread evenly   emission W/m²/sr
+    surface      w = A cos θl / (N d²),  N uniform samples         emission W/m²/sr
 
-A surface is a rectangle, or triangles of a mesh chosen by area. Its samples are spread over its strata and shifted in
-these for each receiver (`relume.lights.light_sampling`): what noise is left is as fine as the pixels.
+A surface is a rectangle, or triangles of a mesh chosen by area. Its samples are stratified and shifted in their strata
+per receiver (`relume.lights.light_sampling`), so that the remaining noise is of pixel frequency.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.lights.light_sampling import (
@@ -34,74 +35,74 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 POINT, DIRECTIONAL, SURFACE = 0, 1, 2
-MIN_DISTANCE = np.float32(1e-3)  # metres: a point light is no smaller
+MIN_DISTANCE = np.float32(1e-3)  # meters, clamps the falloff of point lights
 _INFINITE = np.float32(np.inf)
 _SEED = 1
-_SAMPLE_FACTORS = {"rectangle": 1, "mesh": 4}  # of a mesh most samples face away from a point, or are far from it
+_SAMPLE_FACTORS = {"rectangle": 1, "mesh": 4}  # most samples of a mesh face away from a point, or are far from it
 _PI = np.float32(math.pi)
-_MIN_CONE_COSINES = 1e-3  # of cosines, as KHR_lights_punctual has it
+_MIN_CONE_COSINES = 1e-3  # difference of cosines, as in KHR_lights_punctual
 _PARALLEL_TOLERANCE = 1e-6
 
 
 class LocalLight(NamedTuple):
-    """A light as the kernels want it.
+    """A light in the layout of the kernels.
 
     Attributes:
-        kind: `POINT_LIGHT` (spots too), `DIRECTIONAL` or `SURFACE`.
-        position: of points. (3,) float32. axis: unit, of spots, and the way that directional light goes. (3,)
+        kind: `POINT` (spots too), `DIRECTIONAL` or `SURFACE`.
+        position: of point lights. axis: unit, of spots, and the direction in which directional light travels.
         cone_scale, cone_offset: s = clamp(cone_scale · cos θ + cone_offset, 0, 1).
-        corner, edges, normal: of parallelograms or triangles. (T, 3), (T, 2, 3), (T, 3) float32; the last unit
-        power_cdf: of the power, up to each piece and with it. (T,) float32. area: of all, m², where it shines evenly.
-        is_rectangle: a parallelogram, else triangles. is_two_sided: shines to both sides.
+        corner, edges, normal: of parallelograms or triangles; unit normals.
+        power_cdf: cumulative power of the pieces. area: of all pieces, m², weighted by their relative radiance.
+        is_rectangle: a parallelogram, else triangles. is_two_sided: emits to both sides.
     """
 
     kind: int
-    position: F32
-    axis: F32
+    position: Shaped[F32, " 3"]
+    axis: Shaped[F32, " 3"]
     cone_scale: np.float32
     cone_offset: np.float32
-    corner: F32
-    edges: F32
-    normal: F32
-    power_cdf: F32
+    corner: Shaped[F32, "T 3"]
+    edges: Shaped[F32, "T 2 3"]
+    normal: Shaped[F32, "T 3"]
+    power_cdf: Shaped[F32, " T"]
     area: np.float32
     is_rectangle: bool
     is_two_sided: bool
 
 
 class LightTriangles(NamedTuple):
-    """Triangles that shine.
+    """Emissive triangles.
 
     Attributes:
-        corners: (T, 3, 3) float32. relative_radiance: how brightly each shines, over the mean of all. (T,) float32
-        is_two_sided: whether they do to both sides.
+        corners: of the triangles. relative_radiance: radiance of each over the mean of all.
+        is_two_sided: emits to both sides.
     """
 
-    corners: F32
-    relative_radiance: F32
+    corners: Shaped[F32, "T 3 3"]
+    relative_radiance: Shaped[F32, " T"]
     is_two_sided: bool
 
 
 def num_samples(geometry: LightGeometry, num_rectangle_samples: int) -> int:
-    """Tell how many samples a light has where a rectangle has `num_rectangle_samples`."""
+    """Return the number of samples of a light, given that of a rectangle."""
     return _SAMPLE_FACTORS.get(geometry.kind, 0) * num_rectangle_samples or 1
 
 
 def make_light_strata(light: LocalLight, num_rectangle_samples: int) -> LightStrata:
-    """Make the samples of a light. of_rectangle: how many a rectangle has, a power of four"""
+    """Create the samples of a light. num_rectangle_samples: of a rectangle, a power of four"""
     factor = _SAMPLE_FACTORS["rectangle" if light.is_rectangle else "mesh"]
     num_light_samples = factor * num_rectangle_samples if light.kind == SURFACE else 1
     return make_strata(split_axes(len(light.power_cdf), num_light_samples), _SEED)
 
 
 def make_emitter_parts(light: LocalLight, strata: LightStrata) -> EmitterParts:
-    """Find the parts of a lamp's surface that samples stand for. strata: from `make_light_strata`"""
+    """Compute the parts of an area light's surface. strata: from `make_light_strata`"""
     split_axis = split_axes(len(light.power_cdf), len(strata.uv))
     return subdivide_emitter(split_axis, light.corner, light.edges, light.power_cdf, is_rectangle=light.is_rectangle)
 
 
 def prepare_local_lights(geometry: LightGeometry, triangles: LightTriangles | None = None) -> LocalLight:
-    """Make a light of a look. triangles: those of a light of kind "mesh"; a surface without area gives no light."""
+    """Prepare a light of a look. triangles: of a light of kind "mesh"; without area it emits nothing."""
     is_rectangle = geometry.kind == "rectangle"
     corner, edges = _outline(geometry, triangles)
     piece_normals = np.cross(edges[:, 0], edges[:, 1])
@@ -129,12 +130,12 @@ def prepare_local_lights(geometry: LightGeometry, triangles: LightTriangles | No
 
 
 def emitter_geometry(geometry: LightGeometry) -> LightGeometry:
-    """Reduce a light to what its shadows depend on: a spot has those of a point."""
+    """Reduce a light to the geometry of its shadows: a spot has those of a point light."""
     return LightGeometry("point", geometry.position) if geometry.kind == "spot" else geometry
 
 
 def _outline(geometry: LightGeometry, triangles: LightTriangles | None) -> tuple[F64, F64]:
-    """Find a corner (T, 3) and two edges (T, 2, 3) of each piece of a surface."""
+    """Return a corner (T, 3) and two edges (T, 2, 3) of each piece of a surface."""
     if geometry.kind == "rectangle":
         corner, edges = rectangle(geometry)
         return corner[None], edges[None]
@@ -142,8 +143,8 @@ def _outline(geometry: LightGeometry, triangles: LightTriangles | None) -> tuple
     return corners[:, 0], corners[:, 1:] - corners[:, :1]
 
 
-def rectangle(geometry: LightGeometry) -> tuple[F64, F64]:
-    """Place a rectangle: a corner (3,) and its edges (2, 3), whose cross product points the way it faces; metres."""
+def rectangle(geometry: LightGeometry) -> tuple[Shaped[F64, " 3"], Shaped[F64, "2 3"]]:
+    """Return a corner and the edges of a rectangle, whose cross product points to its emitting side; meters."""
     facing = _unit(geometry.direction)
     up_hint = np.array([0.0, 1.0, 0.0]) if abs(facing[1]) < 1 - _PARALLEL_TOLERANCE else np.array([0.0, 0.0, 1.0])
     up = up_hint - (up_hint @ facing) * facing
@@ -162,12 +163,12 @@ def rectangle(geometry: LightGeometry) -> tuple[F64, F64]:
 
 def _unit(direction: tuple[float, float, float]) -> F64:
     vector = np.array(direction, np.float64)
-    vector /= np.abs(vector).max()  # first, so that squares of tiny numbers do not vanish
+    vector /= np.abs(vector).max()  # first, so that squares of tiny numbers do not underflow
     return np.asarray(vector / np.linalg.norm(vector))
 
 
 def _cone(inner: float, outer: float) -> tuple[float, float]:
-    """Compute scale and offset of the falloff between two half-angles, degrees."""
+    """Return scale and offset of the falloff between two half-angles in degrees."""
     cos_outer = math.cos(math.radians(outer))
     scale = 1 / max(_MIN_CONE_COSINES, math.cos(math.radians(inner)) - cos_outer)
     return scale, -cos_outer * scale
@@ -176,15 +177,15 @@ def _cone(inner: float, outer: float) -> tuple[float, float]:
 # inlined: a call would count references to all arrays of the light, which threads share, and take 13 times as long
 @nb.njit(nogil=True, cache=True, inline="always")
 def light_sample(light, strata, sample, shift_u, shift_v, px, py, pz):  # type: ignore[no-untyped-def]
-    """Find a sample of a light as a point sees it.
+    """Evaluate a sample of a light at a point.
 
     Args:
-        light: a `LocalLight`. strata: its samples, from `make_light_strata`. sample: which of them.
+        light: a `LocalLight`. strata: its samples, from `make_light_strata`. sample: its index.
         shift_u, shift_v: the point's shift within the strata, from `cranley_patterson_offset`. px, py, pz: the point,
-        metres.
+            meters.
     Returns:
-        Unit direction towards it (three), distance, w, and the normal of its surface on the point's side (three; zeros
-        where it has none).
+        Unit direction toward the sample (three), distance, w, and the surface normal on the point's side (three; zeros
+        if it has no surface).
     """
     zero, unity = np.float32(0), np.float32(1)
     if light.kind == DIRECTIONAL:
@@ -221,6 +222,6 @@ def light_sample(light, strata, sample, shift_u, shift_v, px, py, pz):  # type: 
     if cosine < 0 and light.is_two_sided:
         nx, ny, nz, cosine = -nx, -ny, -nz, -cosine
     area = light.area / np.float32(strata.uv.shape[0])
-    # a patch of this area that is as near as it is wide fills the half space: it gives no more than that
+    # a sample's area at a distance below its width fills the half space: w is clamped
     weight = area * max(cosine, zero) / max(distance * distance, area / _PI)
     return dx, dy, dz, distance, weight, nx, ny, nz

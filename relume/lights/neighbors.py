@@ -1,35 +1,31 @@
-"""Which lights are next to each other on the sphere."""
+"""Neighboring lights on the sphere."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, cKDTree
 
-_MAX_COMPLETE_LIGHTS = 8  # up to here all are neighbours of all
+_MAX_COMPLETE_LIGHTS = 8  # up to this number all lights are neighbors of each other
 
 
 class LightNeighbors(NamedTuple):
-    """The neighbours of light m are `beside[first[m]:first[m + 1]]`, ascending, never m itself.
+    """Neighbors of lights: those of light m are `neighbors[first[m]:first[m + 1]]`, ascending, without m itself."""
 
-    Attributes:
-        first: (num_lights + 1,) int32. neighbors: (sum of all their numbers,) int32
-    """
-
-    first: NDArray[np.int32]
-    neighbors: NDArray[np.int32]
+    first: Shaped[NDArray[np.int32], " ends"]
+    neighbors: Shaped[NDArray[np.int32], " pairs"]
 
 
-def find_neighbors(directions: NDArray[np.float32]) -> LightNeighbors:
-    """Find neighbours in the Delaunay triangulation of the sphere, which is the convex hull of the directions.
+def find_neighbors(directions: Shaped[NDArray[np.float32], "lights 3"]) -> LightNeighbors:
+    """Find neighbors by Delaunay triangulation of the sphere, the convex hull of the directions. O(n log n) time.
 
-    A direction that coincides with another is the neighbour of that one alone.
+    A direction that coincides with another has that one as its only neighbor.
 
     Args:
-        directions: unit, not all in one plane where there are more than eight. (num_lights, 3)
-    Cost: O(n log n) time.
+        directions: unit, not all in one plane if there are more than eight.
     """
     num_lights = len(directions)
     if num_lights <= _MAX_COMPLETE_LIGHTS:

@@ -1,4 +1,4 @@
-"""Spherical triangles that tile the sphere: leaves of a hierarchy that begins as an octahedron.
+"""Spherical triangles that tile the sphere: leaves of a hierarchy over an octahedron.
 
 Ben-Artzi 2006, section 5.2: each triangle is split into four at its edges' midpoints where the metric of structured
 importance sampling (Agarwal 2003, L · ΔΩ^b) is largest.
@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.environments.equirect import texel_directions, texel_solid_angles
@@ -24,31 +25,31 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 MIN_LIGHTS, MAX_LIGHTS = 8, 65_536
-MAX_DEPTH = 28  # of the hierarchy: what a code of 64 bits holds
+MAX_DEPTH = 28  # of the hierarchy: capacity of a 64-bit code
 
-# Agarwal 2003 use ΔΩ^(1/4) against the error of shadows; highlights show the map itself, so that size counts more
-# here, and a little of plain solid angle is added, weighted by the mean radiance
+# Agarwal 2003 uses ΔΩ^(1/4) against errors of shadows; highlights show the map itself, so that the size has more weight
+# here, and a small term of plain solid angle is added, weighted by the mean radiance
 # (docs/direct-light.md#environment-triangles).
 SOLID_ANGLE_EXPONENT = 0.4
 UNIFORM_FRACTION = 1e-2
-# Light that may come to any azimuth has more dim places where a lamp may arrive
+# With light at any azimuth, a larger fraction of tiles is dim until a bright region is rotated there
 # (docs/direct-light.md#environment-triangles).
 _RELIGHTABLE_UNIFORM_FRACTION = 0.1
 
 _OCTAHEDRON = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], dtype=np.float64)
-# counter-clockwise seen from outside, and so are all their descendants; in the order of the signs of x, y, z
+# counter-clockwise from outside, as are all descendants; in the order of the signs of x, y, z
 _OCTANTS = np.array([(5, 3, 1), (1, 3, 4), (1, 2, 5), (4, 2, 1), (0, 3, 5), (4, 3, 0), (5, 2, 0), (0, 2, 4)])
-# corners of the children at a, b, c and in the middle, of a, b, c and the middles of ab, bc, ca
+# corners of the children at a, b, c and in the middle, among the nodes a, b, c, ab, bc, ca
 _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
 
 
-def unit(v: F64) -> F64:
-    """Scale vectors to length one, along the last axis."""
+def unit(v: Shaped[F64, " ..."]) -> Shaped[F64, " ..."]:
+    """Normalize vectors along the last axis."""
     return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True), dtype=np.float64)
 
 
-def solid_angles(corners: F64) -> F64:
-    """Compute those of spherical triangles (M, 3, 3), sr (van Oosterom and Strackee 1983). (M,)"""
+def solid_angles(corners: Shaped[F64, "M 3 3"]) -> Shaped[F64, " M"]:
+    """Return the solid angles of spherical triangles, sr (van Oosterom and Strackee 1983)."""
     a, b, c = corners.transpose(1, 0, 2)
     dots = 1 + np.sum(a * b + b * c + c * a, axis=1)
     return np.asarray(2 * np.arctan2(np.sum(a * np.cross(b, c), axis=1), dots))
@@ -59,13 +60,13 @@ class Tiles:
     """M triangles that tile the sphere.
 
     Attributes:
-        codes: place of each in the hierarchy: 8 + octant, then two bits for the child at each level. (M,) uint64
+        codes: path of each in the hierarchy: 8 + octant, then two bits for the child at each level.
     """
 
-    codes: NDArray[np.uint64]
+    codes: Shaped[NDArray[np.uint64], " M"]
 
     def is_whole(self) -> bool:
-        """Tell whether they are leaves of a hierarchy, and cover the sphere once."""
+        """Return True if the tiles are leaves of a hierarchy and cover the sphere once."""
         codes = set(map(int, self.codes))
         bits = [code.bit_length() for code in codes]
         if len(codes) != len(self.codes) or any(n % 2 or not 4 <= n <= 4 + 2 * MAX_DEPTH for n in bits):
@@ -74,28 +75,28 @@ class Tiles:
         return inner.isdisjoint(codes) and sum(4 ** (MAX_DEPTH - (n - 4) // 2) for n in bits) == 8 * 4**MAX_DEPTH
 
     @cached_property
-    def corners(self) -> F64:
-        """The unit corners of each tile, counter-clockwise seen from outside. (M, 3, 3)"""
+    def corners(self) -> Shaped[F64, "M 3 3"]:
+        """Unit directions of the corners of each tile, counter-clockwise from outside."""
         return _corners(self.codes)
 
     @cached_property
-    def traversal_key(self) -> NDArray[np.uint64]:
-        """Numbers that rise along a way through all tiles, which leaves no node before it was in all of it. (M,)"""
+    def traversal_key(self) -> Shaped[NDArray[np.uint64], " M"]:
+        """Sort key of the tiles in depth-first order of the hierarchy."""
         levels = np.array([(code.bit_length() - 4) // 2 for code in map(int, self.codes)], np.uint64)
         return self.codes << (2 * (MAX_DEPTH - levels)).astype(np.uint64)
 
     @cached_property
-    def solid_angles(self) -> F64:
-        """Of each tile, sr. (M,)"""
+    def solid_angles(self) -> Shaped[F64, " M"]:
+        """Solid angle of each tile, sr."""
         return solid_angles(self.corners)
 
     @cached_property
-    def centroids(self) -> F64:
-        """The unit direction to the middle of each tile. (M, 3)"""
+    def centroids(self) -> Shaped[F64, "M 3"]:
+        """Unit direction to the center of each tile."""
         return unit(self.corners.mean(axis=1))
 
-    def locate(self, directions: F64) -> NDArray[np.int32]:
-        """Find the tile that each direction (n, 3) lies in; a direction on an edge has exactly one. (n,) int32"""
+    def locate(self, directions: Shaped[F64, "n 3"]) -> Shaped[NDArray[np.int32], " n"]:
+        """Return the tile of each direction; a direction on an edge has exactly one."""
         edges, children = self._tree
         tile_index = np.empty(len(directions), np.int32)
         parallel_for_chunks(
@@ -116,7 +117,7 @@ class Tiles:
         index.update((node, k) for k, node in enumerate(nodes) if node not in index)
         children = np.zeros((len(nodes), 4), np.int32)
         for k, node in enumerate(nodes):
-            if index[node] < 0:  # an octant that is a tile itself
+            if index[node] < 0:  # the octant is a tile itself
                 children[k] = index[node]
             else:
                 children[k] = [index[4 * node + child] for child in range(4)]
@@ -124,7 +125,7 @@ class Tiles:
 
 
 def _corners(codes: NDArray[np.uint64]) -> F64:
-    """Find the corners of n nodes of the hierarchy. (n, 3, 3)"""
+    """Return the corners of n nodes of the hierarchy. (n, 3, 3)"""
     levels = np.array([(code.bit_length() - 4) // 2 for code in map(int, codes)], np.uint64)
     corners = np.asarray(_OCTAHEDRON[_OCTANTS[(codes >> 2 * levels) - 8]], np.float64)
     for level in range(int(levels.max(initial=0))):
@@ -135,28 +136,28 @@ def _corners(codes: NDArray[np.uint64]) -> F64:
 
 
 def _children(corners: F64) -> F64:
-    """Find the corners of the four children of triangles (n, 3, 3). (n, 4, 3, 3)"""
+    """Return the corners of the four children of triangles (n, 3, 3). (n, 4, 3, 3)"""
     six_points = np.concatenate([corners, _middles(corners)], axis=1)
     return np.asarray(six_points[:, _CHILDREN], np.float64)
 
 
 def _middles(corners: F64) -> F64:
-    """Find the directions to the middles of the edges ab, bc, ca of triangles (n, 3, 3). (n, 3, 3)"""
+    """Return the directions of the midpoints of the edges ab, bc, ca of triangles (n, 3, 3). (n, 3, 3)"""
     return unit(corners + corners[:, (1, 2, 0)])
 
 
 def _middle_edges(corners: F64) -> F64:
-    """Find the normals of the edges of middle children, each towards the corner that it cuts off. (n, 3, 3)"""
+    """Return the normals of the edges of middle children, each toward the corner that it cuts off. (n, 3, 3)"""
     middles = _middles(corners)
     return np.cross(middles, middles[:, (2, 0, 1)])
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _child(d, edges):  # type: ignore[no-untyped-def]
-    """Tell which of four children a direction lies in: 0, 1, 2 at the corners, 3 in the middle.
+    """Return the child that contains a direction: 0, 1, 2 at the corners, 3 in the middle.
 
-    The middle child's three edges decide: outside edge k means child k. Every direction gets exactly one child, also
-    where rounding puts it on an edge.
+    The middle child's three edges decide: outside edge k means child k. Every direction gets exactly one child, even
+    if rounding puts it on an edge.
     """
     for k in range(3):
         if edges[k, 0] * d[0] + edges[k, 1] * d[1] + edges[k, 2] * d[2] > 0:
@@ -200,13 +201,13 @@ class _Subdivision:
         light = float(self.luminous[texels].sum())
         extent = float(self.solid_angles[texels].sum())
         metric = light * max(extent, 1e-12) ** SOLID_ANGLE_EXPONENT + self.uniform * extent
-        # fewer than two texels hold nothing more to resolve: last in the queue
+        # leaves with fewer than two texels have no more detail: last in the queue
         can_split = len(texels) > 1 and code.bit_length() < 4 + 2 * MAX_DEPTH
         heapq.heappush(self.heap, (-metric if can_split else 0.0, self.count, code, corners, texels))
         self.count += 1
 
     def split_largest(self) -> bool:
-        """Replace the leaf of largest metric by its four children; False where nothing is left to split."""
+        """Replace the leaf of largest metric by its four children; return False if none can be split."""
         if self.heap[0][0] == 0.0:
             return False
         _, _, code, corners, texels = heapq.heappop(self.heap)
@@ -217,16 +218,16 @@ class _Subdivision:
         return True
 
 
-def choose_tiles(radiance: F32, num_lights: int, relightable: bool = False) -> Tiles:
+def choose_tiles(radiance: Shaped[F32, "height width 3"], num_lights: int, relightable: bool = False) -> Tiles:
     """Divide the sphere into about `num_lights` triangles (the next count of the form 8 + 3k, or fewer).
 
+    O(texels · depth) time.
+
     Args:
-        radiance: equirectangular, top row first. (height, width, 3) float32
-        num_lights: in [8, 65536].
-        relightable: the environment will be turned or exchanged: divide rings about +Y evenly, by their mean light.
+        radiance: equirectangular, top row first. num_lights: in [8, 65536].
+        relightable: the environment will be rotated or exchanged: divide rings about +Y uniformly, by their mean.
     Raises:
         PlanError: `num_lights` outside [8, 65536].
-    Cost: O(texels · depth) time.
     """
     if not MIN_LIGHTS <= num_lights <= MAX_LIGHTS:
         raise PlanError(f"{num_lights} lights were asked for; give {MIN_LIGHTS} to {MAX_LIGHTS}")
@@ -237,5 +238,5 @@ def choose_tiles(radiance: F32, num_lights: int, relightable: bool = False) -> T
         tree = _Subdivision(radiance, UNIFORM_FRACTION)
     while len(tree.heap) + 3 <= num_lights and tree.split_largest():
         pass
-    leaves = sorted(tree.heap, key=lambda leaf: leaf[1])  # order of creation keeps neighbours together
+    leaves = sorted(tree.heap, key=lambda leaf: leaf[1])  # order of creation keeps neighbors together
     return Tiles(np.array([leaf[2] for leaf in leaves], np.uint64))

@@ -1,4 +1,4 @@
-"""The environment as spherical triangles of pre-integrated radiance: what light lies in each tile of the sphere."""
+"""The environment as spherical triangles of pre-integrated radiance, one per tile of the sphere."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.environments.equirect import rotate_about_y, texel_directions, texel_solid_angles
@@ -18,136 +19,134 @@ from relume.lights.tile_hierarchy import highest_ancestors, sum_inner_nodes
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_MIN_TANGENT_COSINE = (
-    0.8  # triangles within 37° of their light are matched in its tangent plane; larger ones stay as they are
-)
+_MIN_TANGENT_COSINE = 0.8  # triangles within 37° of their light are matched in its tangent plane, larger ones are kept
 _MAX_LIGHTS_PER_GROUP = 12
-_MIN_GROUPED_LIGHTS = 200  # of fewer lights, groups would save nothing
+_MIN_GROUPED_LIGHTS = 200  # with fewer lights groups save nothing
 
 
 class TriangleSubset(NamedTuple):
-    """What merged triangles are made of: M of a finer division, which points see or do not.
+    """Parts of merged triangles: M triangles of a finer division, with their own visibility.
 
     Attributes:
-        group: the merged triangle that each is in. (M,) int32
-        fraction: of that triangle's light. (M,) float32
+        group: the merged triangle of each part. fraction: of that triangle's light.
     """
 
-    group: NDArray[np.int32]
-    fraction: F32
+    group: Shaped[NDArray[np.int32], " M"]
+    fraction: Shaped[F32, " M"]
 
 
 @dataclass(frozen=True)
 class TriangleLights:
     """M spherical triangles with the environment's light.
 
-    The sphere is tiled by a hierarchy of triangles. What is kept of a tile is the triangle with the same light, whose
-    mean direction and spread (first and second moments) are those of the light in the tile: the same tile where the
-    light is uniform, a smaller one around a lamp. Highlights then err in the third order of the tile's size instead
-    of the first (docs/direct-light.md#environment-triangles).
+    The sphere is tiled by a hierarchy of triangles. Each tile is represented by a triangle with the same light, whose
+    mean direction and spread (first and second moments) are those of the light in the tile: the tile itself if the
+    light is uniform, a smaller one around a bright region. Errors of highlights are then of third order in the tile's
+    size instead of first (docs/direct-light.md#environment-triangles).
 
     Attributes:
-        nodes: unit directions of the corners a, b, c and of the midpoints of ab, bc, ca. (3 axes, 6, M) float32
-        direction: mean direction of the light; shadow rays go there. (M, 3) float32
-        irradiance: ∫ L dω over the tile, what the light brings to a surface across its way; per channel. (M, 3) float32
-        parts: where each is merged of several, which are what points see.
-        codes: where each tile is in the hierarchy, see `Tiles`. (M,) uint64; none where that is of no use.
+        nodes: unit directions of the corners a, b, c and of the midpoints of ab, bc, ca, one row per axis.
+        direction: mean direction of the light, and of shadow rays.
+        irradiance: ∫ L dω over the tile: irradiance on a surface perpendicular to it; per channel.
+        parts: of merged triangles, with visibility per part.
+        codes: of the tiles in the hierarchy, see `Tiles`; None if not needed.
     """
 
-    nodes: F32
-    direction: F32
-    irradiance: F32
+    nodes: Shaped[F32, "3 6 M"]
+    direction: Shaped[F32, "M 3"]
+    irradiance: Shaped[F32, "M 3"]
     parts: TriangleSubset | None = None
-    codes: NDArray[np.uint64] | None = None
+    codes: Shaped[NDArray[np.uint64], " M"] | None = None
 
     @property
     def num_lights(self) -> int:
-        """Their number M."""
+        """Number of triangles M."""
         return int(self.nodes.shape[2])
 
     def empty(self) -> TriangleLights:
-        """Keep none of them, as where no light comes from the environment itself."""
+        """Return no lights, for an environment without direct light."""
         return self.select(np.empty(0, np.intp), self.irradiance[:0])
 
-    def select(self, rows: NDArray[np.intp], irradiance: F32) -> TriangleLights:
-        """Choose some of them, with other light. chosen: (N,). irradiance: (N, 3) float32"""
+    def select(self, rows: Shaped[NDArray[np.intp], " N"], irradiance: Shaped[F32, "N 3"]) -> TriangleLights:
+        """Select triangles, with new irradiance."""
         codes = None if self.codes is None else self.codes[rows]
         return TriangleLights(self.nodes[:, :, rows], self.direction[rows], irradiance, codes=codes)
 
     @cached_property
-    def nodes_by_light(self) -> F32:
-        """The nodes, those of one light together. (M, 6, 3)"""
+    def nodes_by_light(self) -> Shaped[F32, "M 6 3"]:
+        """The nodes, contiguous per light."""
         return np.ascontiguousarray(self.nodes.transpose(2, 1, 0))
 
     @cached_property
-    def radius(self) -> F32:
-        """The angle from each light's direction to its farthest corner, within which all of it lies; radians. (M,)"""
+    def radius(self) -> Shaped[F32, " M"]:
+        """Angle from each light's direction to its farthest corner, radians."""
         chords = np.linalg.norm(self.nodes[:, :3].transpose(2, 1, 0) - self.direction[:, None], axis=2)
         return np.asarray(2 * np.arcsin(np.minimum(chords.max(axis=1) / 2, 1)), np.float32)
 
     @cached_property
-    def variance(self) -> F64:
-        """Of directions in each light, but for a factor that is the same for all. (M,)"""
+    def variance(self) -> Shaped[F64, " M"]:
+        """Variance of the directions in each light, up to a common factor."""
         middles = self.nodes[:, 3:].astype(np.float64)
         return np.asarray(np.square(middles - middles.mean(axis=1, keepdims=True)).sum(axis=(0, 1)))
 
     @cached_property
     def groups(self) -> LightGroups | None:
-        """Lights that lie together; of few lights there are none."""
+        """Groups of adjacent lights; None for few lights."""
         if self.codes is None or self.num_lights < _MIN_GROUPED_LIGHTS:
             return None
         return _group_lights(self, self.codes, _MAX_LIGHTS_PER_GROUP)
 
 
 class LightGroups(NamedTuple):
-    """Lights that lie together, as one light for a point that sees all of them.
+    """Adjacent lights, merged for points that see all lights of a group.
 
     Attributes:
         lights: one for each of G groups.
-        first: where the parts of each begin. (G + 1,) int64. light_index: the lights in them. (P,) int64
-        between_variance: the share of its variance that is between its parts; the others are the parts' own. (G,)
-            float32
+        first: begin of each group's lights. light_index: the lights in the groups.
+        between_variance: fraction of a group's variance between its lights; the rest is within them.
     """
 
     lights: TriangleLights
-    first: NDArray[np.int64]
-    light_index: NDArray[np.int64]
-    between_variance: F32
+    first: Shaped[NDArray[np.int64], " ends"]
+    light_index: Shaped[NDArray[np.int64], " P"]
+    between_variance: Shaped[F32, " G"]
 
 
 NO_LIGHTS = TriangleLights(np.empty((3, 6, 0), np.float32), *np.empty((2, 0, 3), np.float32))
 
 
 def _sum_by_index(index: NDArray[np.integer[Any]], values: F64, num: int) -> F64:
-    """Sum the values (n,) that have the same place (n,), in [0, num). (num,)"""
+    """Sum the values (n,) with equal index (n,), in [0, num). (num,)"""
     return np.asarray(np.bincount(index, values, num), np.float64)
 
 
 def _tangent_frames(normals: F64) -> F64:
-    """Find for each of M unit vectors two that are across it and across each other. (M, 2, 3)"""
+    """Return two perpendicular tangents for each of M unit vectors. (M, 2, 3)"""
     axis = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
     first = unit(np.cross(normals, axis))
     return np.stack([first, np.cross(normals, first)], axis=1)
 
 
 def _on_tangent_plane(directions: F64, normals: F64, frames: F64) -> F64:
-    """Project directions (n, 3) gnomonically, each onto the plane that touches the sphere at its normal. (n, 2)"""
+    """Project directions (n, 3) gnomonically, each onto the tangent plane of the sphere at its normal. (n, 2)"""
     height = np.einsum("ni,ni->n", directions, normals)
     return np.asarray(np.einsum("ni,nki->nk", directions, frames) / height[:, None])
 
 
 def _matrix_power(moments: F64, exponent: float) -> F64:
-    """Raise symmetric positive matrices (M, 2, 2) to a power; a vanishing extent is held above rounding."""
+    """Raise symmetric positive matrices (M, 2, 2) to a power; a vanishing extent is clamped above rounding."""
     values, vectors = np.linalg.eigh(moments)
     powers = np.maximum(values, 1e-14) ** exponent
     return np.asarray((vectors * powers[:, None]) @ vectors.transpose(0, 2, 1))
 
 
-def match_moments(corners: F64, texels: LightTexels) -> tuple[F64, F64]:
-    """Find the triangles (M, 3, 3) whose light, uniform, has the moments of the tiles', and its mean directions (M, 3).
+def match_moments(
+    corners: Shaped[F64, "M 3 3"], texels: LightTexels
+) -> tuple[Shaped[F64, "M 3 3"], Shaped[F64, "M 3"]]:
+    """Return triangles whose uniform light has the moments of the tiles' light, and its mean directions.
 
     Args:
-        corners: of the tiles. (M, 3, 3)
+        corners: of the tiles. texels: light in the tiles.
     """
     num_tiles = len(corners)
     total = texels.sums(texels.luminous, num_tiles)
@@ -169,14 +168,16 @@ def match_moments(corners: F64, texels: LightTexels) -> tuple[F64, F64]:
     return matched_corners, mean
 
 
-def merge_groups(lights: TriangleLights, group: NDArray[np.integer[Any]], codes: NDArray[np.uint64]) -> TriangleLights:
-    """Merge lights, so that each group has one with the same light, mean direction and spread.
+def merge_groups(
+    lights: TriangleLights, group: Shaped[NDArray[np.integer[Any]], " M"], codes: Shaped[NDArray[np.uint64], " G"]
+) -> TriangleLights:
+    """Merge the lights of each group into one with the same light, mean direction and spread.
 
-    Light is what a surface across its way receives: a little less of the parts than each of them brings across its own,
-    so that Σ L Ω cos θi is that of the parts wherever all are above the horizon.
+    Its irradiance is that of the parts on a surface perpendicular to the mean direction, slightly less than the sum of
+    theirs, so that Σ L Ω cos θi is preserved wherever all parts are above the horizon.
 
     Args:
-        lights: M of them. group: that each is in. (M,) codes: of nodes above them, one for each group. (G,)
+        lights: M lights. group: of each. codes: of a node above each group.
     """
     luminous = luminance(lights.irradiance).astype(np.float64)
     corners = lights.nodes[:, :3].transpose(2, 1, 0).astype(np.float64)
@@ -189,7 +190,7 @@ def merge_groups(lights: TriangleLights, group: NDArray[np.integer[Any]], codes:
 
 
 def _group_lights(lights: TriangleLights, codes: NDArray[np.uint64], max_lights: int) -> LightGroups:
-    """Group lights below one node each, at most `max_lights` together and two at least. codes: of their tiles. (M,)"""
+    """Group 2 to `max_lights` lights below a common node. codes: of their tiles. (M,)"""
     inner, (num_below,) = sum_inner_nodes(codes, np.ones((1, len(codes))))
     group_codes, group, group_size = np.unique(
         highest_ancestors(codes, inner[num_below > max_lights]), return_inverse=True, return_counts=True
@@ -211,29 +212,28 @@ def _group_lights(lights: TriangleLights, codes: NDArray[np.uint64], max_lights:
     return LightGroups(group_lights, first.astype(np.int64), light_index.astype(np.int64), between_variance)
 
 
-def pack_nodes(corners: F64) -> F32:
-    """Lay out corners (M, 3, 3) and the midpoints of their edges as kernels read them. (3 axes, 6, M) float32"""
+def pack_nodes(corners: Shaped[F64, "M 3 3"]) -> Shaped[F32, "3 6 M"]:
+    """Return corners and edge midpoints in the layout of the kernels."""
     nodes = np.concatenate([corners, unit(corners + np.roll(corners, -1, axis=1))], axis=1)
     return np.ascontiguousarray(nodes.transpose(2, 1, 0), np.float32)
 
 
 @dataclass(frozen=True)
 class RotatedEnvironment:
-    """The texels of an environment before anybody turns it: what stays while a hand does.
+    """The texels of an unrotated environment, computed once for all rotations.
 
     Attributes:
-        light: radiance × solid angle. (n, 3) luminous: its luminance. (n,) directions: unit. (n, 3)
-        solid_angles: (n,)
+        light: radiance × solid angle. luminous: its luminance. directions: unit. solid_angles: of the texels, sr.
     """
 
-    light: F64
-    luminous: F64
-    directions: F64
-    solid_angles: F64
+    light: Shaped[F64, "n 3"]
+    luminous: Shaped[F64, " n"]
+    directions: Shaped[F64, "n 3"]
+    solid_angles: Shaped[F64, " n"]
 
     @classmethod
-    def from_radiance(cls, radiance: F32) -> Self:
-        """Those of an equirectangular map, top row first. (height, width, 3) float32"""
+    def from_radiance(cls, radiance: Shaped[F32, "height width 3"]) -> Self:
+        """Return the texels of an equirectangular map, top row first."""
         height, width, _ = radiance.shape
         directions = texel_directions(height, width).reshape(-1, 3).astype(np.float64)
         texel_angles = np.repeat(texel_solid_angles(height, width), width)
@@ -243,13 +243,13 @@ class RotatedEnvironment:
 
 
 def integrate_environment(tiles: Tiles, environment: RotatedEnvironment, rotation: float = 0.0) -> TriangleLights:
-    """Weigh the light of an environment in each tile; it need not be the one that the tiles were chosen for.
+    """Integrate the light of an environment in each tile; the tiles may be chosen for another environment.
+
+    O(texels · depth) time.
 
     Args:
-        tiles: M tiles of the sphere.
-        environment: its texels.
-        rotation: of the environment about +Y, degrees, counter-clockwise seen from above.
-    Cost: O(texels · depth) time.
+        tiles: M tiles of the sphere. environment: its texels.
+        rotation: of the environment about +Y, degrees, counter-clockwise from above.
     """
     directions = rotate_about_y(environment.directions, rotation)
     texels = LightTexels(tiles.locate(directions), environment.luminous, directions, environment.solid_angles)
@@ -260,6 +260,6 @@ def integrate_environment(tiles: Tiles, environment: RotatedEnvironment, rotatio
     )
 
 
-def tessellate_environment(radiance: F32, num_lights: int) -> TriangleLights:
+def tessellate_environment(radiance: Shaped[F32, "height width 3"], num_lights: int) -> TriangleLights:
     """Divide an environment into about `num_lights` triangles. Raises as `choose_tiles` does."""
     return integrate_environment(choose_tiles(radiance, num_lights), RotatedEnvironment.from_radiance(radiance))

@@ -1,7 +1,7 @@
-"""Suns: light of a map that comes from so small a place, and so strong, that the edges of its shadows are seen.
+"""Sun disks: small regions of an environment so bright that they cast sharp shadows.
 
-A sun is what a few degrees of a map have above what is about them. It is taken out of the map, and comes from a few
-directions spread over it as its light is; what is left of the map is smooth enough for points on surfaces.
+A sun disk is the excess of a region of a few degrees over its surroundings. It is subtracted from the map and
+represented by a few directions distributed like its light; the remaining map is smooth enough for surface probes.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.environments.equirect import texel_directions, texel_solid_angles, uv_to_direction
@@ -17,21 +18,21 @@ from relume.core.color import luminance
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-NUM_TARGET_SETS, NUM_TARGETS = 9, 16  # sets of directions, one for each of 3 × 3 pixels; directions of each
+NUM_TARGET_SETS, NUM_TARGETS = 9, 16  # sets of directions, one per pixel of 3 × 3; directions per set
 MAX_SUN_DISKS = 2
 _MIN_LIGHT_FRACTION = 0.05  # of all light of the map
 _BRIGHTNESS_FACTOR = 100.0  # times the mean radiance
-_MAX_SURROUNDING_FRACTION = 0.2  # of a sun's light
+_MAX_SURROUNDING_FRACTION = 0.2  # of a sun disk's light
 _NUM_ROUNDS = 3
 _PLASTIC = 1.3247179572447460  # x³ = x + 1: steps of Roberts' R2 sequence
 
 
 class SunBounds(NamedTuple):
-    """What is a sun.
+    """Criteria of a sun disk.
 
     Attributes:
-        inner_angle, outer_angle: angles from what is brightest: the sun's, and where no more may be; degrees.
-        max_spread: root mean square of a sun's angles from its middle, degrees.
+        inner_angle, outer_angle: from the brightest direction: of the disk, and of the dark ring around it; degrees.
+        max_spread: root mean square of the angles to the disk's center, degrees.
     """
 
     inner_angle: float
@@ -39,33 +40,33 @@ class SunBounds(NamedTuple):
     max_spread: float
 
 
-SUN_BOUNDS = SunBounds(2.5, 5.0, 1.25)  # of what is wider points know the shadows
-BRIGHT_LIGHT_BOUNDS = SunBounds(4.0, 8.0, 3.0)  # what a highlight shows as itself, narrower than itself
+SUN_BOUNDS = SunBounds(2.5, 5.0, 1.25)  # probes resolve the shadows of wider regions
+BRIGHT_LIGHT_BOUNDS = SunBounds(4.0, 8.0, 3.0)  # narrower than highlights, which show these lights individually
 
 
 class SunDisk(NamedTuple):
-    """One of them.
+    """A sun disk.
 
     Attributes:
-        irradiance: ∫ L dω, of each channel. (3,)
-        mean: Σ ω L / Σ L, luminous; shorter than one by as much as the sun is wide. (3,)
-        directions: unit directions, each with an equal share of the light. (`NUM_TARGET_SETS`, `NUM_TARGETS`, 3)
+        irradiance: ∫ L dω, per channel.
+        mean: Σ ω L / Σ L, luminous; its length is below one by the disk's spread.
+        directions: unit directions with equal fractions of the light.
     """
 
-    irradiance: F64
-    mean: F64
-    directions: F64
+    irradiance: Shaped[F64, " 3"]
+    mean: Shaped[F64, " 3"]
+    directions: Shaped[F64, "sets targets 3"]
 
 
 class SplitEnvironment(NamedTuple):
-    """A map without its suns. beside: radiance. (height, width, 3) float32"""
+    """Sun disks of a map, and the remaining radiance."""
 
     sun_disks: tuple[SunDisk, ...]
-    residual: F32
+    residual: Shaped[F32, "height width 3"]
 
 
 class _BrightTexels(NamedTuple):
-    """The bright ones of a map. rows, columns: (n,). directions: unit. (n, 3). luminous: L dω. (n,)"""
+    """Bright texels of a map. directions: unit. luminous: L dω."""
 
     rows: NDArray[np.intp]
     columns: NDArray[np.intp]
@@ -73,12 +74,11 @@ class _BrightTexels(NamedTuple):
     luminous: F64
 
 
-def remove_sun_disks(radiance: F32, bounds: SunBounds = SUN_BOUNDS) -> SplitEnvironment:
-    """Take the suns out of a map.
+def remove_sun_disks(radiance: Shaped[F32, "height width 3"], bounds: SunBounds = SUN_BOUNDS) -> SplitEnvironment:
+    """Extract the sun disks of a map.
 
     Args:
-        radiance: equirectangular, top row first. (height, width, 3) float32
-        bounds: what is a sun.
+        radiance: equirectangular, top row first. bounds: criteria of a disk.
     """
     height, width, _ = radiance.shape
     solid_angles, light = texel_solid_angles(height, width), luminance(radiance).astype(np.float64)
@@ -108,7 +108,7 @@ def remove_sun_disks(radiance: F32, bounds: SunBounds = SUN_BOUNDS) -> SplitEnvi
 def _find_brightest_region(
     bright: _BrightTexels, is_remaining: NDArray[np.bool_], bounds: SunBounds
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Find what is about the most light of all that is left: within a sun's radius, and in the ring round it."""
+    """Find the region with the most remaining light: masks of the disk, and of the ring around it."""
     axis = bright.directions[np.argmax(np.where(is_remaining, bright.luminous, -1))]
     cos_inner, cos_outer = np.cos(np.radians(bounds[:2]))
     for _ in range(_NUM_ROUNDS):
@@ -123,7 +123,7 @@ def _find_brightest_region(
 def _remove_excess(
     radiance: F32, bright: _BrightTexels, is_inside: NDArray[np.bool_], bounds: SunBounds
 ) -> tuple[F32, F64]:
-    """Lower texels to what is about them. Returns the map, and by how much they were lowered: (n, 3)."""
+    """Reduce texels to their surroundings. Returns the map, and the removed radiance (n, 3)."""
     height, width, _ = radiance.shape
     axis = bright.luminous[is_inside] @ bright.directions[is_inside]
     is_surrounding = texel_directions(height, width) @ (axis / np.linalg.norm(axis)) > np.cos(
@@ -139,10 +139,10 @@ def _remove_excess(
 
 
 def _make_sun_disk(bright: _BrightTexels, is_inside: NDArray[np.bool_], light: F64, size: tuple[int, int]) -> SunDisk:
-    """Sum texels up. light: of each, L dω. (n, 3). size: height and width of the map"""
+    """Build a disk from its texels. light: of each, L dω. (n, 3). size: height and width of the map"""
     rows, columns, luminous = bright.rows[is_inside], bright.columns[is_inside], luminance(light.astype(np.float32))
     mean = luminous @ bright.directions[is_inside] / luminous.sum()
-    serpentine = np.where(rows % 2 == 0, columns, -columns)  # there and back again: what follows lies beside
+    serpentine = np.where(rows % 2 == 0, columns, -columns)  # alternating direction: successive texels are adjacent
     order = np.lexsort((serpentine, rows))
     cumulative, num_samples = np.cumsum(luminous[order]), NUM_TARGET_SETS * NUM_TARGETS
     texel = order[np.searchsorted(cumulative, (np.arange(num_samples) + 0.5) / num_samples * cumulative[-1])]

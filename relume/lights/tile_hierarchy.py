@@ -1,23 +1,24 @@
-"""Nodes above the tiles of a sphere: what lies below them, and which of them stand for several tiles."""
+"""Inner nodes above the tiles of a sphere: sums over them, and ancestors of tiles."""
 
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 F64 = NDArray[np.float64]
 Codes = NDArray[np.uint64]
 
-_FIRST_INNER_CODE = 32  # codes of tiles below are octants
+_FIRST_INNER_CODE = 32  # smaller codes are octants
 
 
-def sum_inner_nodes(codes: Codes, values: F64) -> tuple[Codes, F64]:
-    """Find the nodes above tiles, and sum what lies below each.
+def sum_inner_nodes(
+    codes: Shaped[Codes, " M"], values: Shaped[F64, "K M"]
+) -> tuple[Shaped[Codes, " N"], Shaped[F64, "K N"]]:
+    """Return the sorted codes of the inner nodes above tiles, and the sums of the values below each.
 
     Args:
-        codes: of the tiles, as `relume.lights.sphere_tiles.Tiles` has them. (M,) values: of the tiles. (K, M)
-    Returns:
-        Codes of N nodes, none of them a tile, in order; and sums (K, N).
+        codes: of the tiles, see `relume.lights.sphere_tiles.Tiles`. values: of the tiles.
     """
     ancestors, sums = [np.empty(0, np.uint64)], [values[:, :0]]
     while (is_deeper := codes >= _FIRST_INNER_CODE).any():
@@ -29,11 +30,11 @@ def sum_inner_nodes(codes: Codes, values: F64) -> tuple[Codes, F64]:
     return inner_codes, np.array([np.bincount(node_index, row, len(inner_codes)) for row in leaf_values])
 
 
-def highest_ancestors(codes: Codes, split_codes: Codes) -> Codes:
-    """Find the node above each tile under which nothing is split: the highest below those that are. (M,)
+def highest_ancestors(codes: Shaped[Codes, " M"], split_codes: Shaped[Codes, " splits"]) -> Shaped[Codes, " M"]:
+    """Return the highest node above each tile that is not split.
 
     Args:
-        codes: of the tiles. (M,) split_codes: nodes that do not stand for what lies below them, with all above them.
+        codes: of the tiles. split_codes: split nodes, with all nodes above these.
     """
     ancestors = codes.copy()
     while True:

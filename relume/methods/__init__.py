@@ -1,4 +1,4 @@
-"""Bake methods, direct, gather and surface: what each plans, computes and stores.
+"""Transfer methods `direct`, `gather` and `probes`: plan, bake and open.
 
 Read first: `base`, then `direct`.
 """

@@ -10,20 +10,20 @@ from relume.store.bake_protocol import BakeMethod, StoreReader
 
 
 class TransferMethod(BakeMethod, Protocol):
-    """One paper's light transport: how it is baked, and how its bakes are shown.
+    """Light transport method: bakes scenes and displays its bakes.
 
-    bake (worker, once) → freeze (server, on touch) → frame (server, per edit). A method joins by one module and one
-    line in `relume.methods.registry`, and inherits the contract suite in tests/contract.
+    bake (worker, once) → freeze (server, before an edit) → frame (server, per edit). To add a method, write a module
+    and a line in `relume.methods.registry`, and inherit the contract suite in tests/contract.
     """
 
     def open(self, store: StoreReader, key: str, cache: Cache) -> OpenBake:
-        """A store of this method, opened for freezing and frames.
+        """Open a store of this method for freezing and frames.
 
         Args:
-            key: tells what is made from this bake from what is made from others in the cache: the store's path.
-            cache: of all that is made from the bake and may be made again.
+            key: the store's path; identifies this bake's entries in the cache.
+            cache: of results computed from the bake.
         Raises:
-            StoreError: the store's description is not of this form.
+            StoreError: the store's description is invalid.
             ChunkDamagedError: its arrays do not fit each other.
         """
         ...

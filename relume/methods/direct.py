@@ -1,6 +1,6 @@
 """Method `direct`: environment light, fixed views, shadows, no bounces (Ben-Artzi 2006).
 
-A store of it holds what `relume.methods.view_stages` bakes, and nothing else.
+Its store holds the arrays of `relume.methods.view_stages` only.
 """
 
 from __future__ import annotations
@@ -27,30 +27,30 @@ class DirectMethod:
         self._views = SampledViews()
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
-        """Upper bounds from the recipe alone."""
+        """Return upper bounds, from the recipe alone."""
         plan_estimates.check_gathering(recipe, 0)
         return self._views.plan(scene, recipe)
 
     def prepare(self, scene: Scene) -> None:
-        """Build the triangles' search tree."""
+        """Build the acceleration structure of the triangles."""
         self._views.prepare(scene)
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
-        """What opening the store needs besides its arrays."""
+        """Return the store's attributes."""
         return self._views.attributes(scene, recipe)
 
     def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
-        """The lights and each view; then whole shards of each view's surface samples. See `BakeMethod`."""
+        """Return tasks for the lights and each view; then for shards of each view's samples. See `BakeMethod`."""
         return self._views.tasks(stage, scene, recipe, store)
 
     def arrays(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[ArraySpec]:
-        """The visibility of each view; the arrays of the first stage are made by its tasks. See `BakeMethod`."""
+        """Return the visibility arrays of the views; tasks of the first stage create theirs. See `BakeMethod`."""
         return self._views.arrays(stage, scene, recipe, store)
 
     def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> TaskOutput:
-        """One task; nothing is random, so the same task gives the same bits anywhere. See `BakeMethod`."""
+        """Compute a task; deterministic on any machine. See `BakeMethod`."""
         return self._views.compute(scene, recipe, task, store)
 
     def open(self, store: StoreReader, key: str, cache: Cache) -> BakedFixedViews:
-        """Views lit by the environment and by local lights. See `TransferMethod`."""
+        """Open views lit by the environment and by local lights. See `TransferMethod`."""
         return BakedFixedViews(**read_fields(store, key, cache))

@@ -1,13 +1,11 @@
-"""How much disk a bake takes, tried before it is begun: a plan's bound is a hundred times what some scenes take.
+"""Estimate of the disk space of a bake before it starts, since a plan's bound can be a hundred times the actual size.
 
-A bound counts what each pixel may show and each number may need. So fixed views are tried: the same method bakes the
-scene in small pictures, by few lights, and the bytes of its arrays are scaled by how many rows and columns the wanted
-ones have more. Rows of small pictures are less alike and compress worse, and more of their pixels lie across edges, so
-that what is found is rather too much. Points of the free camera take longer to place than to trace; each part of their
-store is planned as the share of its bound that scenes take at most. `relume bench plan` compares plans with stores.
-
-The result is no bound: a scene may be finer where a small picture does not show it. A bake checks the disk as it
-writes.
+A bound assumes the worst case for each pixel and number. Fixed views are therefore measured: the method bakes small
+images of the scene with few lights, and the bytes of its arrays are scaled to the requested rows and columns. Rows of
+small images are less alike and compress worse, and more of their pixels lie on edges, so that the estimate is rather
+too high. Surface probes take longer to place than to trace; each part of their store is planned as the largest
+fraction of its bound that was measured. `relume bench plan` compares plans with stores.
+The estimate is not a bound: a small image may miss details of a scene. A bake checks the disk while it writes.
 """
 
 from __future__ import annotations
@@ -35,22 +33,22 @@ from relume.store.bake_protocol import BakeMethod, Plan, Recipe
 from relume.store.publish import array_paths
 from relume.store.writer import create_store
 
-SMALL_BYTES = 32 << 20  # plans up to that are as they are bounded
-_PIXELS, _LIGHTS, _PATCHES = 64 * 48, 300, 256  # of what is tried
-_VIEWS = 4  # that are tried
+SMALL_BYTES = 32 << 20  # plans up to this size keep their bound
+_PIXELS, _LIGHTS, _PATCHES = 64 * 48, 300, 256  # of the trial bake
+_VIEWS = 4  # of the trial bake
 _MARGIN = 1.3
-_EDGE_EXPONENT = 1 / 3  # power with which edges are fewer for each pixel in a larger picture; a tuft of blades has 0.3
-_METADATA_BYTES = 64 << 10  # of metadata
-_SCRATCH_ROW_BYTES = 200  # of a sample while samples are sorted
+_EDGE_EXPONENT = 1 / 3  # power of the pixel count by which the fraction of edge pixels falls; 0.3 for a tuft of grass
+_METADATA_BYTES = 64 << 10
+_SCRATCH_ROW_BYTES = 200  # per sample while samples are sorted
 _COMPRESSION_RATIOS = (0.22, 0.6, 0.6, 0.4, 0.8, 0.8, 1.0)  # of the bound of each of `relume.methods.probes.StoreBytes`
-_ROWS_PER_BLOCK, _BLOCKS_PER_TEXTURE = 16, 8  # of a texture: rows beside each other, and how often
+_ROWS_PER_BLOCK, _BLOCKS_PER_TEXTURE = 16, 8  # blocks of adjacent rows of a texture
 
 
 class DiskEstimate(NamedTuple):
     """Bytes on disk.
 
     Attributes:
-        store: of the finished store. scratch: of files that are there besides, while samples are sorted.
+        store: of the finished store. scratch: of temporary files while samples are sorted.
     """
 
     store: int
@@ -58,14 +56,13 @@ class DiskEstimate(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """What a trial took, in bytes.
+    """Measured sizes of a trial bake, in bytes.
 
     Attributes:
-        samples: of a pixel. pixels: of a tried picture.
-        sample: of a view sample, but for what stands below. light: of a sample and a light. gather_hits: of a sample's
-            rays.
-        patch: of a gather cell, but for lights. patch_light: of a cell and a light. per_light: of a light.
-        constant: of all that stays as it is.
+        samples: samples per pixel. pixels: of a trial image.
+        sample: per view sample, without the following. light: per sample and light. gather_hits: per sample.
+        patch: per patch, without lights. patch_light: per patch and light. per_light: per light.
+        constant: of everything that does not scale.
     """
 
     samples: float
@@ -80,19 +77,19 @@ class Rates(NamedTuple):
 
 
 def estimate_disk(method: BakeMethod, scene: Scene, recipe: Recipe, plan: Plan) -> DiskEstimate:
-    """Find how much disk a bake will take.
+    """Estimate the disk space of a bake.
 
     Args:
-        method: that bakes. scene: what. recipe: how. plan: of it, with its bound.
+        method, scene, recipe: of the bake. plan: with its bound.
     Returns:
-        No more than the bound; the bound where it is small, or no method says what it takes.
+        At most the bound; the bound itself if it is small or the method has no estimate.
     """
     estimator = _METHODS.get(method.name)
     if estimator is None or plan.store_bytes <= SMALL_BYTES:
         return DiskEstimate(plan.store_bytes, 0)
     try:
         estimate = estimator(scene, recipe)
-    except OSError:  # there is no room for a trial
+    except OSError:  # no space for a trial
         return DiskEstimate(plan.store_bytes, 0)
     return DiskEstimate(min(plan.store_bytes, estimate.store), estimate.scratch)
 
@@ -100,7 +97,7 @@ def estimate_disk(method: BakeMethod, scene: Scene, recipe: Recipe, plan: Plan) 
 def _trial_estimator(
     make_method: Callable[[], BakeMethod], count_patches: Callable[[Recipe], int]
 ) -> Callable[[Scene, Recipe], DiskEstimate]:
-    """Have fixed views tried. make: a method that holds nothing yet. cells_of: how many gather cells a recipe has."""
+    """Estimate by a trial bake. make_method: returns a new method. count_patches: number of patches of a recipe."""
 
     def estimate(scene: Scene, recipe: Recipe) -> DiskEstimate:
         small, num_patches = _trial_recipe(recipe), count_patches(recipe)
@@ -111,7 +108,7 @@ def _trial_estimator(
         rates, num_pixels = Rates(*cached_rates.tolist()), recipe.size[0] * recipe.size[1]
         edge_factor = min(1.0, rates.pixels / num_pixels) ** (_EDGE_EXPONENT / 2)
         samples = (1 + max(0.0, rates.samples - 1) * edge_factor) * num_pixels * len(recipe.views)
-        # a number of more cells has more bits
+        # indices of more patches have more bits
         index_bits_factor = max(1.0, math.log2(num_patches or 1) / math.log2(_PATCHES))
         total = samples * (
             rates.sample + rates.light * recipe.num_lights * edge_factor + rates.gather_hits * index_bits_factor
@@ -124,7 +121,7 @@ def _trial_estimator(
 
 
 def _trial_recipe(recipe: Recipe) -> Recipe:
-    """What is tried in the place of a recipe: the same for all sizes and numbers of lights."""
+    """Return the recipe of the trial bake, the same for all sizes and numbers of lights."""
     width, height = recipe.size
     scale = min(1.0, math.sqrt(_PIXELS / (width * height)))
     step = -(-len(recipe.views) // _VIEWS)
@@ -134,7 +131,7 @@ def _trial_recipe(recipe: Recipe) -> Recipe:
 
 
 def _measure_rates(method: BakeMethod, scene: Scene, small: Recipe) -> NDArray[np.float64]:
-    """Bake a little; what it took, as `Rates`."""
+    """Bake a small recipe; return its `Rates`."""
     with tempfile.TemporaryDirectory() as folder:
         path = bake_in_process(method, scene, small, Path(folder) / "trial.zarr")
         store = open_store(path)
@@ -153,7 +150,7 @@ def _measure_rates(method: BakeMethod, scene: Scene, small: Recipe) -> NDArray[n
 
 
 def _rate_field(array: str) -> str:
-    """Which of `Rates` the bytes of an array count for."""
+    """Return the field of `Rates` that an array counts toward."""
     group, _, name = array.partition("/")
     if group == "views":
         return {"visibility": "light", "gather_hits": "gather_hits"}.get(name.rpartition("/")[2], "sample")
@@ -163,7 +160,7 @@ def _rate_field(array: str) -> str:
 
 
 def _probe_disk(scene: Scene, recipe: Recipe) -> DiskEstimate:
-    """What points of the free camera take: shares of the bound of each part, and the textures as they compress."""
+    """Estimate a bake for a free camera: fractions of the bound of each part, and compressed textures."""
     total = sum(
         ratio * bound_bytes
         for ratio, bound_bytes in zip(_COMPRESSION_RATIOS, parts_of_surface(scene, recipe), strict=True)
@@ -172,7 +169,7 @@ def _probe_disk(scene: Scene, recipe: Recipe) -> DiskEstimate:
 
 
 def _texture_bytes(scene: Scene) -> float:
-    """Of all textures, each once, by some of their rows."""
+    """Estimate the compressed bytes of all distinct textures from some of their rows."""
     textures = plan_estimates.distinct_textures(scene)
     with tempfile.TemporaryDirectory() as folder:
         store, total = create_store(Path(folder) / "some.zarr", {}), 0.0

@@ -1,12 +1,11 @@
-"""How far the moving pictures of a bake are off in the scene's own look, measured where it is baked against exact ones.
+"""Error of free-camera images in the scene's own look, measured during the bake against exact images.
 
     E² = Σ_p |M(p) − S(p)|² / Σ_p |S(p)|²
 
-p are rays through the middles of few pixels from a few eyes, where they hit a surface; M is what a moving eye is shown
-along them, S what is shown where it rests, with all light paths of the method. Points of a picture err as its pixels
-do: few of them tell what large pictures are off by (of a still life 64 × 48 rays 21.4 to 21.8 %, 640 × 480 pixels
-21.5 %).
-The standard error is that of leaving out squares of rays, which are alike inside.
+p are rays through the centers of a few pixels from a few cameras that hit a surface; M is the free-camera image along
+these, S the static view, with all light paths of the method. Few rays suffice to estimate the error of large images
+(for a still life 64 × 48 rays give 21.4 to 21.8 %, 640 × 480 pixels 21.5 %).
+The standard error is the jackknife over pixel blocks, because neighboring rays are correlated.
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume import look as looks
@@ -32,22 +32,22 @@ F64 = NDArray[np.float64]
 
 _SIZE, _SMALL_SIZE, _BLOCK_SIZE = (64, 48), (32, 24), 8
 _MAX_VIEWS = 3
-_TURNTABLE_STEPS = 18  # steps of a turntable: as far as a hand turns an eye at once
+_TURNTABLE_STEPS = 18  # of a full turn: as far as one drag rotates a camera
 _BUDGET_BYTES = 1 << 30
-PROBE_BYTES = 2600  # of a point while it is measured: six light vectors of 36 functions
-BYTES = 300 << 20  # what else is made: tables, skies, stills
+PROBE_BYTES = 2600  # per probe during the measurement: six vectors of 36 coefficients
+BYTES = 300 << 20  # of everything else: tables, environments, static views
 _DIGITS = 4
 
 
-def measure_error(store: StoreReader, scene: Scene, size: tuple[int, int]) -> NDArray[np.float32]:
-    """The error and its standard error; not a number where all is dark, or it takes more than there is. (2,) float32
+def measure_error(store: StoreReader, scene: Scene, size: tuple[int, int]) -> Shaped[NDArray[np.float32], " 2"]:
+    """Return the error and its standard error; NaN if everything is dark or the memory budget is exceeded.
 
     Args:
-        store: of a bake whose eyes move, everything else in it. scene: with its cameras.
-        size: width and height that its pictures begin with; fewer rays do where they are small.
+        store: of a bake with a free camera, complete except for this result. scene: with its cameras.
+        size: default width and height of the images; small ones are measured with fewer rays.
     """
-    # no folder is there for what pictures keep beside a bake
-    transfer = BakedFreeCamera.from_store(store, f"bake in making/{scene.id}", Cache(_BUDGET_BYTES))
+    # no folder: images are not saved beside an unfinished bake
+    transfer = BakedFreeCamera.from_store(store, f"unfinished bake/{scene.id}", Cache(_BUDGET_BYTES))
     try:
         rays = _SIZE if size[0] * size[1] >= _SIZE[0] * _SIZE[1] else _SMALL_SIZE
         estimate = _estimate_error(transfer, StaticViewBuilder(transfer.light_transport, scene), rays)
@@ -73,17 +73,17 @@ def _estimate_error(
 
 
 def _cameras(transfer: BakedFreeCamera) -> Sequence[Camera]:
-    """Where eyes begin, and, of the first, where a hand may turn it to."""
+    """Return the initial cameras, and turntable positions of the first."""
     views = list(transfer.views.values())[:_MAX_VIEWS]
     turntable_cameras = turntable(views[0].camera, pivot_of(transfer, views[0].camera), _TURNTABLE_STEPS)
     return [*(view.camera for view in views), turntable_cameras[1], turntable_cameras[-1]]
 
 
 def _block_sums(free_picture: FreeCameraPicture, view: StaticViewState) -> F64:
-    """Sums over squares of rays: what the moving picture is off by, and what there is, both squared. (2, squares)
+    """Sum squared errors and squared radiance over blocks of rays. (2, blocks)
 
     Args:
-        free_picture: in the light of the view. view: what is to be seen.
+        free_picture: in the light of the view. view: the reference.
     """
     free_picture.set_camera(*view.sized_camera)
     image, gbuffer = free_picture.render_pixel_centers(view.sized_camera[1], is_fine=False)

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.cache import Cache
@@ -46,7 +47,7 @@ from relume.views.store_io import read_camera
 
 F32 = NDArray[np.float32]
 
-_PROBES_PER_BATCH = 4096  # points whose bits are unpacked at once
+_PROBES_PER_BATCH = 4096  # probes whose bits are unpacked at once
 
 
 @dataclass(frozen=True)
@@ -54,11 +55,10 @@ class BakedFreeCamera:
     """An open bake with a free camera. See `relume.live.free_camera.protocol`.
 
     Attributes:
-        light_transport: the light of the bake, in which no view was baked.
-        stored_scene: what the eye sees.
-        views: where eyes begin.
-        free_camera_error: how far pictures are off while an eye moves, measured in the bake; None where that is not
-            known.
+        light_transport: the light of the bake, without views.
+        stored_scene: the surfaces for primary visibility.
+        views: initial cameras.
+        free_camera_error: error of free-camera images, measured by the bake; None if unknown.
     """
 
     light_transport: BakedIndirectViews
@@ -74,9 +74,9 @@ class BakedFreeCamera:
         """Open a store.
 
         Args:
-            store: an open one. key: of the bake in the memory. cache: of all that is made from the bake.
+            store: an open store. key: of the bake in the cache. cache: of results computed from the bake.
         Raises:
-            StoreError: its description is not of this form. ChunkDamagedError: its arrays do not fit each other.
+            StoreError: its description is invalid. ChunkDamagedError: its arrays do not match.
         """
         light_fields = read_light_fields(store, key, cache)
         light_transport = BakedIndirectViews(
@@ -93,7 +93,7 @@ class BakedFreeCamera:
 
     @property
     def cache(self) -> Cache:
-        """Of all that is made from the bake and may be made again."""
+        """Cache of results computed from the bake."""
         return self.light_transport.cache
 
     @property
@@ -103,12 +103,12 @@ class BakedFreeCamera:
 
     @property
     def scene_id(self) -> str:
-        """Of the scene that was baked."""
+        """Id of the baked scene."""
         return self.light_transport.scene_id
 
     @property
     def method(self) -> str:
-        """That it was baked by."""
+        """Name of the method that baked it."""
         return self.light_transport.method
 
     @property
@@ -118,72 +118,72 @@ class BakedFreeCamera:
 
     @property
     def material_names(self) -> Sequence[str]:
-        """In the scene's order."""
+        """Material names in the scene's order."""
         return self.light_transport.material_names
 
-    def environment_radiance(self, name: str | None) -> F32:
-        """Radiance of an environment, None for the scene's own. (height, width, 3) float32"""
+    def environment_radiance(self, name: str | None) -> Shaped[F32, "height width 3"]:
+        """Return the radiance of an environment, None for the scene's own."""
         return self.light_transport.environment_radiance(name)
 
     def stored_scene_with(self, overrides: tuple[ProbeMapOverrides, ...]) -> StoredScene:
-        """What the eye sees where a look names images in the place of the materials' own.
+        """Return the surfaces with material map overrides.
 
         Args:
-            overrides: what it names, of each material.
+            overrides: of each material.
         Raises:
-            NotFoundError, SceneError: an image cannot be had.
+            NotFoundError, SceneError: an image cannot be loaded.
         """
         if all(override == NO_OVERRIDES for override in overrides):
             return self.stored_scene
-        key = self.key, "images on surfaces", overrides
+        key = self.key, "map overrides on surfaces", overrides
         textures = self.cache.get_value(key, lambda: overridden_textures(self.stored_scene, self.positions, overrides))
         return replace(self.stored_scene, **textures._asdict())
 
     @property
     def has_alpha_tested_surfaces(self) -> bool:
-        """Whether rays may pass some triangles."""
+        """True if some triangles are alpha-tested."""
         return self.light_transport.local.has_alpha_tested_surfaces
 
     @property
     def embree(self) -> EmbreeScene:
-        """The triangles' search tree."""
+        """Acceleration structure of the triangles."""
         return self.light_transport.local.embree
 
     @property
-    def positions(self) -> F32:
-        """Of the triangles' corners, metres. (corners, 3) float32"""
+    def positions(self) -> Shaped[F32, "vertices 3"]:
+        """Vertex positions of the triangles, meters."""
         return self.light_transport.local.positions
 
     @cached_property
     def occlusion_mesh(self) -> OcclusionMesh:
-        """What rays between places on surfaces meet."""
+        """Geometry for occlusion rays between surface points."""
         return OcclusionMesh.build(self.stored_scene, self.positions, self.embree)
 
     @cached_property
-    def has_occluded_neighbor(self) -> NDArray[np.uint8]:
-        """Nodes with an occluded neighbor, from `relume.live.free_camera.occluded_probes`. (nodes,) uint8"""
+    def has_occluded_neighbor(self) -> Shaped[NDArray[np.uint8], " nodes"]:
+        """Nodes with an occluded neighbor, from `relume.live.free_camera.occluded_probes`."""
         return find_occluded_probes(self.occlusion_mesh)
 
     @cached_property
-    def visible(self) -> NDArray[np.uint8]:
-        """Which light triangles points see: triangle l in bit l & 7 of byte l >> 3. (points, bytes) uint8"""
+    def visible(self) -> Shaped[NDArray[np.uint8], "probes bytes"]:
+        """Visibility of the light triangles from the probes: triangle l in bit l & 7 of byte l >> 3."""
         return np.asarray(self.light_transport.store.read("probes/visibility"), np.uint8)
 
     @cached_property
     def _gather_hits(self) -> NDArray[np.uint16]:
         return np.asarray(self.light_transport.store.read("probes/gather_hits"), np.uint16)
 
-    def vectors(self, element: Illumination, without_sun_disks: bool = False) -> F32:
-        """Light vectors of all points in a light: one source, one kind of way, gain 1. (points, 3, K) float32
+    def vectors(self, element: Illumination, without_sun_disks: bool = False) -> Shaped[F32, "probes 3 K"]:
+        """Return the incident radiance coefficients of all probes for one source and light path with gain 1.
 
         Args:
-            element: that light. without_sun_disks: what comes straight from suns of the sky is left out.
+            element: that light. without_sun_disks: excludes direct illumination from sun disks.
         """
         key = self._vectors_key(element, without_sun_disks)
         return self.cache.get_value(key, lambda: self._vectors(element, without_sun_disks))
 
     def has_vectors(self, element: Illumination, without_sun_disks: bool = False) -> bool:
-        """Whether they have been made."""
+        """Return True if these vectors are in the cache."""
         return self.cache.contains(self._vectors_key(element, without_sun_disks))
 
     def _vectors_key(self, element: Illumination, without_sun_disks: bool) -> tuple[Hashable, ...]:
@@ -201,12 +201,12 @@ class BakedFreeCamera:
         return incident_coefficients(probes, self.visible, lights, rays)
 
     def fast_vectors(
-        self, element: Illumination, probe_indices: NDArray[np.intp], without_sun_disks: bool = False
-    ) -> F32:
-        """The same of some points, of a low degree, found quickly. (chosen, 3, functions) float32
+        self, element: Illumination, probe_indices: Shaped[NDArray[np.intp], " m"], without_sun_disks: bool = False
+    ) -> Shaped[F32, "m 3 k"]:
+        """Approximate the incident radiance coefficients of some probes, with a low degree.
 
         Args:
-            element, without_sun_disks: as of `vectors`. probe_indices: the points.
+            element, without_sun_disks: as in `vectors`. probe_indices: the probes.
         """
         probes, rays = self.stored_scene.probes.rows(probe_indices), list[RayList]()
         if element.paths.direct:
@@ -224,11 +224,13 @@ class BakedFreeCamera:
             vectors += self._ray_vectors(self.light_transport.indirect.fast(element), probe_indices)
         return vectors
 
-    def indirect_delta(self, before: Illumination, after: Illumination, probe_indices: NDArray[np.intp]) -> F32:
-        """How what surfaces send to some points changes, of a low degree, found quickly. (chosen, 3, functions) float32
+    def indirect_delta(
+        self, before: Illumination, after: Illumination, probe_indices: Shaped[NDArray[np.intp], " m"]
+    ) -> Shaped[F32, "m 3 k"]:
+        """Approximate the change of indirect light at some probes, as coefficients of a low degree.
 
         Args:
-            before, after: lights of equal sources. probe_indices: the points.
+            before, after: lights of the same sources. probe_indices: the probes.
         """
         return self._ray_vectors(self.light_transport.indirect.delta(before, after), probe_indices)
 
@@ -248,13 +250,13 @@ class BakedFreeCamera:
 
     @cached_property
     def sun_disks(self) -> SunExtractor:
-        """Suns of environments, and what there is beside them."""
+        """Sun disks of environments, and the remaining light."""
         return SunExtractor(self.light_transport)
 
     def hard_shadow_lights(
-        self, light: Illumination, probe_indices: NDArray[np.intp] | None
+        self, light: Illumination, probe_indices: Shaped[NDArray[np.intp], " m"] | None
     ) -> tuple[HardShadowLight, ...]:
-        """Suns and small lamps of a light, and what they bring to some points, None for all, if nothing hides them."""
+        """Return sun disks and small area lights, with their unoccluded light at some probes (None: all)."""
         probes = self.stored_scene.probes if probe_indices is None else self.stored_scene.probes.rows(probe_indices)
         shadow_lights = [
             *self.sun_disks.hard_shadow_lights(light, probes),
@@ -276,7 +278,7 @@ class BakedFreeCamera:
     def _preview_environment(
         self, lights: TriangleLights, probes: SurfacePoints, probe_indices: NDArray[np.intp]
     ) -> F32:
-        """Light vectors of an environment at some points, by harmonics where the bake has them."""
+        """Compute an environment's coefficients at some probes, by spherical harmonics if the bake has them."""
         harmonic = self.light_transport.harmonic
         if harmonic is None:
             return incident_coefficients(probes, self.visible[probe_indices], lights, (), FAST_DEGREE)
@@ -289,14 +291,12 @@ class BakedFreeCamera:
     def _ray_basis(self) -> F32:
         return weighted_basis(self._pattern, 0, FAST_DEGREE)  # all points have one seed
 
-    def unoccluded(self, light: Illumination, material: int, *, is_preview: bool) -> F32:
-        """What white points of a material would send if nothing were in the light's way; of others nothing.
+    def unoccluded(self, light: Illumination, material: int, *, is_preview: bool) -> Shaped[F32, "probes 3"]:
+        """Return the radiance of white probes of a material without occlusion; zero for other materials.
 
         Args:
-            light: straight from the sky and from lamps, not from surfaces that shine, which are not there.
-            material: whose points. is_preview: of another sky than the baked one, quickly.
-        Returns:
-            (points, 3) float32
+            light: direct illumination by environment and area lights; emissive surfaces are excluded.
+            material: of the probes. is_preview: approximates environments other than the baked one.
         """
         rows, cache = np.flatnonzero(self.stored_scene.material == material), self.cache.transient
         key = self.key, "unoccluded light", material
@@ -319,12 +319,12 @@ class BakedFreeCamera:
         return out
 
     def _unoccluded_environment(self, light: Illumination, probes: SurfacePoints, *, is_preview: bool) -> F32:
-        """What white points send under the whole sky, of which there are few that differ. (n, 3) float32"""
+        """Return the radiance of white probes under the whole environment, per distinct normal. (n, 3) float32"""
         _, first, normal_index = np.unique(probes.normal, axis=0, return_index=True, return_inverse=True)
         lights, receivers = self.light_transport.unoccluded_environment(
             light, probes.rows(first), is_preview=is_preview
         )
-        # the first function is constant, and its light vector the irradiance
+        # the first function is constant: its coefficient is proportional to the irradiance
         constant = incident_coefficients(receivers.points, receivers.visible, lights, (), 0)[:, :, 0]
         return np.asarray(constant[normal_index.ravel()] / np.float32(np.sqrt(np.pi)), np.float32)
 
@@ -334,7 +334,7 @@ class BakedFreeCamera:
 
     @property
     def vectors_shape(self) -> tuple[int, int, int]:
-        """Of light vectors: points, channels, K."""
+        """Shape of `vectors`: probes, channels, K."""
         return self.stored_scene.probes.num_points, 3, NUM_FUNCTIONS
 
     @cached_property
@@ -342,8 +342,8 @@ class BakedFreeCamera:
         return PrefilteredEnvironments(self.light_transport)
 
     @cached_property
-    def light_visibility_bits(self) -> NDArray[np.uint8]:
-        """Which light triangles points see, those beside each other one after another. (points, bytes) uint8"""
+    def light_visibility_bits(self) -> Shaped[NDArray[np.uint8], "probes bytes"]:
+        """Visibility of the light triangles from the probes, with adjacent triangles in sequence."""
         order, out = self._prefiltered.order, np.empty_like(self.visible)
         for rows in np.array_split(np.arange(len(out)), len(out) // _PROBES_PER_BATCH + 1):
             bits = np.unpackbits(self.visible[rows], axis=1, bitorder="little")
@@ -352,21 +352,21 @@ class BakedFreeCamera:
         return out
 
     def lobe_lights(self, environment: EnvironmentKey, widths: tuple[int, ...]) -> LobeLightLists:
-        """The light triangles of an environment, as lobes of some widths look for them."""
+        """Return the light triangles of an environment, listed by direction for lobes of some widths."""
         return self._prefiltered.directional_lights(environment, widths)
 
     def environment_lights(self, environment: EnvironmentKey, *, is_preview: bool) -> EnvironmentLights:
-        """The same, as highlights are summed over them. is_preview: of another sky than the baked one, quickly."""
+        """Return an environment's lights for highlights. is_preview: approximates other than the baked environment."""
         return self._prefiltered.combined(environment, is_preview=is_preview)
 
-    def bright_lights(self, environment: EnvironmentKey) -> F32:
-        """Bright lights of an environment, turned; see `PrefilteredEnvironment`. (lights, 7) float32"""
+    def bright_lights(self, environment: EnvironmentKey) -> Shaped[F32, "lights 7"]:
+        """Return the bright lights of an environment, rotated; see `PrefilteredEnvironment`."""
         return self._prefiltered.bright_lights(environment)
 
     def prefiltered(self, name: str | None) -> EnvironmentLookup:
-        """An environment, None for the scene's own, and what it is when it is blurred without its lamps."""
+        """Return an environment (None: the scene's own), and its blurred versions without bright lights."""
         return self._prefiltered.environment_lookup(name)
 
-    def environment_map(self, name: str | None, blur: float = 0) -> F32:
-        """Radiance of an environment, None for the scene's own, blurred by `blur` degrees. (height, width, 3)"""
+    def environment_map(self, name: str | None, blur: float = 0) -> Shaped[F32, "height width 3"]:
+        """Return the radiance of an environment, None for the scene's own, blurred by `blur` degrees."""
         return self.light_transport.environment_map(name, blur)

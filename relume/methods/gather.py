@@ -1,17 +1,17 @@
 """Method `gather`: environment light with any number of bounces, fixed views (after Nguyen 2010).
 
-Beside what `relume.methods.view_stages` bakes: surface patches, the lights that they see, and gather rays from patches
-and view samples, of which only the patch that each hits is kept: their directions are made again from a seed. Stages
-after those of the views: "patches", then "gather rays" (rows of patches, rows of each view).
+Besides the arrays of `relume.methods.view_stages`: surface patches, the lights visible from them, and gather rays from
+patches and view samples. Only the patch that each ray hits is stored; directions are generated again from a seed.
+Stages after those of the views: "patches", then "gather rays" (rows of patches, rows of each view).
 
     patches/axis, value, children, roots        relume.patches.patch_kdtree.PatchTree
     patches/position, normal, material, …       relume.patches.patches.Patches
-    patches/visibility                          lights visible from the points of a patch, one point after another
+    patches/visibility                          lights visible from the sample points of patches, patch by patch
     patches/gather_hits                         patches that the rays of its points hit
     views/<k>/gather_hits                       patches that the rays of a view sample hit
     views/<k>/seed                              seeds the rays of a view sample
     mirror_lights/…                             relume.methods.planar_mirror_light.MirrorLights: bright lights, planes
-    views/<k>/mirror_lights                     which of those lights a view sample sees in flat mirrors
+    views/<k>/mirror_lights                     lights that a view sample sees in planar mirrors
 """
 
 from __future__ import annotations
@@ -45,21 +45,21 @@ PATCHES_PER_SHARD = 4096
 RAYS_PER_SAMPLE, RAYS_PER_POINT = 610, 55
 _GLOSSY_RAYS = 233
 _PIXELS_PER_PATCH, _MIN_PATCHES = 10, 1024
-_PATCH_STAGE, _RAY_STAGE = 2, 3  # stages
+_PATCH_STAGE, _RAY_STAGE = 2, 3
 _PATCH_BYTES = POINTS_PER_PATCH * (56 + 2 * RAYS_PER_POINT) + 64
-_NORMAL_BYTES = 240  # of a triangle, while the normals of all are found
-_PATCH_BUILD_BYTES = 4000  # photons, what they hit, and the tree that grows over them
-_SHARD_ROW_BYTES = 500  # of a sample beside its links, which are there thrice: traced, joined, written
-_RAY_NS, _TRIANGLE_US = 8.0, 3.0  # of one core, on scenes of 200 to a million triangles
+_NORMAL_BYTES = 240  # per triangle, while normals are computed
+_PATCH_BUILD_BYTES = 4000  # photons, their hits, and the tree that is built over them
+_SHARD_ROW_BYTES = 500  # per sample besides its gather hits, which are held three times: traced, joined, written
+_RAY_NS, _TRIANGLE_US = 8.0, 3.0  # on one core, for scenes of 200 to a million triangles
 
 
 class GatherMethod:
     """Implements `relume.methods.base.TransferMethod`.
 
     Args:
-        rays: of a view sample. glossy: of those, where its material has a highlight.
-        num_tent_passes: how often neighbours in the picture share what these bring; see `relume.views.gather_filter`.
-        smooths_edges: whether pixels across edges have several samples.
+        rays: per view sample. glossy: number of these if the material has a highlight.
+        num_tent_passes: filter passes over neighboring pixels; see `relume.views.gather_filter`.
+        smooths_edges: whether pixels on edges have several samples.
     """
 
     name = "gather"
@@ -78,17 +78,17 @@ class GatherMethod:
         self._patch_tree = ReadCache(read_tree)
 
     def prepare(self, scene: Scene) -> None:
-        """Build the triangles' search tree."""
+        """Build the acceleration structure of the triangles."""
         self._views.prepare(scene)
 
     def open(self, store: StoreReader, key: str, cache: Cache) -> BakedIndirectViews:
-        """Views lit by the environment, by local lights, and by surfaces. See `TransferMethod`."""
+        """Open views lit by the environment, local lights and indirect light. See `TransferMethod`."""
         return BakedIndirectViews(
             **read_fields(store, key, cache), patches=read_patches(store), mirror_lights=read_mirror_lights(store)
         )
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
-        """Upper bounds from the recipe alone."""
+        """Return upper bounds, from the recipe alone."""
         plan_estimates.check_gathering(recipe, MAX_PATCHES)
         direct, patch_count, (rays, _) = self._views.plan(scene, recipe), num_patches(recipe), self._ray_counts(recipe)
         num_points, bits = POINTS_PER_PATCH * patch_count, (recipe.num_lights + 7) // 8
@@ -113,8 +113,7 @@ class GatherMethod:
         )
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
-        """What opening the store needs besides its arrays; `gather_rays`: cosine and glossy, of each material, and
-        `gather_filter_passes`: how often they are shared."""
+        """Return the store's attributes, with `gather_rays` (cosine, glossy) by material and filter passes."""
         rays, num_glossy = self._ray_counts(recipe)
         diffuse, glossy = [rays, 0], [rays - num_glossy, num_glossy]
         direct = self._views.attributes(scene, recipe)
@@ -129,7 +128,7 @@ class GatherMethod:
         }
 
     def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
-        """As the views; the cells; then whole shards of cells and of each view's surface samples. See `BakeMethod`."""
+        """Return tasks of the views; the patches; shards of patches and of each view's samples. See `BakeMethod`."""
         if stage < _PATCH_STAGE:
             return self._views.tasks(stage, scene, recipe, store)
         if stage == _PATCH_STAGE:
@@ -143,7 +142,7 @@ class GatherMethod:
         return [Task(stage, index, *task_range) for index, task_range in enumerate(ranges)]
 
     def arrays(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[ArraySpec]:
-        """As the views; what cells see, and all links. See `BakeMethod`."""
+        """Return arrays of the views, visibility from patches, and all gather hits. See `BakeMethod`."""
         if stage < _RAY_STAGE:
             return self._views.arrays(stage, scene, recipe, store) if stage < _PATCH_STAGE else []
         num_patches, mirror_lights = store.shape("patches/material")[0], read_mirror_lights(store)
@@ -167,7 +166,7 @@ class GatherMethod:
         return [*patch_specs, *view_specs]
 
     def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> TaskOutput:
-        """One task; seeds are the scene's and the numbers of rows: the same bits anywhere. See `BakeMethod`."""
+        """Compute a task; seeded by scene and rows: deterministic on any machine. See `BakeMethod`."""
         if task.stage < _PATCH_STAGE:
             return self._views.compute(scene, recipe, task, store)
         if task.stage == _PATCH_STAGE:
@@ -179,7 +178,7 @@ class GatherMethod:
         )
 
     def _ray_counts(self, recipe: Recipe) -> tuple[int, int]:
-        """Rays of a view sample, and of those where its material has a highlight: the same share of any number."""
+        """Rays per view sample, and the number of glossy ones for highlights, in a fixed ratio."""
         rays = recipe.gather_rays or self._rays
         return rays, round(rays * self._glossy / self._rays)
 
@@ -234,7 +233,7 @@ class GatherMethod:
 
 
 def num_patches(recipe: Recipe) -> int:
-    """As many as the pictures' pixels can tell apart, where the recipe does not say."""
+    """Return the number of patches: by default in proportion to the pixels of all views."""
     if recipe.num_patches is not None:
         return recipe.num_patches
     width, height = recipe.size

@@ -1,10 +1,11 @@
-"""What the gather cells of a bake send out under the lights of its pictures, computed once for all of them."""
+"""Outgoing radiance of a bake's patches under the lights of its images, computed once for all of them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.cache import Cache
@@ -21,13 +22,13 @@ F32 = NDArray[np.float32]
 
 
 class IndirectSolver:
-    """Light that cells send; safe to use from several threads.
+    """Indirect illumination from patches; thread-safe.
 
-    What follows a hand is of the normals that were baked: it is made of both ends of an edit alike.
+    Incremental updates use the baked normals, for both ends of an edit alike.
 
     Args:
-        direct_light: what comes to them from the lights themselves.
-        find_direct_light: finds the same where images lean materials, by the image of each.
+        direct_light: direct illumination of the patches.
+        find_direct_light: returns the same for normal-map overrides, by the image of each material.
         key: of the bake in `cache`.
     """
 
@@ -47,12 +48,12 @@ class IndirectSolver:
         self._cache, self._key = cache, key
 
     def exact(self, light: Illumination) -> OutgoingLight:
-        """What exact pictures show."""
+        """Return the outgoing light for exact images."""
         indirect = _without_direct(light)
         return self._cache.get_value((self._key, "indirect light", indirect), lambda: self._outgoing_light(indirect))
 
     def excluding(self, light: Illumination, excluded: Callable[[Illumination], OutgoingRadiance]) -> OutgoingLight:
-        """The same without what `excluded` finds of it: what is shown of that is found otherwise."""
+        """Return exact light without the part that `excluded` returns, which is displayed by other means."""
         indirect = _without_direct(light)
 
         def compute() -> OutgoingLight:
@@ -64,32 +65,34 @@ class IndirectSolver:
 
         return self._cache.get_value((self._key, "indirect light without mirror lights", indirect), compute)
 
-    def preview(self, light: Illumination) -> F32:
-        """What pictures follow while a hand moves, the same in every direction; waits for nobody who wants something
-        exact. (NO_CELL + 1, 3) float32"""
+    def preview(self, light: Illumination) -> Shaped[F32, "patches 3"]:
+        """Return isotropic light for incremental updates of an active edit; never waits for exact light."""
         indirect = _without_direct(light)
         key = self._key, "indirect light, preview", indirect
         return self._cache.transient.get_value(key, lambda: self._preview(indirect))
 
     def fast(self, light: Illumination) -> OutgoingLight:
-        """What moving pictures follow while a hand moves a light."""
+        """Return approximate light for free-camera images during an edit of a light."""
         return self._fast(_without_direct(light), is_preview=True).outgoing_light(self._patches)
 
-    def preview_delta(self, before: Illumination, after: Illumination) -> F32:
-        """How much more cells send, the same in every direction; both ends alike, so that what is wrong with both
-        cancels. Where surfaces alone have changed, highlights give light directions on its way between cells, and
-        what others see of each in the mean is what is left of them in the end. (C, 3) float32"""
+    def preview_delta(self, before: Illumination, after: Illumination) -> Shaped[F32, "patches 3"]:
+        """Return the change of isotropic radiance; both ends are approximated alike, so that errors cancel.
+
+        If only materials have changed, light between patches keeps its directions through highlights, and the result is
+        averaged over directions at the end.
+        """
         if equal_up_to_reflectances(before, after):
             return self._delta(before, after).mean_to_others(self._patches)
         change = self.preview(after) - self.preview(before)
         return change[: self.num_patches]
 
     def delta(self, before: Illumination, after: Illumination) -> OutgoingLight:
-        """How what cells send changes, found quickly, where the lights themselves are as before and their light on
-        cells is found exactly; both ends alike, so that what is wrong with both cancels.
+        """Approximate the change of outgoing light for unchanged lights with exact direct illumination.
+
+        Both ends are approximated alike, so that errors cancel.
 
         Args:
-            before, after: of equal sources.
+            before, after: of the same sources.
         """
         return self._delta(before, after, is_sharp=True).outgoing_light(self._patches)
 
@@ -100,7 +103,7 @@ class IndirectSolver:
         return outgoing_after.subtract(outgoing_before)
 
     def _fast(self, light: Illumination, *, is_preview: bool, is_sharp: bool = False) -> OutgoingRadiance:
-        """What cells send. is_preview: lights are found quickly. is_sharp: sharp highlights go by tables."""
+        """Return outgoing radiance. is_preview: approximates lights. is_sharp: sharp highlights use tables."""
 
         def compute() -> OutgoingRadiance:
             reflectance_operator = self._reflectance_operator(light, self._cache.transient)
@@ -121,7 +124,7 @@ class IndirectSolver:
         return self._outgoing(light).outgoing_light(self._direct_light_for(light).patches)
 
     def _direct_light_for(self, light: Illumination) -> DirectPatchLight:
-        """What comes to cells, which lean as the look says."""
+        """Return the direct light of patches with the look's normal maps."""
         return self._find_direct_light(light.normals) if any(light.normals) else self._direct_light
 
     def _outgoing(self, light: Illumination) -> OutgoingRadiance:
@@ -144,7 +147,7 @@ class IndirectSolver:
     def _outgoing_highlights(
         light: Illumination, reflectance_operator: ReflectanceOperator, direct_light: DirectPatchLight
     ) -> OutgoingHighlights:
-        """What sharp highlights send of light that comes straight to them."""
+        """Return the direct light reflected by sharp highlights."""
         highlights = direct_light.patches.highlight_tables(light.reflectances, reflectance_operator)
         return highlights, outgoing_in_highlights(
             direct_light.patches, highlights, direct_light.direct(light, highlights.rows)
@@ -165,5 +168,5 @@ class IndirectSolver:
 
 
 def _without_direct(light: Illumination) -> Illumination:
-    """All of a light that cells depend on."""
+    """Return the part of a light that the patches depend on."""
     return light._replace(paths=light.paths.without_direct())

@@ -1,4 +1,4 @@
-"""Local lights over a baked store: their shadows are traced when a look asks for them, and remembered by who asks."""
+"""Local lights over a baked store: their shadows are traced on demand, and cached by the caller."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.cache import Cache
@@ -31,26 +32,26 @@ from relume.transport.shading_points import LocalRays
 
 F32 = NDArray[np.float32]
 
-SAMPLES = 64  # of a rectangle, for each view sample
-MESH_SAMPLE_FACTOR, MAX_FINE_MESHES = 4, 4  # times as many of a mesh, where no more materials of the scene shine
-PREVIEW_SAMPLES = 4  # while a hand moves it
+SAMPLES = 64  # of a rectangle, per view sample
+MESH_SAMPLE_FACTOR, MAX_FINE_MESHES = 4, 4  # mesh lights have more samples, if the scene has few emissive materials
+PREVIEW_SAMPLES = 4  # during an edit of the light
 _ONES = np.ones(3, np.float32)
 
 
 @dataclass(frozen=True)
 class ShadowCache:
-    """Samples of a light that points see, as in `LocalRays.visible`."""
+    """Visibility of a light's samples, as in `LocalRays.visible`."""
 
-    visible: NDArray[np.uint8]
+    visible: Shaped[NDArray[np.uint8], "n bytes"]
 
     @property
     def num_bytes(self) -> int:
-        """Memory it holds."""
+        """Memory in use."""
         return self.visible.nbytes
 
 
 class LocalLights:
-    """The triangles of a store, and lights among them; shared by all pictures of the bake.
+    """Triangles of a store, and lights among them; shared by all images of the bake.
 
     Args:
         key: of the bake in `cache`.
@@ -60,23 +61,23 @@ class LocalLights:
         self._store, self._cache, self._key = store, cache, key
 
     @cached_property
-    def positions(self) -> F32:
-        """Corners of the scene's triangles. (num_vertices, 3) float32"""
+    def positions(self) -> Shaped[F32, "vertices 3"]:
+        """Vertex positions of the scene, meters."""
         return np.asarray(self._store.read("scene/positions"), np.float32)
 
     @cached_property
-    def faces(self) -> NDArray[np.uint32]:
-        """The triangles. (num_faces, 3) uint32"""
+    def faces(self) -> Shaped[NDArray[np.uint32], "triangles 3"]:
+        """Vertex indices of the triangles."""
         return np.asarray(self._store.read("scene/faces"), np.uint32)
 
     @property
     def has_alpha_tested_surfaces(self) -> bool:
-        """Whether rays may pass some of them."""
+        """True if some triangles are alpha-tested."""
         return has_alpha_tested_surfaces(self._store)
 
     @cached_property
     def embree(self) -> EmbreeScene:
-        """Their search tree."""
+        """Acceleration structure of the triangles."""
         return EmbreeScene.build(self.positions, self.faces, read_alpha_test(self._store, self.positions, self.faces))
 
     @cached_property
@@ -84,9 +85,9 @@ class LocalLights:
         return offset_point(self.positions)
 
     def num_samples(self, geometry: LightGeometry, rectangle_samples: int = SAMPLES) -> int:
-        """The samples of a light where a rectangle has so many; see `make_light_strata`.
+        """Return the number of samples of a light, given that of a rectangle; see `make_light_strata`.
 
-        A mesh has more: walls hide parts of it, and it is near to the frame that it stands in.
+        A mesh has more: parts of it are often occluded, and its housing is close.
         """
         lights = self._store.attributes["look"]["lights"].values()
         has_few_meshes = sum(light["kind"] == "mesh" for light in lights) <= MAX_FINE_MESHES
@@ -100,12 +101,12 @@ class LocalLights:
         *,
         is_coarse: bool = False,
     ) -> list[LocalRays]:
-        """Find the local light that comes directly to points, as rays.
+        """Return the direct illumination of points by local lights, as rays.
 
         Args:
-            light: all that arrives at the picture. points: where it arrives.
-            find_shadows: where they are remembered; they are traced where there is no such place.
-            is_coarse: without it, for broad functions of where light comes from; every light has `SAMPLES`.
+            light: all light of the image. points: receivers.
+            find_shadows: looks shadows up in a cache; None: they are traced.
+            is_coarse: without `find_shadows`, for low-degree bases: every light has `SAMPLES`.
         """
         if not light.paths.direct:
             return []
@@ -121,53 +122,54 @@ class LocalLights:
         return rays
 
     def preview(self, geometry: LightGeometry, points: SurfacePoints) -> MovingLight:
-        """Preview what points get of a light of unit emission, by few samples of it where it has an extent."""
+        """Preview a light of unit emission at points, with few samples if it has an extent."""
         return trace_moving_light(self.embree, self._ray_offset, *self.sample_light(geometry, PREVIEW_SAMPLES), points)
 
-    def preview_rays(self, source: LightSource, visible: NDArray[np.uint8]) -> LocalRays:
-        """Make rays of a previewed light, for terms that ask where light comes from. seen: `MovingLight.visible`"""
+    def preview_rays(self, source: LightSource, visible: Shaped[NDArray[np.uint8], "n bytes"]) -> LocalRays:
+        """Return rays of a previewed light, for directional terms. visible: `MovingLight.visible`"""
         return LocalRays(
             *self.sample_light(source.geometry, PREVIEW_SAMPLES), np.array(source.gain, np.float32), visible
         )
 
     def unoccluded_rays(self, geometry: LightGeometry, points: SurfacePoints) -> LocalRays:
-        """What would come to points from a light of unit emission if nothing were in its way, as rays."""
+        """Return unoccluded light of unit emission at points, as rays."""
         light, strata = self.sample_light(geometry, SAMPLES)
         visible = np.full((points.num_points, -(-len(strata.uv) // 8)), 255, np.uint8)
         return LocalRays(light, strata, _ONES, visible)
 
-    def unoccluded(self, geometry: LightGeometry, points: SurfacePoints) -> F32:
-        """What would come to points from a light of unit emission if nothing were in its way. (n,) float32"""
+    def unoccluded(self, geometry: LightGeometry, points: SurfacePoints) -> Shaped[F32, " n"]:
+        """Return the unoccluded irradiance of points from a light of unit emission."""
         rays = self.unoccluded_rays(geometry, points)
         return compute_irradiance(rays.light, rays.strata, points, rays.visible)
 
     def shadows(self, geometry: LightGeometry, points: SurfacePoints) -> ShadowCache:
-        """What points see of a light."""
+        """Trace the shadows of a light."""
         return ShadowCache(self.trace(geometry, points, self.num_samples(geometry)))
 
-    def is_emissive_at(self, material: int, camera_position: F32, position: F32) -> NDArray[np.bool_]:
-        """Whether points of a material that shines are seen from a side that does.
+    def is_emissive_at(
+        self, material: int, camera_position: Shaped[F32, "cameras 3"], position: Shaped[F32, "n 3"]
+    ) -> Shaped[NDArray[np.bool_], " n"]:
+        """True for points of an emissive material that are visible from an emissive side.
 
         Args:
-            material: its index. camera_position: places that they are seen from. (n, 3) or (1, 3) float32
-            position: of the points. (n, 3) float32
+            material: its index. camera_position: of each point, or one for all. position: of the points.
         """
         if self._is_two_sided(material):
             return np.ones(len(position), np.bool_)
         return is_front(self.embree, self.positions, self.faces, camera_position, position)
 
-    def trace(self, geometry: LightGeometry, points: SurfacePoints, num_samples: int) -> NDArray[np.uint8]:
-        """Find which samples of a light points see.
+    def trace(
+        self, geometry: LightGeometry, points: SurfacePoints, num_samples: int
+    ) -> Shaped[NDArray[np.uint8], "n bytes"]:
+        """Trace the visibility of a light's samples from points; see `LocalRays.visible`.
 
         Args:
-            geometry: of the light. points: that see it. num_samples: from `samples_of`.
-        Returns:
-            As in `LocalRays.visible`. (n, bytes) uint8
+            geometry: of the light. points: receivers. num_samples: from `LocalLights.num_samples`.
         """
         return trace_light_visibility(self.embree, self._ray_offset, *self.sample_light(geometry, num_samples), points)
 
     def sample_light(self, geometry: LightGeometry, rectangle_samples: int) -> tuple[LocalLight, LightStrata]:
-        """Make a light, and its samples. of_rectangle: see `make_light_strata`"""
+        """Build a light and its samples; see `make_light_strata`."""
         light = self._light(geometry)
         return light, make_light_strata(light, rectangle_samples)
 

@@ -1,4 +1,4 @@
-"""What the lights themselves bring to gather cells, before any surface has reflected it."""
+"""Direct illumination of patches."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable, Hashable
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.cache import Cache
@@ -28,15 +29,15 @@ from relume.transport.shading_points import LocalRays
 
 F32 = NDArray[np.float32]
 
-SAMPLES_PER_PATCH_POINT = 16  # of a rectangle, for each point of a cell
+SAMPLES_PER_PATCH_POINT = 16  # of a rectangle, per sample point of a patch
 
 
 class LocalPatchLight:
-    """What local lights bring to gather cells, each of unit emission.
+    """Direct illumination of patches by local lights of unit emission.
 
     Args:
-        local: the lights. patches: that they shine on.
-        cache: of all that is made from the bake. key: of the bake in it. normal_overrides: see `DirectPatchLight`.
+        local: the lights. patches: the receivers.
+        cache: of results computed from the bake. key: of the bake in it. normal_overrides: see `DirectPatchLight`.
     """
 
     def __init__(
@@ -45,8 +46,8 @@ class LocalPatchLight:
         self._local, self._patches = local, patches
         self._cache, self._key, self._normal_overrides = cache, key, normal_overrides
 
-    def irradiance(self, geometry: LightGeometry) -> F32:
-        """What comes to every cell, the mean over its points. (C,) float32"""
+    def irradiance(self, geometry: LightGeometry) -> Shaped[F32, " patches"]:
+        """Return the irradiance of each patch, averaged over its sample points."""
         key = self._key, "light on patches", geometry, *self._normal_overrides
         return self._cache.get_value(key, lambda: self._irradiance(geometry))
 
@@ -67,22 +68,18 @@ class LocalPatchLight:
             (self._key, "shadows on patches", emitter_geometry(geometry), *self._normal_overrides), trace
         )
 
-    def rays(self, geometry: LightGeometry, rows: NDArray[np.intp]) -> LocalRays:
-        """What comes to the points of some cells, as rays.
-
-        Args:
-            geometry: of the light. rows: the cells. (G,)
-        """
+    def rays(self, geometry: LightGeometry, rows: Shaped[NDArray[np.intp], " G"]) -> LocalRays:
+        """Return the light at the sample points of patches `rows`, as rays."""
         visible, points_per_patch = self._visibility(geometry), self._patches.points_per_patch
         bits = visible.reshape(-1, points_per_patch, visible.shape[1])[rows].reshape(-1, visible.shape[1])
         return LocalRays(*self._sample_light(geometry), np.ones(3, np.float32), bits)
 
-    def preview_irradiance(self, geometry: LightGeometry) -> F32:
-        """Preview what comes to every cell, at one of its points. (C,) float32"""
+    def preview_irradiance(self, geometry: LightGeometry) -> Shaped[F32, " patches"]:
+        """Approximate the irradiance of each patch at one of its sample points."""
         return self._preview(geometry).irradiance
 
-    def preview_rays(self, geometry: LightGeometry, rows: NDArray[np.intp]) -> LocalRays:
-        """The same of some cells as rays, at the first of their points. rows: the cells. (G,)"""
+    def preview_rays(self, geometry: LightGeometry, rows: Shaped[NDArray[np.intp], " G"]) -> LocalRays:
+        """Approximate the light at the first sample points of patches `rows`, as rays."""
         return self._local.preview_rays(LightSource(geometry, (1.0, 1.0, 1.0)), self._preview(geometry).visible[rows])
 
     def _preview(self, geometry: LightGeometry) -> MovingLight:
@@ -99,14 +96,14 @@ class LocalPatchLight:
 
 
 class DirectPatchLight:
-    """Found for one source after another, and kept: transport is linear in them.
+    """Direct illumination of patches, computed and cached per source: transport is linear in the sources.
 
     Args:
-        patches: that it comes to. local: local lights. find_lights: finds the triangles of an environment.
-        find_preview_lights: finds them quickly.
-        cache: of all that is made from the bake. key: of the bake in it.
-        harmonic: transfer of smooth light, for previews; None where a bake has none.
-        normal_overrides: names how cells lean that lean otherwise than they were baked; empty for those that were.
+        patches: the receivers. local: local lights. find_lights: returns the triangles of an environment.
+        find_preview_lights: approximates them.
+        cache: of results computed from the bake. key: of the bake in it.
+        harmonic: transfer of low-frequency light, for previews; None if a bake has none.
+        normal_overrides: identifies overridden normals; empty for the baked ones.
     """
 
     def __init__(
@@ -127,11 +124,11 @@ class DirectPatchLight:
     def incident_light(
         self, light: Illumination, reflectance_operator: ReflectanceOperator, *, is_preview: bool
     ) -> IncidentLight:
-        """Sum what all sources bring.
+        """Sum the light of all sources.
 
         Args:
-            light: all that shines. reflectance_operator: tells which cells ask where light comes from.
-            is_preview: local lights by few samples, large environments by small maps, directions roughly.
+            light: all light of the scene. reflectance_operator: selects the patches that need directional light.
+            is_preview: few samples of local lights, small maps of large environments, low-degree directions.
         """
         incident = IncidentLight(
             np.zeros((self.patches.num_patches, 3), np.float32),
@@ -152,8 +149,8 @@ class DirectPatchLight:
             )
         return incident
 
-    def direct(self, light: Illumination, rows: NDArray[np.intp]) -> DirectLobes:
-        """What comes to the points of some cells, exactly, source after source. rows: the cells. (G,)"""
+    def direct(self, light: Illumination, rows: Shaped[NDArray[np.intp], " G"]) -> DirectLobes:
+        """Return the exact direct light at the sample points of patches `rows`, per source."""
         local_rays = ((self._local.rays(geometry, rows), gain) for geometry, gain in light.local)
         rays = [replace(rays, gain=np.array(gain, np.float32)) for rays, gain in local_rays]
         if not light.has_environment:
@@ -185,7 +182,7 @@ class DirectPatchLight:
         patches, rows = self.patches, reflectance_operator.rows
         key = (
             self._key,
-            "environment on cells, by direction",
+            "environment on patches, directional",
             environment,
             reflectance_operator.has_lobe,
             *self._normal_overrides,
@@ -209,7 +206,7 @@ class DirectPatchLight:
     def _local_coefficients(
         self, geometry: LightGeometry, reflectance_operator: ReflectanceOperator, is_preview: bool
     ) -> F32:
-        """Of a light of unit emission; for a preview at one point of each cell. (G, 3, J) float32"""
+        """Coefficients of a light of unit emission; a preview uses one point per patch. (G, 3, J) float32"""
         patches, rows = self.patches, reflectance_operator.rows
 
         def compute() -> F32:
@@ -219,7 +216,7 @@ class DirectPatchLight:
                 points, rays = patches.points_of(rows), self._local.rays(geometry, rows)
             return patches.mean_coefficients(rows, points, ray_incident_coefficients(points, [rays], OUTGOING_DEGREE))
 
-        cache, label = self._cache.transient if is_preview else self._cache, "light on cells, by direction"
+        cache, label = self._cache.transient if is_preview else self._cache, "light on patches, directional"
         return cache.get_value(
             (self._key, label, geometry, reflectance_operator.has_lobe, is_preview, *self._normal_overrides), compute
         )

@@ -1,8 +1,8 @@
-"""What a bake needs at most, from the scene and the recipe alone: samples of a view, and memory of a process.
+"""Upper bounds for a bake, from scene and recipe alone: samples per view, memory per process.
 
-Nothing is traced to plan a bake, so the number of samples is bounded by what a pixel can hold; foliage and hair come
-near it, most scenes have one to two. Bytes were measured, and are rounded up so that every scene stays below them:
-`relume bench plan` prints the share of the bounds that scenes take.
+Planning traces no rays, so the number of samples is bounded by the capacity of a pixel; foliage and hair come near it,
+most scenes have one to two. Bytes were measured, and are rounded up so that every scene stays below:
+`relume bench plan` prints actual sizes as fractions of the bounds.
 """
 
 from __future__ import annotations
@@ -26,43 +26,42 @@ MIN_REQUESTED_PATCHES, MIN_GATHER_RAYS = 64, 16
 PROGRAM_BYTES = 360_000_000  # of a process: interpreter, libraries, compiled kernels
 
 _TREE_BYTES_PER_TRIANGLE = 160  # Embree's, while it is built
-LIGHT_BYTES_PER_TEXEL = 270  # while the environment is divided into triangles: directions, weights, places in the tree
-BYTES_PER_RAY = 300  # a camera ray with its hit, the surface there, and what they are merged by
-_PIXEL_BYTES = 16  # of what is known of every pixel before samples are made, and while they are looked through
-_SPLIT_BYTES, _TINT_BYTES = 36, 12  # of a sample, while tinted light is looked for; of each of its tints
-_WRITING_BYTES = 64 << 20  # a shard of a column, as it is, compressed, and while it is read
+LIGHT_BYTES_PER_TEXEL = 270  # while the environment is divided into triangles: directions, weights, tile codes
+BYTES_PER_RAY = 300  # a camera ray with its hit, its surface, and the keys for merging
+_PIXEL_BYTES = 16  # per-pixel data before samples are created, and during a scan
+_SPLIT_BYTES, _TINT_BYTES = 36, 12  # per sample while tinted light is traced; per tint of a sample
+_WRITING_BYTES = 64 << 20  # a shard of a column: raw, compressed, and as it is read
 _MIP_CHAIN_FRACTION = 1 / 3  # of a texture's texels, in half precision
-_MIP_PEAK_FACTOR = 2  # of the largest texture's bytes, while its first halving is made
-_ALPHA_MASK_BYTES = 80  # of a material: its row of `relume.raytrace.alpha_test.AlphaMasks`
-_LIGHT_BYTES = 112  # of a light triangle in the store: nodes, direction, power, place in the tree
+_MIP_PEAK_FACTOR = 2  # of the largest texture's bytes, while its first mip level is computed
+_ALPHA_MASK_BYTES = 80  # per material: its row of `relume.raytrace.alpha_test.AlphaMasks`
+_LIGHT_BYTES = 112  # per light triangle in the store: nodes, direction, power, tile code
 
 
 def max_view_samples(scene: Scene, recipe: Recipe) -> int:
-    """View samples of one view."""
+    """Maximum number of view samples of one view."""
     width, height = recipe.size
     return view_sample_limit(scene.materials, width * height)
 
 
 def num_camera_rays(scene: Scene, recipe: Recipe) -> int:
-    """Rays that find the samples of all views: one through each pixel, then all positions of each, and all layers."""
+    """Number of camera rays of all views: one per pixel, then all positions of each pixel, and all layers."""
     width, height = recipe.size
-    rays_per_pixel = 2 + sum(map(len, PATTERNS))  # where many found too much, fewer are tried
+    rays_per_pixel = 2 + sum(map(len, PATTERNS))  # patterns with too many samples are retried with fewer
     return rays_per_pixel * width * height * len(recipe.views) * max_layers(scene.materials)
 
 
 def num_tinted_rays(scene: Scene, num_samples: int) -> int:
-    """Rays that find which of some samples see light through tinted glass."""
+    """Number of rays that find samples with light through tinted glass."""
     return num_samples * max_tint_rays(scene.materials)
 
 
 def lights_bytes(scene: Scene, recipe: Recipe) -> int:
-    """Of the store: the light triangles, and the environment to weigh them by."""
+    """Store size of the light triangles and of the environment's radiance."""
     return recipe.num_lights * _LIGHT_BYTES + scene.environment.radiance.nbytes
 
 
 def triangles_bytes(scene: Scene) -> int:
-    """Of the store: the triangles, their corners, the material and the mesh of each, how brightly they shine where
-    images say it; where rays pass some, which and where."""
+    """Store size of the triangles: vertices, material and mesh of each, image emission, and alpha masks."""
     bytes_per_face = 12 if has_emission_images(scene) else 8
     triangles = sum(
         mesh.positions.nbytes + mesh.faces.nbytes + bytes_per_face * len(mesh.faces) for mesh in scene.meshes
@@ -73,53 +72,53 @@ def triangles_bytes(scene: Scene) -> int:
 
 
 def opacity_bytes(scene: Scene) -> int:
-    """Of all opacity, and of what says how materials are passed."""
+    """Size of all opacity textures and alpha-test parameters."""
     images = sum(material.opacity.alpha.nbytes for material in scene.materials if material.opacity is not None)
     return images + len(scene.materials) * _ALPHA_MASK_BYTES
 
 
 def corner_bytes(scene: Scene) -> int:
-    """Of the store: the corners' places in textures, and their tangents in half precision."""
+    """Store size of the vertices' UV coordinates, and of their tangents in half precision."""
     return sum(mesh.uvs.nbytes + mesh.tangents.nbytes // 2 for mesh in scene.meshes)
 
 
 def texture_bytes(scene: Scene) -> int:
-    """Of all textures and normal maps, in half precision."""
+    """Size of all textures and normal maps, in half precision."""
     return sum(texture.pixels.size * 2 for texture in _textures(scene))
 
 
 def distinct_textures(scene: Scene) -> list[Texture]:
-    """All textures and normal maps, each once, whatever materials have it."""
+    """Return all textures and normal maps, each once, even if materials share it."""
     return list({id(texture): texture for texture in _textures(scene)}.values())
 
 
 def num_triangles(scene: Scene) -> int:
-    """Of all meshes together."""
+    """Number of triangles of all meshes."""
     return sum(len(mesh.faces) for mesh in scene.meshes)
 
 
 def supersampling_ratio(scene: Scene, recipe: Recipe) -> float:
-    """Samples by all positions of all pixels ÷ those that a plan counts: work goes with the number of pixels."""
+    """Ratio of samples at all positions of all pixels to the planned samples: work scales with the number of pixels."""
     num_pixels = recipe.size[0] * recipe.size[1]
     return POSITIONS_PER_PIXEL * num_pixels * max_samples(scene.materials) / max_view_samples(scene, recipe)
 
 
 def estimated_work(scene: Scene, num_rays: float, ray_ns: float, triangle_us: float) -> float:
-    """What one core takes for a bake, about.
+    """Estimate the time of a bake on one core, in seconds.
 
     Args:
-        scene: whose triangles take their part: they are merged, and searched, and some are looked at one by one.
-        num_rays: of all positions. ray_ns, triangle_us: of one of them, and of a triangle, as measured of a method.
+        scene: its triangles add time: they are merged, sorted into a tree, and in part processed one by one.
+        num_rays: at all positions. ray_ns, triangle_us: measured per ray and per triangle for a method.
     """
     return 1e-9 * ray_ns * num_rays + 1e-6 * triangle_us * num_triangles(scene)
 
 
 def process_bytes(scene: Scene) -> int:
-    """What a process holds between tasks: the program, the scene, its merged triangles, their tree, mip pyramids."""
+    """Memory of a process between tasks: program, scene, merged triangles, acceleration structure, mip pyramids."""
     textures = [texture.pixels.nbytes for texture in _textures(scene)]
     mip_bytes = sum(_MIP_CHAIN_FRACTION * texture.pixels.size * 2 for texture in _textures(scene))
     meshes = [array.nbytes for mesh in scene.meshes for array in _arrays(mesh)]
-    largest = max([scene.environment.radiance.nbytes, *textures, *meshes])  # read from disk, it is there twice
+    largest = max([scene.environment.radiance.nbytes, *textures, *meshes])  # held twice while it is read from disk
     return (
         PROGRAM_BYTES
         + scene.environment.radiance.nbytes
@@ -133,7 +132,7 @@ def process_bytes(scene: Scene) -> int:
 
 
 def sampling_bytes(scene: Scene, recipe: Recipe) -> int:
-    """What a task of the first stage takes besides: the lights, or the samples of a view."""
+    """Additional memory of a task of the first stage: the lights, or the samples of a view."""
     num_pixels = recipe.size[0] * recipe.size[1]
     num_rays = (1 + POSITIONS_PER_PIXEL) * min(num_pixels, TILE_SIZE**2) * max_layers(scene.materials)
     tints = num_tints(scene.materials)
@@ -143,7 +142,7 @@ def sampling_bytes(scene: Scene, recipe: Recipe) -> int:
 
 
 def light_selection_bytes(scene: Scene) -> int:
-    """What it takes to choose the lights."""
+    """Memory for the selection of the lights."""
     height, width, _ = scene.environment.radiance.shape
     return int(height * width) * LIGHT_BYTES_PER_TEXEL
 
@@ -158,11 +157,10 @@ def _arrays(mesh: Mesh) -> list[NDArray[Any]]:
 
 
 def check_gathering(recipe: Recipe, max_samples: int) -> None:
-    """Refuse numbers of patches and gather rays that no store can have.
+    """Check the numbers of patches and gather rays of a recipe.
 
     Args:
-        recipe: whose `num_patches` and `gather_rays` are checked. max_samples: that the method can keep; 0 where
-            it gathers no light.
+        recipe: with `num_patches` and `gather_rays`. max_samples: maximum of the method; 0 if it has no gathering.
     Raises:
         PlanError: they are out of bounds.
     """

@@ -1,11 +1,11 @@
-"""Light that flat mirrors throw: of the lights whose way over a plane was traced to view samples, exact and sharp.
+"""Virtual lights of planar mirrors: exact, sharp reflections of the lights whose mirrored shadow rays were traced.
 
-A gather cell on a mirror sends what comes to it as few functions have it, some 30° wide, a small sun as all else. Of
-lights that were traced it sends nothing to samples that know which of them they see: these get
+A patch on a mirror reflects light in a low-degree basis, some 30° wide, even that of a small sun. It excludes the
+light of the traced lights to samples that store their mirrored visibility: these receive
 
-    E m c F(θ)   in the direction v = d − 2 (d · n) n,   cos θ = |d · n|,
+    E m c F(θ)   from the direction v = d − 2 (d · n) n,   cos θ = |d · n|,
 
-with the irradiance E of lights that lie together in direction d, and what the mirror sends on in the look
+with the irradiance E of a group of lights in direction d, and the mirror's reflectance in the look
 (`relume.brdf.specular`).
 """
 
@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.albedo import Reflectances, pack_reflectance, unpack_mirrors
@@ -41,45 +42,44 @@ from relume.transport.shading_points import MirrorRays
 
 F32 = NDArray[np.float32]
 
-NO_PLANE = 255  # of cells
+NO_PLANE = 255  # of patches
 MAX_GROUPS = 128
-_BRIGHT = 8.0  # times the mean radiance of the sky: gather rays find what is dimmer
+_BRIGHT = 8.0  # times the mean radiance of the environment: gather rays suffice for dimmer light
 
 
 @dataclass(frozen=True)
 class MirrorLights:
-    """What was traced: bright lights, those that lie together as one.
+    """The traced lights, grouped by direction.
 
     Attributes:
-        lights: which of the bake's. (T,) int32. group: that each is in. (T,) int32
-        direction: to the groups. (G, 3) float32
-        mirrors: the planes, P of them.
-        plane: that each gather cell lies in, `NO_PLANE` where in none. (C,) uint8
+        lights: indices of the T traced lights of the bake. group: of each.
+        direction: to the G groups. mirrors: the planes, P of them.
+        plane: of each patch, `NO_PLANE` if it lies in none.
     """
 
-    lights: NDArray[np.int32]
-    group: NDArray[np.int32]
-    direction: F32
+    lights: Shaped[NDArray[np.int32], " T"]
+    group: Shaped[NDArray[np.int32], " T"]
+    direction: Shaped[F32, "G 3"]
     mirrors: FlatMirrors
-    plane: NDArray[np.uint8]
+    plane: Shaped[NDArray[np.uint8], " patches"]
 
     @property
     def num_mirrored_lights(self) -> int:
-        """Groups in all planes together, P G."""
+        """Number of virtual lights in all planes, P G."""
         return self.mirrors.num_planes * len(self.direction)
 
     @classmethod
     def from_lights(
-        cls, lights: TriangleLights, tiles: Tiles, mirrors: FlatMirrors, plane: NDArray[np.uint8]
+        cls, lights: TriangleLights, tiles: Tiles, mirrors: FlatMirrors, plane: Shaped[NDArray[np.uint8], " patches"]
     ) -> MirrorLights:
-        """Choose the lights that are too bright for few functions.
+        """Select the lights that are too bright for a low-degree basis.
 
         Args:
-            lights: of a bake. tiles: that they lie in. mirrors: of its scene. plane: of its cells.
+            lights: of a bake. tiles: of these lights. mirrors: of its scene. plane: of its patches.
         """
         brightness = luminance(lights.irradiance).astype(np.float64)
         bright_indices = np.flatnonzero(brightness > _BRIGHT * brightness.sum() / (4 * np.pi) * tiles.solid_angles)
-        # neighbours beside each other
+        # neighbors in sequence
         bright_indices = bright_indices[np.argsort(tiles.traversal_key[bright_indices], kind="stable")]
         num_groups = min(len(bright_indices), MAX_GROUPS)
         group = np.arange(len(bright_indices)) * num_groups // max(1, len(bright_indices))
@@ -91,25 +91,24 @@ class MirrorLights:
 
     @property
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """As a store keeps them."""
+        """Arrays for a store."""
         fields = {**vars(self), **self.mirrors._asdict()}
         del fields["mirrors"]
         return {f"mirror_lights/{name}": array for name, array in fields.items()}
 
 
 def max_mirror_lights(scene: Scene, recipe: Recipe) -> int:
-    """The most lights that a sample may see in flat mirrors, P G."""
+    """Maximum number of virtual lights of a sample, P G."""
     return MAX_PLANES * min(MAX_GROUPS, recipe.num_lights) if has_flat_mirrors(scene) else 0
 
 
 def make_mirror_lights(
-    scene: Scene, geometry: SceneBuffers, store: StoreReader, patch_positions: F32
+    scene: Scene, geometry: SceneBuffers, store: StoreReader, patch_positions: Shaped[F32, "patches points 3"]
 ) -> dict[str, NDArray[Any]]:
-    """Find the arrays of a store from which `read_mirror_lights` reads; none where nothing is thrown.
+    """Compute the arrays that `read_mirror_lights` reads; empty if no mirror reflects a bright light.
 
     Args:
-        scene: that is baked. geometry: its triangles. store: with its lights.
-        patch_positions: where the points of gather cells are. (C, points, 3)
+        scene: that is baked. geometry: its triangles. store: with its lights. patch_positions: sample points.
     """
     if not has_flat_mirrors(scene):
         return {}
@@ -121,7 +120,7 @@ def make_mirror_lights(
 
 
 def read_mirror_lights(store: StoreReader) -> MirrorLights | None:
-    """What a store knows of flat mirrors; None where there is none, or no bright light."""
+    """Read the mirror lights of a store; None without planar mirrors or bright lights."""
     try:
         store.shape("mirror_lights/offset")
     except StoreError:
@@ -139,7 +138,7 @@ def read_mirror_lights(store: StoreReader) -> MirrorLights | None:
     ]
     are_valid = all(len(indices) == 0 or 0 <= indices.min() <= indices.max() < limit for indices, limit in limits)
     if not are_valid or mirror_lights.plane.shape != store.shape("patches/material"):
-        raise ChunkDamagedError("mirror_lights", "its arrays do not fit the lights, materials and patches of the bake")
+        raise ChunkDamagedError("mirror_lights", "its arrays do not match the lights, materials or patches")
     return mirror_lights
 
 
@@ -148,26 +147,25 @@ class AddedMirrorLights:
     """Change of the light of planar mirrors; a `relume.live.fixed_camera.protocols.MirrorLightsDelta`.
 
     Attributes:
-        direction: of what is thrown. (K, 3) float32 normal_irradiance: what comes across it. (K, 3) float32
-        patch_radiance: what other cells see of the same in the mean, which is no part of what samples get. (C, 3)
-            float32
+        direction: of the virtual lights. normal_irradiance: change of irradiance perpendicular to it.
+        patch_radiance: change of the mean radiance to other patches, which samples do not receive.
     """
 
-    direction: F32
-    normal_irradiance: F32
-    patch_radiance: F32
+    direction: Shaped[F32, "K 3"]
+    normal_irradiance: Shaped[F32, "K 3"]
+    patch_radiance: Shaped[F32, "patches 3"]
 
-    def rays(self, visible: NDArray[np.uint8]) -> MirrorRays:
-        """What comes to samples. visible: of the lights by the planes. (n, bytes) uint8"""
+    def rays(self, visible: Shaped[NDArray[np.uint8], "n bytes"]) -> MirrorRays:
+        """Return the rays to samples. visible: of the virtual lights."""
         return MirrorRays(self.direction, self.normal_irradiance, visible)
 
 
 class MirrorLightTransfer:
-    """Of one bake, in any look; safe to use from several threads.
+    """Light of planar mirrors of one bake, in any look; thread-safe.
 
     Args:
-        mirror_lights: what was traced. patches: that have sent it. find_lights: finds the triangles of an environment.
-        cache: of all that is made from the bake. key: of the bake in it.
+        mirror_lights: the traced lights. patches: of the bake. find_lights: returns the triangles of an environment.
+        cache: of results computed from the bake. key: of the bake in it.
     """
 
     def __init__(
@@ -184,19 +182,19 @@ class MirrorLightTransfer:
 
     @staticmethod
     def is_in(light: Illumination) -> bool:
-        """Whether anything of it may be in a light: it is reflected once before it comes."""
+        """True if a light includes light of mirrors: environment light with one or more bounces."""
         return light.paths.has_indirect and light.paths.first == 1 and light.has_environment
 
-    def rays(self, light: Illumination, visible: NDArray[np.uint8]) -> MirrorRays:
-        """What comes to samples.
+    def rays(self, light: Illumination, visible: Shaped[NDArray[np.uint8], "n bytes"]) -> MirrorRays:
+        """Return the rays to samples.
 
         Args:
-            light: that `is_in` says has any. visible: see `relume.camera.find_flat_mirrors.Seen`. (n, bytes) uint8
+            light: for which `is_in` is true. visible: of the virtual lights, see `lights_visible_in_mirrors`.
         """
         return MirrorRays(self._directions, self._reflected_irradiance(light), visible)
 
     def delta(self, before: Illumination, after: Illumination) -> AddedMirrorLights | None:
-        """What changes of it where surfaces do, as when a hand drags a mirror's colour; None for nothing.
+        """Return the change after an edit of surfaces, such as a mirror's color; None if there is none.
 
         Args:
             before, after: in the same environment.
@@ -216,7 +214,7 @@ class MirrorLightTransfer:
         )
 
     def _reflected_irradiance(self, light: Illumination) -> F32:
-        """What each group sends by each plane, across its way. (P G, 3) float32"""
+        """Irradiance of each virtual light, perpendicular to its direction. (P G, 3) float32"""
         mirror_lights, gain = self._mirror_lights, np.array(light.environment_gain)
         incident = np.zeros((len(mirror_lights.direction), 3))
         np.add.at(
@@ -232,7 +230,7 @@ class MirrorLightTransfer:
         return np.asarray((mirror_reflectance * incident).reshape(-1, 3), np.float32)
 
     def patch_part(self, light: Illumination) -> OutgoingRadiance:
-        """What cells in the planes send of the same lights, as exact pictures have it."""
+        """Return the part of the patches' outgoing radiance, as in exact images, that mirror lights replace."""
         mirror_reflectances, lights = _mirror_reflectances(light.reflectances), self._bright_lights(light.environment)
         reflectance_operator, incident = self._patch_light(light, mirror_reflectances)
         highlights = self._patches.highlight_tables(mirror_reflectances, reflectance_operator)
@@ -245,13 +243,13 @@ class MirrorLightTransfer:
         )
 
     def _fast_patch_part(self, light: Illumination) -> OutgoingRadiance:
-        """The same as functions have it."""
+        """Return `patch_part` in the low-degree basis."""
         return first_bounce(*self._patch_light(light, _mirror_reflectances(light.reflectances)))
 
     def _patch_light(
         self, light: Illumination, mirror_reflectances: Reflectances
     ) -> tuple[ReflectanceOperator, IncidentLight]:
-        """What cells in the planes make of light, and what comes to them. alone: what mirrors reflect"""
+        """Return reflectance and incident light of patches in the planes, for the mirrors' reflectances alone."""
         all_patches = self._patches.reflectance_operator(mirror_reflectances)
         is_on_plane = self._mirror_lights.plane[all_patches.rows] != NO_PLANE
         rows = all_patches.rows[is_on_plane]
@@ -270,7 +268,7 @@ class MirrorLightTransfer:
         return self._mirror_lights.lights.astype(np.intp)
 
     def _bright_lights(self, environment: EnvironmentKey) -> TriangleLights:
-        """The lights that were traced, in an environment."""
+        """Return the traced lights in an environment."""
         all_lights = self._find_lights(environment)
         return all_lights.select(self._light_indices, all_lights.irradiance[self._light_indices])
 
@@ -286,7 +284,7 @@ class MirrorLightTransfer:
 
 
 def _mirror_reflectances(reflectances: Reflectances) -> Reflectances:
-    """Of materials as far as they are mirrors."""
+    """Return the specular part of materials."""
     return tuple(
         pack_reflectance(list(map(split_specular, unpack_mirrors(reflectance)))) for reflectance in reflectances
     )

@@ -1,4 +1,4 @@
-"""Skies as lobes of moving views show them: blurred, their lamps apart, and the lights by which points see them."""
+"""Prefiltered environments for free-camera highlights: blur, bright lights, and lists of lights for lobes."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.environments.equirect import rotate_about_y
@@ -23,24 +24,24 @@ F32 = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class PrefilteredEnvironments:
-    """Of an opened bake. lit: whose light it is."""
+    """Prefiltered environments of an opened bake, cached."""
 
     light_transport: BakedFixedViews
 
     def _split(self, name: str | None) -> SplitEnvironment:
-        """An environment without its lamps, None for the scene's own."""
-        key = self.light_transport.cache_owner(name), "lamps", name
+        """Split an environment, None for the scene's own, into bright lights and the rest."""
+        key = self.light_transport.cache_owner(name), "bright lights", name
         return self.light_transport.cache.get_value(
             key, lambda: remove_sun_disks(self.light_transport.environment_radiance(name), BRIGHT_LIGHT_BOUNDS)
         )
 
     @cached_property
-    def order(self) -> NDArray[np.intp]:
-        """The light triangles, those beside each other one after another. (lights,)"""
+    def order(self) -> Shaped[NDArray[np.intp], " lights"]:
+        """Order of the light triangles with neighbors in sequence."""
         return np.argsort(self.light_transport.tiles.traversal_key, kind="stable")
 
     def environment_lookup(self, name: str | None) -> EnvironmentLookup:
-        """An environment and what it is when it is blurred without its lamps."""
+        """Return an environment, and its blurred versions without bright lights."""
 
         def compute() -> EnvironmentLookup:
             downsampled_radiance = downsampled(self._split(name).residual)
@@ -51,8 +52,8 @@ class PrefilteredEnvironments:
 
         return self.light_transport.cache.get_value((self.light_transport.cache_owner(name), "sky", name), compute)
 
-    def bright_lights(self, environment: EnvironmentKey) -> F32:
-        """Lamps of an environment, turned; see `PrefilteredEnvironment`. (lamps, 7) float32"""
+    def bright_lights(self, environment: EnvironmentKey) -> Shaped[F32, "lights 7"]:
+        """Return the bright lights of an environment, rotated; see `PrefilteredEnvironment`."""
         sun_disks = self._split(environment.map).sun_disks
         mean, light = (
             np.reshape([getattr(sun_disk, name) for sun_disk in sun_disks], (len(sun_disks), 3))
@@ -63,7 +64,7 @@ class PrefilteredEnvironments:
         return np.ascontiguousarray(np.hstack([direction, light, 1 - length]), np.float32)
 
     def directional_lights(self, environment: EnvironmentKey, widths: tuple[int, ...]) -> LobeLightLists:
-        """The light triangles of an environment, as lobes of some widths look for them, in `order`."""
+        """Return the light triangles of an environment, listed by direction for lobes of some widths, in `order`."""
 
         def compute() -> LobeLightLists:
             tile_luminance = luminance(self.light_transport.preview_light_of_environment(environment).irradiance)
@@ -89,7 +90,7 @@ class PrefilteredEnvironments:
         )
 
     def combined(self, environment: EnvironmentKey, *, is_preview: bool) -> EnvironmentLights:
-        """The same, as highlights are summed over them. is_preview: of another sky than the baked one, quickly."""
+        """Return an environment's lights for highlights. is_preview: approximates other than the baked environment."""
         light_transport, is_fast = self.light_transport, is_preview and environment != BAKED_ENVIRONMENT
 
         def compute() -> EnvironmentLights:

@@ -1,9 +1,9 @@
-"""Method `probes`: free-camera views (Mahajan 2008, Sun 2007); incident light is kept at surface probes.
+"""Method `probes`: free-camera views (Mahajan 2008, Sun 2007); incident light is stored at surface probes.
 
-The bake keeps for each probe what `gather` keeps for each view sample: the light triangles that it sees, and the
-patches that its gather rays hit. Neither depends on a BRDF or a camera. Stages: "probes" (light triangles, probes,
-patches), "visibility and gather rays" (rows of patches and of probes), "spherical harmonics", then "free-camera error",
-which reads the finished bake.
+The bake stores for each probe what `gather` stores for each view sample: its visible light triangles, and the patches
+that its gather rays hit. Neither depends on a BRDF or a camera. Stages: "probes" (light triangles, probes, patches),
+"visibility and gather rays" (rows of patches and of probes), "spherical harmonics", then "free-camera error", which
+reads the finished bake.
 
     scene/positions, faces, face_material, uvs, textures, …  relume.live.free_camera.probes.stored_scene
     lights/…                                                 as in relume.methods.view_stages
@@ -52,19 +52,19 @@ from relume.scene.model import Scene
 from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput, TaskStore
 
 ROWS_PER_SHARD = 4096
-RAYS_PER_PROBE = 377  # a point alone then errs by less than 1 % of its radiance (`probes.probe_rmse`)
+RAYS_PER_PROBE = 377  # a single probe then errs by less than 1 % of its radiance (`probes.probe_rmse`)
 RAYS_PER_PATCH_POINT = 55
 _MIN_PATCHES, _MAX_PATCHES, _PROBES_PER_PATCH = 512, 8192, 6
 _MAX_REQUESTED_PATCHES = 4 * _MAX_PATCHES
 MIN_PROBES = 64
-_MAX_UNSHARED_PROBES = 54  # points of a material, on both sides, in each of 27 directions
-_PROBE_MARGIN = 1.05  # than asked for, at most
+_MAX_UNSHARED_PROBES = 54  # probes of a material, on both sides, in each of 27 directions
+_PROBE_MARGIN = 1.05  # maximum ratio to the requested number
 _PROBE_BYTES = 3 * 12 + 2
 _NODE_BYTES = 12 + 2 * 4 * PROBES_PER_NODE
-_NODE_BUILD_BYTES = 600  # while nodes are shared: their surface, their keys, and the order of these
+_NODE_BUILD_BYTES = 600  # while nodes are merged: their surface, their keys, and the order of these
 _PATCH_BYTES = POINTS_PER_PATCH * (56 + 2 * RAYS_PER_PATCH_POINT) + 64
 _PATCH_BUILD_BYTES = 4000
-_RAY_NS, _TRIANGLE_US = 2000.0, 40.0  # of one core, on scenes of 200 to a million triangles
+_RAY_NS, _TRIANGLE_US = 2000.0, 40.0  # on one core, for scenes of 200 to a million triangles
 
 
 class ProbesMethod:
@@ -78,15 +78,15 @@ class ProbesMethod:
         self._patch_tree, self._shadow_targets = ReadCache(read_tree), ReadCache(read_targets)
 
     def prepare(self, scene: Scene) -> None:
-        """Build the triangles' search tree."""
+        """Build the acceleration structure of the triangles."""
         self._views.prepare(scene)
 
     def open(self, store: StoreReader, key: str, cache: Cache) -> BakedFreeCamera:
-        """Views from anywhere, lit by the environment, by local lights, and by surfaces. See `TransferMethod`."""
+        """Open a free camera with environment, local lights and indirect light. See `TransferMethod`."""
         return replace(BakedFreeCamera.from_store(store, key, cache), free_camera_error=read_free_camera_error(store))
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
-        """Upper bounds from the recipe alone."""
+        """Return upper bounds, from the recipe alone."""
         plan_estimates.check_gathering(recipe, _MAX_REQUESTED_PATCHES)
         views_plan = self._views.plan(scene, recipe)
         if not MIN_PROBES <= recipe.num_probes <= MAX_PROBES:
@@ -116,7 +116,7 @@ class ProbesMethod:
         )
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
-        """What opening the store needs besides its arrays."""
+        """Return the store's attributes."""
         return {
             **self._views.attributes(scene, recipe),
             "gather_seed": int(scene.id[:7], 16),
@@ -126,7 +126,7 @@ class ProbesMethod:
         }
 
     def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
-        """The lights, the points, the cells; then whole shards of cells and of points. See `BakeMethod`."""
+        """Return tasks for lights, probes and patches; then for shards of patches and of probes. See `BakeMethod`."""
         if stage == 0:
             return [Task(0, index, group, 0, 0) for index, group in enumerate(("lights", "probes", "patches"))]
         if stage == 2:
@@ -142,7 +142,7 @@ class ProbesMethod:
         return [Task(1, index, *task_range) for index, task_range in enumerate(ranges)]
 
     def arrays(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[ArraySpec]:
-        """What cells and points see, and their links; the first stage makes its own. See `BakeMethod`."""
+        """Return visibility and gather hits of patches and probes; tasks create the other arrays. See `BakeMethod`."""
         if stage != 1:
             return []
         bits = (store.shape("lights/irradiance")[0] + 7) // 8
@@ -163,7 +163,7 @@ class ProbesMethod:
         ]
 
     def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> TaskOutput:
-        """One task; seeds are the scene's and the numbers of rows: the same bits anywhere. See `BakeMethod`."""
+        """Compute a task; seeded by scene and rows: deterministic on any machine. See `BakeMethod`."""
         if task.stage == 0:
             bake_functions = {"lights": self._bake_lights, "probes": self._bake_probes, "patches": self._bake_patches}
             return TaskOutput(bake_functions[task.group](scene, recipe), 0, 0.0)
@@ -217,7 +217,7 @@ class ProbesMethod:
         return {f"patches/{name}": array for name, array in fields.items()}
 
     def _bake_rows(self, scene: Scene, recipe: Recipe, task: Task, store: StoreReader) -> TaskOutput:
-        """What some cells or points see, and what their rays hit."""
+        """Trace visibility and gather rays of some patches or probes."""
         geometry, seed = self._views.geometry_of(scene), int(store.attributes["gather_seed"])
         if task.group == "patches":
             points = read_patch_points(store, task.start, task.stop)
@@ -240,8 +240,7 @@ class ProbesMethod:
 def _trace_visibility(
     geometry: SceneBuffers, points: SurfacePoints, targets: LightTargets, *, is_uniform: bool
 ) -> VisibilityBits:
-    """Find the lights that points see. is_even: they lie evenly, so that much can be predicted; else those that are few
-    about their place would take it from others."""
+    """Trace the lights visible from points. is_uniform: points are dense enough to predict it from neighbors."""
     if not is_uniform:
         return trace_visibility(geometry.embree, points.position, points.normal, targets.directions)
     visibility = trace_visibility_masks(geometry.embree, points.position, points.normal, targets)
@@ -249,7 +248,7 @@ def _trace_visibility(
 
 
 class StoreBytes(NamedTuple):
-    """Numbers of the parts of a store, textures apart."""
+    """Bytes of the parts of a store, without textures."""
 
     gather_hits: int
     probes: int
@@ -261,7 +260,7 @@ class StoreBytes(NamedTuple):
 
 
 def bound_store_bytes(scene: Scene, recipe: Recipe) -> StoreBytes:
-    """Bound the bytes of each part of a store before it is compressed."""
+    """Bound the uncompressed bytes of each part of a store."""
     num_probes, bits, num_patches = _max_probes(scene, recipe), (recipe.num_lights + 7) // 8, _num_patches(recipe)
     triangles = plan_estimates.num_triangles(scene)
     return StoreBytes(
@@ -276,17 +275,17 @@ def bound_store_bytes(scene: Scene, recipe: Recipe) -> StoreBytes:
 
 
 def _max_probes(scene: Scene, recipe: Recipe) -> int:
-    unshared_probes = _MAX_UNSHARED_PROBES * len(scene.materials)  # that cannot be shared, however few are asked for
+    unshared_probes = _MAX_UNSHARED_PROBES * len(scene.materials)  # cannot be merged, however few are requested
     return int(_PROBE_MARGIN * recipe.num_probes) + unshared_probes
 
 
 def _num_patches(recipe: Recipe) -> int:
-    """Fewer than points, where the recipe does not say: what they send is gathered over hemispheres, which blurs it."""
+    """Return the number of patches: by default fewer than probes, since gathering blurs their light."""
     if recipe.num_patches is not None:
         return recipe.num_patches
     return min(_MAX_PATCHES, max(_MIN_PATCHES, recipe.num_probes // _PROBES_PER_PATCH))
 
 
 def _num_rays(recipe: Recipe) -> int:
-    """Of a point."""
+    """Return the number of gather rays of a probe."""
     return recipe.gather_rays or RAYS_PER_PROBE

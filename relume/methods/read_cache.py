@@ -1,4 +1,4 @@
-"""What was found of a store, or of anything large, stays while questions about the same follow each other."""
+"""A one-entry cache for values read from a store or any large object."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ Value = TypeVar("Value")
 
 
 class ReadCache(Generic[Source, Value]):
-    """A function that remembers its last answer; for several threads, and travelling without what it keeps.
+    """A function that caches its last result; thread-safe, and pickled without the cached value.
 
     Args:
-        read: finds it; of a store, whose arrays for it are complete.
+        read: computes the value, from a store whose arrays for it are complete.
     """
 
     def __init__(self, read: Callable[[Source], Value]) -> None:
@@ -25,7 +25,7 @@ class ReadCache(Generic[Source, Value]):
         return type(self), (self._read,)
 
     def __call__(self, source: Source) -> Value:
-        """Of this very object."""
+        """Return the value of this object, compared by identity."""
         with self._lock:
             if self._last is None or self._last[0] is not source:
                 self._last = source, self._read(source)

@@ -23,14 +23,14 @@ def open_bake(path: Path, cache: Cache) -> OpenBake:
     """Open a published store by the method that baked it.
 
     Args:
-        cache: of all that is made from the bake and may be made again.
+        cache: of results computed from the bake.
     Raises:
         StoreNotFoundError, SchemaVersionError, ChunkDamagedError, StoreError: see `relume.store.open_store`.
     """
     store = open_store(path)
     method = METHODS.get(str(store.attributes.get("method")))
     if method is None:
-        raise StoreError(f"no method of this version bakes like {path.name}; delete the bake, bake again")
+        raise StoreError(f"no method of this version can open {path.name}; delete the bake and bake again")
     return method.open(store, str(path.resolve()), cache)
 
 
@@ -38,11 +38,11 @@ def open_transfer(path: Path, cache: Cache) -> FixedViewTransfer:
     """Open a published store of fixed views.
 
     Args:
-        cache: of all that is made from the bake and may be made again.
+        cache: of results computed from the bake.
     Raises:
-        StoreError: its eyes move. Else as `open_bake`.
+        StoreError: it has a free camera. Otherwise as `open_bake`.
     """
     bake = open_bake(path, cache)
     if bake.camera_mode is not CameraMode.FIXED:
-        raise StoreError(f"{path.name} has no fixed views; bake the scene by another method")
+        raise StoreError(f"{path.name} has no fixed views; bake the scene with another method")
     return cast("FixedViewTransfer", bake)

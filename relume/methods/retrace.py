@@ -1,10 +1,11 @@
-"""Rays of a baked store, traced for normals that it did not know; shared by all pictures of the bake."""
+"""Rays of a baked store, traced again for overridden normals; shared by all images of the bake."""
 
 from __future__ import annotations
 
 from functools import cached_property
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.camera.planar_mirrors import lights_visible_in_mirrors
@@ -26,28 +27,27 @@ _POINTS_PER_BATCH = 4096
 
 
 class NormalRetracer:
-    """The triangles of a store, and where its rays go; a `relume.views.map_override_store.RayTracer`.
+    """Traces the rays of a store again; a `relume.views.map_override_store.RayTracer`.
 
     Args:
-        local: with the triangles' search tree. mirror_lights: what flat mirrors send exactly, where they do.
+        local: with the acceleration structure. mirror_lights: virtual lights of planar mirrors, if any.
     """
 
     def __init__(self, store: StoreReader, local: LocalLights, mirror_lights: MirrorLights | None) -> None:
         self._store, self._local, self._mirror_lights = store, local, mirror_lights
 
     def check(self) -> None:
-        """Raises StoreError where the store does not say what is needed to trace its rays."""
+        """Raise StoreError if the store lacks data for tracing its rays."""
         if "gather_rays" in self._store.attributes:
             _ = self._geometry
 
-    def visibility(self, points: SurfacePoints, baked_normals: F32, baked_bits: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Find which lights points see: those that come up are traced, those that go down are hidden.
+    def visibility(
+        self, points: SurfacePoints, baked_normals: Shaped[F32, "n 3"], baked_bits: Shaped[NDArray[np.uint8], "n bytes"]
+    ) -> Shaped[NDArray[np.uint8], "n bytes"]:
+        """Update light visibility: traces lights that rise above the horizon, clears those that set.
 
         Args:
-            points: as they lean now. baked_normals: their normals when the bake was traced. (n, 3) float32
-            baked_bits: what it found. (n, bytes) uint8
-        Returns:
-            (n, bytes) uint8
+            points: with the new normals. baked_normals, baked_bits: normals and visibility of the bake.
         """
         directions = read_shadow_ray_directions(self._store)
         visible = trace_visibility(
@@ -59,19 +59,19 @@ class NormalRetracer:
             visible[batch] |= baked_bits[batch] & above
         return visible
 
-    def gather_hits(self, points: SurfacePoints, wo: F32, pattern: RayPattern) -> NDArray[np.uint16]:
-        """Find the cells that gather rays of points hit.
+    def gather_hits(
+        self, points: SurfacePoints, wo: Shaped[F32, "n 3"], pattern: RayPattern
+    ) -> Shaped[NDArray[np.uint16], "n rays"]:
+        """Return the patches that gather rays hit.
 
         Args:
-            points: as they lean now. wo: towards the viewer. (n, 3) float32. pattern: of the rays.
-        Returns:
-            (n, rays) uint16
+            points: with the new normals. wo: view directions. pattern: of the rays.
         """
         return trace_gather_rays(self._geometry, self._tree, points, wo, pattern).patch
 
-    def mirror_lights(self, points: SurfacePoints) -> NDArray[np.uint8]:
-        """Find which lights points see in flat mirrors. points: as they lean now. Returns (n, bytes) uint8"""
-        assert self._mirror_lights is not None  # who asks has read them from the store
+    def mirror_lights(self, points: SurfacePoints) -> Shaped[NDArray[np.uint8], "n bytes"]:
+        """Trace the lights that points see in planar mirrors. points: with the new normals"""
+        assert self._mirror_lights is not None  # callers have read them from the store
         return lights_visible_in_mirrors(
             self._geometry, self._mirror_lights.mirrors, points, self._mirror_lights.direction
         ).visible
@@ -82,14 +82,14 @@ class NormalRetracer:
 
     @cached_property
     def _geometry(self) -> SceneBuffers:
-        """What of a scene's triangles rays between surfaces ask for: no normals, no textures."""
+        """Triangles for rays between surfaces: without normals and textures."""
         store, positions, faces = self._store, self._local.positions, self._local.faces
         try:
             mesh, material = (store.read(f"scene/{name}") for name in ("face_mesh", "face_material"))
         except ChunkDamagedError:
             raise
         except StoreError:
-            raise StoreError("this bake is too old to show images of normals; bake the scene again") from None
+            raise StoreError("this bake is too old to show normal map overrides; bake the scene again") from None
         empty = np.empty((0, 3), np.float32)
         return SceneBuffers(
             positions, empty, empty, empty, faces, material, mesh, self._local.embree, offset_point(positions)

@@ -1,9 +1,9 @@
-"""Transfer of harmonics in a store: what smooth light brings to points and cells (`relume.transport.sh_transfer`).
+"""Spherical-harmonic transfer in a store: low-frequency light at probes and patches (`relume.transport.sh_transfer`).
 
     sh/basis, cluster, weight            of probes: ClusteredTransfer
     sh/irradiance, coefficients          of patches: (C, NUM_HARMONICS), and of their first points (C, K, NUM_HARMONICS)
 
-Found once in a bake, it serves while a hand turns or exchanges an environment.
+Computed once per bake; used while an environment is rotated or exchanged.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import ChunkDamagedError
@@ -30,33 +31,33 @@ from relume.transport.sh_transfer import NUM_CLUSTERS, NUM_COMPONENTS, Clustered
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-PATCH_DEGREE = 2  # cells are seen from all around: in the mean little more is left of what they send
+PATCH_DEGREE = 2  # light of patches is averaged over many directions, which leaves little above this degree
 
 
 @dataclass(frozen=True)
 class HarmonicLight:
-    """Transfer of harmonics to the points and cells of a bake.
+    """Spherical-harmonic transfer to the probes and patches of a bake.
 
     Attributes:
-        probe_transfer: in the in-basis of `FAST_DEGREE`.
-        irradiance: of cells. (C, NUM_HARMONICS) float32
-        patch_coefficients: of their first points, of `PATCH_DEGREE`. (C, K, NUM_HARMONICS) float32
-        light_coefficients: by the bake's lights in light that is a harmonic. (M, NUM_HARMONICS)
+        probe_transfer: in the Zernike basis of `FAST_DEGREE`.
+        irradiance: of patches.
+        patch_coefficients: of their first points, of `PATCH_DEGREE`.
+        light_coefficients: weights of the bake's lights for each harmonic.
     """
 
     probe_transfer: ClusteredTransfer
-    irradiance: F32
-    patch_coefficients: F32
-    light_coefficients: F64
+    irradiance: Shaped[F32, "patches harmonics"]
+    patch_coefficients: Shaped[F32, "patches K harmonics"]
+    light_coefficients: Shaped[F64, "M harmonics"]
 
     @cached_property
     def frequency_split(self) -> ReadCache[TriangleLights, FrequencySplit]:
-        """Divides light into what harmonics tell and what they do not; asked thrice for each."""
+        """Split lights into spherical harmonics and the residual; cached, as callers need it three times."""
         return ReadCache(lambda lights: split_frequencies(lights, self.light_coefficients))
 
 
 def make_harmonic_light(store: StoreReader, seed: int) -> dict[str, NDArray[Any]]:
-    """Find the arrays of a store in which points and cells know their lights. seed: of the clusters."""
+    """Compute the arrays of a store for `read_harmonic_light`. seed: of the clusters."""
     light_samples = read_shadow_ray_directions(store), read_tiles(store).solid_angles
     probes, visible, patches = read_probes(store), store.read("probes/visibility"), read_patches(store)
 
@@ -83,17 +84,17 @@ def make_harmonic_light(store: StoreReader, seed: int) -> dict[str, NDArray[Any]
 
 
 def harmonic_bytes(num_probes: int, num_patches: int) -> int:
-    """What its arrays need in a store, at most."""
+    """Upper bound of its bytes in a store."""
     basis_bytes = 2 * NUM_CLUSTERS * (1 + NUM_COMPONENTS) * num_functions(FAST_DEGREE) * NUM_HARMONICS
     probe_bytes = num_probes * (1 + 2 * NUM_COMPONENTS)
     return basis_bytes + probe_bytes + 2 * num_patches * (1 + num_functions(PATCH_DEGREE)) * NUM_HARMONICS
 
 
 def read_harmonic_light(store: StoreReader, patches: PatchLight) -> HarmonicLight | None:
-    """Read it; None where a store has none, as those of fixed views and of earlier versions.
+    """Read the transfer; None if a store has none, such as those of fixed views and of earlier versions.
 
     Raises:
-        ChunkDamagedError: arrays of the store do not fit each other.
+        ChunkDamagedError: the arrays do not match.
     """
     if not store.attributes.get("has_sh"):
         return None
@@ -107,7 +108,7 @@ def read_harmonic_light(store: StoreReader, patches: PatchLight) -> HarmonicLigh
     fits = fits and int(probe_transfer.cluster.max(initial=0)) < len(probe_transfer.basis)
     patch_shape = patches.num_patches, num_functions(PATCH_DEGREE), NUM_HARMONICS
     if not (fits and irradiance.shape == patch_shape[::2] and patch_coefficients.shape == patch_shape):
-        raise ChunkDamagedError("sh", "its arrays do not fit the probes and patches")
+        raise ChunkDamagedError("sh", "its arrays do not match the probes and patches")
     light_coefficients = (
         harmonics(read_shadow_ray_directions(store).astype(np.float64)) * read_tiles(store).solid_angles[:, None]
     )

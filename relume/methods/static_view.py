@@ -1,8 +1,8 @@
-"""Stills: what a fixed-view bake of the place where a moving eye rests would hold, made in memory and at once.
+"""Static views: a fixed view traced in memory when a free camera stops.
 
-Light triangles, gather cells and what those see are in the moving bake already. What the eye alone decides is traced by
-the stages of the method `gather`: view samples, the lights that they see, the cells that their gather rays hit. A still
-is exact as `gather` is, and all that is made from the bake's light is shared with it.
+Light triangles, patches and their visibility are in the free-camera bake already. Only the view-dependent part is
+traced, by the stages of the method `gather`: view samples, their visible lights, their gather hits. A static view is as
+exact as `gather`, and shares all results computed from the bake's light.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from functools import cached_property
 from typing import IO, Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import CancelledError
@@ -31,14 +32,14 @@ from relume.scene.model import Camera, Scene
 from relume.store.bake_protocol import Recipe, StoreReader, Task
 from relume.views.view import View, open_view
 
-# a fifth of a bake's, both lattices Fibonacci's; what they bring is shared with more neighbours
+# a fifth of a bake's rays, both lattices of Fibonacci size; their light is shared with more neighbors
 _RAYS, _GLOSSY_RAYS, _NUM_TENT_PASSES = 123, 34, 2
-_ROWS_PER_TASK = 4096  # half a second's work at most: so soon is a still given up
-_SAMPLE_STAGE, _SHADOW_STAGE, _HIT_STAGE = 0, 1, 3  # stages of `gather`; the one between them is the bake's
+_ROWS_PER_TASK = 4096  # at most half a second of work, which bounds the time to cancel
+_SAMPLE_STAGE, _SHADOW_STAGE, _HIT_STAGE = 0, 1, 3  # stages of `gather`; the stage between these is in the bake
 
 
 class ExtendedStore:
-    """A store in which nothing is written: over it the arrays of one more view, the first; a `TaskStore`."""
+    """A read-only store extended in memory by the arrays of one view, with index 0; a `TaskStore`."""
 
     def __init__(self, store: StoreReader, attributes: Mapping[str, Any]) -> None:
         self._store, self._attributes = store, {**store.attributes, **attributes}
@@ -46,7 +47,7 @@ class ExtendedStore:
 
     @property
     def attributes(self) -> Mapping[str, Any]:
-        """Those of the store, but for what the view brings."""
+        """Attributes of the store, overridden by those of the view."""
         return self._attributes
 
     def shape(self, path: str) -> tuple[int, ...]:
@@ -54,7 +55,7 @@ class ExtendedStore:
         return self.arrays[path].shape if path in self.arrays else self._store.shape(path)
 
     def scratch(self) -> IO[bytes]:
-        """In memory: a still's view is there all the same."""
+        """Return a scratch file in memory, where the whole view is held."""
         return io.BytesIO()
 
     def read(self, path: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
@@ -65,11 +66,11 @@ class ExtendedStore:
 
 @dataclass(frozen=True)
 class StaticView(BakedIndirectViews):
-    """One view of a moving bake, opened as if it had been baked; what is no view's is the bake's.
+    """One static view over a free-camera bake, opened like a fixed view; shares everything that is not of the view.
 
     Attributes:
-        light_transport: the light of the bake. reflects: whether gather rays were traced; else light comes straight
-            alone.
+        light_transport: the light of the bake. reflects: True if gather rays were traced; else direct illumination
+            only.
     """
 
     light_transport: BakedIndirectViews
@@ -77,10 +78,10 @@ class StaticView(BakedIndirectViews):
 
     @classmethod
     def from_store(cls, light_transport: BakedIndirectViews, store: ExtendedStore, reflects: bool) -> StaticView:
-        """Open the view that a store has more than the bake.
+        """Open the view of an extended store.
 
         Args:
-            light_transport: the light of the bake. store: over the bake's. reflects: whether its gather rays are there.
+            light_transport: the light of the bake. store: over the bake's. reflects: True if it has gather rays.
         """
         view = open_view(store, 0, light_transport.cache, light_transport.key)
         bake_fields = {
@@ -94,32 +95,31 @@ class StaticView(BakedIndirectViews):
 
     @property
     def derived(self) -> ImageFiles:
-        """Where images of the default look are kept: among those of others, for eyes are without number."""
+        """Images of the default look: bounded like those of other looks, since the number of cameras is not."""
         return self.edited
 
     @cached_property
     def local(self) -> LocalLights:
-        """What local lights need."""
+        """Local lights of the scene."""
         return self.light_transport.local
 
     @cached_property
     def indirect(self) -> IndirectSolver:
-        """Light that gather cells send out."""
+        """Solver for the outgoing light of the patches."""
         return self.light_transport.indirect
 
     def subset(
-        self, view: View, material: int, sample_indices: NDArray[np.integer], *, has_indirect: bool
+        self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " m"], *, has_indirect: bool
     ) -> SampledTransfer:
-        """Some of a material's samples, with what gather rays they have. See `FixedViewTransfer`."""
+        """Select samples of a material, with gather rays if traced. See `FixedViewTransfer`."""
         return super().subset(view, material, sample_indices, has_indirect=has_indirect and self.reflects)
 
 
 class StaticTracing:
-    """A still that is being traced; given up, it goes on from there when it is wanted again.
+    """A static view that is being traced; after cancellation it resumes from there.
 
     Args:
-        method: whose stages these are. scene: with the eye among its cameras. recipe: of its view.
-        store: that the view's arrays are written to.
+        method: with these stages. scene: with the camera added. recipe: of its view. store: for the view's arrays.
     """
 
     def __init__(self, method: GatherMethod, scene: Scene, recipe: Recipe, store: ExtendedStore) -> None:
@@ -130,7 +130,7 @@ class StaticTracing:
         for stage in (_SHADOW_STAGE, _HIT_STAGE):
             view_specs = (s for s in method.arrays(stage, scene, recipe, store) if s.path.startswith("views/"))
             store.arrays.update({spec.path: np.empty(spec.shape, spec.dtype) for spec in view_specs})
-        # seeds of local lights' shadows, too, which need no gather rays
+        # includes the seeds of local lights' shadows, which do not need gather rays
         seeds = store.arrays["views/0/seed"]
         seeds[:] = np.arange(len(seeds))
         shadow_tasks, hit_tasks = (
@@ -141,24 +141,24 @@ class StaticTracing:
 
     @property
     def num_bytes(self) -> int:
-        """Memory that the view's arrays hold."""
+        """Memory in use."""
         return sum(array.nbytes for array in self.store.arrays.values())
 
     def complete_tracing(self, reflects: bool, progress: ProgressCallback, is_canceled: CancelCheck) -> None:
-        """Trace what is left.
+        """Trace the remaining tasks.
 
         Args:
-            reflects: gather rays, too, by far the most of it.
-            progress: called with the share done. is_canceled: asked now and then.
+            reflects: includes gather rays, which take most of the time.
+            progress: called with the completed fraction. is_canceled: polled.
         Raises:
-            CancelledError: `is_canceled` said so.
+            CancelledError: `is_canceled` returned True.
         """
         num_tasks = len(self._tasks) if reflects else self._num_shadow_tasks
         while True:
             if is_canceled():
-                raise CancelledError("the still was cancelled")
+                raise CancelledError("the static view was canceled")
             progress(min(self._num_done / num_tasks, 1.0) if num_tasks else 1.0)
-            with self._lock:  # for one task, so that others who want it go on with it as well
+            with self._lock:  # per task, so that concurrent callers share the work
                 if self._num_done >= num_tasks:
                     return
                 self._trace(self._tasks[self._num_done])
@@ -172,7 +172,7 @@ class StaticTracing:
 
 
 class StaticViewBuilder:
-    """Makes stills of one moving bake.
+    """Traces static views of one free-camera bake.
 
     Args:
         light_transport: the light of the bake. scene: that was baked.
@@ -193,15 +193,15 @@ class StaticViewBuilder:
         *,
         smooths_edges: bool = True,
     ) -> StaticView:
-        """Trace what an eye sees, as far as it is not remembered.
+        """Trace a static view, as far as it is not cached.
 
         Args:
-            camera: the eye. size: width and height, pixels. reflects: with light from other surfaces.
-            progress: called with the share done. is_canceled: asked now and then.
-            smooths_edges: whether pixels across edges have several samples; else each shows what is at its middle.
+            camera: the pose. size: width and height, pixels. reflects: includes indirect illumination.
+            progress: called with the completed fraction. is_canceled: polled.
+            smooths_edges: whether pixels on edges have several samples; else each has one at its center.
         Raises:
-            CancelledError: `is_canceled` said so.
-            MemoryBudgetError: what is traced is larger than the memory may be.
+            CancelledError: `is_canceled` returned True.
+            MemoryBudgetError: the view exceeds the memory budget.
         """
         cache, name = self._light_transport.cache.transient, _view_name(camera, size, smooths_edges)
         key = self._light_transport.key, "static view", name
@@ -222,7 +222,7 @@ class StaticViewBuilder:
 
 
 def _split_tasks(tasks: Iterable[Task]) -> Iterator[Task]:
-    """Those of the view, cut so that one takes no longer than somebody waits who gives a still up."""
+    """Split the view's tasks so that each is short enough for a cancellation to wait for."""
     for task in tasks:
         if task.group:
             for start in range(task.start, task.stop, _ROWS_PER_TASK):
@@ -230,6 +230,6 @@ def _split_tasks(tasks: Iterable[Task]) -> Iterator[Task]:
 
 
 def _view_name(camera: Camera, size: tuple[int, int], smooths_edges: bool) -> str:
-    """A name that no other eye's still has: by it the memory tells their images apart."""
+    """Return a unique name of a camera's static view, which identifies its images in the cache."""
     identity = camera.to_world.tobytes() + repr((camera.yfov, size, smooths_edges)).encode()
     return f"{camera.name} {hashlib.sha256(identity).hexdigest()[:16]}"

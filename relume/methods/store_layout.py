@@ -1,8 +1,9 @@
-"""Lights, gather cells and ray counts as a store keeps them."""
+"""Lights, patches and ray counts in the layout of a store."""
 
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.texture_slots import TEXTURES
@@ -27,7 +28,7 @@ FREE_CAMERA_ERROR = "error/free_camera"
 
 
 def read_lights(store: StoreReader) -> TriangleLights:
-    """The light triangles of a store."""
+    """Read the light triangles of a store."""
     nodes, direction, power, codes = (
         store.read(f"lights/{name}") for name in ("nodes", "direction", "irradiance", "tiles")
     )
@@ -35,33 +36,33 @@ def read_lights(store: StoreReader) -> TriangleLights:
 
 
 def read_tiles(store: StoreReader) -> Tiles:
-    """The tiles that its light triangles stand for. Raises StoreError where they do not tile the sphere."""
+    """Read the tiles of the light triangles. Raises StoreError if they do not cover the sphere."""
     tiles = Tiles(store.read("lights/tiles"))
     if not tiles.is_whole():
         raise StoreError("the light tiles of the store do not cover the sphere; bake the scene again")
     return tiles
 
 
-def read_shadow_ray_directions(store: StoreReader) -> F32:
-    """Where shadow rays went: light that may come to any part of a tile is asked for in its middle. (M, 3) float32"""
+def read_shadow_ray_directions(store: StoreReader) -> Shaped[F32, "M 3"]:
+    """Return the directions of shadow rays: tile centers if light may come from any part of a tile."""
     if store.attributes["relightable"]:
         return read_tiles(store).centroids.astype(np.float32)
     return read_lights(store).direction
 
 
 def read_tree(store: StoreReader) -> PatchTree:
-    """The tree over a store's gather cells."""
+    """Read the kd-tree over a store's patches."""
     return PatchTree(*(store.read(f"patches/{name}") for name in PatchTree._fields))
 
 
 def read_patch_points(store: StoreReader, start: int = 0, stop: int | None = None) -> SurfacePoints:
-    """The points that stand for gather cells [start, stop) of a store, those of a cell one after another."""
+    """Read the sample points of patches [start, stop) of a store, patch by patch."""
     position, normal = (store.read(f"patches/{name}", start, stop) for name in ("position", "normal"))
     return patch_sample_points(position, normal, start)
 
 
 def read_patches(store: StoreReader) -> PatchLight:
-    """The gather cells of a store."""
+    """Read the patches of a store."""
     points, visible = read_patch_points(store), store.read("patches/visibility")
     gather_hits, material = store.read("patches/gather_hits"), store.read("patches/material")
     points_per_patch = store.shape("patches/normal")[1]
@@ -78,7 +79,7 @@ def read_patches(store: StoreReader) -> PatchLight:
 
 
 def _read_optional(store: StoreReader, path: str) -> F32 | None:
-    """An array that stores of before do not have; None in those."""
+    """Read an array that stores of earlier versions lack; None for those."""
     try:
         store.shape(path)
     except StoreError:
@@ -87,18 +88,19 @@ def _read_optional(store: StoreReader, path: str) -> F32 | None:
 
 
 def has_alpha_tested_surfaces(store: StoreReader) -> bool:
-    """Tell whether rays may pass some triangles of a store."""
+    """Return True if some triangles of a store are alpha-tested."""
     return bool(store.attributes.get("has_alpha_test"))
 
 
-def read_alpha_test(store: StoreReader, positions: F32, faces: NDArray[np.uint32]) -> AlphaTest | None:
-    """Where triangles of a store have holes; None where all are whole.
+def read_alpha_test(
+    store: StoreReader, positions: Shaped[F32, "vertices 3"], faces: Shaped[NDArray[np.uint32], "triangles 3"]
+) -> AlphaTest | None:
+    """Read the alpha test of a store; None if all triangles are opaque.
 
     Args:
-        store: an open one. positions: its vertices. (num_vertices, 3) float32. faces: its triangles.
-            (num_faces, 3) uint32
+        store: an open store. positions: its vertices. faces: its triangles.
     Raises:
-        ChunkDamagedError: what says so does not fit the triangles.
+        ChunkDamagedError: its arrays do not match the triangles.
     """
     if not has_alpha_tested_surfaces(store):
         return None
@@ -113,12 +115,12 @@ def read_alpha_test(store: StoreReader, positions: F32, faces: NDArray[np.uint32
         or len(material) != len(faces)
         or not 0 <= material.min(initial=0) <= last < len(names)
     ):
-        raise ChunkDamagedError("scene/faces", "a triangle has a corner or a material that the scene has not")
+        raise ChunkDamagedError("scene/faces", "a triangle has a corner or a material that is not in the scene")
     return AlphaTest.build(faces, positions, uvs, material, alpha_masks)
 
 
 def read_free_camera_error(store: StoreReader) -> JackknifeEstimate | None:
-    """How far moving pictures of a bake are off, relative RMS; None where that is not known, as of bakes of before."""
+    """Read the relative RMS error of free-camera images; None if unknown, as for bakes of earlier versions."""
     if not store.attributes.get("has_free_camera_error"):
         return None
     error, standard_error = store.read(FREE_CAMERA_ERROR).tolist()
@@ -126,7 +128,7 @@ def read_free_camera_error(store: StoreReader) -> JackknifeEstimate | None:
 
 
 def read_rays(store: StoreReader) -> RayCounts:
-    """Shadow rays of the whole bake: traced, saved, and how often a prediction was found wrong."""
+    """Return the bake's shadow rays: traced, saved by prediction, and mispredicted."""
     counts = [
         store.read(f"views/{k}/rays/{shard}")
         for k in range(len(store.attributes["views"]))

@@ -1,4 +1,4 @@
-"""Suns of environments over an opened bake, and the light of its triangles without them."""
+"""Sun disks of environments over an opened bake, and the remaining light of its triangles."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ F32 = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class SunExtractor:
-    """What comes straight from suns, and what comes beside them. lit: whose light it is."""
+    """Separates direct illumination by sun disks from the remaining environment of a bake."""
 
     light_transport: BakedFixedViews
 
     def _split(self, name: str | None) -> SplitEnvironment:
-        """An environment without its suns, None for the scene's own."""
+        """Split an environment, None for the scene's own, into sun disks and the rest."""
         key = self.light_transport.cache_owner(name), "suns", name
         return self.light_transport.cache.get_value(
             key, lambda: remove_sun_disks(self.light_transport.environment_radiance(name))
         )
 
     def are_in(self, light: Illumination) -> bool:
-        """Whether light of suns comes straight to a picture."""
+        """True if a light includes direct illumination by sun disks."""
         return light.has_direct_environment and bool(self._split(light.environment.map).sun_disks)
 
     def remaining_lights(self, light: Illumination) -> TriangleLights:
-        """The triangles by which light comes straight, without that of suns."""
+        """Return the environment triangles for direct illumination, without sun disks."""
         if not self.are_in(light):
             return self.light_transport.lights_for(light)
         key = self.light_transport.key, "lights without sun disks", light.environment
@@ -46,7 +46,7 @@ class SunExtractor:
         )
 
     def preview_remaining_lights(self, light: Illumination) -> TriangleLights:
-        """The same, found quickly."""
+        """Approximate `remaining_lights`."""
         if not self.are_in(light):
             return self.light_transport.preview_lights_for(light)
         return displayed_of(
@@ -65,7 +65,7 @@ class SunExtractor:
         return self._split(name).residual
 
     def hard_shadow_lights(self, light: Illumination, points: SurfacePoints) -> Iterator[HardShadowLight]:
-        """Suns whose light comes straight, and what they bring to points if nothing hides them."""
+        """Yield sun disks for direct illumination, with their unoccluded light at points."""
         if not self.are_in(light):
             return
         key, gain = light.environment, np.array(light.environment_gain, np.float32)

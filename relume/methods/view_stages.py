@@ -1,9 +1,9 @@
-"""Fixed views: their samples, and which light triangles each sample sees; methods share these two stages.
+"""Fixed views: their samples, and the light triangles visible from each; two stages that methods share.
 
-The bake keeps rays, not answers: one visibility bit per view sample and light triangle. Stages: "samples" (the light
+The bake stores rays, not results: one visibility bit per view sample and light triangle. Stages: "samples" (the light
 triangles, and each view's samples), then "visibility" (rows of each view).
 
-    scene/positions, faces, face_material, face_mesh     triangles, for rays that looks add
+    scene/positions, faces, face_material, face_mesh     triangles, for rays that looks require
     scene/uvs, alpha_masks/…                             of alpha-tested scenes: relume.raytrace.alpha_test.AlphaMasks
     lights/environment                                   radiance, to weight it again
     lights/tiles                                         relume.lights.sphere_tiles.Tiles
@@ -55,13 +55,13 @@ MIN_SIDE, MAX_PIXELS = 16, 4096 * 4096
 _SURFACE_BYTES = 4 + 4 + 2 + 1 + 5 * 12 + 20
 _EMISSION_BYTES, _NORMAL_MAP_BYTES = 12, 4 + 12
 _LAYER_BYTES = 12 + 12 + 1 + 4 + MAX_MIRROR_BOUNCES * (2 + 4 + 12)
-_SHARD_ROW_BYTES = 200  # position, normal, and the blocks they are traced in
+_SHARD_ROW_BYTES = 200  # position, normal, and the blocks of the tracer
 _METADATA_BYTES = 1 << 20
-_RAY_NS, _TRIANGLE_US = 5.0, 2.0  # of one core, on scenes of 200 to a million triangles
+_RAY_NS, _TRIANGLE_US = 5.0, 2.0  # on one core, for scenes of 200 to a million triangles
 
 
 class ViewStage(NamedTuple):
-    """What every task of the second stage needs of the first.
+    """Results of the first stage that every task of the second needs.
 
     Attributes:
         targets: of shadow rays. num_surface_samples: of each view.
@@ -72,10 +72,10 @@ class ViewStage(NamedTuple):
 
 
 class SampledViews:
-    """The two stages as a part of a method; a `relume.store.bake_protocol.BakeMethod` but for its name.
+    """The two stages as part of a method; a `relume.store.bake_protocol.BakeMethod` without a name.
 
     Args:
-        smooths_edges: whether pixels across edges have several samples; see `sample_view`.
+        smooths_edges: whether pixels on edges have several samples; see `sample_view`.
     """
 
     stages: tuple[str, ...] = ("samples", "visibility")
@@ -87,16 +87,16 @@ class SampledViews:
         self.view_stage = ReadCache(_read_view_stage)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _make_sampled_views, (self._smooths_edges,)  # travels to workers without what it keeps
+        return _make_sampled_views, (self._smooths_edges,)  # pickled without cached data
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
-        """Upper bounds from the recipe alone."""
+        """Return upper bounds, from the recipe alone."""
         width, height = recipe.size
         view_names = [camera.name for camera in scene.cameras]
         if unknown := [view for view in recipe.views if view not in view_names]:
             raise PlanError(f"the scene has no view {unknown[0]!r}; choose from {', '.join(view_names)}")
         if not recipe.views or len(set(recipe.views)) != len(recipe.views):
-            raise PlanError("name each view once, and at least one")
+            raise PlanError("name at least one view, and each only once")
         if not (min(width, height) >= MIN_SIDE and width * height <= MAX_PIXELS):
             able = f"give at least {MIN_SIDE}×{MIN_SIDE}, at most {MAX_PIXELS} in all"
             raise PlanError(f"{width}×{height} pixels were asked for; {able}")
@@ -107,7 +107,7 @@ class SampledViews:
         surface_bytes = _SURFACE_BYTES + (_EMISSION_BYTES if has_emission_images(scene) else 0)
         surface_bytes += _NORMAL_MAP_BYTES if _has_normal_maps(scene) else 0
         surface_bytes += _LAYER_BYTES if has_layers(scene.materials) else 0
-        # while samples are sorted, files of them are there twice, and no bits yet
+        # while samples are sorted, their files exist twice, and no bits yet
         in_store = samples * (surface_bytes + max(bits, surface_bytes)) + plan_estimates.lights_bytes(scene, recipe)
         num_rays = (
             samples * recipe.num_lights
@@ -115,7 +115,7 @@ class SampledViews:
             + plan_estimates.num_tinted_rays(scene, samples)
         )
         sampling, tracing = plan_estimates.sampling_bytes(scene, recipe), SHARD_ROWS * (bits + _SHARD_ROW_BYTES)
-        # while a single view is sampled, others do this at most
+        # concurrent tasks while a single view is sampled
         concurrent_bytes = max(tracing, plan_estimates.light_selection_bytes(scene))
         return Plan(
             num_view_samples=samples,
@@ -129,11 +129,11 @@ class SampledViews:
         )
 
     def prepare(self, scene: Scene) -> None:
-        """Build the triangles' search tree."""
+        """Build the acceleration structure of the triangles."""
         self.geometry_of(scene)
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
-        """What opening the store needs besides its arrays."""
+        """Return the store's attributes."""
         cameras = {camera.name: camera for camera in scene.cameras}
         return {
             "method": recipe.method,
@@ -154,7 +154,7 @@ class SampledViews:
         }
 
     def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:
-        """The lights and each view; then whole shards of each view's surface samples. See `BakeMethod`."""
+        """Return tasks for the lights and each view; then for shards of each view's samples. See `BakeMethod`."""
         if stage == 0:
             return [Task(0, 0, "", 0, 0), *(Task(0, k + 1, view, 0, 0) for k, view in enumerate(recipe.views))]
         ranges = [
@@ -166,7 +166,7 @@ class SampledViews:
         return [Task(1, index, view, start, stop) for index, (view, start, stop) in enumerate(ranges)]
 
     def arrays(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[ArraySpec]:
-        """The visibility of each view; the arrays of the first stage are made by its tasks. See `BakeMethod`."""
+        """Return the visibility arrays of the views; tasks of the first stage create theirs. See `BakeMethod`."""
         if stage == 0:
             return []
         bits = (store.shape("lights/irradiance")[0] + 7) // 8
@@ -183,7 +183,7 @@ class SampledViews:
         ]
 
     def compute(self, scene: Scene, recipe: Recipe, task: Task, store: TaskStore) -> TaskOutput:
-        """One task; nothing is random, so the same task gives the same bits anywhere. See `BakeMethod`."""
+        """Compute a task; deterministic on any machine. See `BakeMethod`."""
         if task.stage == 1:
             return self._visibility(scene, recipe.views.index(task.group), task, store)
         if not task.group:
@@ -213,7 +213,7 @@ class SampledViews:
         return TaskOutput(arrays, visibility.rays.num_traced, visibility.trace_s)
 
     def geometry_of(self, scene: Scene) -> SceneBuffers:
-        """The scene's triangles, built once for all tasks of a process."""
+        """Return the scene's triangles, built once for all tasks of a process."""
         with self._lock:
             if self._geometry is None or self._geometry[0] != scene.id:
                 self._geometry = scene.id, build_scene_buffers(scene)
@@ -221,7 +221,7 @@ class SampledViews:
 
 
 def _columns(scene: Scene) -> list[str]:
-    """What is kept of view samples."""
+    """Return the names of the stored columns of view samples."""
     names = ["pixel", "weight", "material", "level", "position", "normal", "tangent", "diffuse", "specular", "uv"]
     if has_layers(scene.materials):
         names += ["transmittance", "camera", "is_mirrored", "mirror", "mirror_cosine", "mirror_tint"]
@@ -247,7 +247,7 @@ def _read_view_stage(store: StoreReader) -> ViewStage:
 
 
 def light_arrays(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
-    """The light triangles of a scene's environment, as arrays of a store."""
+    """Return the light triangles of a scene's environment, as arrays of a store."""
     radiance = scene.environment.radiance
     tiles = choose_tiles(radiance, recipe.num_lights, recipe.relightable)
     lights = integrate_environment(tiles, RotatedEnvironment.from_radiance(radiance))
@@ -261,7 +261,7 @@ def light_arrays(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
 
 
 def triangle_arrays(geometry: SceneBuffers, scene: Scene) -> dict[str, NDArray[Any]]:
-    """The triangles of a scene, merged, as arrays of a store."""
+    """Return the merged triangles of a scene, as arrays of a store."""
     arrays = {f"scene/{name}": getattr(geometry, name) for name in ("positions", "faces", "face_material", "face_mesh")}
     if has_emission_images(scene):
         arrays["scene/face_emission"] = relative_emission(scene)
@@ -275,10 +275,10 @@ def triangle_arrays(geometry: SceneBuffers, scene: Scene) -> dict[str, NDArray[A
 
 
 def read_targets(store: StoreReader) -> LightTargets:
-    """What shadow rays of a store are sent to."""
+    """Return the targets of a store's shadow rays."""
     return make_light_targets(read_shadow_ray_directions(store), read_lights(store).irradiance)
 
 
 def _view_attributes(camera: Camera) -> dict[str, Any]:
-    """A view among a store's attributes."""
+    """Return a view's entry in a store's attributes."""
     return {"name": camera.name, "to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov}

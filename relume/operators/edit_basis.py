@@ -1,4 +1,4 @@
-"""What an operator leaves free: one curve in its wavelet basis, or whatever moves several of them together."""
+"""Bases of the free curves of an operator: one curve in wavelets, or a parameter that changes several curves."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.term import Curve, Term
@@ -20,34 +21,34 @@ F64 = NDArray[np.float64]
 
 
 class EditBasis(Protocol):
-    """A direction in which a term is free; hashable, and equal where its operators are interchangeable."""
+    """A basis for edits of a term; hashable, and equal if operators are interchangeable."""
 
     @property
     def label(self) -> str:
-        """What people read."""
+        """Label for users."""
         ...
 
     @property
     def affected_curves(self) -> tuple[str, ...]:
-        """Names of the curves that are free, all others being dormant."""
+        """Names of the free curves; all others are fixed."""
         ...
 
     @property
     def num_columns(self) -> int:
-        """Coefficients a channel."""
+        """Coefficients per channel."""
         ...
 
     @property
     def is_complete(self) -> bool:
-        """Whether every curve can be said in it; else what it shows is near the look, not the look."""
+        """True if the basis represents every curve; otherwise images are approximate."""
         ...
 
     def is_valid_for(self, document: Mapping[str, Any]) -> bool:
-        """Whether the curves of a term document of the same kind lie along it."""
+        """Return True if the curves of a term document of the same kind lie in the basis."""
         ...
 
-    def coefficients(self, bands: Mapping[str, F64]) -> F64:
-        """c of a term's curves, (3, J) each. (3, num_columns)"""
+    def coefficients(self, bands: Mapping[str, F64]) -> Shaped[F64, "3 columns"]:
+        """Return the coefficients c of a term's curves, (3, J) each."""
         ...
 
     def precompute(
@@ -61,13 +62,13 @@ class EditBasis(Protocol):
         *,
         is_quantized: bool = False,
     ) -> LinearOperator | QuantizedOperator:
-        """The operator. See `relume.operators.linear_operator.precompute`."""
+        """Precompute the operator. See `relume.operators.linear_operator.precompute`."""
         ...
 
 
 @dataclass(frozen=True)
 class CurveBasis:
-    """One curve, free to take any shape."""
+    """Wavelet basis of one curve, for any shape."""
 
     name: str
     label: str
@@ -77,20 +78,20 @@ class CurveBasis:
 
     @classmethod
     def from_curve(cls, curve: Curve) -> CurveBasis:
-        """Along a declared curve."""
+        """Create the basis of a declared curve."""
         return cls(curve.name, curve.label, curve.num_bands)
 
     @property
     def affected_curves(self) -> tuple[str, ...]:
-        """The curve alone."""
+        """Name of the curve."""
         return (self.name,)
 
     def is_valid_for(self, document: Mapping[str, Any]) -> bool:
-        """Any shape is among its own."""
+        """Return True: the basis represents any shape."""
         return True
 
-    def coefficients(self, bands: Mapping[str, F64]) -> F64:
-        """Of the wavelets."""
+    def coefficients(self, bands: Mapping[str, F64]) -> Shaped[F64, "3 columns"]:
+        """Return the wavelet coefficients."""
         return analysis(bands[self.name])
 
     def precompute(

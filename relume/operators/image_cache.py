@@ -1,9 +1,9 @@
-"""Images of terms, kept beside the rays they were made from: what lies below the memory, and outlives the process.
+"""Images of terms, saved beside the rays they were computed from: a disk cache that outlives the process.
 
-    <folder>/<code>/<hash of what the image is>.npy
+    <folder>/<code>/<hash of the image's key>.npy
 
-An image that other code made is not found, so that none is ever shown as exact that this code would make otherwise; it
-goes when this code keeps its first. All can be lost without loss: what cannot be read, or does not fit, is made again.
+Images of other versions of the code are not used, so that every exact image is reproducible; they are deleted when this
+version saves its first. Files may be lost at any time: what is missing or damaged is computed again.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from relume.operators.shade import ShadedTerm
 
 
 class ImageFiles:
-    """Files in a folder of a store's own; they go with it.
+    """Files in a folder of a store, deleted with it.
 
     Args:
-        code: names the code that makes the images, see `relume.core.source_hash`.
-        max_bytes: those that were used longest ago go where they would be larger together; None for no bound.
+        code: identifies the code that computes the images, see `relume.core.source_hash`.
+        max_bytes: the least recently used files are deleted beyond this total; None for no limit.
     """
 
     def __init__(self, folder: Path, code: str, max_bytes: int | None = None) -> None:
         self._folder, self._max_bytes = folder / code, max_bytes
 
     def get(self, key: Hashable, shape: tuple[int, ...], compute: Callable[[], ShadedTerm]) -> ShadedTerm:
-        """The image of a key, from its file where there is a sound one of this shape, else from `compute`."""
+        """Return the image of a key, from a valid file of this shape or else from `compute`."""
         path = self._path(key)
         with suppress(OSError, ValueError, EOFError):
             image = np.load(path, mmap_mode="r", allow_pickle=False)
@@ -41,12 +41,12 @@ class ImageFiles:
                 path.touch()
                 return ShadedTerm(np.array(image))
         shaded = compute()
-        with suppress(OSError, RelumeError):  # a full or read-only disk costs time at the next opening, nothing else
+        with suppress(OSError, RelumeError):  # a full or read-only disk only costs time when the bake is opened again
             self._write(path, shaded)
         return shaded
 
     def has(self, key: Hashable) -> bool:
-        """Whether there is a file of a key; nobody says that it is sound."""
+        """Return True if a file of a key exists; it may be damaged."""
         return self._path(key).exists()
 
     def _path(self, key: Hashable) -> Path:
@@ -63,7 +63,7 @@ class ImageFiles:
             self._evict(self._max_bytes)
 
     def _remove_outdated(self) -> None:
-        """Remove what other code has made."""
+        """Remove images of other versions of the code."""
         for entry in self._folder.parent.iterdir():
             if entry == self._folder:
                 continue
@@ -73,7 +73,7 @@ class ImageFiles:
                 entry.unlink(missing_ok=True)
 
     def _evict(self, max_bytes: int) -> None:
-        """Remove what was used longest ago until the rest is small enough."""
+        """Remove the least recently used files beyond a total size."""
         files = [(path.stat(), path) for path in self._folder.glob("*.npy")]
         num_bytes = sum(stat.st_size for stat, _ in files)
         for stat, path in sorted(files, key=lambda entry: entry[0].st_mtime_ns):

@@ -1,10 +1,10 @@
-"""IndirectOperator: from the light that gather cells send out to the image of one term, in few coefficients.
+"""Operator from the outgoing light of patches to the image of one term, in few wavelet coefficients.
 
     R(x) = c(γ) · Tʷ(x) · Lʷ                                        eq. 9, Nguyen 2010
 
-with all curves of the term contracted, so that c · Tʷ is one row for each view sample. Blocks of neighbouring samples
-share the coefficients they keep: those that move their samples most under light like the present. Only changes of light
-go through rows; what they leave out is a small part of a small part of the picture.
+All curves of the term are contracted, so that c · Tʷ is one row per view sample. Blocks of neighboring samples share
+their selected coefficients: those that change the samples most under light like the present. Only changes of light
+use these transport rows, so that the truncation affects a small part of an image.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from scipy.sparse import eye_array
 
@@ -37,39 +38,37 @@ from relume.transport.shading_points import GatherRays, ShadingPoints
 F32 = NDArray[np.float32]
 
 NUM_COEFFICIENTS = 128
-_LEVEL_FRACTION = 0.3  # of the light's coefficients, how much may come from anywhere on their level
+_LEVEL_FRACTION = 0.3  # fraction of the expected light that is uniform over each wavelet level
 _BLOCKS_PER_STEP = 8
 
 
 @dataclass(frozen=True)
 class IndirectOperator:
-    """The operator from the light of gather cells to the image of one term.
+    """The operator from the light of patches to the image of one term.
 
     Attributes:
-        coefficients: Haar coefficients of each block of samples. (blocks, K) int32
-        scale: what a step of their weights is worth. (blocks, K) float32
-        weights: (blocks, K, channels, `BLOCK_SAMPLES`) int16; one channel where all are alike, else three
-        num_samples: of the image, the last block's padding left out.
-        neighbor_weights: weights of the samples for each other.
+        coefficients: indices of the Haar coefficients of each block of samples.
+        scale: of their quantized weights. weights: one channel if all are equal, else three.
+        num_samples: of the image, without the padding of the last block.
+        neighbor_weights: filter weights of neighboring samples.
     """
 
-    coefficients: NDArray[np.int32]
-    scale: F32
-    weights: NDArray[np.int16]
+    coefficients: Shaped[NDArray[np.int32], "blocks K"]
+    scale: Shaped[F32, "blocks K"]
+    weights: Shaped[NDArray[np.int16], "blocks K channels block_samples"]
     num_samples: int
     neighbor_weights: FilterWeights
 
     @property
     def num_bytes(self) -> int:
-        """Memory it holds."""
+        """Memory in use."""
         return self.coefficients.nbytes + self.scale.nbytes + self.weights.nbytes
 
-    def add(self, light: F32, image: F32) -> None:
-        """Add what light of cells brings, in place.
+    def add(self, light: Shaped[F32, "padded 3"], image: Shaped[F32, "tiles 3 samples"]) -> None:
+        """Add the reflected light of patches, in place. Reads all weights once; memory-bound.
 
         Args:
-            light: its Haar coefficients. (padded cells, 3) float32. image: (tiles, 3, samples) float32
-        Cost: reads all weights once; bound by the memory's bandwidth.
+            light: its Haar coefficients. image: added to.
         """
         args = (self.coefficients, self.scale, self.weights, light)
         unfiltered = np.empty((len(self.coefficients) * BLOCK_SAMPLES, 4), np.float32)
@@ -84,13 +83,13 @@ class IndirectOperator:
 
 
 def row_bytes(num_samples: int, num_channels: int) -> int:
-    """Memory that rows need."""
+    """Return the memory of an operator's rows."""
     blocks = -(-num_samples // BLOCK_SAMPLES)
     return blocks * NUM_COEFFICIENTS * (2 * num_channels * BLOCK_SAMPLES + 8)
 
 
 def num_channels(term: Term, bands: Mapping[str, NDArray[np.float64]]) -> int:
-    """Channels that rows have: one where a term weighs all of them alike, else three."""
+    """Return the channels of an operator's rows: one if a term weights all equally, else three."""
     upright = np.array([0, 0, 1], np.float32).reshape(3, 1)
     is_gray = all(
         np.all(c.num_rows == 1) and np.all(c.constant == c.constant[0]) for c in contract_levels(term, bands, None)
@@ -98,12 +97,8 @@ def num_channels(term: Term, bands: Mapping[str, NDArray[np.float64]]) -> int:
     return 1 if is_gray and len(term.quotients(*upright, *upright)) == 1 else 3
 
 
-def expected_light(radiance: F32) -> F32:
-    """How large the Haar coefficients of light are that is like some light of cells. (padded cells,) float32
-
-    Args:
-        radiance: of cells. (C, 3)
-    """
+def expected_light(radiance: Shaped[F32, "patches 3"]) -> Shaped[F32, " padded"]:
+    """Estimate the magnitude of the Haar coefficients of light similar to the given radiance of patches."""
     magnitude = np.sqrt(np.square(haar(radiance)).sum(axis=1))
     level = coefficient_levels(len(magnitude))
     level_power = np.bincount(level, np.square(magnitude)) / np.bincount(level)
@@ -116,19 +111,19 @@ def precompute_rows(
     bands: Mapping[str, NDArray[np.float64]],
     receivers: ShadingPoints,
     rays: GatherRays,
-    expected: F32,
+    expected: Shaped[F32, " padded"],
     progress: Callable[[float], None],
     is_canceled: Callable[[], bool],
 ) -> IndirectOperator:
-    """Contract all curves of a term along the rays of points.
+    """Contract all curves of a term along the gather rays of points.
 
     Args:
-        bands: of each curve that depends on wi. (3, J) each, or (L, 3, J) where it differs from level to level
-        receivers: what arrives at them does not matter. rays: theirs, whatever is sent.
+        bands: of each curve that depends on wi. (3, J) each, or (L, 3, J) if it depends on the level
+        receivers: their light is not used. rays: of these; their outgoing light is not used.
         expected: from `expected_light`.
-        progress: called with the share done. is_canceled: asked now and then.
+        progress: called with the completed fraction. is_canceled: polled.
     Raises:
-        CancelledError: `is_canceled` said so.
+        CancelledError: `is_canceled` returned True.
     """
     unit_lit = replace(receivers, rays=(replace(rays, outgoing=isotropic(np.ones_like(rays.outgoing.isotropic))),))
     contractions, num_samples = contract_levels(term, bands, None), len(receivers.normal)
@@ -156,7 +151,7 @@ def _identity_weights(num_samples: int) -> FilterWeights:
 
 
 class _RowMaker:
-    """Makes the rows of one block after another; holds the scratch memory of one thread."""
+    """Computes rows block by block; holds the scratch memory of one thread."""
 
     def __init__(
         self,
@@ -170,11 +165,11 @@ class _RowMaker:
         self._patch_row = np.empty(len(expected), np.int32)
         max_coefficients = len(expected) + 1
         self._index = np.empty(max_coefficients, np.int32)
-        # the system gives what is written to
+        # pages are allocated as they are written
         self._details = np.empty(max_coefficients * 3 * BLOCK_SAMPLES, np.float32)
 
     def write(self, rows: IndirectOperator, block: int) -> None:
-        """Make one block."""
+        """Compute one block."""
         start, channels = block * BLOCK_SAMPLES, rows.weights.shape[2]
         stop = min(start + BLOCK_SAMPLES, rows.num_samples)
         patches = number_patches(self._gather_hits, start, stop, self._patch_row)

@@ -1,4 +1,4 @@
-"""The kernels of `relume.operators.indirect`: ray weights summed for each cell, transformed where they are not zero."""
+"""Kernels of `relume.operators.indirect`: ray weights summed per patch, and their sparse Haar transform."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ _HALF = np.float32(math.sqrt(0.5))
 
 @nb.njit(nogil=True, cache=True)
 def number_patches(gather_hits, start, stop, patch_row):  # type: ignore[no-untyped-def]
-    """Number the patches that samples [start, stop) hit, in their order; gather_hits: patches that rays hit. (n, rays)
+    """Number the patches that samples [start, stop) hit, ascending; gather_hits: patches that rays hit. (n, rays)
 
-    Writes patch_row (patches,) int32, −1 where a patch is not hit; returns the patches hit, rising.
+    Writes patch_row (patches,) int32, −1 for a patch that is not hit; returns the patches hit.
     """
     patch_row[:] = -1
     for p in range(start, stop):
@@ -40,12 +40,12 @@ def number_patches(gather_hits, start, stop, patch_row):  # type: ignore[no-unty
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
 def sum_by_patch(gather_hits, start, stop, patch_row, weight, sums):  # type: ignore[no-untyped-def]
-    """Add the weights of the rays of samples [start, stop) to those of the cells that they hit.
+    """Add the weights of the rays of samples [start, stop) to the patches that they hit.
 
     Args:
-        gather_hits: cells that rays hit. (n, rays) uint16. patch_row: from `number_patches`. (cells,) int32
-        weight: of the rays, in the order of `list_rays`. (channels, K) float32
-        sums: added to. (cells seen, channels, samples) float32
+        gather_hits: patches that rays hit. (n, rays) uint16. patch_row: from `number_patches`. (patches,) int32
+        weight: of the rays, in the order of `list_gather_rays`. (channels, K) float32
+        sums: added to. (patches hit, channels, samples) float32
     """
     ray_index = 0
     for p in range(start, stop):
@@ -59,10 +59,11 @@ def sum_by_patch(gather_hits, start, stop, patch_row, weight, sums):  # type: ig
 
 @nb.njit(nogil=True, cache=True, fastmath=True)
 def transform(patches, sums, num_levels, index, details):  # type: ignore[no-untyped-def]
-    """Haar coefficients of columns that are zero but for the cells seen; both arguments are overwritten.
+    """Compute the Haar coefficients of sparse columns; both arguments are overwritten.
 
     Args:
-        patches: cells, rising. (n,) int32. sums: their values. (n, width) float32. num_levels: of all cells, padded.
+        patches: nonzero patches, ascending. (n,) int32. sums: their values. (n, width) float32. num_levels: of all
+            patches, padded.
     Writes index (≥ m,) and details (≥ m, width); returns m.
     """
     num, end = patches.shape[0], 0
@@ -95,11 +96,11 @@ def transform(patches, sums, num_levels, index, details):  # type: ignore[no-unt
 
 @nb.njit(nogil=True, cache=True, fastmath=True)
 def select_coefficients(index, details, expected, coefficients, scale, rows):  # type: ignore[no-untyped-def]
-    """Keep the coefficients that move the samples most, as 16-bit weights.
+    """Select the coefficients that change the samples most, as 16-bit weights.
 
     Args:
-        index: of coefficients. (m,) details: (m, width). expected: of the light's. (padded cells,) float32
-    Writes kept (K,) int32, scale (K,) float32, rows (K, width) int16, zero where there are fewer than K.
+        index: of coefficients. (m,) details: (m, width). expected: of the light's. (padded patches,) float32
+    Writes coefficients (K,) int32, scale (K,) float32, rows (K, width) int16; zero if there are fewer than K.
     """
     importance = np.empty(index.shape[0], np.float32)
     for m in range(index.shape[0]):
@@ -110,7 +111,7 @@ def select_coefficients(index, details, expected, coefficients, scale, rows):  #
     num_dropped = index.shape[0] - coefficients.shape[0]
     threshold = np.partition(importance, num_dropped)[num_dropped] if num_dropped > 0 else np.float32(0)
     slot = 0
-    # from coarse to fine: of those that matter alike the finest are left out
+    # from coarse to fine: of equally important coefficients the finest are omitted
     for m in range(index.shape[0] - 1, -1, -1):
         if importance[m] < threshold or slot == coefficients.shape[0]:
             continue
@@ -128,15 +129,15 @@ def select_coefficients(index, details, expected, coefficients, scale, rows):  #
 
 @nb.njit(nogil=True, cache=True, fastmath=True)
 def apply_rows(coefficients, scale, rows, light, start, stop, unfiltered):  # type: ignore[no-untyped-def]
-    """What blocks [start, stop) make of light.
+    """Compute the reflected light of blocks [start, stop), before filtering.
 
     Args:
         coefficients, scale: (blocks, K). rows: (blocks, K, 1 or 3 channels, `BLOCK_SAMPLES`) int16.
-        light: Haar coefficients. (padded cells, 3) float32
-    Writes unfiltered (blocks · `BLOCK_SAMPLES`, 4) float32, whose last channel says nothing.
+        light: Haar coefficients. (padded patches, 3) float32
+    Writes unfiltered (blocks · `BLOCK_SAMPLES`, 4) float32; the last channel is unused.
     """
     num_channels = rows.shape[2]
-    # arrays of their own, so that the compiler knows that they do not overlap
+    # separate arrays, so that the compiler can rule out aliasing
     red, green, blue = (
         np.empty(BLOCK_SAMPLES, np.float32), np.empty(BLOCK_SAMPLES, np.float32), np.empty(BLOCK_SAMPLES, np.float32)
     )  # fmt: skip
@@ -165,7 +166,7 @@ def apply_rows(coefficients, scale, rows, light, start, stop, unfiltered):  # ty
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
 def add_filtered(first, neighbors, weight, unfiltered, start, stop, image):  # type: ignore[no-untyped-def]
-    """Add to samples [start, stop) of an image the weighted means of what samples have alone.
+    """Add filtered samples to samples [start, stop) of an image.
 
     Args:
         first, neighbors, weight: rows of `relume.views.gather_filter`, compressed. unfiltered: from `apply_rows`.

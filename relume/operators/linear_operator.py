@@ -1,4 +1,4 @@
-"""Freezing: a term's transport along one curve, everything dormant contracted, in the wavelet basis.
+"""Precomputed linear operators: a term's transport along one free curve, all others fixed, in the wavelet basis.
 
 T_D4 = T_box · S, with S the orthonormal Daubechies-4 synthesis (appendix B, Ben-Artzi 2006).
 """
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
@@ -37,57 +38,55 @@ class LinearOperator(Operator):
     """The linear operator from one curve to the image of one term.
 
     Attributes:
-        transport: wavelet coefficients, samples padded with zeros to whole tiles. (tiles, 3, J, samples) float32
-        importance: length of each column over all samples; what a coefficient moves in the picture. (3, J) float64,
-            (L, 3, J) over those of each level
-        bounds: where the samples of each level begin and end, where coefficients differ from level to level.
-            (L + 1,) int64
+        transport: wavelet coefficients, samples padded with zeros to whole tiles.
+        importance: norm of each column over all samples; (3, J), or (L, 3, J) over those of each level.
+        bounds: ranges of the levels' samples, if coefficients depend on the level.
     """
 
-    transport: F32
-    importance: NDArray[np.float64]
-    bounds: NDArray[np.int64] | None = None
+    transport: Shaped[F32, "tiles 3 J samples"]
+    importance: Shaped[NDArray[np.float64], "*levels 3 J"]
+    bounds: Shaped[NDArray[np.int64], " ends"] | None = None
 
     is_whole = True
     is_exact = True
 
     @property
     def num_bytes(self) -> int:
-        """Memory it holds."""
+        """Memory in use."""
         return self.transport.nbytes
 
-    def add(self, change: NDArray[np.float64], image: F32) -> None:
+    def add(self, change: Shaped[NDArray[np.float64], "*levels 3 J"], image: Shaped[F32, "tiles 3 samples"]) -> None:
         """Add Σ_j Δc_j T_j to an image; see `Operator`."""
         stream(self.transport, changed_columns(change), image, self.bounds)
 
-    def columns_at(self, sample: int) -> NDArray[np.float64]:
-        """What each coefficient gives to one sample. (3, J)"""
+    def columns_at(self, sample: int) -> Shaped[NDArray[np.float64], "3 J"]:
+        """Return the column values at one sample."""
         tile, offset = divmod(sample, self.transport.shape[3])
         return self.transport[tile, :, :, offset].astype(np.float64)
 
 
 class MergedLightOperator(LinearOperator):
-    """An operator of merged lights: how an image changes, nearly, until the exact one is there."""
+    """Merged-light operator: approximates changes of an image until the exact operator is computed."""
 
     is_whole = False
     is_exact = False
 
 
 def tile_layout(num_samples: int) -> tuple[int, int]:
-    """Number of tiles, and samples a tile, that hold so many samples: tiles alike, none much larger than needed."""
+    """Return the number of equal tiles for a number of samples, and their size, with little padding."""
     tiles = max(1, -(-num_samples // TILE_SAMPLES))
     samples = -(-num_samples // tiles)
     return tiles, -(-max(1, samples) // 16) * 16
 
 
 def operator_bytes(num_samples: int, num_bands: int) -> int:
-    """Memory that freezing needs to keep."""
+    """Return the memory of an operator."""
     tiles, samples = tile_layout(num_samples)
     return tiles * samples * 3 * num_bands * 4
 
 
 def quantized_bytes(num_samples: int, num_bands: int) -> int:
-    """Memory that freezing needs to keep where it packs."""
+    """Return the memory of a quantized operator."""
     tiles, samples = tile_layout(num_samples)
     return tiles * 3 * num_bands * (2 * samples + 4 * -(-samples // BLOCK_SAMPLES))
 
@@ -103,16 +102,16 @@ def precompute(
     *,
     is_quantized: bool = False,
 ) -> LinearOperator | QuantizedOperator:
-    """Project all receivers along a curve.
+    """Precompute the operator of one free curve at all receivers.
 
     Args:
-        bands: of all the term's curves, (3, J) each, or (L, 3, J) where one differs from level to level; the active
-            one's values do not matter.
-        lights, receivers: what arrives, and where.
-        progress: called with the share done. is_canceled: asked now and then.
-        is_quantized: whether the operator is packed.
+        bands: of all the term's curves, (3, J) each, or (L, 3, J) if one depends on the level; values of the active
+            one do not matter.
+        lights, receivers: incident light, and its receivers.
+        progress: called with the completed fraction. is_canceled: polled.
+        is_quantized: whether the operator is quantized.
     Raises:
-        CancelledError: `is_canceled` said so.
+        CancelledError: `is_canceled` returned True.
     """
     contractions = contract_levels(term, without_free_curves(bands, [active]), active)
 
@@ -132,20 +131,20 @@ def pack_columns(
     rows: Callable[[int, int], F32],
     num_columns: int,
     receivers: ShadingPoints,
-    bounds: NDArray[np.int64] | None,
+    bounds: Shaped[NDArray[np.int64], " ends"] | None,
     progress: Callable[[float], None],
     is_canceled: Callable[[], bool],
     *,
     is_quantized: bool,
 ) -> LinearOperator | QuantizedOperator:
-    """Make an operator of its rows, block after block, so that nothing but itself is in memory as a whole.
+    """Build an operator from its rows, block by block, so that no second copy is in memory.
 
     Args:
         rows: columns at samples [begin, end), called from several threads. (3, end - begin, J) float32
         num_columns: J. receivers: all samples. bounds: from `level_bounds`.
-        progress: called with the share done. is_canceled: asked now and then. is_quantized: whether it is packed.
+        progress: called with the completed fraction. is_canceled: polled. is_quantized: whether it is quantized.
     Raises:
-        CancelledError: `is_canceled` said so.
+        CancelledError: `is_canceled` returned True.
     """
     num_samples, lock = len(receivers.normal), threading.Lock()
     tiles, samples = tile_layout(num_samples)
@@ -183,13 +182,11 @@ def pack_columns(
 
 def level_bounds(
     receivers: ShadingPoints, bands: Mapping[str, NDArray[np.float64]], free_curves: Iterable[str]
-) -> NDArray[np.int64] | None:
-    """Where the samples of each level begin and end, where the curves that move differ; None where they do not.
+) -> Shaped[NDArray[np.int64], " ends"] | None:
+    """Return the L + 1 bounds of the levels' samples, if free curves depend on the level; else None.
 
     Args:
-        receivers: sorted by level. bands: of all curves. free_curves: names of those that are free.
-    Returns:
-        (L + 1,) int64
+        receivers: sorted by level. bands: of all curves. free_curves: names of the free curves.
     """
     num_of_levels = num_levels({name: bands[name] for name in free_curves})
     if num_of_levels == 1 or receivers.level is None:

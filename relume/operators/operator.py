@@ -1,4 +1,4 @@
-"""What every operator of a term does, whether it was made of all samples of a picture or of some of them."""
+"""Interface of the operators of a term, of all samples of an image or of a subset."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from typing import ClassVar
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 F32 = NDArray[np.float32]
@@ -16,34 +17,29 @@ class Operator(ABC):
     """The linear map from coefficients to the image of one term.
 
     Attributes:
-        is_whole: made of all samples: its sums are images; else they only say how an image changes.
-        is_exact: its sums are those that a full evaluation gives, to rounding.
-        importance: length of each column over all samples; what a coefficient moves in the picture. (3, J) float64,
-            (L, 3, J) over those of each level
+        is_whole: contains all samples, so that its sums are images; otherwise they are changes of an image.
+        is_exact: its sums equal a full evaluation up to rounding.
+        importance: norm of each column over all samples.
     """
 
     is_whole: ClassVar[bool]
     is_exact: ClassVar[bool]
-    importance: F64
+    importance: Shaped[F64, "*levels 3 J"]
 
     @property
     @abstractmethod
     def num_bytes(self) -> int:
-        """Memory it holds."""
+        """Memory in use."""
 
     @abstractmethod
-    def add(self, change: F64, image: F32) -> None:
+    def add(self, change: Shaped[F64, "*levels 3 J"], image: Shaped[F32, "tiles 3 samples"]) -> None:
         """Add Σ_j Δc_j T_j to an image; see `write_image`."""
 
     @abstractmethod
-    def columns_at(self, sample: int) -> F64:
-        """What each coefficient gives to one sample. (3, J)"""
+    def columns_at(self, sample: int) -> Shaped[F64, "3 J"]:
+        """Return the column values at one sample."""
 
-    def write_image(self, coefficients: F64, image: F32) -> None:
-        """Write Σ_j c_j T_j over an image.
-
-        Args:
-            coefficients: c of all columns. (3, J), or (L, 3, J). image: (tiles, 3, samples) float32, overwritten
-        """
+    def write_image(self, coefficients: Shaped[F64, "*levels 3 J"], image: Shaped[F32, "tiles 3 samples"]) -> None:
+        """Overwrite an image with Σ_j c_j T_j, for the coefficients c of all columns."""
         image[:] = 0
         self.add(coefficients, image)

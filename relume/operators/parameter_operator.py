@@ -1,12 +1,12 @@
-"""Freezing along a parameter: a term's image at any value of it, also where it moves several curves at once.
+"""Operators of a parameter: a term's image at any value of it, even if it changes several curves.
 
 The image of a term is a linear function of the product of its curves (eq. 26, Ben-Artzi 2006). Over a parameter's range
-these products lie almost in a space of few dimensions (Nguyen 2010, section 4): the operator holds the images at a few
+these products lie close to a space of few dimensions (Nguyen 2010, section 4): the operator holds the images at a few
 values of the parameter that span it,
 
     R(p) = Σ_s c_s(p) R(p_s),
 
-with as many as hold every band of the product to `MAX_ERROR`, and so every pixel
+as many as represent every band of the product to `MAX_ERROR`, and hence every pixel
 (docs/direct-light.md#algorithm).
 """
 
@@ -18,6 +18,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.curves import curve_bands, drawn_curves
@@ -39,21 +40,19 @@ ParameterSettings = tuple[tuple[str, float | tuple[float, ...]], ...]
 
 MAX_ERROR = 2e-2
 MAX_NODES = 36
-_TARGET_ERROR = 0.9 * MAX_ERROR  # at the values that are looked at; between them it is a little more
+_TARGET_ERROR = 0.9 * MAX_ERROR  # at the checked values; between these it is a little larger
 _NUM_VALUES = 97
-_MAX_SECONDARY_BANDS = (
-    12  # of every moved curve but the first, at most: those are smooth, and a product with all is large
-)
+_MAX_SECONDARY_BANDS = 12  # of each affected curve but the first: those are smooth, and a full product is large
 
 
 @dataclass(frozen=True)
 class ParameterOperator:
-    """What a parameter does to a term's curves, as a combination of what it does at a few values; an `EditBasis`.
+    """A basis of a parameter's curves at a few values of it; an `EditBasis`.
 
     Attributes:
-        fixed_settings: parameters that move the same curves, with their values.
-        curves: those it moves.
-        nodes: of R, G and B, equally many; their curves are products of those moved (`_product`).
+        fixed_settings: other parameters of the same curves, with their values.
+        curves: affected by the parameter.
+        nodes: of R, G and B, equally many; products of the affected curves (`_product`).
     """
 
     model: str
@@ -66,25 +65,25 @@ class ParameterOperator:
 
     @property
     def label(self) -> str:
-        """What people read."""
+        """Label for users."""
         return TERMS[self.model].parameter(self.parameter).label
 
     @property
     def affected_curves(self) -> tuple[str, ...]:
-        """Names of the curves it moves."""
+        """Names of the affected curves."""
         return tuple(curve.name for curve in self.curves)
 
     @property
     def num_columns(self) -> int:
-        """S, the number of nodes."""
+        """Number of nodes S."""
         return len(self.nodes[0].values)
 
     def is_valid_for(self, document: Mapping[str, Any]) -> bool:
-        """Whether a term document differs from the one linearised in the parameter alone, as far as its curves go."""
+        """Return True if the curves of a term document differ from the linearized one by the parameter alone."""
         return document["model"] == self.model and _fixed_settings(document, self.parameter) == self.fixed_settings
 
-    def coefficients(self, bands: Mapping[str, F64]) -> F64:
-        """c of a term's curves, (3, J) each. (3, S); (L, 3, S) where moved curves differ from level to level"""
+    def coefficients(self, bands: Mapping[str, F64]) -> Shaped[F64, "*levels 3 S"]:
+        """Return the coefficients c of a term's curves, (3, J) each; one set per level if a curve depends on it."""
         moved_bands = {name: bands[name] for name in self.affected_curves}
         num_of_levels = num_levels(moved_bands)
         return (
@@ -96,7 +95,7 @@ class ParameterOperator:
         )
 
     def _coefficients_at_level(self, bands: Mapping[str, F64]) -> F64:
-        """c at one level. (3, S)"""
+        """Return c at one level. (3, S)"""
         moved_rows = [bands[curve.name] for curve in self.curves]
         if all(np.all(rows == rows[0]) for rows in moved_rows) and self.nodes[0] is self.nodes[1] is self.nodes[2]:
             return np.tile(self.nodes[0].coefficients(_product([rows[0] for rows in moved_rows])), (3, 1))
@@ -104,7 +103,7 @@ class ParameterOperator:
         return np.array([nodes.coefficients(curve) for nodes, curve in zip(self.nodes, products, strict=True)])
 
     def node_bands(self) -> dict[str, F64]:
-        """Bands of the moved curves at all nodes. (3, S, J) each"""
+        """Return the bands of the affected curves at all nodes. (3, S, J) each"""
         documents = [
             _document_at(self.model, self.fixed_settings, self.parameter, values)
             for values in zip(*(n.values for n in self.nodes), strict=True)
@@ -125,18 +124,18 @@ class ParameterOperator:
         *,
         is_quantized: bool = False,
     ) -> LinearOperator | QuantizedOperator:
-        """Contract all curves at all nodes in one pass: the columns are the images there.
+        """Contract all curves at all nodes in one pass: the columns are the images at the nodes.
 
-        Where the parameter moves a single curve, its nodes are combinations of that curve's bands, which are quicker to
-        share light out to.
+        If the parameter affects a single curve, its nodes are combinations of that curve's bands, which are faster to
+        project.
 
         Args:
-            bands: of all the term's curves, (3, J) each; the moved ones' values do not matter.
-            lights, receivers: what arrives, and where.
-            progress: called with the share done. is_canceled: asked now and then.
-            is_quantized: whether the operator is packed.
+            bands: of all the term's curves, (3, J) each; values of the affected ones do not matter.
+            lights, receivers: incident light, and its receivers.
+            progress: called with the completed fraction. is_canceled: polled.
+            is_quantized: whether the operator is quantized.
         Raises:
-            CancelledError: `is_canceled` said so.
+            CancelledError: `is_canceled` returned True.
         """
         node_bands = self.node_bands()
         single_curve = self.affected_curves[0] if len(self.affected_curves) == 1 else None
@@ -158,13 +157,13 @@ class ParameterOperator:
 
 
 def linearize(document: Mapping[str, Any], parameter: str) -> ParameterOperator | None:
-    """The nodes of a term's parameter; None where none do: no curve moves, one is drawn, or `MAX_NODES` are too few."""
+    """Choose nodes of a parameter; None if it affects no curve, one is drawn, or `MAX_NODES` are too few."""
     fixed_settings = _fixed_settings(document, parameter)
     return None if fixed_settings is None else _linearize_cached(document["model"], parameter, fixed_settings)
 
 
 def _fixed_settings(document: Mapping[str, Any], parameter: str) -> ParameterSettings | None:
-    """What else the curves that a parameter moves are made from; None where it moves none, or one is drawn."""
+    """Return the other settings of the curves that a parameter affects; None if it affects none, or one is drawn."""
     term = TERMS[document["model"]]
     curves = curves_of_parameter(term, parameter)
     if not curves or any(drawn_curves(document, curve) for curve in curves):
@@ -184,7 +183,7 @@ def _linearize_cached(model: str, parameter: str, fixed_settings: ParameterSetti
     documents = [
         _document_at(model, fixed_settings, parameter, (value, value, value)) for value in (*values, *midpoints)
     ]
-    # (n, 3, J) of each curve
+    # (n, 3, J) per curve
     curve_rows = [np.array([curve_bands(document, curve) for document in documents]) for curve in curves]
     weights = _product([solid_angles(curve) for curve in curves])
     is_gray = all(bool(np.all(rows == rows[:, :1])) for rows in curve_rows)
@@ -196,7 +195,7 @@ def _linearize_cached(model: str, parameter: str, fixed_settings: ParameterSetti
 
 
 def _choose_channel_nodes(num: int, values: F64, rows: Sequence[F64], weights: F64) -> list[CurveNodes] | None:
-    """Equally many nodes of each channel, as few as are enough; None where `MAX_NODES` are not.
+    """Choose nodes per channel, as few as suffice and equally many; None if `MAX_NODES` do not suffice.
 
     Args:
         rows: of each curve, at the values and between them. (2 n − 1, 3, J) each
@@ -222,16 +221,16 @@ def _choose_channel_nodes(num: int, values: F64, rows: Sequence[F64], weights: F
 def _document_at(
     model: str, fixed_settings: ParameterSettings, parameter: str, values: Sequence[float]
 ) -> dict[str, Any]:
-    """A document with one parameter at a value for R, G and B."""
+    """Return a document with one parameter set to a value for R, G and B."""
     return {"model": model, "params": {**dict(fixed_settings), parameter: [float(value) for value in values]}}
 
 
 def _product(bands: Sequence[F64]) -> F64:
-    """Products of bands of all moved curves: all of the first, some of each other. (J_1,), … -> (J,)"""
+    """Return products of bands of the affected curves: all of the first, some of each other. (J_1,), … -> (J,)"""
     first, *secondary = bands
     return joint([first, *(rows[_secondary_bands(len(rows))] for rows in secondary)])
 
 
 def _secondary_bands(num: int) -> NDArray[np.intp]:
-    """Some of so many bands, denser towards the horizon, where masking turns."""
+    """Select bands, denser toward grazing angles, where masking varies."""
     return num - np.unique(np.geomspace(1, num, _MAX_SECONDARY_BANDS).astype(np.intp))

@@ -1,10 +1,10 @@
-"""An operator in half the memory: columns in 16 bits, with a scale for each column of each block of samples.
+"""An operator in half the memory: columns in 16 bits, with a scale per column and block of samples.
 
     T_ij ≈ s_bj n_ij,   n an integer of 16 bits, s_bj the largest |T_ij| of block b over 32,767
 
-A rest of at most s/2 stays in every number: images of all columns are within 10⁻⁴ of those in float32, for which
-float16 needs as much memory and has three times the error (docs/direct-light.md#algorithm). An operator in
-use adds changes to an exact image, so that the rest is one of the change alone.
+The rounding error of an entry is at most s/2: images of all columns are within 10⁻⁴ of those in float32, a third of the
+error of float16 with the same memory (docs/direct-light.md#algorithm). An operator in use adds changes to an exact
+image, so that only the change is rounded.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -29,46 +30,40 @@ _MAX_CODE = 32_767
 
 @dataclass(frozen=True)
 class QuantizedOperator(Operator):
-    """As `relume.operators.linear_operator.LinearOperator`, in 16 bits.
+    """`relume.operators.linear_operator.LinearOperator` in 16 bits.
 
     Attributes:
-        transport: integers. (tiles, 3, J, samples) int16
-        scale: what they are multiplied by. (tiles, 3, J, blocks) float32
-        importance, bounds: see `LinearOperator`.
+        transport: integers. scale: their factors. importance, bounds: see `LinearOperator`.
     """
 
-    transport: NDArray[np.int16]
-    scale: F32
-    importance: F64
-    bounds: NDArray[np.int64] | None = None
+    transport: Shaped[NDArray[np.int16], "tiles 3 J samples"]
+    scale: Shaped[F32, "tiles 3 J blocks"]
+    importance: Shaped[F64, "*levels 3 J"]
+    bounds: Shaped[NDArray[np.int64], " ends"] | None = None
 
     is_whole = True
     is_exact = False
 
     @property
     def num_bytes(self) -> int:
-        """Memory it holds."""
+        """Memory in use."""
         return self.transport.nbytes + self.scale.nbytes
 
-    def add(self, change: F64, image: F32) -> None:
+    def add(self, change: Shaped[F64, "*levels 3 J"], image: Shaped[F32, "tiles 3 samples"]) -> None:
         """Add Σ_j Δc_j T_j to an image; see `Operator`."""
         stream_quantized(self.transport, self.scale, changed_columns(change), image, self.bounds)
 
-    def columns_at(self, sample: int) -> F64:
-        """What each coefficient gives to one sample. (3, J)"""
+    def columns_at(self, sample: int) -> Shaped[F64, "3 J"]:
+        """Return the column values at one sample."""
         tile, offset = divmod(sample, self.transport.shape[3])
         scale = self.scale[tile, :, :, offset // BLOCK_SAMPLES].astype(np.float64)
         return np.asarray(scale * self.transport[tile, :, :, offset])
 
 
-def quantize(rows: F32) -> tuple[NDArray[np.int16], F32]:
-    """Integers of 16 bits for the columns of one block, and their scales.
-
-    Args:
-        rows: of its samples. (channels, samples, J)
-    Returns:
-        (channels, samples, J) int16, (channels, J) float32
-    """
+def quantize(
+    rows: Shaped[F32, "channels samples J"],
+) -> tuple[Shaped[NDArray[np.int16], "channels samples J"], Shaped[F32, "channels J"]]:
+    """Quantize the columns of one block of samples; returns integers and their scales."""
     scale = np.abs(rows).max(axis=1) / np.float32(_MAX_CODE)
     inverse_scale = np.divide(1, scale, out=np.zeros_like(scale), where=scale > np.finfo(np.float32).tiny)
     return np.rint(rows * inverse_scale[:, None]).clip(-_MAX_CODE, _MAX_CODE).astype(np.int16), scale
@@ -118,16 +113,19 @@ def _stream(transport, scale, bounds, index, change, count, image, start, stop):
 
 
 def stream_quantized(
-    transport: NDArray[np.int16], scale: F32, columns: Columns, image: F32, bounds: NDArray[np.int64] | None = None
+    transport: Shaped[NDArray[np.int16], "tiles 3 J samples"],
+    scale: Shaped[F32, "tiles 3 J blocks"],
+    columns: Columns,
+    image: Shaped[F32, "tiles 3 samples"],
+    bounds: Shaped[NDArray[np.int64], " ends"] | None = None,
 ) -> None:
     """Add T · Δc to an image, in place; see `relume.operators.update_kernel.stream`.
 
+    Reads 2 · count · tiles · samples bytes per channel; memory-bound.
+
     Args:
-        transport: (tiles, 3, J, samples) int16. scale: of its blocks. (tiles, 3, J, blocks) float32
-        columns: what has changed, from `changed_columns`.
-        image: added to. (tiles, 3, samples) float32
-        bounds: where the samples of each level begin and end, tile after tile; None: there is one. (L + 1,) int64
-    Cost: reads 2 · count · tiles · samples bytes a channel; bound by the memory's bandwidth.
+        transport: quantized. scale: of its blocks. columns: from `changed_columns`.
+        image: added to. bounds: of the levels' samples, tile by tile; None for a single level.
     """
     if columns.count.any():
         if bounds is None:

@@ -1,9 +1,9 @@
-"""The image of a term with all its curves contracted: what a picture shows before anybody touches a curve.
+"""The image of a term with all curves contracted, before an operator exists.
 
     Σ_j c_j T_j = Σ_m V L_m Ω_m cos θi · q · Π_f mean_m(f)
 
-The sums that freezing makes, by another quadrature (`relume.transport.shading.shader`); pictures differ by a thousandth
-or two.
+The same sums as those of an operator, by another quadrature (`relume.transport.shading.shader`); images differ by
+one or two thousandths.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
@@ -32,30 +33,30 @@ _MIN_ROWS_PER_STEP, _MAX_ROWS_PER_STEP, _NUM_STEPS = 128, 2048, 8
 
 @dataclass(frozen=True)
 class ShadedTerm:
-    """An image of one term, before colour, texture and outgoing curves. (tiles, 3, samples) float32"""
+    """An image of one term, before color, texture and outgoing curves."""
 
-    image: F32
+    image: Shaped[F32, "tiles 3 samples"]
 
     @classmethod
-    def from_rows(cls, rows: F32) -> ShadedTerm:
-        """From one row for each sample, padded with zeros to whole tiles. rows: (n, 3)"""
+    def from_rows(cls, rows: Shaped[F32, "n 3"]) -> ShadedTerm:
+        """Create an image from one row per sample, padded with zeros to whole tiles."""
         tiles, samples = tile_layout(len(rows))
         padded = np.zeros((tiles * samples, 3), np.float32)
         padded[: len(rows)] = rows
         return cls(np.ascontiguousarray(padded.reshape(tiles, samples, 3).transpose(0, 2, 1)))
 
-    def rows(self, num_samples: int) -> F32:
-        """One row for each sample. (num_samples, 3)"""
+    def rows(self, num_samples: int) -> Shaped[F32, "n 3"]:
+        """Return one row per sample."""
         return self.image.transpose(0, 2, 1).reshape(-1, 3)[:num_samples]
 
     @property
     def num_bytes(self) -> int:
-        """Memory it holds."""
+        """Memory in use."""
         return self.image.nbytes
 
 
 def shaded_bytes(num_samples: int) -> int:
-    """Memory that shading needs to keep."""
+    """Return the memory of a shaded image."""
     tiles, samples = tile_layout(num_samples)
     return tiles * samples * 3 * 4
 
@@ -67,13 +68,13 @@ def shade_rows(
     receivers: ShadingPoints,
     start: int,
     stop: int,
-    base_radiance: F32 | None = None,
-) -> F32:
-    """Contract all curves of a term at receivers [start, stop). (stop - start, 3)
+    base_radiance: Shaped[F32, "n 3"] | None = None,
+) -> Shaped[F32, "m 3"]:
+    """Contract all curves of a term at receivers [start, stop).
 
     Args:
         contractions: of the term's curves, none of them free, from `contract_levels`.
-        lights, receivers: what arrives, and where. base_radiance: as `Shader` takes it.
+        lights, receivers: incident light, and its receivers. base_radiance: as in `Shader`.
     """
     if term.texels is not None and receivers.uv is not None:
         return texel_rows(term.texels, lights, receivers, start, stop)
@@ -83,25 +84,25 @@ def shade_rows(
 
 @dataclass(frozen=True, eq=False)
 class PartialImage:
-    """An image of one term of which some is shaded.
+    """A partially shaded image of one term.
 
     Attributes:
-        rows: one for each sample, nothing where it is not shaded yet. (n, 3) float32
-        steps: which of them are.
+        rows: one per sample, zero until it is shaded.
+        steps: the completed ranges.
     """
 
-    rows: F32
+    rows: Shaped[F32, "n 3"]
     steps: ResumableLoop
 
     @classmethod
     def empty(cls, num_samples: int) -> PartialImage:
-        """Nothing of it."""
+        """Create an image without shaded samples."""
         grain = min(max(num_samples // _NUM_STEPS, _MIN_ROWS_PER_STEP), _MAX_ROWS_PER_STEP)
         return cls(np.zeros((num_samples, 3), np.float32), ResumableLoop.start(num_samples, grain))
 
     @property
     def num_bytes(self) -> int:
-        """Memory it holds."""
+        """Memory in use."""
         return self.rows.nbytes + self.steps.done.nbytes
 
     def shade(
@@ -112,16 +113,16 @@ class PartialImage:
         receivers: ShadingPoints,
         progress: Callable[[float], None],
         is_canceled: Callable[[], bool],
-        target_rows: NDArray[np.bool_] | None = None,
+        target_rows: Shaped[NDArray[np.bool_], " n"] | None = None,
     ) -> None:
-        """Shade what is lacking of it.
+        """Shade the missing samples.
 
         Args:
-            term: it is of. bands: of its curves, as of `shade`. lights, receivers: what arrives, and where.
-            progress: called with the share done. is_canceled: asked now and then.
-            target_rows: samples that are shaded, with those beside them; None: all. (n,)
+            term: of the image. bands: of its curves, as in `shade`. lights, receivers: incident light, and receivers.
+            progress: called with the completed fraction. is_canceled: polled.
+            target_rows: samples to shade, with others of the same ranges; None: all.
         Raises:
-            CancelledError: `is_canceled` said so; what was shaded stays.
+            CancelledError: `is_canceled` returned True; completed ranges are kept.
         """
         contractions = contract_levels(term, bands, None)
 
@@ -142,11 +143,11 @@ def shade(
     """Contract all curves of a term.
 
     Args:
-        bands: of each curve that depends on wi. (3, J) each, or (L, 3, J) where it differs from level to level
-        lights, receivers: what arrives, and where.
-        progress: called with the share done. is_canceled: asked now and then.
+        bands: of each curve that depends on wi. (3, J) each, or (L, 3, J) if it depends on the level
+        lights, receivers: incident light, and its receivers.
+        progress: called with the completed fraction. is_canceled: polled.
     Raises:
-        CancelledError: `is_canceled` said so.
+        CancelledError: `is_canceled` returned True.
     """
     partial_image = PartialImage.empty(len(receivers.normal))
     partial_image.shade(term, bands, lights, receivers, progress, is_canceled)

@@ -1,9 +1,9 @@
-"""An operator of some samples, for pictures whose operator of all would not fit the memory.
+"""An operator at a subset of samples, for images whose full operator would exceed the memory.
 
     R' = R + W T Δc
 
-T are the columns at the chosen samples, W says how all others change with them. An image keeps what it has of shadows,
-edges and bumps, which only its change knows coarsely (docs/direct-light.md#algorithm).
+T are the columns at the selected samples, W interpolates their changes to all others. The image keeps its shadows,
+edges and normal-mapped detail; only its change is coarse (docs/direct-light.md#algorithm).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -23,39 +24,38 @@ from relume.operators.quantized import QuantizedOperator
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-NUM_NEIGHBORS = 3  # chosen samples that a sample changes with
+NUM_NEIGHBORS = 3  # selected samples that a sample is interpolated from
 _NEIGHBOR_BYTES = 8 * NUM_NEIGHBORS
 
 
 @dataclass(frozen=True)
 class SubsampledOperator(Operator):
-    """The operator of a term at chosen samples, and what all others take of it.
+    """The operator of a term at selected samples, with interpolation weights for all others.
 
     Attributes:
-        subset_operator: of the chosen samples. num_subset: their number.
-        neighbors: chosen samples that each changes with. (n, k) int32
-        weight: of each of them; rows sum to one. (n, k) float32
+        subset_operator: at the selected samples. num_subset: their number.
+        neighbors: selected samples around each sample. weight: of these; rows sum to one.
     """
 
     subset_operator: LinearOperator | QuantizedOperator
     num_subset: int
-    neighbors: NDArray[np.int32]
-    weight: F32
-    importance: F64 = field(init=False)
+    neighbors: Shaped[NDArray[np.int32], "n k"]
+    weight: Shaped[F32, "n k"]
+    importance: Shaped[F64, "*levels 3 J"] = field(init=False)
 
     is_whole = False
     is_exact = False
 
     def __post_init__(self) -> None:
-        scale = np.sqrt(len(self.neighbors) / max(1, self.num_subset))  # a chosen sample stands for so many
+        scale = np.sqrt(len(self.neighbors) / max(1, self.num_subset))  # samples per selected sample
         object.__setattr__(self, "importance", self.subset_operator.importance * scale)
 
     @property
     def num_bytes(self) -> int:
-        """Memory it holds."""
+        """Memory in use."""
         return self.subset_operator.num_bytes + self.neighbors.nbytes + self.weight.nbytes
 
-    def add(self, change: F64, image: F32) -> None:
+    def add(self, change: Shaped[F64, "*levels 3 J"], image: Shaped[F32, "tiles 3 samples"]) -> None:
         """Add W Σ_j Δc_j T_j to an image; see `Operator`."""
         tiles, _, _, samples = self.subset_operator.transport.shape
         subset_change = np.zeros((tiles, 3, samples), np.float32)
@@ -64,24 +64,24 @@ class SubsampledOperator(Operator):
             np.ascontiguousarray(subset_change.transpose(0, 2, 1).reshape(-1, 3)), self.neighbors, self.weight, image
         )
 
-    def columns_at(self, sample: int) -> F64:
-        """What each coefficient gives to one sample, as far as the chosen ones tell. (3, J)"""
+    def columns_at(self, sample: int) -> Shaped[F64, "3 J"]:
+        """Return the interpolated column values at one sample."""
         columns = [self.subset_operator.columns_at(int(row)) for row in self.neighbors[sample]]
         return np.asarray(np.tensordot(self.weight[sample].astype(np.float64), columns, 1))
 
 
 def subsampled_bytes(num_samples: int, num_subset: int, num_bands: int) -> int:
-    """Memory that an operator of some of a term's samples needs to keep.
+    """Return the memory of an operator at a subset of a term's samples.
 
     Args:
-        num_samples: of the term. num_subset: of them, chosen. num_bands: columns of each channel.
+        num_samples: of the term. num_subset: selected samples. num_bands: columns per channel.
     """
     return quantized_bytes(num_subset, num_bands) + num_samples * _NEIGHBOR_BYTES
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _interpolate(rows, neighbors, weight, image, start, stop):  # type: ignore[no-untyped-def]
-    """Add to tiles [start, stop) of an image."""
+    """Interpolate tiles [start, stop) of an image and add them."""
     samples, num = image.shape[2], neighbors.shape[1]
     for tile in range(start, stop):
         first = tile * samples
@@ -97,12 +97,16 @@ def _interpolate(rows, neighbors, weight, image, start, stop):  # type: ignore[n
             image[tile, 2, s] += blue
 
 
-def interpolate(rows: F32, neighbors: NDArray[np.int32], weight: F32, image: F32) -> None:
-    """Add to every sample of an image the weighted sum of what is at some, in place.
+def interpolate(
+    rows: Shaped[F32, "m 3"],
+    neighbors: Shaped[NDArray[np.int32], "n k"],
+    weight: Shaped[F32, "n k"],
+    image: Shaped[F32, "tiles 3 samples"],
+) -> None:
+    """Interpolate values of selected samples and add them to an image, in place.
 
     Args:
-        rows: at those. (m, 3) float32, C order. neighbors: which of them each sample takes. (n, k) int32
-        weight: how much of each. (n, k) float32
-        image: added to. (tiles, 3, samples) float32 that hold n samples
+        rows: values of the selected samples, C order. neighbors: selected samples for each of n samples.
+        weight: of these. image: added to; holds n samples.
     """
     parallel_for_chunks(lambda start, stop: _interpolate(rows, neighbors, weight, image, start, stop), len(image))

@@ -1,4 +1,4 @@
-"""Light at the samples of a texture that looks different from every side, kept while texels are summed anew."""
+"""Incident light at samples with a BTF, cached while texels are summed again."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.terms.btf import BtfRef
@@ -20,34 +21,34 @@ from relume.transport.texture_light import rotated_tables, texture_light_rows
 F32 = NDArray[np.float32]
 
 _SAMPLES_PER_RANGE = 1024
-_MAX_CLUSTERS_PER_SAMPLE = 8  # a sample, in which its texels are, at most
-_MAX_TABLE_ROWS = 12_000_000  # rows of tables: half a second of two cores
+_MAX_CLUSTERS_PER_SAMPLE = 8  # maximum number of clusters of a sample's texels
+_MAX_TABLE_ROWS = 12_000_000  # rows of tables: half a second on two cores
 
 
 @dataclass(frozen=True, eq=False)
 class BtfIncidentLight:
-    """What arrives at n samples from each direction in which a BTF is known.
+    """Incident light of n samples in the direction basis of a BTF.
 
     Attributes:
-        light: see `relume.transport.texture_light`. (n, 3, L) float32
-        rotation: of the texture in whose frames the directions are, radians.
+        light: see `relume.transport.texture_light`.
+        rotation: of the texture that defines the frames, radians.
     """
 
-    light: F32
+    light: Shaped[F32, "n 3 L"]
     rotation: float
 
     @property
     def num_bytes(self) -> int:
-        """Memory it holds."""
+        """Memory in use."""
         return self.light.nbytes
 
     def shade(self, btf_ref: BtfRef, receivers: ShadingPoints) -> ShadedTerm:
-        """The image of a BTF of the same directions, in the threads of the caller.
+        """Return the image of a BTF with the same directions, in the threads of the caller.
 
-        A texture that was turned since is lit nearly: light is spread by up to a step of a ring.
+        After a rotation of the texture it is approximate: light is blurred by up to one step of a ring.
 
         Args:
-            btf_ref: how the samples are covered. receivers: the samples; light need not be with them.
+            btf_ref: the BTF and its mapping. receivers: the samples; their light is not used.
         """
         tables, rotation_delta = btf_ref.tables, btf_ref.rotation - self.rotation
         if rotation_delta:
@@ -62,13 +63,13 @@ class BtfIncidentLight:
 
 
 def fits_budget(btf_ref: BtfRef, num_samples: int) -> bool:
-    """Whether a frame can wait for texels to be summed anew: each sample sums the tables of clusters about it."""
+    """Return True if texels can be summed again within a frame: each sample sums the tables of nearby clusters."""
     clusters = min(btf_ref.btf.mean.shape[1], _MAX_CLUSTERS_PER_SAMPLE)
     return bool(num_samples * clusters * (1 + btf_ref.btf.num_components) <= _MAX_TABLE_ROWS)
 
 
 def incident_light_bytes(btf_ref: BtfRef, num_samples: int) -> int:
-    """Memory that keeping it takes."""
+    """Return the memory of `BtfIncidentLight`."""
     return 4 * 3 * btf_ref.btf.grid.num_directions * num_samples
 
 
@@ -79,13 +80,13 @@ def collect_light(
     progress: Callable[[float], None],
     is_canceled: Callable[[], bool],
 ) -> BtfIncidentLight:
-    """Share light out to the directions of a BTF.
+    """Project incident light onto the direction basis of a BTF.
 
     Args:
-        btf_ref: how samples are covered. lights, receivers: what arrives, and where.
-        progress: called with the share done. is_canceled: asked now and then.
+        btf_ref: the BTF and its mapping. lights, receivers: incident light, and its receivers.
+        progress: called with the completed fraction. is_canceled: polled.
     Raises:
-        CancelledError: `is_canceled` said so.
+        CancelledError: `is_canceled` returned True.
     """
     num_samples = len(receivers.normal)
     light = np.empty((num_samples, 3, btf_ref.btf.grid.num_directions), np.float32)
@@ -100,12 +101,12 @@ def collect_light(
 def indirect_texel_light(
     btf_ref: BtfRef, sampled: BtfIncidentLight, weights: Any, receivers: ShadingPoints
 ) -> ShadedTerm:
-    """The image of a BTF in light that is known at a few of its samples: texels are each sample's own.
+    """Return the image of a BTF with light interpolated from few samples; texels are those of each sample.
 
     Args:
-        btf_ref: how all samples are covered. sampled: what arrives at a few of them.
-        weights: of these in each. (samples, few samples) sparse float32
-        receivers: all samples; light need not be with them.
+        btf_ref: the BTF and its mapping at all samples. sampled: incident light at few samples.
+        weights: interpolation weights. (samples, few samples) sparse float32
+        receivers: all samples; their light is not used.
     """
     num_samples, num_sampled = weights.shape
     flat_light = sampled.light.reshape(num_sampled, -1)

@@ -1,6 +1,6 @@
-"""The update R += T · Δc: streams the columns of a frozen operator that changed (eq. 30, Ben-Artzi 2006).
+"""The incremental update R += T · Δc: streams the changed columns of an operator (eq. 30, Ben-Artzi 2006).
 
-Memory is laid out for this one access: [tile][channel][coefficient][sample], so that a column of a tile is one run.
+The memory layout serves this access only: [tile][channel][coefficient][sample], with contiguous columns per tile.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -16,28 +17,27 @@ from relume.core.thread_pools import parallel_for_chunks
 
 F32 = NDArray[np.float32]
 
-# Long runs keep the memory's prefetchers going: with 30 of 256 columns 16,384 samples read at 0.94 of the machine's
+# Long contiguous runs suit the hardware prefetcher: with 30 of 256 columns 16,384 samples read at 0.94 of the machine's
 # bandwidth, 4,096 at 0.70 (docs/performance.md).
 TILE_SAMPLES = 16_384
 
 
 @dataclass(frozen=True)
 class Columns:
-    """The coefficients that change, by level of the samples and by channel.
+    """The changed coefficients, by level of the samples and by channel.
 
     Attributes:
-        index: columns of each channel, rising; only the first `count` of a row hold. (L, 3, n) int32
-        change: Δc of each. (L, 3, n) float32
-        count: (L, 3) int64
+        index: columns of each channel, ascending; only the first `count` of a row are valid.
+        change: Δc of each. count: valid columns.
     """
 
-    index: NDArray[np.int32]
-    change: F32
-    count: NDArray[np.int64]
+    index: Shaped[NDArray[np.int32], "levels 3 n"]
+    change: Shaped[F32, "levels 3 n"]
+    count: Shaped[NDArray[np.int64], "levels 3"]
 
 
-def changed_columns(change: NDArray[np.float64]) -> Columns:
-    """The columns with a change; change: Δc, zero where nothing is to be done. (3, J), or (L, 3, J) float64"""
+def changed_columns(change: Shaped[NDArray[np.float64], "*levels 3 J"]) -> Columns:
+    """Return the columns with a nonzero change Δc."""
     change = change.reshape(-1, *change.shape[-2:])
     count = np.count_nonzero(change, axis=2)
     index = np.zeros((*count.shape, max(1, int(count.max()))), np.int32)
@@ -51,10 +51,10 @@ def changed_columns(change: NDArray[np.float64]) -> Columns:
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def tile_offset(bounds, level, tile, samples):  # type: ignore[no-untyped-def]
-    """Find where the samples of a level begin and end in a tile; there are none where they end before they begin.
+    """Return the range of a level's samples in a tile; empty if the end is not above the begin.
 
     Args:
-        bounds: see `stream`. level, tile: their numbers. samples: of a tile.
+        bounds: see `stream`. level, tile: their indices. samples: of a tile.
     """
     return max(bounds[level] - tile * samples, 0), min(bounds[level + 1] - tile * samples, samples)
 
@@ -63,7 +63,7 @@ def tile_offset(bounds, level, tile, samples):  # type: ignore[no-untyped-def]
 def _stream(transport, bounds, index, change, count, image, start, stop):  # type: ignore[no-untyped-def]
     """Add the changed columns of planes [start, stop), a plane being a channel of a tile.
 
-    Four columns at a time, so that the image is read and written less.
+    Processes four columns at a time to reduce traffic of the image.
     """
     samples = image.shape[2]
     for plane in range(start, stop):
@@ -89,14 +89,17 @@ def _stream(transport, bounds, index, change, count, image, start, stop):  # typ
                     sums[s] += wa * a[s]
 
 
-def stream(transport: F32, columns: Columns, image: F32, bounds: NDArray[np.int64] | None = None) -> None:
-    """Add T · Δc to an image, in place.
+def stream(
+    transport: Shaped[F32, "tiles 3 J samples"],
+    columns: Columns,
+    image: Shaped[F32, "tiles 3 samples"],
+    bounds: Shaped[NDArray[np.int64], " ends"] | None = None,
+) -> None:
+    """Add T · Δc to an image, in place. Reads 4 · count · tiles · samples bytes per channel; memory-bound.
 
     Args:
-        transport: (tiles, 3, J, samples) float32. columns: what has changed, from `changed_columns`.
-        image: added to. (tiles, 3, samples) float32
-        bounds: where the samples of each level begin and end, tile after tile; None: there is one. (L + 1,) int64
-    Cost: reads 4 · count · tiles · samples bytes a channel; bound by the memory's bandwidth.
+        transport: of the operator. columns: from `changed_columns`.
+        image: added to. bounds: of the levels' samples, tile by tile; None for a single level.
     """
     if columns.count.any():
         if bounds is None:

@@ -1,4 +1,4 @@
-"""Links: which cell each gather ray of a point hits. A pixel, a vertex or a cell may own the point."""
+"""Gather hits: the patch that each gather ray of a point hits. Points belong to pixels, probes or patches."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -36,23 +37,23 @@ _POINTS_PER_RANGE = 256
 
 @dataclass(frozen=True)
 class GatherHits:
-    """What the rays of n points hit.
+    """Hits of the gather rays of n points.
 
     Attributes:
-        patch: that each ray hits, `NO_PATCH` where it leaves the scene or was not to be traced. (n, rays) uint16
+        patch: that each ray hits, `NO_PATCH` if it leaves the scene or was not traced.
         num_rays: traced. trace_s: wall time of the tracing alone.
     """
 
-    patch: NDArray[np.uint16]
+    patch: Shaped[NDArray[np.uint16], "n rays"]
     num_rays: int
     trace_s: float
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _load_points(points, wo, pattern, first, width, packet, frame, local_wo, offsets):  # type: ignore[no-untyped-def]
-    """Begin with points [first, first + width): origins of their rays, local frames, shifts; one lane each.
+    """Load points [first, first + width): ray origins, local frames, offsets; one lane each.
 
-    wo: (n, 3). frame: tangent, bitangent, normal. (3, 3, `LANES`) shifts: (2 sets, 4, `LANES`)
+    wo: (n, 3). frame: tangent, bitangent, normal. (3, 3, `LANES`) offsets: (2 sets, 4, `LANES`)
     """
     position, normal, tangent, seed, alpha_sample = points
     for k in range(LANES):
@@ -72,7 +73,7 @@ def _load_points(points, wo, pattern, first, width, packet, frame, local_wo, off
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
 def _aim(pattern, ray, frame, local_wo, offsets, packet, width):  # type: ignore[no-untyped-def]
-    """Aim the same ray of all lanes; returns how many of them are above their horizon."""
+    """Generate the same ray of all lanes; return the number of rays above their horizon."""
     pattern_ray, is_cosine = pattern.rays[ray], ray < pattern.num_cosine
     cosine, glossy = offsets[0], offsets[1]
     num_valid = 0
@@ -94,7 +95,7 @@ def _aim(pattern, ray, frame, local_wo, offsets, packet, width):  # type: ignore
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
 def _locate_hits(packet, surfaces, tree, keys, nodes):  # type: ignore[no-untyped-def]
-    """Find the cells that the rays of all lanes have hit, into nodes. (`LANES`,) int32. keys: scratch. (6, `LANES`)"""
+    """Find the patches hit by the rays of all lanes, into nodes. (`LANES`,) int32. keys: scratch. (6, `LANES`)"""
     normals, sides, roots = surfaces[0], surfaces[1], tree.roots
     for k in range(LANES):
         nodes[k] = NO_PATCH_NODE
@@ -118,9 +119,9 @@ def _locate_hits(packet, surfaces, tree, keys, nodes):  # type: ignore[no-untype
 def _trace(  # type: ignore[no-untyped-def]
     intersect, scene, arguments, points, wo, surfaces, tree, pattern, start, stop, gather_hits
 ):
-    """Trace all rays of points [start, stop), the same ray of `LANES` points at once; returns how many.
+    """Trace all rays of points [start, stop), the same ray of `LANES` points at once; return their number.
 
-    surfaces: normal, and number of the front side, of each face.
+    surfaces: normal, and index of the front side, of each face.
     """
     packet = new_packet(scene, arguments)
     frame, local_wo = np.empty((3, 3, LANES), np.float32), np.empty((3, LANES), np.float32)
@@ -140,18 +141,15 @@ def _trace(  # type: ignore[no-untyped-def]
 
 
 def trace_gather_rays(
-    geometry: SceneBuffers, tree: PatchTree, points: SurfacePoints, wo: F32, pattern: RayPattern
+    geometry: SceneBuffers, tree: PatchTree, points: SurfacePoints, wo: Shaped[F32, "n 3"], pattern: RayPattern
 ) -> GatherHits:
-    """Trace all rays of points.
+    """Trace all gather rays of points. O(n · rays · (log triangles + log patches)) time.
 
     Args:
-        geometry: the scene's triangles. tree: tells which cell a place on them belongs to.
-        points: where rays leave; their seeds shift the pattern.
-        wo: towards the viewer, unit, world space; glossy rays leave about its mirror direction. (n, 3) float32
-        pattern: directions of the rays of every point.
-    Returns:
-        The cell of each ray, (n, `pattern.num_rays`) uint16, and what it cost.
-    Cost: O(n · rays · (log triangles + log cells)) time.
+        geometry: the scene's triangles. tree: of the patches.
+        points: ray origins; their seeds shift the pattern.
+        wo: view directions, unit, world space; glossy rays are distributed about their mirror direction.
+        pattern: ray directions of every point.
     """
     gather_hits = np.empty((points.num_points, pattern.num_rays), np.uint16)
     arguments = packet_arguments(coherent=False)

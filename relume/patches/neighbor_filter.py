@@ -1,4 +1,4 @@
-"""How points share what their gather rays bring: weighted means of neighbours, taken once or several times."""
+"""Filter for the light of gather rays: weighted means over neighboring points, in one or several passes."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from relume.brdf.term import Term
 
 
 class FilterWeights(NamedTuple):
-    """Weights of n points for each other.
+    """Filter weights of n points.
 
     Attributes:
         matrix: rows sum to one. (n, n) sparse, float32
-        num_passes: how often what each point has is replaced by the weighted mean.
+        num_passes: number of times that values are replaced by their weighted means.
     """
 
     matrix: Any
     num_passes: int
 
     def find_dependencies(self, start: int, stop: int) -> tuple[list[Any], NDArray[np.intp]]:
-        """Find what points [start, stop) need of others.
+        """Find the points whose values points [start, stop) depend on.
 
         Returns:
-            Matrices that are to be multiplied with what the points have, the last one first; and those points.
+            Matrices to multiply with these points' values, the last one first; and the points.
         """
         needed, matrices = np.arange(start, stop), list[Any]()
         compact_index, is_neighbor = np.empty(self.matrix.shape[1], np.int32), np.zeros(self.matrix.shape[1], np.bool_)
@@ -43,15 +43,15 @@ class FilterWeights(NamedTuple):
 
 
 class NeighborFilter(NamedTuple):
-    """How points share what their gather rays bring; see `relume.views.gather_filter`.
+    """Filters for the light of gather rays; see `relume.views.gather_filter`.
 
     Attributes:
-        diffuse: of what is scattered evenly. highlights: of what is sent about one direction.
+        diffuse: for diffuse terms. highlights: for directional terms.
     """
 
     diffuse: FilterWeights
     highlights: FilterWeights
 
     def weights_for(self, term: Term) -> FilterWeights:
-        """Those of what a term makes of the rays' light."""
+        """Return the weights for a term."""
         return self.diffuse if term.scatters_diffusely else self.highlights

@@ -1,8 +1,8 @@
-"""Which gather cell a point on a surface belongs to: a kd-tree over positions and normals, one for each side of a mesh.
+"""Lookup of the patch at a surface point: a kd-tree over positions and normals, one for each side of a mesh.
 
-A side of a mesh is a tree of its own, and directions that differ much are told apart before places are, so that no cell
-reaches through a thin wall or round an edge. Cells are numbered in the order of the tree: neighbours have near numbers,
-which is what a Haar transform over them compresses.
+Each side of a mesh has its own tree, and very different normals are split before positions, so that no patch reaches
+through a thin wall or around an edge. Patches are numbered in tree order: neighbors have similar indices, which a Haar
+transform over the indices compresses.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -20,37 +21,37 @@ from relume.raytrace.ray_packet import LANES
 F32 = NDArray[np.float32]
 I32 = NDArray[np.int32]
 
-NO_PATCH = 65_535  # of 16-bit links
+NO_PATCH = 65_535  # in 16-bit gather hits
 MAX_PATCHES = 65_535
-NO_PATCH_NODE = np.int32(-1 - NO_PATCH)  # a leaf, like those of cells
-# extent of a normal's component over a cell, from which on the cell is divided by it
+NO_PATCH_NODE = np.int32(-1 - NO_PATCH)  # a leaf without a patch
+# a patch with a larger extent of a normal component is split along it
 _MAX_NORMAL_EXTENT = np.float32(0.5)
 
 
 class PatchTree(NamedTuple):
-    """Inner nodes, and where the trees of the sides begin.
+    """Inner nodes of the trees, and their roots.
 
     Attributes:
-        axis: 0 to 2 for a position's component, 3 to 5 for a normal's. (n,) uint8
-        value: points below go to the first child, the others to the second. (n,) float32
-        children: nodes; −1 − c for cell c. (n, 2) int32
-        roots: of side s of mesh m at 2 m + s, s = 1 where triangles are seen from behind. (2 meshes,) int32
+        axis: 0 to 2 for a position component, 3 to 5 for a normal component.
+        value: smaller keys are in the first child, others in the second.
+        children: nodes; −1 − c for patch c.
+        roots: of side s of mesh m at 2 m + s, with s = 1 for the back side.
     """
 
-    axis: NDArray[np.uint8]
-    value: F32
-    children: I32
-    roots: I32
+    axis: Shaped[NDArray[np.uint8], " n"]
+    value: Shaped[F32, " n"]
+    children: Shaped[I32, "n 2"]
+    roots: Shaped[I32, " sides"]
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def locate(tree, keys, nodes):  # type: ignore[no-untyped-def]
-    """Locate the cells of `LANES` points; all go down the tree together, so that none waits for memory alone.
+    """Find the patches of `LANES` points; interleaves the lookups to hide memory latency.
 
     Args:
         tree: a `PatchTree`.
         keys: position and normal of each. (6, `LANES`) float32
-        nodes: the tree's root on each one's side; becomes its cell, `NO_PATCH` where there is none. (`LANES`,) int32
+        nodes: root of each point's side; replaced by its patch, `NO_PATCH` if there is none. (`LANES`,) int32
     """
     axes, values, children = tree.axis, tree.value, tree.children
     num_unfinished = LANES
@@ -67,10 +68,10 @@ def locate(tree, keys, nodes):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def _find_gap(values):  # type: ignore[no-untyped-def]
-    """Count the sorted values below a gap that is as near as possible to their middle.
+    """Count the sorted values below a gap near their middle.
 
-    Points of one plane differ by rounding, and their light comes from beside it: a plane between points that lie
-    together would put hits on the wrong side of it, so that gaps are no smaller than a quarter of the mean one.
+    Points of one plane differ by rounding: a split between such points would assign hits to the wrong side. Gaps
+    are therefore at least a quarter of the mean gap.
     """
     num = values.shape[0]
     min_gap = np.float32(0.25) * (values[num - 1] - values[0]) / num
@@ -83,10 +84,10 @@ def _find_gap(values):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def _split(keys, rows):  # type: ignore[no-untyped-def]
-    """Sort rows along the axis to divide them by.
+    """Sort rows along the axis to split.
 
     Returns:
-        The axis, −1 where all rows are the same point; how many rows go to the first child, and the value between.
+        The axis, −1 if all rows are the same point; number of rows in the first child, and the split value.
     """
     low, high = keys[rows[0]].copy(), keys[rows[0]].copy()
     for row in rows:
@@ -102,23 +103,23 @@ def _split(keys, rows):  # type: ignore[no-untyped-def]
     order = np.argsort(values, kind="mergesort")
     rows[:] = rows[order]
     values = values[order]
-    # directions fall into heaps, of which none is cut; places are divided evenly
+    # normals form clusters, which are not cut; positions are split evenly
     num_first = np.searchsorted(values, np.float32(0.5) * (low[axis] + high[axis])) if axis >= 3 else _find_gap(values)
     value = np.float32(0.5) * (values[num_first - 1] + values[num_first])
-    if value <= values[num_first - 1]:  # they are one rounding apart
+    if value <= values[num_first - 1]:  # adjacent floats
         value = values[num_first]
     return axis, num_first, value
 
 
 @nb.njit(nogil=True, cache=True)
 def _light_variation(keys, reach, rows):  # type: ignore[no-untyped-def]
-    """Estimate how uneven the light on a cell is, times its points: q / (1 + q), q = Var(x) / R² + Var(n).
+    """Estimate the variation of light on a patch, times its points: q / (1 + q), q = Var(x) / R² + Var(n).
 
-    Light changes with place by at most about 1 / R and with the normal by about 1, where R is the harmonic mean of the
-    distances of what is seen from there (the split sphere of Ward 1988); what lobes see is told apart by their width.
+    Light changes with position by at most about 1 / R and with the normal by about 1. R is the harmonic mean distance
+    of visible surfaces (the split sphere of Ward 1988); lobes resolve surfaces by their width.
 
     Args:
-        keys, reach: as of `grow_tree`. rows: points of the cell.
+        keys, reach: as in `grow_tree`. rows: points of the patch.
     """
     mean, mean_inverse_reach = np.zeros(6), 0.0
     for row in rows:
@@ -138,15 +139,15 @@ def _light_variation(keys, reach, rows):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def _grow_nodes(keys, reach, rows, root_starts, max_leaves):  # type: ignore[no-untyped-def]
-    """Divide rows into at most `max_leaves` leaves, always the one on which light is most uneven.
+    """Split rows into at most `max_leaves` leaves, always the one with the largest variation of light.
 
     Args:
-        keys, reach: as of `grow_tree`.
-        rows: points, those of each root one after another; sorted so that those of each leaf are.
-        root_starts: where the rows of each root begin, and their end. (roots + 1,) int64
+        keys, reach: as in `grow_tree`.
+        rows: points, grouped by root; sorted so that those of each leaf are contiguous.
+        root_starts: begin of each root's rows, and the end. (roots + 1,) int64
     Returns:
-        Axes, values and children of nodes; of each leaf where its rows begin, its parent (−1 − root where it is a root
-        itself) and which child it is; the node of each root, where it has one.
+        Axes, values and children of nodes; per leaf the begin of its rows, its parent (−1 − root if it is a root
+        itself) and its child index; the node of each root, if it has one.
     """
     num_roots = len(root_starts) - 1
     axes, values = np.empty(max_leaves, np.uint8), np.empty(max_leaves, np.float32)
@@ -178,18 +179,17 @@ def _grow_nodes(keys, reach, rows, root_starts, max_leaves):  # type: ignore[no-
 
 
 def grow_tree(
-    keys: F32, reach: F32, side: I32, num_sides: int, max_patches: int
+    keys: Shaped[F32, "n 6"], reach: Shaped[F32, " n"], side: Shaped[I32, " n"], num_sides: int, max_patches: int
 ) -> tuple[PatchTree, list[NDArray[np.int64]]]:
-    """Divide points into cells on which light is about as uneven, times the points.
+    """Divide points into patches of about equal variation of light times number of points.
 
     Args:
-        keys: position and unit normal. (n, 6) float32
-        reach: how far apart places are that a ray from what sees a point cannot tell from each other. (n,) float32
-        side: number of each point's, in [0, num_sides). (n,) int32
-        num_sides: twice the number of meshes.
-        max_patches: at most `MAX_PATCHES`; fewer where points coincide, or more so that each side has one.
+        keys: position and unit normal.
+        reach: width of the footprint at each point, below which a ray does not resolve positions.
+        side: of each point, in [0, num_sides). num_sides: twice the number of meshes.
+        max_patches: at most `MAX_PATCHES`; fewer if points coincide, or more so that each side has one.
     Returns:
-        The tree, and the points of each cell.
+        The tree, and the points of each patch.
     """
     rows = np.argsort(side, kind="stable")
     sides, root_starts = np.unique(side[rows], return_index=True)

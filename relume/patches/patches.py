@@ -1,8 +1,8 @@
-"""Gather cells: the pieces of surfaces that reflected light is kept for (the gather samples of Nguyen 2010).
+"""Surface patches, between which indirect light is solved (the gather samples of Nguyen 2010).
 
-A cell is a leaf of the tree over importance photons, so that cells are small where the picture's gather rays go and
-light is uneven. A few of its photons stand for its area (its sub-area samples): light that changes across a cell is
-averaged over it, and no point of it lies where no ray arrives, such as on a floor below a box.
+A patch is a leaf of the tree over importance photons, so that patches are small where gather rays of the images arrive
+and light varies. A few of its photons are its sample points (sub-area samples): light that varies over a patch is
+averaged, and no point lies where no ray arrives, such as on a floor below a box.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.patches.patch_kdtree import MAX_PATCHES, PatchTree, grow_tree
@@ -25,44 +26,44 @@ F32 = NDArray[np.float32]
 
 POINTS_PER_PATCH = 4
 _PHOTONS_PER_PATCH = 16
-_TEXTURE_ANGLE = 0.02  # textures are read blurred, as cells blur them
+_TEXTURE_ANGLE = 0.02  # filter width of textures, comparable to that of patches
 
 
 @dataclass(frozen=True)
 class Patches:
-    """Cells in the order of their tree.
+    """Patches in the order of their tree.
 
     Attributes:
-        position: of the points that stand for a cell, off the surface. (C, `POINTS_PER_PATCH`, 3) float32
-        normal: shading normals there. (C, `POINTS_PER_PATCH`, 3) float32
-        diffuse, specular: texture channels, their means over the cell's points. (C, 3) float32
-        material: index into the scene's materials. (C,) uint16
-        uv: where points lie in textures, the side of what is read about them, and how textures are turned there, as
-            `relume.raytrace.surface_interaction.SurfaceInteraction` has it. (C, `POINTS_PER_PATCH`, 5) float32
-        surface_normal: normals there without bumps. (C, `POINTS_PER_PATCH`, 3) float32
+        position: of the sample points, offset from the surface. normal: shading normals there.
+        diffuse, specular: texture channels, averaged over the points.
+        material: index into the scene's materials.
+        uv: coordinates, filter width and texture rotation, as in
+            `relume.raytrace.surface_interaction.SurfaceInteraction`.
+        surface_normal: normals without normal mapping.
     """
 
     tree: PatchTree
-    position: F32
-    normal: F32
-    diffuse: F32
-    specular: F32
-    material: NDArray[np.uint16]
-    uv: F32
-    surface_normal: F32
+    position: Shaped[F32, "patches points 3"]
+    normal: Shaped[F32, "patches points 3"]
+    diffuse: Shaped[F32, "patches 3"]
+    specular: Shaped[F32, "patches 3"]
+    material: Shaped[NDArray[np.uint16], " patches"]
+    uv: Shaped[F32, "patches points 5"]
+    surface_normal: Shaped[F32, "patches points 3"]
 
     @property
     def num_patches(self) -> int:
-        """Their number C."""
+        """Number of patches."""
         return len(self.material)
 
 
-def patch_sample_points(position: F32, normal: F32, first_patch: int = 0) -> SurfacePoints:
-    """Make the points that stand for cells, where direct light arrives at them; any tangent does.
+def patch_sample_points(
+    position: Shaped[F32, "patches points 3"], normal: Shaped[F32, "patches points 3"], first_patch: int = 0
+) -> SurfacePoints:
+    """Create the sample points of patches, with arbitrary tangents.
 
     Args:
-        position, normal: as in `Patches`. (cells, `POINTS_PER_PATCH`, 3) float32
-        first_patch: number of the first of these cells among all.
+        position, normal: as in `Patches`. first_patch: index of the first of these patches.
     """
     position, normal = position.reshape(-1, 3), normal.reshape(-1, 3)
     first_seed = POINTS_PER_PATCH * first_patch
@@ -74,12 +75,12 @@ def patch_sample_points(position: F32, normal: F32, first_patch: int = 0) -> Sur
 def choose_patches(
     scene: Scene, geometry: SceneBuffers, views: Sequence[str], size: tuple[int, int], num_patches: int
 ) -> Patches:
-    """Place about `num_patches` cells where gather rays of these views go; nothing but the scene seeds it.
+    """Create about `num_patches` patches where gather rays of the views arrive; seeded by the scene alone.
 
     Args:
-        scene: what is seen. geometry: its triangles.
-        views: names of the cameras. size: width and height of their pictures, pixels.
-        num_patches: about so many; held to `MAX_PATCHES` less two for each mesh.
+        scene: of the views. geometry: its triangles.
+        views: names of the cameras. size: width and height of their images, pixels.
+        num_patches: clamped to `MAX_PATCHES` less two for each mesh.
     """
     max_patches = min(num_patches, MAX_PATCHES - 2 * len(scene.meshes))
     photons = shoot_photons(scene, geometry, views, size, _PHOTONS_PER_PATCH * max_patches)
@@ -96,7 +97,7 @@ def choose_patches(
         2 * len(scene.meshes),
         max_patches,
     )
-    # a cell's photons are in order along the axis that divided it last: every so many are far apart
+    # a patch's photons are sorted along the last split axis: an even stride spreads the points
     fractions = (np.arange(POINTS_PER_PATCH) + 0.5) / POINTS_PER_PATCH
     point_rows = np.array(
         [photon_rows[(fractions * len(photon_rows)).astype(np.int64)] for photon_rows in patch_rows], np.int64

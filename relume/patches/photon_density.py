@@ -1,12 +1,11 @@
-"""Importance photons: where light that reaches the picture by reflection comes from.
+"""Importance photons: surface points that indirect light reaches the image from.
 
-Paths start at the pictures' own points and go backward, as gather rays do; what they hit after the first surface is
-what gather rays will hit (backward photon shooting, Nguyen 2010, section 5.1, after Hašan 2006). Where what is seen
-has a highlight, some leave it about the mirror direction, so that cells are small where they are seen in it.
+Paths start at the visible surfaces and go backward, like gather rays; their hits after the first surface are those of
+gather rays (backward photon shooting, Nguyen 2010, section 5.1, after Hašan 2006). At visible surfaces with a highlight
+some paths leave about the mirror direction, so that patches are small where highlights show them.
 
-Where surfaces touch, rays fly a few pixels only, and what they hit fills much of the hemisphere: paths that fly so
-short a way are split, and split again where it is a quarter and a sixteenth of that, so that cells are small along
-contacts.
+Near contacts of surfaces rays travel a few pixels only, and their hits fill much of the hemisphere: such short paths
+are split, again at a quarter and at a sixteenth of the distance, so that patches are small along contacts.
 """
 
 from __future__ import annotations
@@ -17,6 +16,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.albedo import scatters_diffusely
@@ -31,47 +31,42 @@ F32 = NDArray[np.float32]
 
 _BOUNCES = 3
 _PATHS_PER_PASS = 1 << 15
-_CONTACT_PIXELS = 12  # flights shorter than this many pixels are split
+_CONTACT_PIXELS = 12  # shorter paths, in pixels, are split
 _SPLIT_FACTOR, _NUM_SPLITS = 8, 3
-_MAX_CONTACT_FRACTION = 0.25  # of all photons, at most
-_MAX_SPLIT_PATHS = 1 << 15  # paths of a pass, each time they are split: among leaves all flights are short
-_LOBE_EXPONENT = 200.0  # exponent of the mirror lobes
-_MAX_MIRROR_FRACTION = 1 / 7  # of all photons, at most: a sixth of the others
-_MIRROR_RAYS_PER_POINT = 4  # from each point that has a highlight
-_MAX_PASSES = 64  # of paths that nearly all leave the scene no more are worth their time
-_MIN_PASSES = 2  # after which none are, if all have left it
+_MAX_CONTACT_FRACTION = 0.25  # of all photons
+_MAX_SPLIT_PATHS = 1 << 15  # split paths per pass and level: in foliage all paths are short
+_LOBE_EXPONENT = 200.0  # of the mirror lobes
+_MAX_MIRROR_FRACTION = 1 / 7  # of all photons: a sixth of the others
+_MIRROR_RAYS_PER_POINT = 4  # from each point with a highlight
+_MAX_PASSES = 64  # bounds the time if nearly all paths leave the scene
+_MIN_PASSES = 2  # passes before giving up if all paths leave the scene
 
 
 @dataclass(frozen=True)
 class Photons:
-    """Hits of paths, the first surface seen left out.
+    """Hits of paths, without the first visible surface.
 
     Attributes:
-        hits: on triangles, all of them. directions: in which they were hit. (n, 3) float32
-        width: of the lobe by which they were shot, radians; over the distance it is what one ray cannot tell from
-            another. (n,) float32
+        hits: on triangles. directions: of the incoming rays.
+        width: of the lobe, radians; over the distance it is the footprint that one ray does not resolve.
     """
 
     hits: Hits
-    directions: F32
-    width: F32
+    directions: Shaped[F32, "n 3"]
+    width: Shaped[F32, " n"]
 
     @staticmethod
-    def from_lobe(hits: Hits, directions: F32, exponent: float) -> Photons:
-        """Photons that left with density ∝ cos^exponent: the root mean square of their sines, √(2 / (e + 3)).
-
-        Args:
-            hits, directions: as of the attributes. exponent: e
-        """
+    def from_lobe(hits: Hits, directions: Shaped[F32, "n 3"], exponent: float) -> Photons:
+        """Create photons from rays with density ∝ cos^e; width is the root mean square of the sine, √(2 / (e + 3))."""
         return Photons(hits, directions, np.full(len(directions), math.sqrt(2 / (exponent + 3)), np.float32))
 
     def rows(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Photons:
-        """Choose some of them."""
+        """Select photons."""
         return Photons(self.hits.rows(rows), self.directions[rows], self.width[rows])
 
 
 class _PhotonSets(NamedTuple):
-    """Photons of all paths so far, by how they came about."""
+    """Photons of all paths so far, by the kind of path."""
 
     diffuse: list[Photons]
     contact: list[Photons]
@@ -81,12 +76,12 @@ class _PhotonSets(NamedTuple):
 def shoot_photons(
     scene: Scene, geometry: SceneBuffers, views: Sequence[str], size: tuple[int, int], num_photons: int
 ) -> Photons:
-    """Shoot photons; they are seeded by the scene's id.
+    """Shoot photons, seeded by the scene's id.
 
     Args:
-        scene: what is seen. geometry: its triangles.
-        views: names of the cameras that paths start from. size: width and height of their pictures, pixels.
-        num_photons: how many are wanted; there are fewer where paths leave the scene too soon.
+        scene: of the views. geometry: its triangles.
+        views: names of the cameras that paths start from. size: width and height of their images, pixels.
+        num_photons: requested; there are fewer if paths leave the scene too soon.
     """
     rng = np.random.default_rng(int(scene.id, 16))
     cameras = [camera for camera in scene.cameras if camera.name in views]
@@ -106,7 +101,7 @@ def shoot_photons(
 
 
 def _concatenate(batches: Sequence[Photons]) -> Photons:
-    """Join photons in their order."""
+    """Concatenate photons in order."""
     directions, width = (
         np.concatenate([getattr(batch, name) for batch in batches]) for name in ("directions", "width")
     )
@@ -114,7 +109,7 @@ def _concatenate(batches: Sequence[Photons]) -> Photons:
 
 
 def _random_subset(batches: Sequence[Photons], count: int, rng: np.random.Generator) -> Photons:
-    """Choose a random subset of so many, its order kept."""
+    """Select a random subset in order."""
     photons = _concatenate(batches)
     return photons.rows(np.sort(rng.permutation(len(photons.directions))[:count]))
 
@@ -129,8 +124,7 @@ def _trace_paths(
     rng: np.random.Generator,
     photon_sets: _PhotonSets,
 ) -> None:
-    """Follow paths through random positions of a picture; add what they hit, at most `max_contact` of it after short
-    flights. shines: whether each material does"""
+    """Trace paths through random positions of an image; add their hits, at most `max_contact` of short paths."""
     width, height = size
     x, y = rng.random((2, num_paths), np.float32) * np.array([[width], [height]], np.float32)
     hits, directions = _trace_hits(
@@ -153,7 +147,7 @@ def _trace_paths(
 
 
 def _trace_hits(geometry: SceneBuffers, origin: F32, directions: F32) -> tuple[Hits, F32]:
-    """Find the hits of the rays that hit anything, and these rays' directions."""
+    """Return the hits of rays that hit anything, and their directions."""
     hits = trace_rays(geometry.embree, origin, directions)
     is_hit = hits.face >= 0
     return hits.rows(is_hit), directions[is_hit]
@@ -162,7 +156,7 @@ def _trace_hits(geometry: SceneBuffers, origin: F32, directions: F32) -> tuple[H
 def _shoot_mirror_lobes(
     geometry: SceneBuffers, points: SurfacePoints, directions: F32, rng: np.random.Generator
 ) -> Photons:
-    """Find what points seen along directions reflect, about the mirror direction: eq. (16), Nguyen 2010."""
+    """Trace rays about the mirror direction from visible points: eq. (16), Nguyen 2010."""
     position, normal = (np.repeat(a, _MIRROR_RAYS_PER_POINT, axis=0) for a in (points.position, points.normal))
     directions = np.repeat(directions, _MIRROR_RAYS_PER_POINT, axis=0)
     mirror_directions = directions - 2 * np.einsum("nc,nc->n", directions, normal)[:, None] * normal
@@ -174,7 +168,7 @@ def _shoot_mirror_lobes(
 def _shoot_short_paths(
     geometry: SceneBuffers, points: SurfacePoints, reach: F32, rng: np.random.Generator
 ) -> list[Photons]:
-    """Shoot photons of short flights from points, many from those that have any. reach: what is short, metres. (n,)"""
+    """Split short paths at points. reach: maximum length of a short path, meters. (n,)"""
     position, normal, photons = points.position, points.normal, []
     for round_index in range(_NUM_SPLITS + 1):
         directions = lobe_directions(normal, 1.0, rng)
@@ -189,13 +183,11 @@ def _shoot_short_paths(
     return photons
 
 
-def lobe_directions(axis: F32, exponent: float, rng: np.random.Generator) -> F32:
-    """Draw a random direction about each axis, with density ∝ cos^exponent.
+def lobe_directions(axis: Shaped[F32, "n 3"], exponent: float, rng: np.random.Generator) -> Shaped[F32, "n 3"]:
+    """Sample a random unit direction about each axis, with density ∝ cos^exponent.
 
     Args:
-        axis: unit. (n, 3) float32. exponent: at least 0; 1 is the cosine's. rng: where randomness comes from.
-    Returns:
-        Unit directions. (n, 3) float32
+        axis: unit. exponent: at least 0; 1 is the cosine's. rng: random generator.
     """
     z, phi = (1 - rng.random(len(axis))) ** (1 / (exponent + 1)), 2 * np.pi * rng.random(len(axis))
     across = np.sqrt(1 - z * z)

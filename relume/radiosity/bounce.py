@@ -1,16 +1,17 @@
-"""Reflected light on gather cells: direct light, then bounce after bounce along links; never a matrix, never inverted.
+"""Bounces between patches along gather hits, starting from direct light; no matrix is built or inverted.
 
-    L_0 = ρ/π E,   L_{b+1}(g) = ρ(g) · mean over the gather rays r of g of L_b(link(g, r)),   L = Σ_b L_b
+    L_0 = ρ/π E,   L_{b+1}(g) = ρ(g) · mean over the gather rays r of g of L_b(hit(g, r)),   L = Σ_b L_b
 
-with ρ the reflectance of a cell, of all its terms over all directions, and E its irradiance from the environment. Rays
-of density cos θ / π make the mean an estimate of ∫ L cos θ dω / π; a ray that leaves the scene finds nothing, since
-what it would find is in E.
+ρ is the reflectance of a patch, of all terms over all directions, and E its direct irradiance. Rays with density
+cos θ / π make the mean an estimate of ∫ L cos θ dω / π; rays that leave the scene count as black, since the environment
+is included in E.
 """
 
 from __future__ import annotations
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -21,7 +22,7 @@ from relume.patches.patch_kdtree import NO_PATCH
 F32 = NDArray[np.float32]
 
 _POINTS_PER_RANGE = 2048
-_PREVIEW_BOUNCES = 6  # a thousandth of the light in a Cornell box is wrong then
+_PREVIEW_BOUNCES = 6  # the error in a Cornell box is then a thousandth
 _MAX_BOUNCE_RATIO = 0.999
 
 
@@ -39,15 +40,14 @@ def _irradiance(normal, visible, directions, normal_irradiance, start, stop, out
         out[p, 0], out[p, 1], out[p, 2] = red, green, blue
 
 
-def irradiance(normal: F32, visible: NDArray[np.uint8], lights: TriangleLights) -> F32:
-    """Sum the irradiance of points, with the cosine of each light's mean direction.
+def irradiance(
+    normal: Shaped[F32, "n 3"], visible: Shaped[NDArray[np.uint8], "n bytes"], lights: TriangleLights
+) -> Shaped[F32, "n 3"]:
+    """Return the irradiance of points, with the cosine of each light's mean direction.
 
     Args:
-        normal: of the points, unit. (n, 3) float32
-        visible: light m of a point in bit m & 7 of byte m >> 3. (n, bytes) uint8
+        normal: of the points, unit. visible: light m of a point in bit m & 7 of byte m >> 3.
         lights: the environment's triangles.
-    Returns:
-        E per channel. (n, 3) float32
     """
     out = np.empty((len(normal), 3), np.float32)
     args = (normal, visible, lights.direction, lights.irradiance)
@@ -57,7 +57,7 @@ def irradiance(normal: F32, visible: NDArray[np.uint8], lights: TriangleLights) 
 
 @nb.njit(nogil=True, cache=True, fastmath=True)
 def _bounce_kernel(gather_hits, reflectance, radiance, start, stop, out):  # type: ignore[no-untyped-def]
-    """Reflect once. radiance: four channels, so that a cell's are added at once; black in row `NO_PATCH`."""
+    """Compute one bounce. radiance: four channels, added as one vector; black in row `NO_PATCH`."""
     ray_weight = np.float32(1 / gather_hits.shape[1])
     total = np.empty(4, np.float32)
     for patch in range(start, stop):
@@ -70,15 +70,15 @@ def _bounce_kernel(gather_hits, reflectance, radiance, start, stop, out):  # typ
             out[patch, channel] = reflectance[patch, channel] * total[channel] * ray_weight
 
 
-def one_bounce(gather_hits: NDArray[np.uint16], reflectance: F32, radiance: F32) -> F32:
-    """Reflect the light of cells once more: L_{b+1} of L_b.
+def one_bounce(
+    gather_hits: Shaped[NDArray[np.uint16], "patches rays"],
+    reflectance: Shaped[F32, "patches 3"],
+    radiance: Shaped[F32, "patches 3"],
+) -> Shaped[F32, "patches 3"]:
+    """Compute one bounce between patches: L_{b+1} from L_b. O(patches · rays) random reads from the cache.
 
     Args:
-        gather_hits: cell that each ray of a cell hits. (C, rays) uint16
-        reflectance: in [0, 1]. (C, 3) float32. radiance: L_b. (C, 3) float32
-    Returns:
-        L_{b+1}. (C, 3) float32
-    Cost: O(C · rays) reads at random from the radiance, which fits a core's cache.
+        gather_hits: patch that each ray of a patch hits. reflectance: in [0, 1]. radiance: L_b.
     """
     out = np.empty_like(radiance)
     padded = np.zeros((NO_PATCH + 1, 4), np.float32)
@@ -89,14 +89,16 @@ def one_bounce(gather_hits: NDArray[np.uint16], reflectance: F32, radiance: F32)
     return out
 
 
-def bounces(gather_hits: NDArray[np.uint16], reflectance: F32, direct: F32, num_bounces: int) -> F32:
-    """Sum the radiance that cells send out after at most `num_bounces` reflections between them, L_0 included.
+def bounces(
+    gather_hits: Shaped[NDArray[np.uint16], "patches rays"],
+    reflectance: Shaped[F32, "patches 3"],
+    direct: Shaped[F32, "patches 3"],
+    num_bounces: int,
+) -> Shaped[F32, "patches 3"]:
+    """Return the outgoing radiance Σ_b L_b of patches after up to `num_bounces` bounces, with L_0.
 
     Args:
-        gather_hits, reflectance: as in `one_bounce`. direct: L_0. (C, 3) float32
-        num_bounces: at least 0.
-    Returns:
-        Σ_b L_b. (C, 3) float32
+        gather_hits, reflectance: as in `one_bounce`. direct: L_0. num_bounces: at least 0.
     """
     total = direct.astype(np.float64)
     radiance = direct
@@ -107,19 +109,21 @@ def bounces(gather_hits: NDArray[np.uint16], reflectance: F32, direct: F32, num_
 
 
 def preview_bounces(
-    gather_hits: NDArray[np.uint16], few_rays: NDArray[np.uint16], reflectance: F32, direct: F32, num_bounces: int
-) -> F32:
-    """Estimate `bounces` for a moving hand: after a few bounces, as if each left the same share of the one before.
+    gather_hits: Shaped[NDArray[np.uint16], "patches rays"],
+    few_rays: Shaped[NDArray[np.uint16], "patches few"],
+    reflectance: Shaped[F32, "patches 3"],
+    direct: Shaped[F32, "patches 3"],
+    num_bounces: int,
+) -> Shaped[F32, "patches 3"]:
+    """Approximate `bounces` for an active edit: after a few bounces, the ratio of successive ones is kept constant.
 
-    The bounces are a power iteration: their shape settles soon, and then only their size changes.
+    The bounces are a power iteration: their shape soon converges, and then only their magnitude changes.
 
     Args:
-        gather_hits: of all rays, for the first bounce. (C, rays) uint16
-        few_rays: of some of them, for all other bounces, whose light is even already. What noise they leave is each
-            cell's own, and gather rays see many cells. (C, fewer rays) uint16
+        gather_hits: all rays, for the first bounce.
+        few_rays: a subset for further bounces, whose light is smooth. Their noise is independent per patch, and gather
+            rays average over many patches.
         reflectance, direct, num_bounces: as in `bounces`.
-    Returns:
-        Σ_b L_b, roughly. (C, 3) float32
     """
     num_exact = min(num_bounces, _PREVIEW_BOUNCES)
     total, radiance, previous = direct.astype(np.float64), direct, direct

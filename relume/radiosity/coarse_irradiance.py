@@ -1,14 +1,16 @@
-"""What arrives at cells from other cells, quickly: along the same rays, by the squares in which they come and go.
+"""Fast incident light of patches from other patches: along the same rays, by direction bins at both ends.
 
-    t_j(c) = π / N Σ_r L(link(c, r), square it leaves by) h̄_j(square it comes in by)
+    t_j(c) = π / N Σ_r L(hit(c, r), outgoing bin) h̄_j(incident bin)
 
-with h̄ the functions' means over squares, and t_j in the frame of the cell. `PatchLight.arriving` is what it estimates.
+h̄ are the averages of the basis functions over bins, and t_j is in the frame of the patch. It approximates
+`PatchLight.incident_light`.
 """
 
 from __future__ import annotations
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.thread_pools import parallel_for_chunks
@@ -24,7 +26,7 @@ F32 = NDArray[np.float32]
 def _incident_kernel(  # type: ignore[no-untyped-def]
     gather_hits, outgoing_bins, incident_bins, outgoing, row_index, start, stop, irradiance, binned_light
 ):
-    """Sum the rays of cells [start, stop). row_of: each cell's row among the squares, −1 for none. (C,)"""
+    """Sum the rays of patches [start, stop). row_index: row of each patch in binned_light, −1 for none. (C,)"""
     ray_weight = np.float32(np.pi / gather_hits.shape[1])
     light = np.empty((3, gather_hits.shape[1]), np.float32)
     for patch in range(start, stop):
@@ -39,11 +41,11 @@ def _incident_kernel(  # type: ignore[no-untyped-def]
                 bins[channel, incident_bins[patch, ray]] += ray_weight * light[channel, ray]
 
 
-def incident_fast(patches: PatchLight, outgoing: OutgoingLight, rows: NDArray[np.intp]) -> IncidentLight:
-    """What arrives from other cells, whose light differs by direction.
+def incident_fast(patches: PatchLight, outgoing: OutgoingLight, rows: Shaped[NDArray[np.intp], " G"]) -> IncidentLight:
+    """Approximate the incident light of patches from other patches with directional light.
 
     Args:
-        patches: that it comes to. outgoing: by all cells. rows: those of which light vectors are wanted. (G,)
+        patches: the receivers. outgoing: of all patches. rows: patches that need coefficients.
     """
     irradiance, binned_light = (
         np.empty((patches.num_patches, 3), np.float32),

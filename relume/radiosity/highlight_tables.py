@@ -1,10 +1,11 @@
-"""Highlights of gather cells under one look, as tables: those that few functions do not tell."""
+"""Tabulated highlights of patches under one look, for those too sharp for the low-degree basis."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.albedo import Reflectances, quantized_reflectance, unpack_lobes, white_material_key
@@ -16,38 +17,41 @@ F32 = NDArray[np.float32]
 
 
 class HighlightTables(NamedTuple):
-    """Of cells that have any.
+    """Highlights of the G patches that have any.
 
     Attributes:
-        rows: these cells. (G,) intp
-        table_index: table of each highlight of a cell, −1 for none. (G, highlights) int16
-        gain: its colour and texture. (G, highlights, 3) float32
-        tables: see `relume.brdf.highlight_tables.lobe_table`; one channel where all are grey.
-            (tables, `NUM_FINE_BINS`, 1 or 3, `NUM_DIRECTION_BINS`) float32
-        reflectance: how much they send of all that comes, F_00. (G, 3) float32
+        rows: these patches.
+        table_index: table of each highlight of a patch, −1 for none. gain: color and texture of each highlight.
+        tables: see `relume.brdf.highlight_tables.lobe_table`; one channel if all are gray. Their bins are
+            `NUM_FINE_BINS` incident and `NUM_DIRECTION_BINS` outgoing ones.
+        reflectance: F_00.
     """
 
-    rows: NDArray[np.intp]
-    table_index: NDArray[np.int16]
-    gain: F32
-    tables: F32
-    reflectance: F32
+    rows: Shaped[NDArray[np.intp], " G"]
+    table_index: Shaped[NDArray[np.int16], "G highlights"]
+    gain: Shaped[F32, "G highlights 3"]
+    tables: Shaped[F32, "tables fine_bins channels bins"]
+    reflectance: Shaped[F32, "G 3"]
 
-    def subset(self, mask: NDArray[np.bool_]) -> HighlightTables:
-        """Those of some of the cells. chosen: (G,)"""
+    def subset(self, mask: Shaped[NDArray[np.bool_], " G"]) -> HighlightTables:
+        """Select patches."""
         rows, table_index, gain = self.rows[mask], self.table_index[mask], self.gain[mask]
         return HighlightTables(rows, table_index, gain, self.tables, self.reflectance[mask])
 
     @classmethod
     def from_materials(
-        cls, reflectances: Reflectances, material: NDArray[np.uint16], textures: F32, energy_scale: F32
+        cls,
+        reflectances: Reflectances,
+        material: Shaped[NDArray[np.uint16], " patches"],
+        textures: Shaped[F32, "2 patches 3"],
+        energy_scale: Shaped[F32, "patches 3"],
     ) -> HighlightTables:
         """Tabulate the highlights of all materials.
 
         Args:
-            reflectances: of all materials. material: of each cell. (C,) uint16
-            textures: multipliers of each of `relume.brdf.texture_slots.TEXTURES`. (2, C, 3) float32
-            energy_scale: what all that a cell sends is multiplied by. (C, 3) float32
+            reflectances: of all materials. material: of each patch.
+            textures: multipliers of each of `relume.brdf.texture_slots.TEXTURES`.
+            energy_scale: factor on all outgoing light of a patch.
         """
         documents = [unpack_lobes(entry) for entry in reflectances]
         max_highlights, table_numbers = max(map(len, documents), default=0), dict[str, int]()
@@ -80,7 +84,7 @@ class HighlightTables(NamedTuple):
 
 
 def _stack_tables(tables: list[F32]) -> F32:
-    """All tables, of one channel where each has three alike."""
+    """Stack all tables, with one channel if each is gray."""
     if not tables:
         return np.zeros((0, NUM_FINE_BINS, 1, NUM_DIRECTION_BINS), np.float32)
     is_gray = all((table == table[:, :1]).all() for table in tables)

@@ -1,9 +1,10 @@
-"""What gather cells send of light that comes straight to them, where few functions do not tell their highlights.
+"""Direct light reflected by sharp highlights of patches, for which the low-degree basis is too coarse.
 
     L(c, s) = Σ_k g_k(c) Σ_b E_b(c) T_k(b, s),   E_b(c) = Σ_l V_l E_l cos θ_l   over the lights l in bin b
 
-with T of the highlights k of its material (`relume.brdf.highlight_tables`) and g their colours and textures. All points
-of a cell count. Where their normals differ, light comes from where the cell's own normal mirrors it to as theirs do.
+T are the tables of the highlights k of its material (`relume.brdf.highlight_tables`) and g their colors and textures.
+All points of a patch contribute. If their normals differ, a light is binned in the direction from which the patch
+normal reflects it as the point's normal does.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -32,30 +34,29 @@ from relume.transport.shading_points import RayList, ShadingPoints, build_ray_li
 F32 = NDArray[np.float32]
 
 _PATCHES_PER_RANGE = 16  # their bins stay in the cache
-_PARALLEL_COSINE = np.float32(0.9998)  # cosine between normals, 1°
+_PARALLEL_COSINE = np.float32(0.9998)  # of the angle between normals, 1°
 
 
 class DirectLobes(NamedTuple):
-    """Light that comes to some cells.
+    """Direct light at some patches.
 
     Attributes:
-        lights: triangles of the environment. visible: which of them points see. (G, points a cell, bytes) uint8
-        rays: of the same points, those of local lights.
+        lights: triangles of the environment. visible: these lights from the sample points.
+        rays: of the same points, from local lights.
     """
 
     lights: TriangleLights | None = None
-    visible: NDArray[np.uint8] | None = None
+    visible: Shaped[NDArray[np.uint8], "G points bytes"] | None = None
     rays: Sequence[RayList] = ()
 
 
-def outgoing_in_highlights(patches: PatchLight, highlights: HighlightTables, direct_lobes: DirectLobes) -> F32:
-    """Find what cells send of light that comes to them.
+def outgoing_in_highlights(
+    patches: PatchLight, highlights: HighlightTables, direct_lobes: DirectLobes
+) -> Shaped[F32, "G 3 bins"]:
+    """Return the binned outgoing radiance by highlights, for each patch of `highlights`.
 
     Args:
-        patches: that send it. highlights: the highlights of some of them.
-        direct_lobes: what comes to them.
-    Returns:
-        Of each of the cells of `highlights`, by squares. (G, 3, `NUM_DIRECTION_BINS`) float32
+        patches: of the bake. highlights: of some patches. direct_lobes: their direct light.
     """
     out = np.zeros((len(highlights.rows), 3, NUM_DIRECTION_BINS), np.float32)
     points = patches.points_of(highlights.rows)
@@ -88,7 +89,7 @@ def outgoing_in_highlights(patches: PatchLight, highlights: HighlightTables, dir
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _mirror_bin(frame, n, dx, dy, dz):  # type: ignore[no-untyped-def]
-    """Find the mirroring and the bin of light from a direction, as a point with normal n mirrors it."""
+    """Return reflection symmetry and bin of a light direction, as a point with normal n reflects it."""
     t, b = frame[0], frame[1]
     mx, my, mz = t[1] * b[2] - t[2] * b[1], t[2] * b[0] - t[0] * b[2], t[0] * b[1] - t[1] * b[0]
     twice = np.float32(2) * (n[0] * dx + n[1] * dy + n[2] * dz)
@@ -115,10 +116,10 @@ def _are_parallel(normals):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _add_triangles(frames, normals, visible, direction, irradiance, bins):  # type: ignore[no-untyped-def]
-    """Put the light triangles that the points of cells see into bins.
+    """Add the light triangles that are visible from the points of patches to bins.
 
     Args:
-        frames: of the cells. (G, 2, 3). normals: of their points. (G, P, 3). visible: to these. (G, P, bytes) uint8
+        frames: of the patches. (G, 2, 3). normals: of their points. (G, P, 3). visible: from these. (G, P, bytes) uint8
         direction, irradiance: of the lights. (M, 3)
         bins: added to. (G, `NUM_REFLECTIONS`, `NUM_FINE_BINS`, 3)
     """
@@ -144,7 +145,7 @@ def _add_triangles(frames, normals, visible, direction, irradiance, bins):  # ty
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _add_ray_list(frames, points, first, wi, irradiance, bins):  # type: ignore[no-untyped-def]
-    """The same of listed rays, whose light has been weighed by the cosine. points: of the cells. wi: (3, K) local"""
+    """Add listed rays, weighted by the cosine, to bins. points: of the patches. wi: (3, K) local"""
     num_points = points.normal.shape[0] // bins.shape[0]
     point_weight = np.float32(1 / num_points)
     for p in range(points.normal.shape[0]):
@@ -160,10 +161,10 @@ def _add_ray_list(frames, points, first, wi, irradiance, bins):  # type: ignore[
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _spread(bins, table_index, gain, tables, bin_permutation, out):  # type: ignore[no-untyped-def]
-    """Spread binned light into squares.
+    """Apply the tables to binned light.
 
     Args:
-        bins: light. (G, `NUM_REFLECTIONS`, `NUM_FINE_BINS`, 3). table_index: tables of each cell, −1 for none. (G,
+        bins: light. (G, `NUM_REFLECTIONS`, `NUM_FINE_BINS`, 3). table_index: tables of each patch, −1 for none. (G,
             terms)
         gain: of each. (G, terms, 3). tables: T of all highlights. (tables, `NUM_FINE_BINS`, 1 or 3,
             `NUM_DIRECTION_BINS`)

@@ -1,9 +1,10 @@
-"""From where gather cells are seen by each other: the mean of the functions by which they send light."""
+"""Basis functions of patches' outgoing light, averaged over the directions in which other patches see them."""
 
 from __future__ import annotations
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -17,21 +18,20 @@ F32 = NDArray[np.float32]
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _count(gather_hits, bins, counts):  # type: ignore[no-untyped-def]
-    """Count rays by the cell that they hit and the square that they come from. counts: (C, SIDE²)"""
+    """Count rays by the patch that they hit and their direction bin there. counts: (C, SIDE²)"""
     for p in range(gather_hits.shape[0]):
         for ray in range(gather_hits.shape[1]):
             if gather_hits[p, ray] != NO_PATCH:
                 counts[gather_hits[p, ray], bins[p, ray]] += np.float32(1)
 
 
-def mean_incoming(gather_hits: NDArray[np.uint16], bins: DirectionBins, num_patches: int) -> F32:
-    """Mean of every function over the directions in which rays see cells.
+def mean_incoming(
+    gather_hits: Shaped[NDArray[np.uint16], "n rays"], bins: Shaped[DirectionBins, "n rays"], num_patches: int
+) -> Shaped[F32, "patches J"]:
+    """Average every basis function over the directions of rays that hit a patch; zero if none does.
 
     Args:
-        gather_hits: cells that rays hit. (n, rays) uint16. bins: in which they see them. (n, rays) uint8
-        num_patches: C.
-    Returns:
-        Zero where nothing sees a cell. (C, J) float32
+        gather_hits: patches that rays hit. bins: their direction bins there.
     """
     counts = np.zeros((num_patches, SIDE * SIDE), np.float32)
     _count(gather_hits, bins, counts)

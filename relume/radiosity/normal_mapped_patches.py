@@ -1,7 +1,7 @@
-"""Gather cells whose material leans as an image of normals says: what a bake finds whose scene has it as its map.
+"""Patches with overridden normal maps, as if the scene had been baked with these.
 
-Each point of a cell takes the normal of its texels, as blurred as its textures are. What then comes up over its horizon
-is traced, and its gather rays leave about the normal as it is now; docs/indirect-light.md#algorithm.
+Each sample point of a patch takes the normal of its texels, filtered like its textures. Lights that rise above its
+horizon are traced, and its gather rays are distributed about the new normal; docs/indirect-light.md#algorithm.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from relume.raytrace.tangents import any_tangent
 from relume.views.map_override_store import RayTracer
 from relume.views.normal_override import perturb_normals
 
-_PATCHES_PER_STEP = 512  # a twentieth of a second's rays
+_PATCHES_PER_STEP = 512  # rays for 0.05 s
 
 
 def normal_mapped_patches(
@@ -29,17 +29,16 @@ def normal_mapped_patches(
     tracer: RayTracer,
     is_canceled: Callable[[], bool] = lambda: False,
 ) -> PatchLight:
-    """Lean the cells of some materials.
+    """Apply normal-map overrides to patches. Traces O(points · (rays per point + lights that rise)) rays.
 
     Args:
-        patches: as they were baked. normals: the image that leans each material, None for none. (materials,)
-        tracer: of rays that the bake did not trace. is_canceled: asked now and then.
+        patches: as baked. normals: override of each material, None for none.
+        tracer: of the additional rays. is_canceled: polled.
     Returns:
-        All cells; those of bakes that do not say how textures lie on them stay as they are.
+        All patches, unchanged if the bake has no UV coordinates for them.
     Raises:
-        StoreError: the store does not say what is needed to trace its rays. NotFoundError, SceneError: an image cannot
-            be had. CancelledError: `is_canceled` said so.
-    Cost: O(points · (rays of a point + lights that come up)) rays.
+        StoreError: the store lacks data for tracing its rays. NotFoundError, SceneError: an image cannot be loaded.
+            CancelledError: `is_canceled` returned True.
     """
     if patches.uv is None or patches.surface_normal is None:
         return patches
@@ -52,8 +51,8 @@ def normal_mapped_patches(
 
 
 def _perturbed_points(patches: PatchLight, rows: NDArray[np.intp], normal_map: NormalMap) -> SurfacePoints:
-    """The points of all cells where some lean. rows: which. (G,)"""
-    assert patches.uv is not None  # who calls has looked
+    """Return the points of all patches, with perturbed normals in some patches `rows`. (G,)"""
+    assert patches.uv is not None  # checked by the caller
     assert patches.surface_normal is not None
     points = patches.points_of(rows)
     uv, surface_normal = patches.uv[rows].reshape(points.num_points, -1), patches.surface_normal[rows].reshape(-1, 3)
@@ -73,7 +72,7 @@ def _retrace(
     tracer: RayTracer,
     is_canceled: Callable[[], bool],
 ) -> PatchLight:
-    """Cells with other normals, and what some of them see and hit. leaning: points of all. rows: those cells. (G,)"""
+    """Trace patches `rows` with perturbed normals. perturbed_points: of all patches."""
     retraced = replace(
         patches, points=perturbed_points, visible=patches.visible.copy(), gather_hits=patches.gather_hits.copy()
     )
@@ -90,6 +89,6 @@ def _retrace(
         )
 
     parallel_for_cancellable(
-        trace, len(rows), _PATCHES_PER_STEP, lambda share: None, is_canceled, "tracing cells that lean"
+        trace, len(rows), _PATCHES_PER_STEP, lambda fraction: None, is_canceled, "tracing normal-mapped patches"
     )
     return retraced

@@ -1,10 +1,11 @@
-"""What gather cells send out: evenly, by few functions, and by squares where those do not tell a highlight."""
+"""Outgoing radiance of patches: isotropic, in a low-degree basis, and in direction bins for sharp highlights."""
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.math.direction_grid import NUM_DIRECTION_BINS
@@ -16,21 +17,21 @@ from relume.transport.outgoing_patch_light import OutgoingLight, decay_of, radia
 
 F32 = NDArray[np.float32]
 OutgoingHighlights = tuple[HighlightTables, F32]
-"""Highlights of patches and their outgoing light. See `relume.radiosity.highlight_transport`. (F, 3, bins) float32"""
+"""Highlights of patches and their binned light. See `relume.radiosity.highlight_transport`. (F, 3, bins) float32"""
 
 
 class BinnedRadiance(NamedTuple):
-    """What some cells send besides, by squares.
+    """Additional binned outgoing radiance of some patches.
 
     Attributes:
-        rows: these cells. (F,) intp. radiance: of each. (F, 3, squares) float32
+        rows: these patches. radiance: of each.
     """
 
-    rows: NDArray[np.intp]
-    radiance: F32
+    rows: Shaped[NDArray[np.intp], " F"]
+    radiance: Shaped[F32, "F 3 bins"]
 
     def subtract(self, subtrahend: BinnedRadiance) -> BinnedRadiance:
-        """The difference to another, whose rows may be others."""
+        """Return the difference to another, which may have other rows."""
         rows = np.union1d(self.rows, subtrahend.rows)
         radiance = np.zeros((len(rows), *self.radiance.shape[1:]), np.float32)
         radiance[np.searchsorted(rows, self.rows)] = self.radiance
@@ -42,23 +43,23 @@ EMPTY_BINS = BinnedRadiance(np.empty(0, np.intp), np.empty((0, 3, NUM_DIRECTION_
 
 
 class OutgoingRadiance(NamedTuple):
-    """What cells send out.
+    """Outgoing radiance of patches.
 
     Attributes:
-        isotropic: the part that is the same everywhere. (C, 3) float32
-        rows: the cells that send more one way than another. (G,) intp. coefficients: L_j of each. (G, 3, J) float32
-        roughening: by their highlights, see `ReflectanceOperator`. (G,) float32
-        bins: what those of them send besides whose highlights are sharp.
+        isotropic: the isotropic part.
+        rows: patches with directional light. coefficients: L_j of each.
+        roughening: by their highlights, see `ReflectanceOperator`.
+        bins: additional light of patches with sharp highlights.
     """
 
-    isotropic: F32
-    rows: NDArray[np.intp]
-    coefficients: F32
-    roughening: F32
+    isotropic: Shaped[F32, "patches 3"]
+    rows: Shaped[NDArray[np.intp], " G"]
+    coefficients: Shaped[F32, "G 3 J"]
+    roughening: Shaped[F32, " G"]
     bins: BinnedRadiance = EMPTY_BINS
 
     def outgoing_light(self, patches: PatchLight, *, to_narrow_lobes: bool = True) -> OutgoingLight:
-        """As rays look it up. to_narrow_lobes: whether rays of pictures do"""
+        """Tabulate for lookups by rays. to_narrow_lobes: for view samples rather than patches"""
         decay = decay_of(self.roughening) if to_narrow_lobes else None
         bin_rows = np.searchsorted(self.rows, self.bins.rows)
         frames = patches.frames[self.rows]
@@ -66,12 +67,12 @@ class OutgoingRadiance(NamedTuple):
             pad(self.isotropic), self.rows, frames, self.coefficients, decay, (bin_rows, self.bins.radiance)
         )
 
-    def mean_to_others(self, patches: PatchLight) -> F32:
-        """What other cells see of each in the mean, that by squares left out. (C, 3) float32"""
+    def mean_to_others(self, patches: PatchLight) -> Shaped[F32, "patches 3"]:
+        """Return the mean radiance of each patch toward other patches, without the binned part."""
         return patches.mean_to_others(self.isotropic, self.coefficients, self.rows)
 
     def subtract(self, subtrahend: OutgoingRadiance) -> OutgoingRadiance:
-        """The difference to another, whose rows may be others."""
+        """Return the difference to another, which may have other rows."""
         rows = np.union1d(self.rows, subtrahend.rows)
         coefficients = np.zeros((len(rows), *self.coefficients.shape[1:]), np.float32)
         coefficients[np.searchsorted(rows, self.rows)] += self.coefficients
@@ -89,11 +90,11 @@ def first_bounce(
     incident: IncidentLight,
     outgoing_highlights: OutgoingHighlights | None = None,
 ) -> OutgoingRadiance:
-    """What cells send of what comes to them.
+    """Reflect incident light once.
 
     Args:
-        reflectance_operator: what they make of it. incident: what comes.
-        outgoing_highlights: what sharp highlights send; None: functions say it.
+        reflectance_operator: of the patches. incident: light at the patches.
+        outgoing_highlights: light reflected by sharp highlights; None: these use the low-degree basis.
     """
     isotropic, coefficients = reflectance_operator.apply(incident)
     if outgoing_highlights is None:
@@ -110,8 +111,8 @@ def first_bounce(
     )
 
 
-def pad(radiance: NDArray[np.floating[Any]]) -> F32:
-    """Radiance of cells, (C, 3), and black for those that are none. (NO_CELL + 1, 3) float32"""
+def pad(radiance: Shaped[NDArray[np.floating[Any]], "patches 3"]) -> Shaped[F32, "padded 3"]:
+    """Extend the radiance of patches by black rows, up to row `NO_PATCH`."""
     out = np.zeros((NO_PATCH + 1, 3), np.float32)
     out[: len(radiance)] = radiance
     return out

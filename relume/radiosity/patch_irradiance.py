@@ -1,4 +1,4 @@
-"""Gather cells, and what arrives at them: the light that gather rays bring back from the surfaces they hit."""
+"""Patches of a bake, and their incident light along gather rays from other surfaces."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.albedo import Reflectances, unpack_images
@@ -30,37 +31,35 @@ from relume.transport.shading_points import GatherRays
 
 F32 = NDArray[np.float32]
 
-_RAY_STRIDE = 16  # one ray in so many is enough for a moving hand, but for the first bounce
+_RAY_STRIDE = 16  # during an active edit one ray in 16 is used, except for the first bounce
 _ROOT_PI = np.float32(np.sqrt(np.pi))
 
 
 @dataclass(frozen=True)
 class PatchLight:
-    """The gather cells of a bake, shared by all its pictures.
+    """The patches of a bake, shared by all its images.
 
     Attributes:
-        points: that stand for them, those of a cell one after another. C · points a cell
-        visible: lights that those points see. (C, points a cell, bytes) uint8
-        gather_hits: of their gather rays. (C, rays) uint16. pattern: the directions of a point's.
-        material: index into the scene's materials. (C,) uint16
-        textures: multipliers of each of `relume.brdf.texture_slots.TEXTURES`. (2, C, 3) float32
-        uv: where points lie in textures, for images that looks name, see `relume.patches.patches`; None in stores that
-            do not say so. (C, points a cell, ≥ 3) float32
-        surface_normal: normals without bumps, which images of others lean; None likewise. (C, points a cell, 3) float32
+        points: sample points, patch by patch. visible: lights from these.
+        gather_hits: of the points' gather rays. pattern: their directions, for one point.
+        material: index into the scene's materials.
+        textures: multipliers of each of `relume.brdf.texture_slots.TEXTURES`.
+        uv: of the points, for material map overrides, see `relume.patches.patches`; None if not stored.
+        surface_normal: normals without normal mapping, for overrides; None if not stored.
     """
 
     points: SurfacePoints
-    visible: NDArray[np.uint8]
-    gather_hits: NDArray[np.uint16]
+    visible: Shaped[NDArray[np.uint8], "patches points bytes"]
+    gather_hits: Shaped[NDArray[np.uint16], "patches rays"]
     pattern: RayPattern
-    material: NDArray[np.uint16]
-    textures: F32
-    uv: F32 | None = None
-    surface_normal: F32 | None = None
+    material: Shaped[NDArray[np.uint16], " patches"]
+    textures: Shaped[F32, "2 patches 3"]
+    uv: Shaped[F32, "patches points coordinates"] | None = None
+    surface_normal: Shaped[F32, "patches points 3"] | None = None
 
     @cached_property
-    def few_rays(self) -> NDArray[np.uint16]:
-        """Other rays for each of the cells beside each other: a stretch of the pattern would see one side alone."""
+    def few_rays(self) -> Shaped[NDArray[np.uint16], "patches few"]:
+        """A subset of the rays, spread over the pattern and different for adjacent patches."""
         patch, num = np.arange(self.num_patches)[:, None], max(1, self.gather_hits.shape[1] // _RAY_STRIDE)
         return np.ascontiguousarray(
             self.gather_hits[patch, (patch % _RAY_STRIDE + _RAY_STRIDE * np.arange(num)) % self.gather_hits.shape[1]]
@@ -68,17 +67,17 @@ class PatchLight:
 
     @property
     def num_patches(self) -> int:
-        """C."""
+        """Number of patches."""
         return len(self.material)
 
     @property
     def points_per_patch(self) -> int:
-        """How many stand for each."""
+        """Number of sample points per patch."""
         return int(self.visible.shape[1])
 
     @cached_property
-    def frames(self) -> F32:
-        """Tangents and bitangents of cells, across the mean normals of their points. (C, 2, 3) float32"""
+    def frames(self) -> Shaped[F32, "patches 2 3"]:
+        """Tangents and bitangents of the patches, perpendicular to the mean normals of their points."""
         normal = self.points.normal.reshape(-1, self.points_per_patch, 3)
         mean = normal.mean(axis=1)
         length = np.linalg.norm(mean, axis=1, keepdims=True)
@@ -87,20 +86,20 @@ class PatchLight:
         return np.stack([tangent, np.cross(mean, tangent)], axis=1).astype(np.float32)
 
     def reflectance_operator(self, reflectances: Reflectances) -> ReflectanceOperator:
-        """What the cells make of light in a look."""
+        """Return the patches' reflectance operator in a look."""
         return ReflectanceOperator.from_materials(reflectances, self.material, self._texture_multipliers(reflectances))
 
     def highlight_tables(
         self, reflectances: Reflectances, reflectance_operator: ReflectanceOperator
     ) -> HighlightTables:
-        """The highlights of cells in a look that few functions do not tell. reflecting: what cells make of light"""
+        """Return highlights in a look that are too sharp for the low-degree basis."""
         highlights = HighlightTables.from_materials(
             reflectances, self.material, self._texture_multipliers(reflectances), reflectance_operator.energy_scale
         )
         return highlights.subset(np.isin(highlights.rows, reflectance_operator.rows))
 
     def _texture_multipliers(self, reflectances: Reflectances) -> F32:
-        """Multipliers of cells, those of images that a look names in their place. (2, C, 3) float32"""
+        """Return texture multipliers, with the look's material map overrides. (2, C, 3) float32"""
         image_names = [unpack_images(material_reflectance) for material_reflectance in reflectances]
         if not any(map(any, image_names)):
             return self.textures
@@ -113,31 +112,31 @@ class PatchLight:
         return multipliers
 
     def _mean_texture(self, texture: Texture, rows: NDArray[np.intp]) -> F32:
-        """What some cells show of a texture: its own mean where nobody knows where they lie in it. (rows or 1, 3)"""
+        """Return the texture values of patches, or the texture's mean without UV coordinates. (rows or 1, 3)"""
         if self.uv is None:
             return mean_value(texture)[None].astype(np.float32)
         point_values = sample_image(texture, self.uv[rows].reshape(-1, self.uv.shape[2]))
         return np.asarray(point_values.reshape(len(rows), -1, 3).mean(axis=1), np.float32)
 
-    def irradiance(self, lights: TriangleLights, light_indices: NDArray[np.intp] | None = None) -> F32:
-        """What comes to every cell from the lights themselves, the mean over its points. (C, 3) float32
+    def irradiance(
+        self, lights: TriangleLights, light_indices: Shaped[NDArray[np.intp], " M"] | None = None
+    ) -> Shaped[F32, "patches 3"]:
+        """Return the direct irradiance of each patch, averaged over its points.
 
         Args:
-            lights: triangles of the environment. light_indices: which of the bake's they are, (M,); None: all.
+            lights: triangles of the environment. light_indices: their indices in the bake; None: all.
         """
         visible = self._select_visible(self.visible.reshape(-1, self.visible.shape[2]), light_indices)
         point_irradiance = irradiance(self.points.normal, visible, lights).reshape(*self.visible.shape[:2], 3)
         return np.asarray(point_irradiance.mean(axis=1, dtype=np.float64), np.float32)
 
     def visibility_bits(
-        self, rows: NDArray[np.intp], light_indices: NDArray[np.intp] | None = None
-    ) -> NDArray[np.uint8]:
-        """What the points of some cells see. rows: the cells. (G,)
+        self, rows: Shaped[NDArray[np.intp], " G"], light_indices: Shaped[NDArray[np.intp], " M"] | None = None
+    ) -> Shaped[NDArray[np.uint8], "G points bytes"]:
+        """Return the light visibility of the points of patches `rows`.
 
         Args:
-            light_indices: which of the bake's lights, (M,); None: all.
-        Returns:
-            (G, points a cell, bytes) uint8
+            rows: the patches. light_indices: of the bake's lights; None: all.
         """
         visible = self._select_visible(self.visible[rows].reshape(-1, self.visible.shape[2]), light_indices)
         return np.ascontiguousarray(visible.reshape(len(rows), self.points_per_patch, visible.shape[1]))
@@ -147,16 +146,18 @@ class PatchLight:
         return visible if light_indices is None else select_visibility(visible, np.arange(len(visible)), light_indices)
 
     def incident_coefficients(
-        self, rows: NDArray[np.intp], lights: TriangleLights, degree: int, light_indices: NDArray[np.intp] | None = None
-    ) -> F32:
-        """The same as light vectors, of cells that ask where light comes from; at the first of their points.
+        self,
+        rows: Shaped[NDArray[np.intp], " G"],
+        lights: TriangleLights,
+        degree: int,
+        light_indices: Shaped[NDArray[np.intp], " M"] | None = None,
+    ) -> Shaped[F32, "G 3 J"]:
+        """Return the direct incident radiance coefficients of patches `rows`, at the first of their points.
 
         Args:
-            rows: the cells. (G,). lights: triangles of the environment.
-            degree: at most `OUTGOING_DEGREE`; the numbers of higher functions are left at nothing.
-            light_indices: which of the bake's lights they are, (M,); None: all.
-        Returns:
-            t. (G, 3, J) float32
+            rows: the patches. lights: triangles of the environment.
+            degree: at most `OUTGOING_DEGREE`; coefficients of higher functions are zero.
+            light_indices: of the lights in the bake; None: all.
         """
         points, visible = (
             self.first_points(rows),
@@ -164,22 +165,22 @@ class PatchLight:
         )
         return self.mean_coefficients(rows, points, incident_coefficients(points, visible, lights, (), degree))
 
-    def first_points(self, rows: NDArray[np.intp]) -> SurfacePoints:
-        """The first of the points of each of some cells."""
+    def first_points(self, rows: Shaped[NDArray[np.intp], " G"]) -> SurfacePoints:
+        """Return the first sample point of each of some patches."""
         return self.points.rows(rows * self.points_per_patch)
 
-    def points_of(self, rows: NDArray[np.intp]) -> SurfacePoints:
-        """The points that stand for some cells."""
+    def points_of(self, rows: Shaped[NDArray[np.intp], " G"]) -> SurfacePoints:
+        """Return the sample points of some patches."""
         return self.points.rows((rows[:, None] * self.points_per_patch + np.arange(self.points_per_patch)).ravel())
 
-    def mean_coefficients(self, rows: NDArray[np.intp], points: SurfacePoints, point_coefficients: F32) -> F32:
-        """Light vectors of cells from those of their points.
+    def mean_coefficients(
+        self, rows: Shaped[NDArray[np.intp], " G"], points: SurfacePoints, point_coefficients: Shaped[F32, "n 3 k"]
+    ) -> Shaped[F32, "G 3 J"]:
+        """Average the coefficients of points over patches, rotated to the frames of the patches.
 
         Args:
-            rows: the cells. (G,). points: equally many of each, those of a cell one after another. (n,)
-            point_coefficients: at the points, in their own frames, of any number of functions. (n, 3, …) float32
-        Returns:
-            The mean over a cell's points, in its own frame. (G, 3, J) float32
+            rows: the patches. points: the same number per patch, patch by patch.
+            point_coefficients: in the points' own frames, of any number of functions.
         """
         if len(rows) == 0:
             return np.zeros((0, 3, NUM_OUTGOING), np.float32)
@@ -205,17 +206,17 @@ class PatchLight:
     def _gather_hits_by_point(self) -> NDArray[np.uint16]:
         return self.gather_hits.reshape(self.points.num_points, self.pattern.num_rays)
 
-    def incident_light(self, outgoing: OutgoingLight, rows: NDArray[np.intp]) -> IncidentLight:
-        """What arrives from other cells, whose light differs by direction.
+    def incident_light(self, outgoing: OutgoingLight, rows: Shaped[NDArray[np.intp], " G"]) -> IncidentLight:
+        """Return the incident light from other patches with directional light.
 
         Args:
-            outgoing: by all cells. rows: those of which light vectors are wanted. (G,)
+            outgoing: of all patches. rows: patches that need coefficients.
         """
         gather_hits = self._gather_hits_by_point
         point_values = ray_incident_coefficients(self.points, [GatherRays(gather_hits, self.pattern, outgoing)], 0)[
             ..., 0
         ]
-        # of the first function, 1 / √π
+        # coefficient of the first function, 1 / √π
         patch_irradiance = _ROOT_PI * point_values.reshape(-1, self.points_per_patch, 3).mean(axis=1)
         points = self.points_of(rows)
         row_hits = self.gather_hits[rows].reshape(points.num_points, self.pattern.num_rays)
@@ -226,12 +227,16 @@ class PatchLight:
             patch_irradiance.astype(np.float32), self.mean_coefficients(rows, points, point_coefficients)
         )
 
-    def mean_to_others(self, isotropic: F32, coefficients: F32, rows: NDArray[np.intp]) -> F32:
-        """What other cells see of each in the mean. (C, 3) float32
+    def mean_to_others(
+        self,
+        isotropic: Shaped[F32, "patches 3"],
+        coefficients: Shaped[F32, "G 3 J"],
+        rows: Shaped[NDArray[np.intp], " G"],
+    ) -> Shaped[F32, "patches 3"]:
+        """Return the mean radiance of each patch toward other patches.
 
         Args:
-            isotropic: the part that cells send everywhere. (C, 3) float32
-            coefficients: L_j of some beside it, (G, 3, J) float32. rows: which those are. (G,)
+            isotropic: the isotropic part. coefficients: L_j of some patches. rows: these patches.
         """
         radiance = isotropic.copy()
         radiance[rows] += np.einsum("gj,gcj->gc", self._mean_outgoing_basis[rows], coefficients) if len(rows) else 0
@@ -239,17 +244,17 @@ class PatchLight:
 
     @cached_property
     def _mean_outgoing_basis(self) -> F32:
-        """The mean of all functions over the directions that others see a cell in. (C, J) float32"""
+        """Basis functions averaged over the directions in which other patches see a patch. (C, J) float32"""
         return mean_incoming(self.gather_hits, self.outgoing_bins, self.num_patches)
 
     @cached_property
-    def outgoing_bins(self) -> DirectionBins:
-        """In which squares light leaves the cells that rays hit. (C, rays) uint8"""
+    def outgoing_bins(self) -> Shaped[DirectionBins, "patches rays"]:
+        """Direction bins of the gather rays at the patches that they hit."""
         bins = outgoing_bins(self.points, self._gather_hits_by_point, self.pattern, self.frames)
         return bins.reshape(self.gather_hits.shape)
 
     @cached_property
-    def incident_bins(self) -> DirectionBins:
-        """In which squares it comes in by them. (C, rays) uint8"""
+    def incident_bins(self) -> Shaped[DirectionBins, "patches rays"]:
+        """Direction bins of the gather rays at their own patches."""
         bins = incoming_bins(self.points, self.points_per_patch, self.pattern, self.frames)
         return bins.reshape(self.gather_hits.shape)

@@ -1,4 +1,4 @@
-"""What gather cells make of light that arrives at them, under one look: L_j = Σ_k F_jk t_k (`relume.brdf.albedo`)."""
+"""Reflectance operator of patches under one look: L_j = Σ_k F_jk t_k (`relume.brdf.albedo`)."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.albedo import PAIRS, Reflectances, unpack_reflectance
@@ -15,42 +16,43 @@ from relume.math.zernike import OUTGOING_DEGREE, recurrence
 F32 = NDArray[np.float32]
 
 
-_DIAGONAL_PAIRS = {2 * rung: PAIRS.index((rung, rung)) for rung in range(1 + OUTGOING_DEGREE // 2)}  # those of order 0
+# functions of order 0
+_DIAGONAL_PAIRS = {2 * k: PAIRS.index((k, k)) for k in range(1 + OUTGOING_DEGREE // 2)}
 
 
 class IncidentLight(NamedTuple):
-    """What has come to cells.
+    """Incident light of patches.
 
     Attributes:
-        irradiance: E of all. (C, 3) float32
-        coefficients: t of those that send more one way than another, `ReflectanceOperator.rows`. (G, 3, J) float32
+        irradiance: E of all patches.
+        coefficients: t of patches with directional light, `ReflectanceOperator.rows`.
     """
 
-    irradiance: F32
-    coefficients: F32
+    irradiance: Shaped[F32, "patches 3"]
+    coefficients: Shaped[F32, "G 3 J"]
 
 
 @dataclass(frozen=True)
 class ReflectanceOperator:
-    """F of all cells, textures included.
+    """F of all patches, textures included.
 
     Attributes:
-        reflectance: F_00, never above one. (C, 3) float32
-        has_lobe: tells which materials send more one way than another; as bytes, a part of keys.
-        rows: cells of these. (G,) intp
-        reflectance_matrix: all of F of those. (pairs, G, 3) float32
-        energy_scale: what all that cells send is multiplied by, so that none sends more than it gets. (C, 3) float32
+        reflectance: F_00, at most 1.
+        has_lobe: one byte per material, nonzero if it reflects directionally; part of cache keys.
+        rows: patches of these materials.
+        reflectance_matrix: all of F for `rows`.
+        energy_scale: factor on all outgoing light of a patch, so that it never reflects more than it receives.
     """
 
-    reflectance: F32
+    reflectance: Shaped[F32, "patches 3"]
     has_lobe: bytes
-    rows: NDArray[np.intp]
-    reflectance_matrix: F32
-    energy_scale: F32
+    rows: Shaped[NDArray[np.intp], " G"]
+    reflectance_matrix: Shaped[F32, "pairs G 3"]
+    energy_scale: Shaped[F32, "patches 3"]
 
     @cached_property
-    def roughening(self) -> F32:
-        """How fast the highlights of `rows` let light fall with the degree n, as e^(−n (n + 2) f). f: (G,) float32"""
+    def roughening(self) -> Shaped[F32, " G"]:
+        """Decay f by the highlights of `rows`: light of degree n is multiplied by e^(−n (n + 2) f)."""
         low, high = (np.abs(self.reflectance_matrix[_DIAGONAL_PAIRS[n]]).mean(axis=1) for n in (2, OUTGOING_DEGREE))
         decay = np.log(np.maximum(low, 1e-30) / np.maximum(high, 1e-30)) / (
             OUTGOING_DEGREE * (OUTGOING_DEGREE + 2) - 2 * 4
@@ -59,13 +61,16 @@ class ReflectanceOperator:
 
     @classmethod
     def from_materials(
-        cls, reflectances: Reflectances, material: NDArray[np.uint16], textures: F32
+        cls,
+        reflectances: Reflectances,
+        material: Shaped[NDArray[np.uint16], " patches"],
+        textures: Shaped[F32, "2 patches 3"],
     ) -> ReflectanceOperator:
-        """F of cells.
+        """Compute F of patches.
 
         Args:
-            reflectances: of all materials. material: of each cell. (C,) uint16
-            textures: multipliers of each of `relume.brdf.texture_slots.TEXTURES`. (2, C, 3) float32
+            reflectances: of all materials. material: of each patch.
+            textures: multipliers of each of `relume.brdf.texture_slots.TEXTURES`.
         """
         matrices = np.stack([unpack_reflectance(material_reflectance) for material_reflectance in reflectances])
         multipliers = np.concatenate([np.ones_like(textures[:1]), textures])
@@ -78,13 +83,9 @@ class ReflectanceOperator:
         reflectance = np.clip(total_reflectance, 0, 1).astype(np.float32)
         return cls(reflectance, has_lobe.tobytes(), rows, reflectance_matrix.astype(np.float32), energy_scale)
 
-    def apply(self, incident: IncidentLight) -> tuple[F32, F32]:
-        """What cells send of what arrives.
-
-        Returns:
-            The part that is the same everywhere, (C, 3), and L_j of `rows` beside it, (G, 3, J); float32
-        """
-        # a function's numbers lie together
+    def apply(self, incident: IncidentLight) -> tuple[Shaped[F32, "patches 3"], Shaped[F32, "G 3 J"]]:
+        """Return the reflected light: the isotropic part, and L_j of `rows`."""
+        # contiguous per function
         coefficients = np.ascontiguousarray(incident.coefficients.transpose(2, 0, 1))
         recurrence_table, outgoing = recurrence(OUTGOING_DEGREE), np.zeros_like(coefficients)
         for pair, (j, k) in enumerate(PAIRS[1:], 1):

@@ -1,11 +1,11 @@
-"""Light between surfaces: what cells send, reflection after reflection, until it is even.
+"""Indirect light of patches, bounce by bounce, until it is isotropic.
 
-    t^0: from the lights;   L^b = F t^b;   t^(b+1)(c) = mean over the rays r of c of π L^b(link(c, r), −ω_r) h(ω_r)
+    t^0: from the lights;   L^b = F t^b;   t^(b+1)(c) = mean over the rays r of c of π L^b(hit(c, r), −ω_r) h(ω_r)
 
-The first reflections keep the directions that highlights give light, the more of them the more highlights send. What is
-reflected once more has come from everywhere: from then on a cell sends the same to all others, the mean of what they
-see of it (`relume.radiosity.bounce`). Of what comes straight from lights, sharp highlights send what tables say in
-the place of functions (`relume.radiosity.highlight_transport`).
+The first bounces keep directions, the more of them the more light highlights reflect. Later light has come from
+everywhere: from then on a patch radiates isotropically, with the mean of its directional light
+(`relume.radiosity.bounce`). For direct light, sharp highlights use tables in place of the low-degree basis
+(`relume.radiosity.highlight_transport`).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.radiosity.bounce import bounces, one_bounce, preview_bounces
@@ -23,8 +24,8 @@ from relume.radiosity.reflectance_operator import IncidentLight, ReflectanceOper
 
 F32 = NDArray[np.float32]
 
-_MIN_DIRECTIONAL_BOUNCES, _MAX_DIRECTIONAL_BOUNCES = 2, 4  # reflections
-_ENERGY_CUTOFF = 0.1  # of the light, that highlights have sent on each time
+_MIN_DIRECTIONAL_BOUNCES, _MAX_DIRECTIONAL_BOUNCES = 2, 4
+_ENERGY_CUTOFF = 0.1  # fraction of the light that highlights have reflected at each bounce
 
 
 def solve_indirect(
@@ -35,12 +36,12 @@ def solve_indirect(
     last: int,
     outgoing_highlights: OutgoingHighlights | None = None,
 ) -> OutgoingRadiance:
-    """What every cell sends out of light that surfaces have reflected `first` to `last` times, its own included.
+    """Return the outgoing radiance of all patches by bounces `first` to `last`.
 
     Args:
-        patches: that send it. reflectance_operator: what they make of light.
-        incident: from the lights. first: at least 1. last: not less.
-        outgoing_highlights: sharp highlights, and what they send of it; None: functions say it.
+        patches: of the bake. reflectance_operator: of the patches.
+        incident: direct light. first: at least 1. last: at least `first`.
+        outgoing_highlights: sharp highlights and their direct light; None: these use the low-degree basis.
     """
     gather_hits, rho = patches.gather_hits, reflectance_operator.reflectance
 
@@ -63,7 +64,7 @@ def solve_indirect(
 
 
 def _num_directional_bounces(reflectance_operator: ReflectanceOperator) -> int:
-    """How many reflections keep directions: until highlights have sent little each time."""
+    """Return the number of bounces with directions: until highlights have reflected little at each."""
     mean_reflectance = float(reflectance_operator.reflectance[reflectance_operator.rows].sum(dtype=np.float64)) / max(
         1, reflectance_operator.reflectance.size
     )
@@ -84,10 +85,10 @@ def solve_indirect_fast(
     last: int,
     outgoing_highlights: OutgoingHighlights | None = None,
 ) -> OutgoingRadiance:
-    """The same for a moving hand: by squares in place of directions, and few rays where light is even.
+    """Approximate `solve_indirect` for an active edit: direction bins, and fewer rays for isotropic light.
 
     Args:
-        patches, reflectance_operator, incident, first, last, outgoing_highlights: as of `solve_indirect`.
+        patches, reflectance_operator, incident, first, last, outgoing_highlights: as in `solve_indirect`.
     """
     gather_hits, few_rays, rho = patches.gather_hits, patches.few_rays, reflectance_operator.reflectance
 
@@ -109,12 +110,12 @@ def _sum_bounces(
     last: int,
     reflect: Callable[[OutgoingRadiance], OutgoingRadiance], sum_isotropic: Callable[[F32, int], F32],
 ) -> OutgoingRadiance:  # fmt: skip
-    """Reflect light between cells.
+    """Sum bounces between patches.
 
     Args:
-        first_outgoing: what they send of light that comes from the lights.
-        reflect: reflects light that has directions once more.
-        sum_isotropic: the sum of even light and what becomes of it in some reflections.
+        first_outgoing: reflected direct light.
+        reflect: reflects directional light once more.
+        sum_isotropic: sums isotropic light over further bounces.
     """
     outgoing, bounce_index = first_outgoing, 1
     num_directional = min(last, _num_directional_bounces(reflectance_operator)) if len(first_outgoing.rows) else 1
@@ -140,11 +141,11 @@ def _sum_bounces(
 
 def solve_indirect_preview(
     patches: PatchLight, reflectance_operator: ReflectanceOperator, incident: IncidentLight, first: int, last: int
-) -> F32:
-    """The same roughly, without directions, as others see it in the mean. (NO_CELL + 1, 3) float32
+) -> Shaped[F32, "padded 3"]:
+    """Approximate `solve_indirect` by the mean radiance toward other patches, without directions.
 
     Args:
-        patches, reflectance_operator, incident, first, last: as of `solve_indirect`.
+        patches, reflectance_operator, incident, first, last: as in `solve_indirect`.
     """
     isotropic = patches.mean_to_others(*reflectance_operator.apply(incident), reflectance_operator.rows)
     for _ in range(first - 1):

@@ -1,7 +1,7 @@
-"""The kernel that lists lamps of some extent as light triangles: those parts of them that a point sees.
+"""Kernel that lists the visible parts of area lights as light triangles.
 
-A part that is seen as a whole and no wider than `_NARROW` is two triangles; what is wider, or partly hidden, is
-divided along its halvings (`relume.lights.light_sampling`), down to single samples.
+A fully visible part no wider than `_NARROW` becomes two triangles. A wider or partly occluded part is divided along its
+halves (`relume.lights.light_sampling`), down to single samples.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from relume.transport.light_culling import cull
 _ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
 _THIRD, _TWO = np.float32(1 / 3), np.float32(2)
 _PI = np.float32(math.pi)
-_NARROW = np.float32(0.12)  # radians, to the farthest corner: what cosines vary over it is a hundredth
+_NARROW = np.float32(0.12)  # radians, to the farthest corner: cosines vary over it by about 0.01
 _NOT_FLAT = np.float32(NOT_FLAT_RADIUS)
-_NOTHING = np.float32(1e-6)  # as a share of a part: a corner is a triangle's where it is two of four
+_NOTHING = np.float32(1e-6)  # fraction of a part: a corner belongs to a triangle if it is two of its four
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def _count_visible(bits, first, count):  # type: ignore[no-untyped-def]
-    """Count the samples [first, first + count) that are seen, count a power of four."""
+    """Count the visible samples in [first, first + count); count is a power of four."""
     if count < 8:
         nibble: Any = np.int64(bits[first >> 3]) >> (first & 7)
         return (nibble & 1) + ((nibble >> 1 & 1) + (nibble >> 2 & 1) + (nibble >> 3 & 1) if count == 4 else 0)
@@ -44,7 +44,7 @@ def _count_visible(bits, first, count):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _make_square(x, y, z, nx, ny, nz, half, corner):  # type: ignore[no-untyped-def]
-    """Lay a square about a place, across a normal. half: of its side. corner: written. (4, 3)"""
+    """Center a square at a point, perpendicular to a normal. half: half its side. corner: written. (4, 3)"""
     length = math.sqrt(max(nx * nx + nz * nz, ny * ny + nz * nz))
     ex, ey, ez = (nz, _ZERO, -nx) if abs(nx) > abs(ny) else (_ZERO, nz, -ny)
     along = half / max(length, np.float32(1e-20))
@@ -64,10 +64,10 @@ def _unit(x, y, z):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _triangle_nodes(corner, second, node):  # type: ignore[no-untyped-def]
-    """Find the directions of a triangle's corners, 0, `second` and the next of four, and of its edges' middles.
+    """Compute the directions of a triangle's corners (0, `second` and the next of four) and of its edge midpoints.
 
     Args:
-        corner: seen from the point, metres. (4, 3) node: written. (6, 3)
+        corner: relative to the shaded point, meters. (4, 3) node: written. (6, 3)
     """
     for k in range(3):
         corner_index = 0 if k == 0 else second + k - 1
@@ -86,7 +86,7 @@ def _triangle_nodes(corner, second, node):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _radius(x, y, z, node):  # type: ignore[no-untyped-def]
-    """Find the angle from a direction to the farthest of a triangle's corners."""
+    """Return the angle from a direction to the farthest corner of a triangle."""
     max_squared = _ZERO
     for k in range(3):
         dx, dy, dz = node[k, 0] - x, node[k, 1] - y, node[k, 2] - z
@@ -94,8 +94,8 @@ def _radius(x, y, z, node):  # type: ignore[no-untyped-def]
     return _TWO * math.asin(min(_HALF * math.sqrt(max_squared), _ONE))
 
 
-# What is inlined takes arrays of the lamp, which a call would count references to: threads share them, and a list of
-# parts took twice as long.
+# Passing arrays of the light to a call would count references to them, and threads share these counters: listing parts
+# took twice as long. Hence the inlining.
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _add_halves(  # type: ignore[no-untyped-def]
     frame,
@@ -115,12 +115,12 @@ def _add_halves(  # type: ignore[no-untyped-def]
     """Add the two triangles of a quadrilateral.
 
     Args:
-        frame: tangent, n × t, normal of the point. (3, 3) corner: seen from there, metres. (4, 3)
-        normal: of the lamp there. (3,) first_fraction: of the first in its light. area: that it stands for, m².
-        gain: (3,). num_triangles, end: of triangles and entries so far.
+        frame: tangent, n × t, normal of the shaded point. (3, 3) corner: relative to this point, meters. (4, 3)
+        normal: of the light at this part. (3,) first_fraction: fraction of the light in the first triangle.
+        area: that the quadrilateral represents, m². gain: (3,). num_triangles, end: triangles and entries so far.
         light, wi, nodes, irradiance_radius: written, see `list_area_light`.
     Returns:
-        made and end, afterwards.
+        The new num_triangles and end.
     """
     for half in range(2):
         triangle_area = area * (first_fraction if half == 0 else _ONE - first_fraction)
@@ -151,15 +151,15 @@ def _add_halves(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _outline(light, strata, emitter_parts, part_index, sample, shift, x, y, z, area, corner, across):  # type: ignore[no-untyped-def]
-    """Find the quadrilateral that stands for a part.
+    """Compute the quadrilateral that represents a part.
 
     Args:
-        light, strata, emitter_parts: of the lamp. part_index: number of the part. sample: its only one, if it does not
-        lie flat.
-        shift: of the point. x, y, z: the point. area: that the part stands for, m².
-        corner: seen from the point, written. (4, 3) across: normal of the lamp there, written. (3,)
+        light, strata, emitter_parts: of the area light. part_index: index of the part. sample: its only sample, if the
+        part is not flat.
+        shift: sample offset of the shaded point. x, y, z: the shaded point. area: that the part represents, m².
+        corner: relative to the shaded point, written. (4, 3) across: normal of the light at the part, written. (3,)
     Returns:
-        The share of its first triangle.
+        Fraction of the light in its first triangle.
     """
     if emitter_parts.radius[part_index] < _NOT_FLAT:
         for k in range(4):
@@ -172,7 +172,7 @@ def _outline(light, strata, emitter_parts, part_index, sample, shift, x, y, z, a
             emitter_parts.normal[part_index, 2],
         )
         return emitter_parts.first_fraction[part_index]
-    # a sample of several pieces stands for so much about it
+    # a sample that covers several pieces represents a square of its area
     dx, dy, dz, distance, _, nx, ny, nz = light_sample(light, strata, sample, shift[0], shift[1], x, y, z)
     across[0], across[1], across[2] = nx, ny, nz
     _make_square(distance * dx, distance * dy, distance * dz, nx, ny, nz, _HALF * math.sqrt(area), corner)
@@ -183,10 +183,10 @@ def _outline(light, strata, emitter_parts, part_index, sample, shift, x, y, z, a
 def _list_visible_parts(  # type: ignore[no-untyped-def]
     frame, position, shift, bits, area_light, scratch, num_triangles, end, light, wi, nodes, irradiance_radius
 ):
-    """List the parts that a point sees; returns triangles and entries so far.
+    """List the visible parts of an area light; return the triangles and entries so far.
 
     Args:
-        frame: as in `_add_halves`. position: of the point. (3,) shift: of its samples. bits: which of them it sees.
+        frame: as in `_add_halves`. position: of the point. (3,) shift: of its samples. bits: their visibility.
         area_light: light, strata, parts and gain, as in `LocalRays`. scratch: from `_scratch`.
         num_triangles, end, light, wi, nodes, irradiance_radius: as in `_add_halves`.
     """
@@ -239,7 +239,7 @@ def _list_visible_parts(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def _scratch():  # type: ignore[no-untyped-def]
-    """Make room for corners, a normal, and the parts that wait for their turn: three more at each level."""
+    """Allocate memory for corners, a normal, and a stack of parts: three more at each level."""
     return np.empty((4, 3), np.float32), np.empty(3, np.float32), np.empty((16, 2), np.int64)
 
 
@@ -247,16 +247,16 @@ def _scratch():  # type: ignore[no-untyped-def]
 def list_area_light(  # type: ignore[no-untyped-def]
     points, wo, area_light, visible, kinds, support, start, stop, first, light, wi, out, nodes, irradiance_radius
 ):
-    """List what points [start, stop) see of a lamp.
+    """List the parts of an area light that are visible from points [start, stop).
 
     Args:
-        points: `SurfacePoints`. wo: towards the viewer. (n, 3) float32
-        area_light: light, strata, parts and gain, as in `LocalRays`. visible: as there.
-        kinds, support, first, light, wi, out: as of `relume.transport.light_culling.list_lights`.
-        nodes: of triangles, written, corners and midpoints of edges. (M, 6, 3) float32
-        irradiance_radius: their irradiance and, in radians, radius, written. (M, 4) float32
+        points: `SurfacePoints`. wo: view directions. (n, 3) float32
+        area_light: light, strata, parts and gain, as in `LocalRays`. visible: as in `LocalRays`.
+        kinds, support, first, light, wi, out: as in `relume.transport.light_culling.list_lights`.
+        nodes: corners and edge midpoints of the triangles, written. (M, 6, 3) float32
+        irradiance_radius: irradiance and angular radius (radians) of the triangles, written. (M, 4) float32
     Returns:
-        K, the number of entries, and M, of triangles.
+        K, the number of entries, and M, the number of triangles.
     """
     position, normal, tangent, seed, _ = points
     max_triangles = 2 * area_light[1].uv.shape[0]

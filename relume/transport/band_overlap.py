@@ -1,13 +1,12 @@
-"""How much of a triangle lies in each band of an angle: Ben-Artzi 2006, appendix A; eight bands at once.
+"""Area of a triangle in each band of an angle (Ben-Artzi 2006, appendix A), for eight bands at a time.
 
-Only the angle at the three corners is needed: where the angle is linear over the triangle, the area below a value y
-grows quadratically from the smallest corner to the middle one and from there to the largest. What lies beyond the last
-band counts to it: angles are clamped to its end.
+Only the angle at the three corners is needed: if the angle is linear over the triangle, the area below a value y
+grows quadratically from the smallest corner to the middle one and from there to the largest. The area beyond the last
+band is added to this band: angles are clamped to its end.
 
-Half of the projector's time goes into the inner sums over bands, a handful for each triangle: too few for the compiler
-to vectorise by itself, and scattered where it cannot know that they do not alias. Written as vectors of eight floats,
-by Numba intrinsics, they take half the time (docs/adr/0009-numba-and-embree.md). LLVM lowers them to whatever
-registers the machine has.
+The inner sums over bands take half of the projector's time. They have a handful of terms per triangle: too few for the
+compiler to vectorize, with scattered writes that may alias. As vectors of eight floats, by Numba intrinsics, they take
+half the time (docs/adr/0009-numba-and-embree.md). LLVM lowers them to the registers of the machine.
 """
 
 from __future__ import annotations
@@ -37,16 +36,16 @@ from relume.core.simd import (
 )
 
 _ONE = np.float32(1)
-# corners closer than this, in bands, count as one: the formula divides by their distance
+# corners closer than this, in bands, are treated as equal: the formula divides by their distance
 _CLOSE = np.float32(1e-4)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def overlap(a, b, c):  # type: ignore[no-untyped-def]
-    """Compute what the share below an angle needs of a triangle, whose corners have the angles a, b, c in bands.
+    """Return the parameters of the cumulative area of a triangle with the angles a, b, c at its corners, in bands.
 
     Returns:
-        Smallest, middle and largest angle of corners in any order; 1/((b−a)(c−a)) and 1/((c−b)(c−a)) of the sorted.
+        Smallest, middle and largest angle; 1/((b−a)(c−a)) and 1/((c−b)(c−a)) of the sorted angles.
     """
     smaller, larger = min(a, b), max(a, b)
     low, middle, high = min(smaller, c), max(smaller, min(larger, c)), max(larger, c)
@@ -55,11 +54,11 @@ def overlap(a, b, c):  # type: ignore[no-untyped-def]
     return low, middle, high, _ONE / (rising * width), _ONE / (falling * width)
 
 
-_OVERLAP = (types.float32,) * 5  # what `overlap` returns
+_OVERLAP = (types.float32,) * 5  # the return value of `overlap`
 
 
 def _area_below(builder: Any, y: Any, low: Any, middle: Any, high: Any, rise: Any, fall: Any) -> Any:
-    """Compute the share of a triangle's area where the angle is below each of eight values y."""
+    """Return the fraction of a triangle's area with angles below each of eight values y."""
     from_low, to_high = subtract(builder, y, low), subtract(builder, high, y)
     ones, zeros = ir.Constant(VECTOR, [1.0] * NUM), ir.Constant(VECTOR, [0.0] * NUM)
     upper = subtract(builder, ones, multiply(builder, multiply(builder, to_high, to_high), fall))
@@ -70,14 +69,14 @@ def _area_below(builder: Any, y: Any, low: Any, middle: Any, high: Any, rise: An
 
 
 def _areas(builder: Any, band: Any, overlap: Any) -> Any:
-    """Compute the shares of area below the beginnings of bands [band, band + 8)."""
+    """Return the fractions of area below the lower ends of bands [band, band + 8)."""
     first = broadcast(builder, builder.sitofp(band, FLOAT))
     starts = sum_values(builder, [first, ir.Constant(VECTOR, [float(k) for k in range(NUM)])])
     return _area_below(builder, starts, *(broadcast(builder, value) for value in overlap))
 
 
 def _band_fractions(builder: Any, band: Any, overlap: Any) -> Any:
-    """Compute Δ of bands [band, band + 8)."""
+    """Return Δ of bands [band, band + 8)."""
     upper = _areas(builder, builder.add(band, constant_index(1)), overlap)
     return subtract(builder, upper, _areas(builder, band, overlap))
 
@@ -87,8 +86,8 @@ def deposit(typing_context, out, band, low, middle, high, rise, fall, red, green
     """Add (red, green, blue) · Δ of bands [band, band + 8) to `out`.
 
     Args:
-        typing_context: Numba's. out: (3, bands padded by 8) float32. band: the first of the eight.
-        low, middle, high, rise, fall: the triangle's, from `overlap`. red, green, blue: its weights.
+        typing_context: Numba's. out: (3, bands padded by 8) float32. band: first of the eight.
+        low, middle, high, rise, fall: of the triangle, from `overlap`. red, green, blue: its weights.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -108,14 +107,14 @@ def deposit(typing_context, out, band, low, middle, high, rise, fall, red, green
 
 @untyped_intrinsic
 def mean_over_bands(typing_context, decrements, channel, band, low, middle, high, rise, fall):  # type: ignore[no-untyped-def]
-    """Compute Σ_j A_j (c_{j-1} − c_j) over bands [band, band + 8), with A_j the share of area below band j.
+    """Return Σ_j A_j (c_{j-1} − c_j) over bands [band, band + 8), with A_j the fraction of area below band j.
 
-    Of all bands from the smallest corner's to a last one k beyond the largest's, with c_k, it is the mean Σ Δ_j c_j:
-    half of the areas, and where a curve falls nothing is a difference.
+    Summed from the band of the smallest corner to a band k beyond the largest, plus c_k, it is the mean Σ Δ_j c_j. It
+    needs half as many areas, and steep curves cause no cancellation.
 
     Args:
         typing_context: Numba's. decrements: c_{j-1} − c_j of a curve. (3, bands padded by 8) float32. channel: its row.
-        band: the first of the eight. low, middle, high, rise, fall: the triangle's, from `overlap`.
+        band: first of the eight. low, middle, high, rise, fall: of the triangle, from `overlap`.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -128,12 +127,12 @@ def mean_over_bands(typing_context, decrements, channel, band, low, middle, high
 
 @untyped_intrinsic
 def add_means(typing_context, means, settings, first, band, low, middle, high, rise, fall):  # type: ignore[no-untyped-def]
-    """Add Σ Δ_j settings[j] over bands [band, band + 8) to the means, eight settings from the first on.
+    """Add Σ Δ_j settings[j] over bands [band, band + 8) to the means of eight settings.
 
     Args:
-        typing_context: Numba's. means: added to. (settings,) float32, a multiple of eight of them.
-        settings: of a curve. (bands padded by 8, settings) float32. first: the first of the eight settings.
-        band: the first of the eight bands. low, middle, high, rise, fall: the triangle's, from `overlap`.
+        typing_context: Numba's. means: added to. (settings,) float32, a multiple of eight.
+        settings: of a curve. (bands padded by 8, settings) float32. first: first of the eight settings.
+        band: first of the eight bands. low, middle, high, rise, fall: of the triangle, from `overlap`.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

@@ -1,9 +1,9 @@
-"""What surfaces send whose every texel has a BRDF of its own: the sum over light, texel by texel.
+"""Outgoing radiance of BTF-textured surfaces, summed texel by texel.
 
     L(x, ωo) = Σ_v hat_v(ωo) Σ_j α_vj(x) Σ_l E_vkj(l) a_l(x),   a_l = Σ_s w_s hat_l(ω_s)
 
-where a is all light that arrives at a place (`relume.transport.texture_light`). Where relief is known, x is from each
-side v where the same of it is seen (`relume.assets.btf.parallax`).
+a is the incident light at a point (`relume.transport.texture_light`). For a BTF with a height map, x is shifted per
+view v so that all views show the same point of the relief (`relume.assets.btf.parallax`).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Any
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.btf.direction_rings import interpolation_weights
@@ -28,17 +29,17 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 _MIN_COSINE = np.float32(1e-3)
-_TEXEL = np.float32(0.5)  # side of the texels for a footprint, in footprints: a mean between four is twice as wide
+_TEXEL = np.float32(0.5)  # texel side per footprint side: bilinear interpolation doubles the width
 _MAX_FOOTPRINT_SAMPLES = 4  # along a footprint
-_MAX_SPACING = np.float32(1.5)  # texels, between them at most
-_MAX_ELONGATION = np.float32(3)  # footprint, in widths: of longer ones coarser texels are summed
+_MAX_SPACING = np.float32(1.5)  # texels between footprint samples
+_MAX_ELONGATION = np.float32(3)  # footprint length over width: longer ones sum coarser texels
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _linear_taps(coordinate, count):  # type: ignore[no-untyped-def]
-    """Find the two texels of a row beside a place within [0, 1], and the share of the second."""
+    """Return the two texels of a row around a coordinate in [0, 1], and the fraction of the second."""
     x: Any = coordinate * np.float32(count) - np.float32(0.5)
-    # a floor, which would be a call; whatever the place is
+    # floor without a call, for any coordinate
     low: Any = min(max(np.int32(x + np.float32(1)) - 1, np.int32(-1)), np.int32(count - 1))
     fraction = np.float32(x - np.float32(low))
     return (low if low >= 0 else count - 1), (low + 1 if low + 1 < count else 0), fraction
@@ -46,31 +47,31 @@ def _linear_taps(coordinate, count):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def neighbor_texels(levels, u, v, footprint, texel, weight):  # type: ignore[no-untyped-def]
-    """Find the texels about a place, of the two levels about a footprint.
+    """Select texels for trilinear interpolation.
 
     Args:
-        levels: of the BTF. u, v: the place, in repeats. footprint: side of it, in repeats.
-        texel: their numbers, written. (8,) int32. weight: of each, written. (8,) float32
+        levels: of the BTF. u, v: coordinates, in repeats. footprint: its side, in repeats.
+        texel: indices, written. (8,) int32. weight: of each texel, written. (8,) float32
     Returns:
-        How many there are: four of each level that has a share.
+        Number of texels: four of each level with a weight.
     """
     level = mip_level(footprint, np.float32(max(levels[0, 1], levels[0, 2])))
-    u, v = np.float32(u - math.floor(u)), np.float32(v - math.floor(v))  # remainders of integers are slow
+    u, v = np.float32(u - math.floor(u)), np.float32(v - math.floor(v))  # the integer modulo is slow
     return texels_at_level(levels, u, v, level, texel, weight)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def mip_level(footprint, finest):  # type: ignore[no-untyped-def]
-    """Level of halvings for a footprint, however many there are. finest: side of the finest, in texels."""
+    """Return the fractional mip level of a footprint, not clamped. finest: side of level 0, in texels."""
     return fast_log2(max(_TEXEL * footprint * finest, np.float32(1)))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def texels_at_level(levels, u, v, level, texel, weight):  # type: ignore[no-untyped-def]
-    """Do as `neighbor_texels`.
+    """Select texels for trilinear interpolation at a given level, as `neighbor_texels`.
 
     Args:
-        levels, texel, weight: as there. u, v: shares of a repeat. level: between two, see `mip_level`.
+        levels, texel, weight: as in `neighbor_texels`. u, v: in [0, 1). level: fractional, see `mip_level`.
     """
     coarsest = levels.shape[0] - 1
     clamped_level: Any = min(level, np.float32(coarsest))
@@ -100,15 +101,15 @@ def texels_at_level(levels, u, v, level, texel, weight):  # type: ignore[no-unty
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def anisotropic_offsets(footprint, up, finest):  # type: ignore[no-untyped-def]
-    """Find places whose texels, summed, are as long as a footprint, which a slant makes longer than wide.
+    """Distribute samples along an anisotropic footprint.
 
-    Box and tent of texels of side t have a variance of t²/4 about a place, n places d apart one of d² (n² − 1) / 12:
-    both together are that of the footprint's length, a²/12.
+    Box and tent filter of texels of side t have a variance of t²/4, and n samples at distance d have d² (n² − 1) / 12:
+    together they equal a²/12, the variance of the footprint's length a.
 
     Args:
-        footprint: side of the square of its area, in repeats. up: cosine of the slant. finest: see `mip_level`.
+        footprint: side of the square of equal area, in repeats. up: cosine of the slant. finest: see `mip_level`.
     Returns:
-        How many places; how far apart; the footprint's width, or what stands for it.
+        Number of samples; their distance; the width of the footprint that selects the level.
     """
     slanted = np.float32(math.sqrt(max(up, _MIN_COSINE)))
     length: Any = footprint / slanted
@@ -123,15 +124,15 @@ def anisotropic_offsets(footprint, up, finest):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _add_weights(cluster, weight, view, texel, texel_weight, num, sample_weight, num_clusters, clusters, sums):  # type: ignore[no-untyped-def]
-    """Add the weights of texels, seen from one side, by their clusters.
+    """Add the weights of texels for one view, by cluster.
 
     Args:
-        cluster, weight: of the BTF. view: the side. texel, texel_weight: see `neighbor_texels`. num: of them.
-        sample_weight: that they are of all texels.
-        num_clusters: clusters that there are yet. clusters: these, written. (≥ num_found + num,) int32
-        sums: of their means' and components' weights, written. (≥ num_found + num, ≥ 1 + C)
+        cluster, weight: of the BTF. view: its index. texel, texel_weight: see `neighbor_texels`. num: number of texels.
+        sample_weight: weight of this footprint sample.
+        num_clusters: clusters so far. clusters: their indices, written. (≥ num_clusters + num,) int32
+        sums: weights of their means and components, written. (≥ num_clusters + num, ≥ 1 + C)
     Returns:
-        How many clusters there are.
+        The new number of clusters.
     """
     for k in range(num):
         texel_index, w = texel[k], sample_weight * texel_weight[k]
@@ -152,13 +153,13 @@ def _add_weights(cluster, weight, view, texel, texel_weight, num, sample_weight,
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _footprint_samples(levels, heights, footprint_center, x, y, z, slant, out):  # type: ignore[no-untyped-def]
-    """Find the places that stand for a footprint, and how high the relief is that is seen there.
+    """Distribute samples along a footprint and look up the relief height of each.
 
     Args:
-        levels: of the BTF. heights, footprint_center: as of `_send`. x, y, z: the direction to the eye. slant: s of it.
-        out: u, v and height of each, written. (≥ places, 3)
+        levels: of the BTF. heights, footprint_center: as in `_shade_texels`. x, y, z: view direction. slant: its slant.
+        out: u, v and height of each sample, written. (≥ samples, 3)
     Returns:
-        How many; the width of the footprint.
+        Number of samples; width of the footprint.
     """
     num, spacing, width = anisotropic_offsets(footprint_center[2], z, np.float32(max(levels[0, 1], levels[0, 2])))
     across: Any = np.float32(1) / max(np.float32(math.sqrt(x * x + y * y)), _MIN_COSINE)
@@ -171,10 +172,10 @@ def _footprint_samples(levels, heights, footprint_center, x, y, z, slant, out): 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _shade_texels(grid, tables, texel_arrays, heights, incident, axes, wo, positions, out):  # type: ignore[no-untyped-def]
-    """Sum what n points send.
+    """Compute the outgoing radiance of n points.
 
     Args:
-        heights: heights, the lowest and the highest of them, slants of the sides.
+        heights: height map, its minimum and maximum, slants of the views.
         incident: (n, 3, L). wo: in shading frames. (n, 3). positions: u and v in repeats, side of the footprint. (n, 3)
         out: written. (n, 3)
     """
@@ -219,37 +220,40 @@ def _shade_texels(grid, tables, texel_arrays, heights, incident, axes, wo, posit
 
 
 def _texture_positions(btf_ref: BtfRef, uv: F32) -> F32:
-    """Where points are on the texture. (n, 3), as `_send` wants them"""
+    """Return u, v and footprint side in repeats, (n, 3), for `_shade_texels`."""
     cosine, sine, u, up = math.cos(btf_ref.rotation), math.sin(btf_ref.rotation), uv[:, 0], -uv[:, 1]
-    # up in the texture is down in its coordinates
+    # v of the BTF points up, v of the coordinates down
     positions = btf_ref.scale * np.stack([cosine * u + sine * up, sine * u - cosine * up, uv[:, 2]], axis=1)
     return positions.astype(np.float32)
 
 
-def texel_rows(btf_ref: BtfRef, lights: TriangleLights | None, receivers: ShadingPoints, start: int, stop: int) -> F32:
-    """Find what points send, texel by texel.
+def texel_rows(
+    btf_ref: BtfRef, lights: TriangleLights | None, receivers: ShadingPoints, start: int, stop: int
+) -> Shaped[F32, "m 3"]:
+    """Compute the outgoing radiance of points [start, stop), texel by texel.
 
     Args:
-        btf_ref: how they are covered. lights: of the environment, None for rays alone.
-        receivers: all points; `uv` says where they are.
-        start, stop: those that are asked about.
+        btf_ref: the BTF and its mapping. lights: of the environment, None for rays alone.
+        receivers: all points, with `uv`. start, stop: range of points.
     Returns:
-        Radiance. (stop - start, 3) float32
+        Outgoing radiance.
     """
     return outgoing_rows(
         btf_ref, btf_ref.tables, texture_light_rows(btf_ref, lights, receivers, start, stop), receivers, start
     )
 
 
-def outgoing_rows(btf_ref: BtfRef, tables: F32, incident: F32, receivers: ShadingPoints, start: int) -> F32:
-    """Find what points send of light that has been shared out.
+def outgoing_rows(
+    btf_ref: BtfRef, tables: Shaped[F32, " ..."], incident: Shaped[F32, "m 3 L"], receivers: ShadingPoints, start: int
+) -> Shaped[F32, "m 3"]:
+    """Compute the outgoing radiance of points from binned incident light.
 
     Args:
-        btf_ref: how they are covered. tables: of the BTF, or those that `rotated_tables` made of them.
-        incident: at the points that are asked about, see `texture_light_rows`. (n, 3, L)
-        receivers: all points; `uv` says where they are. start: the first that is asked about.
+        btf_ref: the BTF and its mapping. tables: of the BTF, or from `rotated_tables`.
+        incident: of m points, see `texture_light_rows`.
+        receivers: all points, with `uv`. start: the first of the m points.
     Returns:
-        Radiance. (n, 3) float32
+        Outgoing radiance.
     """
     assert receivers.uv is not None
     rows, btf = slice(start, start + len(incident)), btf_ref.btf

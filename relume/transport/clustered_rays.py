@@ -1,14 +1,15 @@
-"""Light vectors of what cells send to points whose gather rays go alike, quickly.
+"""Fast incident radiance coefficients for points that share one pattern of gather rays.
 
-    t_k(x) = Σ_r w_r h_k(ω_r) L(link(x, r), −ω_r)
+    t_k(x) = Σ_r w_r h_k(ω_r) L(hit(x, r), −ω_r)
 
-Where all points have one seed, ray r leaves each of them in the same local direction, and weighs the same.
+If all points have the same seed, ray r has the same local direction and weight at each point.
 """
 
 from __future__ import annotations
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -21,16 +22,16 @@ from relume.transport.outgoing_patch_light import OutgoingLight, incident_along
 F32 = NDArray[np.float32]
 
 
-def weighted_basis(pattern: RayPattern, seed: int, degree: int) -> F32:
-    """Evaluate w_r h_k(ω_r).
+def weighted_basis(pattern: RayPattern, seed: int, degree: int) -> Shaped[F32, "K rays"]:
+    """Evaluate w_r h_k(ω_r) for each ray, including the cosine.
 
     Args:
-        pattern: of the rays, all of them by the cosine. seed: of the points. degree: of the functions.
-    Returns:
-        (K, rays) float32
+        pattern: of the rays, all cosine-distributed. seed: of the points. degree: of the basis.
+    Raises:
+        ValueError: the pattern has glossy rays.
     """
     if pattern.num_cosine != pattern.num_rays:
-        raise ValueError("glossy rays go elsewhere at every point")
+        raise ValueError("expected cosine-distributed rays: glossy rays have another direction at each point")
     wi, weight = np.empty((pattern.num_rays, 3), np.float32), np.empty(pattern.num_rays, np.float32)
     _generate_rays(pattern, np.uint32(seed), wi, weight)
     functions = project(wi.astype(np.float64))[:, : num_functions(degree)]
@@ -65,21 +66,18 @@ def _gather(gather_hits, bins, rows, functions, outgoing, start, stop, out):  # 
 
 
 def shared_direction_coefficients(
-    gather_hits: NDArray[np.uint16],
-    bins: DirectionBins,
-    rows: NDArray[np.intp],
-    functions: F32,
+    gather_hits: Shaped[NDArray[np.uint16], "n rays"],
+    bins: Shaped[DirectionBins, "n rays"],
+    rows: Shaped[NDArray[np.intp], " m"],
+    functions: Shaped[F32, "K rays"],
     outgoing: OutgoingLight,
-) -> F32:
-    """Find what rays bring to some points; `ray_incident_coefficients` is its oracle.
+) -> Shaped[F32, "m 3 K"]:
+    """Compute the incident radiance coefficients of points from patches; reference: `ray_incident_coefficients`.
 
     Args:
-        gather_hits: cell that each ray of all points hits. (n, rays) uint16
-        bins: in which light leaves those cells, from `outgoing_bins`. (n, rays) uint8
-        rows: the points. (m,). functions: from `weighted_basis`. (K, rays) float32
-        outgoing: by the cells.
-    Returns:
-        t. (m, 3, K) float32
+        gather_hits: patch that each ray of all points hits.
+        bins: direction bins of the rays at these patches, from `outgoing_bins`.
+        rows: the points. functions: from `weighted_basis`. outgoing: outgoing radiance of the patches.
     """
     out = np.empty((len(rows), 3, len(functions)), np.float32)
     args = (gather_hits, bins, rows, functions, outgoing)

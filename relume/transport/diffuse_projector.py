@@ -1,14 +1,15 @@
-"""Terms that know of no direction but above and below, under the environment: all lights at once, seen or not.
+"""Lambertian terms under the environment: all lights are summed, occluded or not.
 
     R(x) = q(x) Σ_m V(x, m) L_m Ω_m cos θi
 
-To multiply by a zero of a light that is not seen costs less than to list those that are.
+Multiplying by V = 0 costs less than listing the visible lights.
 """
 
 from __future__ import annotations
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
@@ -21,14 +22,8 @@ F32 = NDArray[np.float32]
 _ZERO = np.float32(0)
 
 
-def diffuse_quotients(term: Term, receivers: ShadingPoints, start: int, stop: int) -> F32:
-    """Evaluate the quotients of a Lambertian term, which know of no direction but above and below.
-
-    Args:
-        term: the term. receivers: of which [start, stop) are asked.
-    Returns:
-        (stop - start,) float32
-    """
+def diffuse_quotients(term: Term, receivers: ShadingPoints, start: int, stop: int) -> Shaped[F32, " m"]:
+    """Evaluate the quotients of a Lambertian term at points [start, stop); they depend only on the side of ωo."""
     cos_theta_o = np.einsum("nc,nc->n", receivers.normal[start:stop], receivers.wo[start:stop])
     zeros = np.zeros_like(cos_theta_o)
     return np.asarray(term.quotients(zeros, zeros, zeros + 1, zeros, zeros, cos_theta_o)[0])
@@ -36,7 +31,7 @@ def diffuse_quotients(term: Term, receivers: ShadingPoints, start: int, stop: in
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _sum_point(n_x, n_y, n_z, bits, x, y, z, red, green, blue, weight, out):  # type: ignore[no-untyped-def]
-    """Sum the lights of a point: a function of its own, whose loops are vectors. weight: scratch. (M,)"""
+    """Sum the lights of a point; a separate function so that its loops are vectorized. weight: scratch. (M,)"""
     for m in range(weight.shape[0]):
         weight[m] = np.float32((np.int32(bits[m >> 3]) >> np.int32(m & 7)) & np.int32(1))
     for m in range(weight.shape[0]):
@@ -53,7 +48,7 @@ def _sum_point(n_x, n_y, n_z, bits, x, y, z, red, green, blue, weight, out):  # 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def sum_lights(normal, visible, direction, irradiance, start, stop, out):  # type: ignore[no-untyped-def]
-    """Sum the lights that points [start, stop) see.
+    """Sum the visible lights of points [start, stop).
 
     Args:
         normal: of all points. (n, 3) float32. visible: as in `ShadingPoints`. (n, bytes) uint8
@@ -65,7 +60,7 @@ def sum_lights(normal, visible, direction, irradiance, start, stop, out):  # typ
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _sum(normal, visible, direction, irradiance, start, stop, weight, out):  # type: ignore[no-untyped-def]
-    """Do what `sum_lights` is for. weight: scratch. (M,)"""
+    """Implement `sum_lights`. weight: scratch. (M,)"""
     x, y, z = direction[0], direction[1], direction[2]
     red, green, blue = irradiance[0], irradiance[1], irradiance[2]
     for p in range(start, stop):
@@ -75,20 +70,20 @@ def _sum(normal, visible, direction, irradiance, start, stop, weight, out):  # t
 
 
 class DiffuseProjector:
-    """Shades points of a Lambertian term whose curves are flat.
+    """Shades points of a Lambertian term with constant curves.
 
     Args:
-        term: the term. constant: product of its curves. (3,) float32. lights: of the environment.
+        term: the term. constant: product of its curves. lights: of the environment.
     """
 
-    def __init__(self, term: Term, constant: F32, lights: TriangleLights) -> None:
+    def __init__(self, term: Term, constant: Shaped[F32, " 3"], lights: TriangleLights) -> None:
         self._term = term
         self._direction = np.ascontiguousarray(lights.direction.T)
         self._irradiance = np.ascontiguousarray((lights.irradiance * constant).T)
 
-    def shade(self, receivers: ShadingPoints, start: int, stop: int) -> F32:
-        """Shade receivers [start, stop). (stop - start, 3) float32"""
+    def shade(self, receivers: ShadingPoints, start: int, stop: int) -> Shaped[F32, "m 3"]:
+        """Return the reflected radiance of receivers [start, stop)."""
         out = np.zeros((stop - start, 3), np.float32)
-        if self._direction.shape[1]:  # else no bits were read
+        if self._direction.shape[1]:  # without lights no visibility is stored
             sum_lights(receivers.normal, receivers.visible, self._direction, self._irradiance, start, stop, out)
         return out * diffuse_quotients(self._term, receivers, start, stop)[:, None]

@@ -1,13 +1,14 @@
-"""Where light leaves a cell by a ray, and where it comes in, as squares of the grid that cells send by.
+"""Direction bins of gather rays, where they leave a patch and where they reach one.
 
-They follow from what is baked alone. Found once, they spare whoever makes light anew while a hand moves the directions
-of all rays.
+They depend on the bake alone. Computed once, they save incremental updates of the light from generating all ray
+directions again.
 """
 
 from __future__ import annotations
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -25,7 +26,7 @@ _POINTS_PER_RANGE = 1024
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _ray_direction(n, t, pattern, ray, shifts):  # type: ignore[no-untyped-def]
-    """Direct a ray of a point with normal n and tangent t, in world space."""
+    """Return the world-space direction of a ray of a point with normal n and tangent t."""
     x, y, z = cosine_ray(pattern.rays[ray], shifts)
     bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
     return t[0] * x + bx * y + n[0] * z, t[1] * x + by * y + n[1] * z, t[2] * x + bz * y + n[2] * z
@@ -33,7 +34,7 @@ def _ray_direction(n, t, pattern, ray, shifts):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _fill_outgoing_bins(points, gather_hits, pattern, frames, start, stop, out):  # type: ignore[no-untyped-def]
-    """Find the squares in which cells are seen by points [start, stop)."""
+    """Find the bins of patches in which points [start, stop) see them."""
     for p in range(start, stop):
         shifts = lattice_offsets(pattern, points.seed[p])[0]
         for ray in range(gather_hits.shape[1]):
@@ -44,15 +45,18 @@ def _fill_outgoing_bins(points, gather_hits, pattern, frames, start, stop, out):
 
 
 def outgoing_bins(
-    points: SurfacePoints, gather_hits: NDArray[np.uint16], pattern: RayPattern, frames: F32
-) -> DirectionBins:
-    """Find the squares in which cells are seen.
+    points: SurfacePoints,
+    gather_hits: Shaped[NDArray[np.uint16], "n rays"],
+    pattern: RayPattern,
+    frames: Shaped[F32, "patches 2 3"],
+) -> Shaped[DirectionBins, "n rays"]:
+    """Compute the direction bin, at the patch that a ray hits, toward the ray's origin.
 
     Args:
-        points: where rays leave. gather_hits: cells that they hit. (n, rays) uint16. pattern: their directions.
-        frames: tangents and bitangents of the cells. (C, 2, 3) float32
+        points: ray origins. gather_hits: patches that the rays hit. pattern: the rays' directions.
+        frames: tangents and bitangents of the patches.
     Returns:
-        Of the cell that each ray hits; nothing where it hits none. (n, rays) uint8
+        Bin of each ray; zero for a ray that hits no patch.
     """
     out = np.zeros(gather_hits.shape, np.uint8)
     for_ranges(
@@ -65,7 +69,7 @@ def outgoing_bins(
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _fill_incoming_bins(points, points_per_patch, pattern, frames, start, stop, out):  # type: ignore[no-untyped-def]
-    """Find the squares in which rays of points [start, stop) come into their own cells."""
+    """Find the bins in which rays of points [start, stop) reach their own patches."""
     for p in range(start, stop):
         shifts = lattice_offsets(pattern, points.seed[p])[0]
         for ray in range(out.shape[1]):
@@ -73,14 +77,14 @@ def _fill_incoming_bins(points, points_per_patch, pattern, frames, start, stop, 
             out[p, ray] = bin_of(frames, p // points_per_patch, x, y, z)
 
 
-def incoming_bins(points: SurfacePoints, points_per_patch: int, pattern: RayPattern, frames: F32) -> DirectionBins:
-    """Find the squares in which the rays of cells come in.
+def incoming_bins(
+    points: SurfacePoints, points_per_patch: int, pattern: RayPattern, frames: Shaped[F32, "patches 2 3"]
+) -> Shaped[DirectionBins, "n rays"]:
+    """Compute the direction bin of each ray in the frame of its own patch.
 
     Args:
-        points: of the cells, `points_per_patch` of each, one after another. pattern: the directions of their rays.
-        frames: as of `outgoing_bins`.
-    Returns:
-        In the frame of the cell whose point it is. (n, rays) uint8
+        points: `points_per_patch` points of each patch, patch by patch. pattern: the rays' directions.
+        frames: as in `outgoing_bins`.
     """
     out = np.empty((points.num_points, pattern.num_rays), np.uint8)
     args = (points, points_per_patch, pattern, frames)

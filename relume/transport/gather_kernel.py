@@ -1,7 +1,7 @@
-"""Gather rays of points: directed, weighed, and listed with the light that they bring, or summed at once.
+"""Kernels of gather rays: generate, weight, and list them with their radiance, or sum them at once.
 
-Loops that make the numbers of all rays of a point write one array each, so that they are vectors; what is looked up by
-the cell that a ray hits comes after them.
+Loops over all rays of a point write one array each, so that the compiler vectorizes them. Lookups by the patch that a
+ray hits follow in separate loops.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _EPSILON, _GROWTH = np.float32(1e-3), np.float32(1 + 1e3)  # of `relume.raytrace
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def in_frame(n, t, o):  # type: ignore[no-untyped-def]
-    """Find the bitangent n × t of a shading frame, and direction o in the frame."""
+    """Return the bitangent n × t of a shading frame, and direction o in this frame."""
     bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
     ox = t[0] * o[0] + t[1] * o[1] + t[2] * o[2]
     oy = bx * o[0] + by * o[1] + bz * o[2]
@@ -33,7 +33,7 @@ def in_frame(n, t, o):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _cosine_rays(rays, shift, x, y, z, radius_squared):  # type: ignore[no-untyped-def]
-    """Direct the cosine rays of a point, as `cosine_ray` does. square: scratch. (rays,) each"""
+    """Generate the cosine rays of a point, as `cosine_ray` does. radius_squared: scratch. (rays,) each"""
     offset, cosine, sine = shift[0], shift[2], shift[3]
     for k in range(x.shape[0]):
         u = rays[k, 0] + offset
@@ -49,7 +49,7 @@ def _cosine_rays(rays, shift, x, y, z, radius_squared):  # type: ignore[no-untyp
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _glossy_rays(rays, shift, o, x, y, z, distance, twice_cosine):  # type: ignore[no-untyped-def]
-    """Direct the glossy rays of a point, as `glossy_ray` does. away, twice: scratch. (rays,) each"""
+    """Generate the glossy rays of a point, as `glossy_ray` does. distance, twice_cosine: scratch. (rays,) each"""
     offset, scale, cosine, sine = shift[0], shift[1], shift[2], shift[3]
     ox, oy, oz = o
     for k in range(x.shape[0]):
@@ -61,7 +61,7 @@ def _glossy_rays(rays, shift, o, x, y, z, distance, twice_cosine):  # type: igno
         x[k] = math.sqrt(distance[k] * (_TWO - distance[k])) * (rays[k, 2] * cosine - rays[k, 3] * sine)
     for k in range(x.shape[0]):
         y[k] = math.sqrt(distance[k] * (_TWO - distance[k])) * (rays[k, 3] * cosine + rays[k, 2] * sine)
-    for k in range(x.shape[0]):  # so far half vectors: they turn into the directions
+    for k in range(x.shape[0]):  # x, y, z are half vectors so far; reflect o about them
         twice_cosine[k] = _TWO * (ox * x[k] + oy * y[k] + oz * (_ONE - distance[k]))
     for k in range(x.shape[0]):
         x[k] = twice_cosine[k] * x[k] - ox
@@ -73,7 +73,7 @@ def _glossy_rays(rays, shift, o, x, y, z, distance, twice_cosine):  # type: igno
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _weights(num_cosine, x, y, z, o, weight):  # type: ignore[no-untyped-def]
-    """Weigh all rays of a point, as `ray_weight` does."""
+    """Weight all rays of a point, as `ray_weight` does."""
     ox, oy, oz = o
     num_cosine_rays, num_glossy_rays = np.float32(num_cosine), np.float32(x.shape[0] - num_cosine)
     if num_glossy_rays == _ZERO:
@@ -84,13 +84,13 @@ def _weights(num_cosine, x, y, z, o, weight):  # type: ignore[no-untyped-def]
         length = math.sqrt(hx * hx + hy * hy + hz * hz)
         cos_theta_h = min(hz / max(length, np.float32(1e-6)), _ONE)
         pdf = glossy_pdf(cos_theta_h, _HALF * length)
-        cosine = max(z[k], _ZERO)  # below the horizon nothing is traced
+        cosine = max(z[k], _ZERO)  # no rays are traced below the horizon
         weight[k] = cosine / (num_cosine_rays * cosine / _PI + num_glossy_rays * pdf)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _generate_rays(pattern, seed, o, local, weight):  # type: ignore[no-untyped-def]
-    """Direct and weigh all rays of a point. o: local wo. local: written, and scratch. (5, rays) weight: (rays,)"""
+    """Generate and weight all rays of a point. o: local wo. local: written, with scratch. (5, rays) weight: (rays,)"""
     num = pattern.num_cosine
     cosine_shift, glossy_shift = lattice_offsets(pattern, seed)
     x, y, z, scratch_a, scratch_b = local[0], local[1], local[2], local[3], local[4]
@@ -102,10 +102,10 @@ def _generate_rays(pattern, seed, o, local, weight):  # type: ignore[no-untyped-
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _lobes_hit(gather_hits, lobe, rows, rays):  # type: ignore[no-untyped-def]
-    """List the rays of a point that hit a lobe, without a branch that nobody could foretell; returns their number.
+    """List the rays of a point that hit a patch with a lobe; return their number. Avoids unpredictable branches.
 
     Args:
-        gather_hits: of the point. (rays,) lobe: of each cell. rows, rays: written, lobes and rays. (> rays,)
+        gather_hits: of the point. (rays,) lobe: of each patch. rows, rays: lobes and rays, written. (> rays,)
     """
     num = 0
     for ray in range(gather_hits.shape[0]):
@@ -116,14 +116,14 @@ def _lobes_hit(gather_hits, lobe, rows, rays):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _bin_hit(outgoing, row, n, t, b, x, y, z):  # type: ignore[no-untyped-def]
-    """Find the square of a lobe that a local direction (x, y, z) looks at. n, t, b: frame of the point"""
+    """Return the direction bin of a lobe toward −(x, y, z), a local direction. n, t, b: frame of the point"""
     dx, dy, dz = t[0] * x + b[0] * y + n[0] * z, t[1] * x + b[1] * y + n[1] * z, t[2] * x + b[2] * y + n[2] * z
     return bin_of(outgoing.frame, row, -dx, -dy, -dz)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _table_for(outgoing, num_cosine, weight):  # type: ignore[no-untyped-def]
-    """Choose what a ray looks lobes up in: where most rays are about the mirror direction, what has no rings."""
+    """Select the lobe table of a ray: the smooth one where rays concentrate about the mirror direction."""
     return outgoing.smooth if _TWO * np.float32(num_cosine) * weight < _PI else outgoing.table
 
 
@@ -131,16 +131,15 @@ def _table_for(outgoing, num_cosine, weight):  # type: ignore[no-untyped-def]
 def list_gather_rays(  # type: ignore[no-untyped-def]
     points, wo, gather_hits, pattern, outgoing, start, stop, first, wi, out, irradiance
 ):
-    """List the rays of points [start, stop) that hit a cell, in the points' local frames.
+    """List the rays of points [start, stop) that hit a patch, in the points' local frames.
 
     Args:
-        points: `SurfacePoints`. wo: towards the viewer. (n, 3) float32
-        gather_hits: cell that each ray hits. (n, rays) uint16. pattern: the rays' directions.
-        outgoing: by cells, a `OutgoingLight`.
-        start, stop: the points.
-        first: written, where the rays of each point begin. (points + 1,) int64
-        wi: written, local directions. (3, K) float32. out: written, local wo. (3, K) float32
-        irradiance: written, w · L of each ray. (3, K) float32
+        points: `SurfacePoints`. wo: view directions. (n, 3) float32
+        gather_hits: patch that each ray hits. (n, rays) uint16. pattern: the rays' directions.
+        outgoing: outgoing radiance of the patches, an `OutgoingLight`. start, stop: range of points.
+        first: begin of each point's rays, written. (points + 1,) int64
+        wi: local directions, written. (3, K) float32. out: local wo, written. (3, K) float32
+        irradiance: w · L of each ray, written. (3, K) float32
     Returns:
         K, the number of rays.
     """
@@ -156,8 +155,7 @@ def list_gather_rays(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _list(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, first, wi, out, irradiance):  # type: ignore[no-untyped-def]
-    """Do what `list_gather_rays` is for. scratch: `rows` and `rays` of `_lobes_hit`, `local` and `weight` of `_direct`,
-    and where each ray is listed. (rays,)"""
+    """Implement `list_gather_rays`. scratch: of `_lobes_hit` and `_generate_rays`, and the list index of each ray."""
     _, normal, tangent, seed, _ = points
     rows, rays, local, weights, entry_index = scratch
     has_lobes, num_rays, end = outgoing.table.shape[0] > 0, gather_hits.shape[1], 0
@@ -189,10 +187,10 @@ def _list(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, firs
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def sum_gather_rays(points, wo, gather_hits, pattern, outgoing, start, stop, out):  # type: ignore[no-untyped-def]
-    """Sum the light of the rays of points [start, stop): what `list_gather_rays` lists, where directions do not matter.
+    """Sum the light of the rays of points [start, stop), if directions do not matter.
 
     Args:
-        points, wo, gather_hits, pattern, outgoing, start, stop: as there.
+        points, wo, gather_hits, pattern, outgoing, start, stop: as in `list_gather_rays`.
         out: Σ w · L, written. (points, 3) float32
     """
     num_rays = gather_hits.shape[1]
@@ -203,7 +201,7 @@ def sum_gather_rays(points, wo, gather_hits, pattern, outgoing, start, stop, out
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _sum(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, out):  # type: ignore[no-untyped-def]
-    """Do what `sum_gather_rays` is for. scratch: as of `_list`, but for the last."""
+    """Implement `sum_gather_rays`. scratch: as in `_list`, except the last."""
     _, normal, tangent, seed, _ = points
     rows, rays, local, weights = scratch
     has_lobes, num_rays = outgoing.table.shape[0] > 0, gather_hits.shape[1]

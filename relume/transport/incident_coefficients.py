@@ -1,9 +1,9 @@
-"""Light vectors: what arrives at points, in the in-basis of their own hemispheres.
+"""Incident radiance coefficients of points, in the hemispherical (Zernike) basis of their local frames.
 
     t_k(x) = ∫ L(x, ωi) V(x, ωi) cos θi h_k(ωi) dωi = Σ_s w_s h_k(ω_s)
 
-where s are light triangles that the point sees, and rays from cells and local lights. Nothing of it knows a BRDF or an
-eye: they multiply it (`relume.live.free_camera.basis.outgoing_coefficients`).
+s are visible light triangles and rays from patches and local lights. t depends on neither BRDF nor camera: these enter
+by the outgoing coefficients (`relume.live.free_camera.basis.outgoing_coefficients`).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -39,12 +40,12 @@ _LISTED_POINTS_PER_RANGE = 128
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _from_triangles(recurrence_table, normal, tangent, visible, direction, irradiance, start, stop, out):  # type: ignore[no-untyped-def]
-    """Add the light triangles that points [start, stop) see. direction, irradiance: (3, M). out: (n, 3, K)"""
+    """Add the visible light triangles of points [start, stop). direction, irradiance: (3, M). out: (n, 3, K)"""
     num_lights = direction.shape[1]
     visible_lights, columns = np.empty(num_lights + 1, np.int32), np.empty(NUM_COLUMNS * BATCH_RAYS, np.float32)
     for p in range(start, stop):
         num_visible = 0
-        for m in range(num_lights):  # without branches, which nothing foretells
+        for m in range(num_lights):  # visibility is unpredictable: no branches
             visible_lights[num_visible] = m
             num_visible += (visible[p, m >> 3] >> (m & 7)) & 1
         n, t = normal[p], tangent[p]
@@ -64,7 +65,7 @@ def _from_triangles(recurrence_table, normal, tangent, visible, direction, irrad
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _from_listed(recurrence_table, num_points, first, wi, irradiance, out):  # type: ignore[no-untyped-def]
-    """Add listed rays, whose light has been weighed by the cosine, to their points. out: (num_points, 3, K)"""
+    """Add listed rays, weighted by the cosine, to their points. out: (num_points, 3, K)"""
     columns = np.empty(NUM_COLUMNS * BATCH_RAYS, np.float32)
     for p in range(num_points):
         for begin in range(first[p], first[p + 1], BATCH_RAYS):
@@ -78,20 +79,19 @@ def _from_listed(recurrence_table, num_points, first, wi, irradiance, out):  # t
 
 def incident_coefficients(
     points: SurfacePoints,
-    visible: NDArray[np.uint8],
+    visible: Shaped[NDArray[np.uint8], "n bytes"],
     lights: TriangleLights,
     rays: Sequence[RayList],
     degree: int = DEGREE,
-) -> F32:
-    """Find what arrives at points, as vectors.
+) -> Shaped[F32, "n 3 K"]:
+    """Compute the incident radiance coefficients of points. O(n · (lights + rays) · K) time.
 
     Args:
-        points: n of them. visible: which of the lights each sees, as in `ShadingPoints`. (n, bytes) uint8
-        lights: triangles of the environment. rays: what brings light besides.
-        degree: of the functions.
+        points: n points. visible: of the lights, as in `ShadingPoints`.
+        lights: triangles of the environment. rays: all other light.
+        degree: of the basis.
     Returns:
-        t, radiance times solid angle, of the functions up to the degree alone. (n, 3, functions) float32
-    Cost: O(n · (lights + rays) · K) time.
+        t, with the cosine, of the functions up to the degree.
     """
     out = np.zeros((points.num_points, 3, num_functions(degree)), np.float32)
     if lights.num_lights:
@@ -102,14 +102,10 @@ def incident_coefficients(
     return out
 
 
-def ray_incident_coefficients(points: SurfacePoints, rays: Sequence[RayList], degree: int = DEGREE) -> F32:
-    """Do as `incident_coefficients` where all light comes along rays.
-
-    Args:
-        points, rays, degree: as there.
-    Returns:
-        As there.
-    """
+def ray_incident_coefficients(
+    points: SurfacePoints, rays: Sequence[RayList], degree: int = DEGREE
+) -> Shaped[F32, "n 3 K"]:
+    """Compute the incident radiance coefficients of points from rays alone; see `incident_coefficients`."""
     out = np.zeros((points.num_points, 3, num_functions(degree)), np.float32)
     _add_rays(points, rays, degree, out)
     return out
@@ -117,7 +113,7 @@ def ray_incident_coefficients(points: SurfacePoints, rays: Sequence[RayList], de
 
 def _add_rays(points: SurfacePoints, rays: Sequence[RayList], degree: int, out: F32) -> None:
     no_visibility = np.empty((points.num_points, 0), np.uint8)
-    # no ray of a point depends on where it is seen from
+    # rays do not depend on the view direction
     receivers = ShadingPoints(points, points.normal, no_visibility)
     for some in rays:
         for_ranges(
@@ -128,20 +124,24 @@ def _add_rays(points: SurfacePoints, rays: Sequence[RayList], degree: int, out: 
 
 
 def _list_and_add(rays: RayList, receivers: ShadingPoints, degree: int, start: int, stop: int, out: F32) -> None:
-    """Add rays of points [start, stop)."""
+    """Add the rays of points [start, stop)."""
     ray_list = build_ray_lists(rays, receivers, start, stop)
     _from_listed(recurrence(degree), stop - start, ray_list.first, ray_list.wi, ray_list.irradiance, out[start:stop])
 
 
 def add_scaled(
-    total: F32, addend: F32, gain: F32, rows: NDArray[np.intp] | None = None, *, has_all_rows: bool = False
+    total: Shaped[F32, "n 3 K"],
+    addend: Shaped[F32, "m 3 k"],
+    gain: Shaped[F32, " 3"],
+    rows: Shaped[NDArray[np.intp], " rows"] | None = None,
+    *,
+    has_all_rows: bool = False,
 ) -> None:
-    """Add light vectors times a gain of each channel to others.
+    """Add incident radiance coefficients times a gain per channel to others, in place.
 
     Args:
-        total: what they are added to. (n, 3, K) float32
-        addend: that is added, of as many functions or fewer. (m, 3, ≤ K) float32. gain: (3,) float32
-        rows: which of the n they are. (m,); None: all. has_all_rows: `addend` has all n, of which `rows` are added.
+        total: added to. addend: of as many functions or fewer.
+        rows: the points that are added; None: all. has_all_rows: `addend` has all n points, not only `rows`.
     """
     target_rows = np.arange(len(total)) if rows is None else rows
     source_rows = target_rows if has_all_rows or rows is None else np.arange(len(addend))

@@ -1,4 +1,4 @@
-"""The lights that reach a point: seen, and near enough for its dormant curves, in its local frame."""
+"""Lights that reach a point: visible, and within the support of its fixed curves, in the point's local frame."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ _SLACK = np.float32(1e-3)
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _half_angle_reach(radius, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
-    """Bound how far the half vector turns while wi turns by `radius`; and compute cos θd of the two directions.
+    """Return a bound of the half vector's rotation while wi rotates by `radius`, and cos θd.
 
-    The half vector is the middle of an arc of length 2θd with one end held. Moving the other end by dε moves the middle
-    by dε / (2 cos θd) at most, and θd by dε / 2.
+    The half vector is the middle of an arc of length 2θd with one fixed end. Moving the other end by dε moves the
+    middle by at most dε / (2 cos θd), and θd by dε / 2.
     """
     x, y, z = ix + ox, iy + oy, iz + oz
     cos_theta_d = min(_HALF * math.sqrt(x * x + y * y + z * z), np.float32(1))
@@ -35,7 +35,7 @@ def _half_angle_reach(radius, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untype
 
 @nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
 def is_bounded(kind):  # type: ignore[no-untyped-def]
-    """Whether `angle_lower_bounds` bounds an angle."""
+    """Return True if `angle_lower_bounds` bounds an angle."""
     return kind in (THETA_I, THETA_R, THETA_D, THETA_H)
 
 
@@ -46,9 +46,9 @@ def angle_lower_bounds(kind, radius, ix, iy, iz, ox, oy, oz, out):  # type: igno
     Args:
         kind: an `Angle`. radius: radians. (n,) float32
         ix, iy, iz: local wi. (n,) float32. ox, oy, oz: local wo, scalars.
-        out: radians. (n,) float32, written.
+        out: radians, written. (n,) float32
     """
-    # one loop for each angle, as in relume.brdf.angles
+    # one loop per angle, as in relume.brdf.angles
     if kind == THETA_I:
         for k in range(ix.shape[0]):
             out[k] = acos_clamped(iz[k]) - radius[k]
@@ -69,11 +69,11 @@ def angle_lower_bounds(kind, radius, ix, iy, iz, ox, oy, oz, out):  # type: igno
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def cull(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, nearest):  # type: ignore[no-untyped-def]
-    """Drop those of the lights [begin, end) that a dormant curve does not see at all; returns the new end.
+    """Remove lights in [begin, end) for which a fixed curve is zero; return the new end.
 
     Args:
-        kinds, support: of dormant curves, and up to where each is not zero, radians. (D,)
-        radius: of each light, radians. light: which are listed. wi: towards them, local, unit. (3, K)
+        kinds: angles of fixed curves. support: angle beyond which each is zero, radians. (D,)
+        radius: of each light, radians. light: listed lights. wi: local unit directions to these. (3, K)
         begin, end: of the list. ox, oy, oz: local wo. reach, nearest: scratch. (≥ end − begin,)
     """
     for k in range(kinds.shape[0]):
@@ -106,15 +106,15 @@ def list_lights(  # type: ignore[no-untyped-def]
     """List the lights of points [start, stop) in their local frames.
 
     Args:
-        normal, tangent: shading frames. wo: towards the viewer. (n, 3) float32
+        normal, tangent: shading frames. wo: view directions. (n, 3) float32
         visible: light m of a point in bit m & 7 of byte m >> 3. (n, bytes) uint8
         directions: mean directions of the lights. (M, 3) float32
-        radius: within which of its direction a light lies, radians. (M,) float32
-        kinds: angles of the curves. support: radians beyond which each is nothing. (C,) float32
-        start, stop: the points.
-        first: written, where the entries of each point begin. (points + 1,) int64
-        light: written, number of the light of each entry. (K + 1,) int32
-        wi: written, local directions. (3, K) float32. out: written, local wo. (3, K) float32
+        radius: angular radius of each light about its direction, radians. (M,) float32
+        kinds: angles of the curves. support: radians beyond which each is zero. (C,) float32
+        start, stop: range of points.
+        first: begin of each point's entries, written. (points + 1,) int64
+        light: light of each entry, written. (K + 1,) int32
+        wi: local directions, written. (3, K) float32. out: local wo, written. (3, K) float32
     Returns:
         K, the number of entries.
     """
@@ -129,7 +129,7 @@ def list_lights(  # type: ignore[no-untyped-def]
 def _list(  # type: ignore[no-untyped-def]
     normal, tangent, wo, visible, directions, radius, kinds, support, start, stop, scratch, first, light, wi, out
 ):
-    """Do what `list_lights` is for. scratch: of `cull`. (M,) each"""
+    """Implement `list_lights`. scratch: of `cull`. (M,) each"""
     num_lights, (reach, nearest) = directions.shape[0], scratch
     end = np.int64(0)
     for p in range(start, stop):
@@ -137,10 +137,10 @@ def _list(  # type: ignore[no-untyped-def]
         first[p - start] = begin
         for eight in range(0, num_lights, 8):
             bits = visible[p, eight >> 3]
-            if bits == 0:  # of many in a row
+            if bits == 0:  # true for long runs
                 continue
             for k in range(min(8, num_lights - eight)):
-                light[end] = eight + k  # kept where it is seen; a branch would be guessed wrong at shadow edges
+                light[end] = eight + k  # overwritten if it is occluded: a branch is mispredicted at shadow edges
                 end += (bits >> k) & 1
         nx, ny, nz = normal[p, 0], normal[p, 1], normal[p, 2]
         tx, ty, tz = tangent[p, 0], tangent[p, 1], tangent[p, 2]

@@ -1,6 +1,6 @@
-"""The lights of a few points at a time, as projectors want them: listed, turned, weighed by the quotient.
+"""Lights of blocks of points for projectors: listed, in local frames, weighted by the quotient.
 
-Those of the environment are the same for all points; parts of a lamp are other triangles for each of them.
+Triangles of the environment are the same for all points; the triangles of an area light differ from point to point.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.term import Angle, Term
@@ -21,21 +22,23 @@ from relume.transport.term_contraction import Contraction
 F32 = NDArray[np.float32]
 Bits = NDArray[np.uint8]
 
-_TRIANGLES_PER_BLOCK = 4096  # of lamps, at least those of one point
+_TRIANGLES_PER_BLOCK = 4096  # of area lights, at least those of one point
 POINTS_PER_BLOCK = 48  # directions of a block stay in a core's second-level cache
 
 _HALF_PI = np.float32(np.pi / 2)
 
 
-def with_half_angle(kinds: NDArray[np.int64], support: F32) -> tuple[NDArray[np.int64], F32]:
-    """Bound the half angle where only two other angles of the half vector are bounded. See `angle_lower_bounds`.
+def with_half_angle(
+    kinds: Shaped[NDArray[np.int64], " C"], support: Shaped[F32, " C"]
+) -> tuple[Shaped[NDArray[np.int64], " B"], Shaped[F32, " B"]]:
+    """Bound the half angle if only two other angles of the half vector are bounded. See `angle_lower_bounds`.
 
     cos θh = cos α cos β, and tan² θh = tan² x + tan² y of the two tilts.
 
     Args:
-        kinds: angles of the curves. support: radians beyond which each is nothing. (C,) float32
+        kinds: angles of the curves. support: radians beyond which each is zero.
     Returns:
-        Both, with one more angle where there is such a bound. (C or C + 1,)
+        Both, with one more angle if there is such a bound.
     """
     limit = {int(kind): float(angle) for kind, angle in zip(kinds, support, strict=True) if angle < _HALF_PI}
     if Angle.ALPHA in limit and Angle.BETA in limit:
@@ -48,13 +51,13 @@ def with_half_angle(kinds: NDArray[np.int64], support: F32) -> tuple[NDArray[np.
 
 
 def _curve_support(contraction: Contraction) -> tuple[NDArray[np.int64], F32]:
-    """Angles of curves, and radians beyond which each is nothing."""
+    """Return the angles of curves, and the radians beyond which each curve is zero."""
     radians = np.asarray(contraction.support * _HALF_PI / contraction.num_bands, np.float32)
     return with_half_angle(contraction.kinds, radians)
 
 
 def _weighted_quotients(term: Term, wi: F32, wo: F32) -> F32:
-    """q cos θi of entries. (1 or 3, K). wi, wo: local. (3, K)"""
+    """Return q cos θi of entries, (1 or 3, K). wi, wo: local. (3, K)"""
     shading = term.quotients(wi[0], wi[1], wi[2], wo[0], wo[1], wo[2])
     shading *= wi[2]
     return shading
@@ -65,11 +68,10 @@ class LightList:
 
     Args:
         term: the BRDF term. contraction: its curves, from `contract`.
-        lights: triangles of the environment; `receivers` tell which of them each point sees.
-        receivers: all points, and what arrives at them.
+        lights: triangles of the environment. receivers: all points, with their visibility and rays.
 
     Attributes:
-        irradiance: of the lights, times curves that are the same everywhere. (M, 3)
+        irradiance: of the lights, times constant curves. (M, 3)
         first, light: written by `list`, see `list_lights`.
     """
 
@@ -86,19 +88,20 @@ class LightList:
         self._wi, self._wo = np.empty((2, 3, capacity), np.float32)
 
     @cached_property
-    def irradiance_radius(self) -> F32:
-        """What the lights bring, and how wide they are: irradiance and radius. (M, 4)"""
+    def irradiance_radius(self) -> Shaped[F32, "M 4"]:
+        """Irradiance and angular radius of the lights."""
         return np.concatenate([self.irradiance, self._lights.radius[:, None]], axis=1)
 
-    def list(self, start: int, stop: int, visible: Bits) -> tuple[F32, F32]:
-        """List the lights of points [start, stop), a block of them at most.
+    def list(
+        self, start: int, stop: int, visible: Shaped[Bits, "n bytes"]
+    ) -> tuple[Shaped[F32, "channels K"], Shaped[F32, "3 capacity"]]:
+        """List the lights of points [start, stop), at most a block.
 
         Args:
-            visible: which of the lights, or of their parts, these points see, as in `ShadingPoints`. (stop - start,
-                bytes)
+            visible: of the lights, or of their parts, from these points, as in `ShadingPoints`.
         Returns:
-            q cos θi of each entry (1 or 3, K), and the local wo (3, ≥ K) that it belongs to: all the room there is, for
-            kernels are compiled anew for what is cut off.
+            q cos θi of each entry (one row if all channels are equal), and the local wo of each. The latter has its
+            full capacity: a slice has another memory layout, for which kernels would be compiled again.
         """
         r, lights, rows = self._receivers, self._lights, slice(start, stop)
         if lights.parts is not None:
@@ -113,20 +116,20 @@ class LightList:
         return shading, self._wo
 
     def _visible_clusters(self, subset: TriangleSubset, visible: Bits) -> Bits:
-        """Find which merged lights points see anything of, as bits; how much of each is in `_visible_fraction`."""
+        """Return the merged lights that are visible at least in part, as bits; fractions are in `_visible_fraction`."""
         visible_fraction(visible, subset.group, subset.fraction, 0, len(visible), self._visible_fraction)
         return np.packbits(self._visible_fraction[:, : len(visible)].T > 0, axis=1, bitorder="little")
 
 
 class AreaLightList:
-    """Lists the parts of a lamp that blocks of receivers see; holds the scratch memory of one thread.
+    """Lists the visible parts of an area light for blocks of receivers; holds the scratch memory of one thread.
 
     Args:
         term: the BRDF term. contraction: its curves, from `contract`.
-        receivers: all points. rays: from a light that has a surface.
+        receivers: all points. rays: from a light with a surface.
 
     Attributes:
-        max_triangles_per_point, points_per_block: the most of both that are listed at once.
+        max_triangles_per_point, points_per_block: maximum listed at once.
         first, light: written by `list`, see `list_area_light`.
     """
 
@@ -144,12 +147,13 @@ class AreaLightList:
             np.empty((capacity, 4), np.float32),
         )
 
-    def list(self, start: int, stop: int) -> tuple[F32, F32, F32, F32]:
-        """List the triangles of points [start, stop), a block of them at most.
+    def list(
+        self, start: int, stop: int
+    ) -> tuple[Shaped[F32, "channels K"], Shaped[F32, "3 capacity"], Shaped[F32, "M 6 3"], Shaped[F32, "M 4"]]:
+        """List the triangles of points [start, stop), at most a block.
 
         Returns:
-            q cos θi of each entry (1 or 3, K), the local wo (3, ≥ K) that it belongs to, nodes of triangles (M, 6, 3),
-            and what they bring and how wide they are (M, 4).
+            q cos θi of each entry, the local wo of each, nodes of the triangles, and their irradiance and radius.
         """
         r, rays = self._receivers, self._rays
         num, num_triangles = list_area_light(
@@ -166,10 +170,10 @@ class AreaLightList:
 
 
 def area_light_lists(term: Term, contraction: Contraction, receivers: ShadingPoints) -> list[AreaLightList]:
-    """Make room for all lamps that are listed as triangles: those with an extent, where any curve asks for it.
+    """Allocate lists for all area lights that are listed as triangles, see `is_area_light`.
 
     Args:
-        term: that is sent. contraction: its curves. receivers: points, and rays from them to lamps.
+        term: the BRDF term. contraction: its curves. receivers: points, with their rays to local lights.
     """
     area_lights = [rays for rays in receivers.rays if is_area_light(rays, contraction.kinds.size)]
     return [AreaLightList(term, contraction, receivers, rays) for rays in area_lights]

@@ -1,15 +1,14 @@
-"""Light that gather cells send out: of most the same in every direction, of those with highlights not.
+"""Outgoing radiance of patches: isotropic, plus a directional part for patches with highlights.
 
     L(c, ωo) = L̄_c + Σ_j L_j h_j(ωo)
 
-with the functions h of the in-basis (`relume.math.zernike`) about the cell's own normal. Looked up once for every
-gather ray, the sum is tabulated: by the means of each function over the squares of a grid, on which a direction has the
-place (x, y) / (1 + z), so that the horizon is as fine as the normal. Rays spread over the squares, and what they bring
-together hardly knows the difference.
+h are the functions of the Zernike basis (`relume.math.zernike`) about the patch normal. For lookups by gather rays the
+sum is tabulated as averages over direction bins: a grid over (x, y) / (1 + z), equally fine at horizon and normal. Rays
+spread over the bins, so that their sum hardly depends on the tabulation.
 
-What few functions make of a small bright light has rings about it, in part below nothing. Who gathers widely sees none
-of them; a narrow lobe sees one alone. For those there is a second table, of L_j times a factor of its degree, which
-takes a part of them away (docs/indirect-light.md#bounces).
+A low-degree expansion of a small bright light rings, with negative values. Wide gathering averages the rings away; a
+narrow lobe does not. A second, smoothed table serves narrow lobes: L_j times a factor per degree, which reduces the
+rings (docs/indirect-light.md#bounces).
 """
 
 from __future__ import annotations
@@ -20,6 +19,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -31,57 +31,54 @@ from relume.patches.patch_kdtree import NO_PATCH
 F32 = NDArray[np.float32]
 
 NUM_OUTGOING = num_functions(OUTGOING_DEGREE)
-"""J, functions by which cells send."""
+"""J, basis functions of outgoing light."""
 
-_NARROWEST = 1 / (2 * 4.9**2)  # of a highlight and the window together: a metal's of roughness 0.3
+_NARROWEST = 1 / (2 * 4.9**2)  # of highlight and window together: a metal of roughness 0.3
 _STEPS = 32_767  # of 16-bit radiance
 _ROWS_PER_RANGE = 256  # their values stay in the cache
 
 
 class OutgoingLight(NamedTuple):
-    """Radiance that leaves cells.
+    """Outgoing radiance of patches.
 
     Attributes:
-        isotropic: the part that is the same everywhere; black in row `NO_PATCH`. (NO_CELL + 1, 3) float32
-        lobe: which row of the others a cell has; −1: it sends nothing but the even part. (NO_CELL + 1,) int32
-        frame: tangents and bitangents. (G, 2, 3) float32
-        scale: what a step of the table is worth. (G, 3) float32
-        table: of each square, x outermost. (G, SIDE², 3) int16
-        smooth: the same, with fewer rings. (G, SIDE², 3) int16
+        isotropic: the isotropic part; black in row `NO_PATCH`.
+        lobe: row of each patch in the other arrays; −1: isotropic only.
+        frame: tangents and bitangents. scale: radiance of one step of the table.
+        table: of each bin, x outermost. smooth: the same, with fewer rings.
     """
 
-    isotropic: F32
-    lobe: NDArray[np.int32]
-    frame: F32
-    scale: F32
-    table: NDArray[np.int16]
-    smooth: NDArray[np.int16]
+    isotropic: Shaped[F32, "patches 3"]
+    lobe: Shaped[NDArray[np.int32], " patches"]
+    frame: Shaped[F32, "G 2 3"]
+    scale: Shaped[F32, "G 3"]
+    table: Shaped[NDArray[np.int16], "G bins 3"]
+    smooth: Shaped[NDArray[np.int16], "G bins 3"]
 
 
-def isotropic(radiance: F32) -> OutgoingLight:
-    """Send the same in every direction. radiance: black in row `NO_PATCH`. (NO_CELL + 1, 3) float32"""
+def isotropic(radiance: Shaped[F32, "patches 3"]) -> OutgoingLight:
+    """Return isotropic outgoing light. radiance: black in row `NO_PATCH`."""
     return radiance_from_patch(
         radiance, np.empty(0, np.intp), np.empty((0, 2, 3), np.float32), np.empty((0, 3, NUM_OUTGOING), np.float32)
     )
 
 
 def radiance_from_patch(
-    isotropic_radiance: F32,
-    rows: NDArray[np.intp],
-    frame: F32,
-    coefficients: F32,
-    decay: F32 | None = None,
+    isotropic_radiance: Shaped[F32, "patches 3"],
+    rows: Shaped[NDArray[np.intp], " G"],
+    frame: Shaped[F32, "G 2 3"],
+    coefficients: Shaped[F32, "G 3 J"],
+    decay: Shaped[F32, " G"] | None = None,
     extra_bins: tuple[NDArray[np.intp], F32] | None = None,
 ) -> OutgoingLight:
-    """Put together what cells send.
+    """Tabulate the outgoing radiance of patches.
 
     Args:
-        isotropic_radiance: as in `OutgoingLight`. rows: the cells that send more one way than another. (G,)
-        frame: their tangents and bitangents. (G, 2, 3) float32. coefficients: L_j of each. (G, 3, J) float32
-        decay: how fast what narrow lobes see of each falls with the degree, see `decay_of`. (G,) float32; None where
-            only cells look it up, which see widely: `smooth` is `table` then.
-        extra_bins: what some of them send besides by squares: which of the G, rising, (F,), and radiance, (F, 3,
-            SIDE²).
+        isotropic_radiance: as in `OutgoingLight`. rows: patches with a directional part.
+        frame: their tangents and bitangents. coefficients: their L_j.
+        decay: of the smoothed table, see `decay_of`; None if only patches look it up, which gather widely: `smooth` is
+            then `table`.
+        extra_bins: additional binned radiance of some of the G: ascending indices, (F,), and radiance, (F, 3, SIDE²).
     """
     lobe = np.full(NO_PATCH + 1, -1, np.int32)
     lobe[rows] = np.arange(len(rows))
@@ -92,7 +89,7 @@ def radiance_from_patch(
     def fill(start: int, stop: int) -> None:
         block = coefficients[start:stop]
         variants = [block] if decay is None else [block, block * np.exp(-np.outer(decay[start:stop], degrees))[:, None]]
-        values = np.stack(variants).astype(np.float32) @ means  # (tables, cells, 3, squares)
+        values = np.stack(variants).astype(np.float32) @ means  # (tables, patches, 3, bins)
         if extra_bins is not None:
             selection = slice(*np.searchsorted(extra_bins[0], [start, stop]))
             values[:, extra_bins[0][selection] - start] += extra_bins[1][selection]
@@ -106,21 +103,21 @@ def radiance_from_patch(
     return OutgoingLight(isotropic_radiance, lobe, frame, scale, tables[0], tables[-1])
 
 
-def decay_of(roughening: F32) -> F32:
-    """How fast what narrow lobes see of cells is to fall with the degree n, as e^(−n (n + 2) f). (G,) float32
+def decay_of(roughening: Shaped[F32, " G"]) -> Shaped[F32, " G"]:
+    """Decay f per patch of the smoothed table; degree n is multiplied by e^(−n (n + 2) f).
 
-    Sharp highlights ring most, and no cell tells how sharp they are: they are seen as wide as those of rough metal.
+    Sharp highlights ring most, and patches do not store their sharpness: all are smoothed to that of a rough metal.
 
     Args:
-        roughening: f by which the cells' highlights let light fall themselves. (G,)
+        roughening: decay f by the patches' own highlights.
     """
     return np.asarray(np.maximum(WINDOW_DECAY, _NARROWEST - roughening), np.float32)
 
 
 @lru_cache(maxsize=1)
-def bin_means() -> F32:
-    """The mean of each function over each square, by the cosine. (J, SIDE²) float32"""
-    wi, weight = offsets_in_bin()  # a square off the disc is as the rim beside it
+def bin_means() -> Shaped[F32, "J bins"]:
+    """Cosine-weighted average of each basis function over each direction bin."""
+    wi, weight = offsets_in_bin()  # bins outside the disk take the values of its edge
     functions = project(wi)[..., :NUM_OUTGOING]
     means = np.einsum("xaybj,xayb->xyj", functions, weight) / np.einsum("xayb->xy", weight)[..., None]
     return np.ascontiguousarray(means.reshape(SIDE * SIDE, NUM_OUTGOING).T, np.float32)
@@ -128,11 +125,11 @@ def bin_means() -> F32:
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def bin_of(frame, row, dx, dy, dz):  # type: ignore[no-untyped-def]
-    """Find the square of a direction.
+    """Return the bin of a direction.
 
     Args:
-        frame: of all rows. (G, 2, 3) float32. row: of the cell.
-        dx, dy, dz: unit, away from the cell, world space.
+        frame: of all rows. (G, 2, 3) float32. row: of the patch.
+        dx, dy, dz: unit, away from the patch, world space.
     """
     x = frame[row, 0, 0] * dx + frame[row, 0, 1] * dy + frame[row, 0, 2] * dz
     y = frame[row, 1, 0] * dx + frame[row, 1, 1] * dy + frame[row, 1, 2] * dz
@@ -144,11 +141,11 @@ def bin_of(frame, row, dx, dy, dz):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def incident_along(outgoing, gather_hits, bins, out):  # type: ignore[no-untyped-def]
-    """Look up what cells send along the rays of a point.
+    """Look up the radiance that arrives along the rays of a point.
 
     Args:
-        outgoing: by all cells, a `OutgoingLight`. gather_hits: cells that the rays hit. (rays,) uint16
-        bins: in which light leaves them. (rays,) uint8
+        outgoing: of all patches, an `OutgoingLight`. gather_hits: patches that the rays hit. (rays,) uint16
+        bins: direction bin at the patch. (rays,) uint8
         out: radiance, written. (3, rays) float32
     """
     for ray in range(gather_hits.shape[0]):

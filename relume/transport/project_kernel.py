@@ -1,9 +1,9 @@
-"""The projector's kernels: the angles of the listed lights, and their division into leaves.
+"""Kernels of the projector: angles of the listed lights, and their subdivision.
 
-A leaf is a triangle over which every angle is linear: a light triangle, or a part of one near an angle's pole
-(appendix A, Ben-Artzi 2006). All triangles of a level are divided together and leaves are gathered in arrays and spent
-together, so that each loop is short enough for the compiler to keep in registers and long enough to fill them; arrays
-handed to a helper inside a hot loop would be counted as references there.
+A subtriangle is a triangle over which every angle is linear: a light triangle, or a part of one near an angle's pole
+(appendix A, Ben-Artzi 2006). All triangles of a level are divided together, and subtriangles are collected in arrays
+and processed together, so that each loop fits the registers and fills them. Passing arrays to a helper inside a hot
+loop would count references.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from relume.transport.triangle_kernel import add_subtriangles, weight_subtriangl
 _QUARTER = np.float32(0.25)
 _HALF = np.float32(0.5)
 _THIRD = np.float32(1 / 3)
-# An angle counts as linear over a triangle when it is this close to linear at the midpoints of the edges, in bands;
-# away from the pole, where curves are wider, a share of the angle more.
+# An angle is treated as linear over a triangle if its error at the edge midpoints is below this tolerance, in bands,
+# plus a fraction of the angle, since curves are wider away from the pole.
 _TOLERANCE_BANDS = np.float32(0.04)
 _TOLERANCE_FRACTION = np.float32(0.015)
-_QUARTERED_BEND = np.float32(4)  # division in four quarters the bend, so that up to here one division is enough
+_QUARTERED_BEND = np.float32(4)  # one division reduces the bend to a quarter: up to this value one is enough
 _MAX_DEPTH = 6
 FINE, COARSE = (np.float32(1), _MAX_DEPTH - 1), (np.float32(8), 2)
 # corners of the four children among the nodes a, b, c, ab, bc, ca
 _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
 _CULLED = np.float32(-1)
-# of NumPy, and not written where kernels are called: for each int of Python these would be compiled anew
+# NumPy integers, and no literals in kernel calls: a Python int would compile each kernel again
 _BEGIN, _MIDDLES, _WHOLE = np.int64(0), np.int64(3), (0, 1, 2)
 _BATCH = 16  # lights divided together
-# Loops run to a multiple of this many triangles: the compiler's vector code rounds otherwise than its code for the
-# rest, and what a triangle gives must not depend on which others are left out.
+# Loops are padded to a multiple of this: vectorized code and remainder loops round differently, and the result of a
+# triangle must not depend on which others are culled.
 _LANES = 32
 _MAX_DIVIDED = _BATCH * 4 ** (_MAX_DEPTH - 1)
 _MAX_SUBTRIANGLES = _BATCH * 4**_MAX_DEPTH
@@ -43,20 +43,20 @@ _SUBTRIANGLES_PER_BATCH = 64  # multiplied by the settings of a curve
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _padded(num):  # type: ignore[no-untyped-def]
-    """Round a number of triangles up to whole vectors."""
+    """Round a number of triangles up to full vectors."""
     return (num + _LANES - 1) // _LANES * _LANES
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _relative_bend(a, b, c, ab, bc, ca):  # type: ignore[no-untyped-def]
-    """Compute how far an angle at the edges' midpoints is from linear between the corners, over what is tolerated."""
+    """Return the deviation of an angle at the edge midpoints from linear interpolation, relative to the tolerance."""
     bend = max(abs(ab - _HALF * (a + b)), max(abs(bc - _HALF * (b + c)), abs(ca - _HALF * (c + a))))
     return bend / (_TOLERANCE_BANDS + _TOLERANCE_FRACTION * min(a, min(b, c)))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _rotate_nodes(n, t, nodes, light, begin, end, local):  # type: ignore[no-untyped-def]
-    """Turn the nodes of the listed lights into the frame of normal n and tangent t. local: (3, 6, entries), written."""
+    """Rotate the nodes of listed lights into the frame of normal n and tangent t. local: (3, 6, entries), written."""
     bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
     for node in range(6):
         for entry in range(begin, end):
@@ -69,7 +69,7 @@ def _rotate_nodes(n, t, nodes, light, begin, end, local):  # type: ignore[no-unt
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _bends(gamma, support, num, bend):  # type: ignore[no-untyped-def]
-    """Find the largest bend over all angles of each light, or `_CULLED` where a dormant curve is nothing all over it.
+    """Find the largest bend over all angles of each light, or `_CULLED` if a fixed curve is zero all over it.
 
     gamma: angles at the nodes, in bands. (C, 6, …). bend: (…), written.
     """
@@ -82,14 +82,14 @@ def _bends(gamma, support, num, bend):  # type: ignore[no-untyped-def]
             curve_bend = _relative_bend(a[e], b[e], c[e], ab[e], bc[e], ca[e])
             low = min(a[e], min(b[e], min(c[e], min(ab[e], min(bc[e], ca[e])))))
             high = max(a[e], max(b[e], max(c[e], max(ab[e], max(bc[e], ca[e])))))
-            # a pole may lie inside by as much as the nodes are apart
+            # a pole may lie inside, up to the distance between nodes
             is_zero = low - (high - low) > limit or bend[e] < 0
             bend[e] = _CULLED if is_zero else max(bend[e], curve_bend)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _sum_bends(gamma, num, bend_sum):  # type: ignore[no-untyped-def]
-    """Sum how far each angle bends at the edges' midpoints. bow: (C, …), written."""
+    """Sum the deviation of each angle at the edge midpoints from linear. bend_sum: (C, …), written."""
     num = _padded(num)
     for k in range(gamma.shape[0]):
         a, b, c, ab, bc, ca = gamma[k, 0], gamma[k, 1], gamma[k, 2], gamma[k, 3], gamma[k, 4], gamma[k, 5]
@@ -113,9 +113,9 @@ def _append(  # type: ignore[no-untyped-def]
     entry_index,
     num,
 ):
-    """Append the triangles between three nodes of the listed ones to the leaves; returns the new number of leaves.
+    """Append the triangles between three nodes of listed triangles to the subtriangles; return the new number.
 
-    Corners move by `bent` times as much as angles bend, which is nearly always one way
+    Corners move by `bent` times the bend of the angles, which nearly always has one sign
     (docs/direct-light.md#algorithm).
     """
     for k in range(gamma.shape[0]):
@@ -135,13 +135,13 @@ def _append(  # type: ignore[no-untyped-def]
 def _classify_triangles(  # type: ignore[no-untyped-def]
     gamma, bend, bend_sum, num_triangles, level, fine, origin, subtriangles, area_fractions, entry_index, num, lists
 ):
-    """Make leaves of the triangles over which all angles are linear, four of those that one division straightens.
+    """Append triangles with linear angles as one subtriangle, and those that one division makes linear as four.
 
     Args:
-        fine: see `project_points`. origin: light that each triangle is a part of.
-        lists: scratch for the numbers of triangles; those that must be divided further are left in lists[2].
+        fine: see `project_points`. origin: light of each triangle.
+        lists: scratch for triangle indices; those to be divided further are left in lists[2].
     Returns:
-        The new number of leaves, and how many must be divided.
+        The new number of subtriangles, and the number of triangles to divide.
     """
     num_whole = num_quartered = num_divided = 0
     max_whole_bend, last_level = fine
@@ -173,7 +173,7 @@ def _classify_triangles(  # type: ignore[no-untyped-def]
     for child in range(4):
         nodes = (_CHILDREN[child, 0], _CHILDREN[child, 1], _CHILDREN[child, 2])
         child_fraction = _QUARTER * area_fraction
-        # a quarter of a triangle bends a quarter as much
+        # a quarter of a triangle has a quarter of the bend
         bent = _QUARTER * _THIRD
         num = _append(
             gamma,
@@ -194,7 +194,7 @@ def _classify_triangles(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _children(local, gamma, origin, triangle_index, count, child_local, child_gamma, child_origin):  # type: ignore[no-untyped-def]
-    """Make the four children of the listed triangles: corners, and midpoints of edges. Returns their number."""
+    """Create the four children of the listed triangles: corners and edge midpoints. Return their number."""
     for child in range(4):
         begin = child * count
         for corner in range(3):
@@ -229,7 +229,7 @@ def _angles(kinds, scale, wo, local, first_node, num, gamma):  # type: ignore[no
     wo: times `Curve.axes`, one for each curve. (C, 3). gamma: (C, 6, …), written.
     """
     num = _padded(num)
-    is_pair = False  # with the curve before it
+    is_pair = False  # evaluated with the previous curve
     for k in range(kinds.shape[0]):
         if is_pair:
             is_pair = False
@@ -250,12 +250,12 @@ def _divide(  # type: ignore[no-untyped-def]
     kinds, scale, wo, support, fine, local, gamma, origin, count, generations, lists, bend, bend_sum, subtriangles,
     area_fractions, entry_index, num
 ):  # fmt: skip
-    """Divide the first `count` triangles of lists[2], and what comes of them, until every angle is linear over each.
+    """Divide the first `count` triangles of lists[2] recursively until every angle is linear over each.
 
     Args:
-        generations: local, gamma and origin of two generations of divided triangles, written in turns.
+        generations: local, gamma and origin of two generations of divided triangles, written alternately.
     Returns:
-        The new number of leaves.
+        The new number of subtriangles.
     """
     all_local, all_gamma, all_origin = generations
     for level in range(1, fine[1] + 1):
@@ -283,10 +283,10 @@ def _divide(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def make_scratch(num_curves, num_lights, num_settings):  # type: ignore[no-untyped-def]
-    """Make room for what `project_points` is in the middle of: it need not be made, and zeroed, for every few points.
+    """Allocate the scratch memory of `project_points` once, rather than for every block of points.
 
     Args:
-        num_curves: C. num_lights: the most that it is asked to list triangles of. num_settings: see `Contraction`.
+        num_curves: C. num_lights: maximum number of listed triangles. num_settings: see `Contraction`.
     """
     capacity = 4 * num_lights + _MAX_SUBTRIANGLES
     return _make_light_scratch(num_curves, num_lights), _make_subtriangle_scratch(num_curves, capacity, num_settings)
@@ -294,7 +294,7 @@ def make_scratch(num_curves, num_lights, num_settings):  # type: ignore[no-untyp
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _make_light_scratch(num_curves, num_lights):  # type: ignore[no-untyped-def]
-    """Make room for lights and parts: local nodes, angles, generations, which light each is of, lists, bends, bows."""
+    """Allocate memory for lights: local nodes, angles, generations, origins, lists, bends, sums of bends."""
     capacity = _padded(num_lights)
     widest = max(capacity, _MAX_DIVIDED)
     local, gamma = np.zeros((3, 6, capacity), np.float32), np.empty((num_curves, 6, capacity), np.float32)
@@ -310,7 +310,7 @@ def _make_light_scratch(num_curves, num_lights):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _make_subtriangle_scratch(num_curves, capacity, num_settings):  # type: ignore[no-untyped-def]
-    """Make room for leaves: corners, shares, entries, overlaps, weights, and means and products of settings."""
+    """Allocate memory for subtriangles: corners, fractions, entries, overlaps, weights, means and products."""
     subtriangles, area_fractions = np.empty((num_curves, 3, capacity), np.float32), np.empty(capacity, np.float32)
     overlaps, weight = np.empty((5, capacity), np.float32), np.empty((3, capacity), np.float32)
     mean, product = np.empty(num_settings, np.float32), np.empty((_SUBTRIANGLES_PER_BATCH, num_settings), np.float32)
@@ -327,14 +327,13 @@ def project_points(  # type: ignore[no-untyped-def]
     """Project the listed lights of points [start, stop).
 
     Args:
-        normal, tangent: shading frames of all points. (n, 3) float32. start, stop: points to be projected.
+        normal, tangent: shading frames of all points. (n, 3) float32. start, stop: range of points.
         first, light, local_wo: from `list_lights`.
         shading: q · cos θi of each entry, one row for all channels, or three. (1 or 3, K) float32
         nodes: of the lights. (3 axes, 6, M) float32. irradiance: of the lights, per channel. (M, 3) float32
         kinds, axes, num_bands, bands, decrements, num_rows, settings, setting_index, support, active: see
         `Contraction`.
-        fine: how far angles may bend over a leaf, times what is tolerated of exact operators; the last level of
-            division. `FINE` or `COARSE`.
+        fine: tolerance of the bend, relative to exact operators; last level of division. `FINE` or `COARSE`.
         scratch: from `make_scratch`.
         out: added to. (points, 3, J padded by 8) float32; with no free curve (points, 3, N) for N settings of the
             others.

@@ -1,14 +1,15 @@
-"""The projector: bins the light that reaches a point along one curve, every other curve multiplied in.
+"""Projector: bins the light that reaches a point along one free curve, with all other curves multiplied in.
 
     T_j(x) = Σ_m V(x, m) L_m Ω_m cos θi · q(x, ω_m) · Π_{f ≠ active} mean_m(f) · Δ_{m,j}
 
-Eqs. 21, 22 and 25 with 26 carried out at once, Ben-Artzi 2006: U is never stored. Triangles over which an angle is not
-linear (near its pole) are divided into four until it is (appendix A).
+Eqs. 21, 22 and 25 combined with 26, Ben-Artzi 2006: U is never stored. Triangles over which an angle is not linear
+(near its pole) are divided into four until it is (appendix A).
 """
 
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
@@ -29,8 +30,7 @@ class Projector:
 
     Args:
         term: the BRDF term. contraction: its curves, from `contract`.
-        lights: triangles of the environment; `receivers` tell which of them each point sees.
-        receivers: all points, and what arrives at them.
+        lights: triangles of the environment. receivers: all points, with their visibility and rays.
     """
 
     def __init__(self, term: Term, contraction: Contraction, lights: TriangleLights, receivers: ShadingPoints) -> None:
@@ -42,12 +42,8 @@ class Projector:
         self._fine = FINE if lights.parts is None else COARSE
         self._scratch = make_scratch(contraction.kinds.size, max_lights, contraction.settings.shape[2])
 
-    def project(self, start: int, stop: int) -> F32:
-        """Project points [start, stop): their transport along the free curve, in its bands.
-
-        Returns:
-            (stop - start, J, 3) float32; with no free curve (stop - start, N, 3).
-        """
+    def project(self, start: int, stop: int) -> Shaped[F32, "m columns 3"]:
+        """Return the transport of points [start, stop): in J bands of the free curve, or in N settings without one."""
         c = self._contraction
         num_padded = c.num_columns + EIGHT if c.active >= 0 else -(-c.num_settings // EIGHT) * EIGHT
         out = np.zeros((stop - start, 3, num_padded), np.float32)
@@ -77,7 +73,7 @@ class Projector:
         self._project(light_arrays, start, stop, out)
 
     def _project(self, light_arrays: _LightArrays, start: int, stop: int, out: F32) -> None:
-        """Project a block. listed: of its points, `first` to `irradiance` of `project_points`."""
+        """Project a block. light_arrays: arguments `first` to `irradiance` of `project_points`."""
         r, c = self._receivers, self._contraction
         project_points(
             r.normal, r.tangent, *light_arrays,

@@ -1,7 +1,7 @@
-"""The kernels of `relume.transport.ray_projector`: rays listed with their light, weighed, put into bands.
+"""Kernels of `relume.transport.ray_projector`: rays are listed with their radiance, weighted, and binned.
 
-A ray is a direction, where a light triangle has an extent: it falls into one band of every curve. Samples of lamps are
-listed where no curve asks where light comes from; else see `relume.transport.area_light_kernel`.
+A ray is a direction without extent: it falls into one band of every curve. Samples of area lights are listed as rays if
+no curve depends on the light direction; otherwise see `relume.transport.area_light_kernel`.
 """
 
 from __future__ import annotations
@@ -24,15 +24,13 @@ _NONE = np.int64(-1)  # no curve is free
 def list_local_rays(  # type: ignore[no-untyped-def]
     points, wo, light, strata, gain, visible, start, stop, first, wi, out, irradiance
 ):
-    """List the samples of a local light that points [start, stop) see.
+    """List the samples of a local light that are visible from points [start, stop).
 
     Args:
-        points: `SurfacePoints`. wo: towards the viewer. (n, 3) float32
-        light, strata, gain, visible: as in `LocalRays`.
-        start, stop: the points.
+        points: `SurfacePoints`. wo: view directions. (n, 3) float32
+        light, strata, gain, visible: as in `LocalRays`. start, stop: range of points.
         first, wi, out, irradiance: written, as by `relume.transport.gather_kernel.list_gather_rays`; the irradiance of
-        a
-            ray is w · cos θi · gain.
+            a ray is w · cos θi · gain.
     Returns:
         K, the number of rays.
     """
@@ -66,11 +64,11 @@ def list_local_rays(  # type: ignore[no-untyped-def]
 def list_mirror_lights(  # type: ignore[no-untyped-def]
     points, wo, direction, normal_irradiance, visible, start, stop, first, wi, out, irradiance
 ):
-    """List the lights that points [start, stop) see in flat mirrors.
+    """List the lights that points [start, stop) see in planar mirrors.
 
     Args:
-        points, wo, start, stop: as of `list_local_rays`. direction, normal_irradiance, visible: as in `MirrorRays`.
-        first, wi, out, irradiance: written, as there; the irradiance of a ray is cos θi · `normal_irradiance`.
+        points, wo, start, stop: as in `list_local_rays`. direction, normal_irradiance, visible: as in `MirrorRays`.
+        first, wi, out, irradiance: written, as above; the irradiance of a ray is cos θi · `normal_irradiance`.
     Returns:
         K, the number of rays.
     """
@@ -98,7 +96,7 @@ def list_mirror_lights(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _multiply(bands, num_rows, band, weight, num):  # type: ignore[no-untyped-def]
-    """Multiply the weights of rays by a dormant curve. bands: (3, ≥ J). band: of each ray. weight: (3, ≥ num)"""
+    """Multiply the weights of rays by a fixed curve. bands: (3, ≥ J). band: of each ray. weight: (3, ≥ num)"""
     for channel in range(3):
         row = channel if num_rows == 3 else 0
         for n in range(num):
@@ -107,7 +105,7 @@ def _multiply(bands, num_rows, band, weight, num):  # type: ignore[no-untyped-de
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _add_settings(settings, setting_index, band, weight, num, product, out):  # type: ignore[no-untyped-def]
-    """Add rays to all settings of the curves that have several.
+    """Add rays to all settings of the curves with several settings.
 
     Args:
         band: of each curve and ray. product: scratch, as long as a row of the settings. out: (3, ≥ N)
@@ -132,7 +130,7 @@ def _contract(  # type: ignore[no-untyped-def]
     begin, end, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_index, active,
     gamma, band, weight,
 ):  # fmt: skip
-    """Weigh rays [begin, end) of a point by all its curves but the free one and those with several settings.
+    """Weight rays [begin, end) of a point by all curves except the free one and those with several settings.
 
     Writes band (curves, ≥ rays) and weight (3, ≥ rays).
     """
@@ -155,7 +153,7 @@ def _contract(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def weight_rays(first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_index, out):  # type: ignore[no-untyped-def]
-    """Weigh what each listed ray brings to its point, all curves contracted.
+    """Compute the contribution of each listed ray, with all curves contracted.
 
     Args:
         first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_index: as in
@@ -178,7 +176,7 @@ def weight_rays(first, wi, wo, irradiance, shading, kinds, axes, num_bands, band
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def sum_rays(first, irradiance, shading, out):  # type: ignore[no-untyped-def]
-    """Sum listed rays where no curve is listed: all that is left of a term is its quotient.
+    """Sum listed rays of a term without curves: only its quotient remains.
 
     Args:
         first, irradiance, shading: as in `project_rays`. out: added to. (points, 3, ≥ 1) float32
@@ -216,7 +214,7 @@ def _project(  # type: ignore[no-untyped-def]
     first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_index, active,
     scratch, out,
 ):  # fmt: skip
-    """Do what `project_rays` is for. scratch: gamma, weight, band of `_contract`, product of `_add_settings`."""
+    """Implement `project_rays`. scratch: gamma, weight, band of `_contract`, product of `_add_settings`."""
     gamma, weight, band, product = scratch
     for p in range(out.shape[0]):
         begin, end = first[p], first[p + 1]

@@ -1,11 +1,12 @@
-"""The projector's other half: light that arrives along rays, from gather cells and from local lights.
+"""Projection of light along rays, from patches and from local lights.
 
-R(x) = Σ_r w_r L_r q(x, ω_r) Π_f curve_f(angle_f(x, ω_r)),   w_r = cos θi over the density of rays
+R(x) = Σ_r w_r L_r q(x, ω_r) Π_f curve_f(angle_f(x, ω_r)),   w_r = cos θi / pdf of the rays
 """
 
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
@@ -19,11 +20,11 @@ F32 = NDArray[np.float32]
 
 
 class RayProjector:
-    """Adds the rays of points to what a projector has made of its lights; holds the scratch memory of one thread.
+    """Adds the light of rays to the output of a projector; holds the scratch memory of one thread.
 
     Args:
         term: the BRDF term. contraction: its curves, from `contract`.
-        receivers: where the rays arrive. capacity: points that are listed at once.
+        receivers: points with rays. capacity: maximum number of points listed at once.
     """
 
     def __init__(self, term: Term, contraction: Contraction, receivers: ShadingPoints, capacity: int) -> None:
@@ -31,12 +32,12 @@ class RayProjector:
         max_rays = capacity * max((rays.max_rays_per_point for rays in receivers.rays), default=0)
         self._ray_list = ReceiverList(np.empty(capacity + 1, np.int64), *np.empty((3, 3, max_rays), np.float32))
 
-    def add(self, start: int, stop: int, out: F32) -> None:
-        """Add points [start, stop) to `out`, laid out as `project_rays` has it."""
+    def add(self, start: int, stop: int, out: Shaped[F32, "m 3 columns"]) -> None:
+        """Add points [start, stop) to `out`; see `project_rays` for its layout."""
         radiance = np.zeros_like(out)
         for rays in self._receivers.rays:
             if is_area_light(rays, self._contraction.kinds.size):
-                continue  # it is listed as triangles
+                continue  # listed as triangles
             if isinstance(rays, GatherRays) and rays.sharing is not None:
                 self._add_shared(rays, rays.sharing, start, stop, radiance)
             else:
@@ -44,7 +45,7 @@ class RayProjector:
         out += self._contraction.constant[:, None] * radiance
 
     def _add_shared(self, rays: GatherRays, sharing: NeighborFilter, start: int, stop: int, out: F32) -> None:
-        """Add what points have of their own rays and of their neighbours'."""
+        """Add the light of points' own rays and of their neighbors' rays."""
         filter_passes, rows = sharing.weights_for(self._term).find_dependencies(start, stop)
         radiance = np.zeros((len(rows), *out.shape[1:]), np.float32)
         self._add(rays.unshared(rows), self._receivers.without_light(rows), 0, len(rows), radiance)
@@ -71,8 +72,8 @@ class RayProjector:
                 c.kinds, c.axes, c.num_bands, c.bands, c.num_rows, c.settings, c.setting_index, c.active, block_out,
             )  # fmt: skip
 
-    def weight_rays(self, start: int, stop: int) -> F32:
-        """Weigh what each ray of points [start, stop) brings, all curves contracted. (3, rays) float32"""
+    def weight_rays(self, start: int, stop: int) -> Shaped[F32, "3 rays"]:
+        """Return the contribution of each ray of points [start, stop), with all curves contracted."""
         c, ray_weights = self._contraction, []
         for rays in self._receivers.rays:
             shading = self._list(rays, self._receivers, start, stop)
@@ -85,7 +86,7 @@ class RayProjector:
         return np.concatenate(ray_weights, axis=1) * c.constant[:, None]
 
     def _list(self, rays: RayList, receivers: ShadingPoints, start: int, stop: int) -> F32:
-        """List rays of points; returns the term's quotients. (1 or 3, rays)"""
+        """List rays of points; return the term's quotients. (1 or 3, rays)"""
         ray_list = self._ray_list
         num = rays.list_into(ray_list, receivers, start, stop)
         return np.asarray(self._term.quotients(*ray_list.wi[:, :num], *ray_list.wo[:, :num]))

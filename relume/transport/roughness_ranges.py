@@ -1,4 +1,4 @@
-"""Points of several levels of roughness under one term: each range of them is projected with its own curves."""
+"""Points with several roughness levels under one term: each range of points is projected with its own curves."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
@@ -20,43 +21,45 @@ F64 = NDArray[np.float64]
 
 
 def at_roughness(bands: Mapping[str, F64], level: int) -> dict[str, F64]:
-    """The curves at one level: those that do not differ from level to level are the same. (3, J) each
+    """Return the curves at one level, (3, J) each; curves without levels are unchanged.
 
     Args:
-        bands: of each curve, (3, J), or (L, 3, J) where it differs.
+        bands: of each curve, (3, J), or (L, 3, J) if it depends on the level.
     """
     return {name: rows[level] if rows.ndim == 3 else rows for name, rows in bands.items()}
 
 
 def without_free_curves(bands: Mapping[str, F64], free: Iterable[str]) -> dict[str, F64]:
-    """The same curves, the free ones as at the first level: their values do not matter, and they need no levels.
+    """Replace the free curves by their first level: their values do not matter, so they need no levels.
 
     Args:
-        bands: as `at_roughness` takes them. free: names of the curves.
+        bands: as in `at_roughness`. free: names of the curves.
     """
     return {**bands, **at_roughness({name: bands[name] for name in free}, 0)}
 
 
 def num_levels(bands: Mapping[str, F64]) -> int:
-    """L, or 1 where no curve differs."""
+    """Return the number of levels L; 1 if no curve depends on the level."""
     return max((len(rows) for rows in bands.values() if rows.ndim == 3), default=1)
 
 
 def contract_levels(term: Term, bands: Mapping[str, F64], active: str | None) -> tuple[Contraction, ...]:
-    """`relume.transport.term_contraction.contract` at each level.
+    """Contract a term at each level; see `relume.transport.term_contraction.contract`.
 
     Args:
-        term: whose curves these are. bands: as `at_roughness` takes them. active: the curve that stays free, if any.
+        term: with these curves. bands: as in `at_roughness`. active: the free curve, if any.
     """
     return tuple(contract(term, at_roughness(bands, level), active) for level in range(num_levels(bands)))
 
 
-def split_by_level(level: NDArray[np.uint8] | None, num: int, start: int, stop: int) -> Iterator[tuple[int, int, int]]:
-    """Cut points [start, stop) into ranges of one level each.
+def split_by_level(
+    level: Shaped[NDArray[np.uint8], " n"] | None, num: int, start: int, stop: int
+) -> Iterator[tuple[int, int, int]]:
+    """Split points [start, stop) into ranges of one level each.
 
     Args:
-        level: of all points. (n,), or None where there is one for all
-        num: levels that are told apart; 1: the range stays whole. start, stop: of the points.
+        level: of all points, or None if all have the same.
+        num: number of levels; 1: the range is not split. start, stop: range of points.
     Yields:
         Level, first point, end.
     """
@@ -76,12 +79,12 @@ def project_levels(
     start: int,
     stop: int,
     projector: Callable[[Term, Contraction, TriangleLights, ShadingPoints], Projector | Shader] = Projector,
-) -> F32:
-    """`Projector.project`, or that of another projector, with the curves of each point's level.
+) -> Shaped[F32, "m columns 3"]:
+    """Project points with the curves of each point's level; see `Projector.project`.
 
     Args:
-        term, lights, receivers: as `Projector` takes them. contractions: from `contract_levels`.
-        start, stop: of the points. projector: which one.
+        term, lights, receivers: as in `Projector`. contractions: from `contract_levels`.
+        start, stop: range of points. projector: its class.
     """
     projected = [
         projector(term, contractions[level], lights, receivers).project(first, last)

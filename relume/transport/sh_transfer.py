@@ -1,10 +1,10 @@
-"""What harmonics of light bring to points, their shadows included: precomputed transfer (Müller 2004, section 5).
+"""Precomputed transfer of spherical harmonics, shadowed (Müller 2004, section 5).
 
     T_k,lm(x) = ∫ Y_lm(ωi) V(x, ωi) cos θi h_k(ωi) dωi = Σ_s ΔΩ_s Y_lm(ω_s) V cos θ_s h_k(ω_s)
 
-with s the light triangles whose shadows are known. Smooth light c arrives as T c. Matrices of neighbours are alike, and
-kept by local PCA (Sloan 2003; `relume.math.local_pca`): a cluster for each point, and weights of its components. Of
-light that changes only the clusters' few vectors are found anew.
+s are the light triangles with known visibility. Low-frequency light c has the incident coefficients T c. Matrices of
+neighboring points are similar and compressed by local PCA (Sloan 2003; `relume.math.local_pca`): a cluster per point,
+and weights of its components. When the light changes, only the few vectors of the clusters are computed again.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -28,25 +29,26 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 NUM_CLUSTERS, NUM_COMPONENTS = 32, 9
-_MIN_POINTS_PER_CLUSTER = 64  # at least, in the mean
-_MAX_FITTED_POINTS = 4096  # points that clusters and components are found from
+_MIN_POINTS_PER_CLUSTER = 64  # on average
+_MAX_FITTED_POINTS = 4096  # points that clusters and components are fitted to
 _POINTS_PER_BATCH = 4096
 _POINTS_PER_RANGE = 256
 _LIGHTS_PER_BATCH = 128  # lights whose functions are summed together; they stay in the cache
-_WIDTH = 32  # numbers that are added at once: as many vectors as hold all harmonics
+_WIDTH = 32  # floats added at once: as many vectors as hold all harmonics
 
 
 def transfer_matrices(
-    points: SurfacePoints, visible: NDArray[np.uint8], directions: F32, solid_angles: F64, degree: int
-) -> F32:
-    """Find T of points.
+    points: SurfacePoints,
+    visible: Shaped[NDArray[np.uint8], "n bytes"],
+    directions: Shaped[F32, "M 3"],
+    solid_angles: Shaped[F64, " M"],
+    degree: int,
+) -> Shaped[F32, "n K harmonics"]:
+    """Compute the transfer matrices T of points.
 
     Args:
-        points: n of them. visible: which of the lights each sees, as in `ShadingPoints`. (n, bytes) uint8
-        directions: of the lights. (M, 3) float32. solid_angles: of these. (M,)
-        degree: of the in-basis.
-    Returns:
-        (n, K, NUM_HARMONICS) float32
+        points: n points. visible: of the lights, as in `ShadingPoints`.
+        directions, solid_angles: of the lights. degree: of the Zernike basis.
     """
     values = np.zeros((len(directions), _WIDTH), np.float32)
     values[:, :NUM_HARMONICS] = harmonics(directions.astype(np.float64)) * solid_angles[:, None]
@@ -58,7 +60,7 @@ def transfer_matrices(
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _transfer(recurrence_table, normal, tangent, visible, direction, values, start, stop, out):  # type: ignore[no-untyped-def]
-    """Sum the lights that points [start, stop) see. out: (n, K, NUM_HARMONICS)"""
+    """Sum the visible lights of points [start, stop). out: (n, K, NUM_HARMONICS)"""
     wi, scratch = np.empty((2, _LIGHTS_PER_BATCH), np.float32), np.empty((5, _LIGHTS_PER_BATCH), np.float32)
     functions, weighted_harmonics = (
         np.zeros((out.shape[1], _LIGHTS_PER_BATCH), np.float32),
@@ -88,26 +90,26 @@ def _transfer(recurrence_table, normal, tangent, visible, direction, values, sta
 
 
 class ClusteredTransfer(NamedTuple):
-    """T of n points, by local PCA.
+    """T of n points, compressed by local PCA.
 
     Attributes:
-        basis: mean, then components of each cluster. (clusters, 1 + C, K, NUM_HARMONICS) float16
-        cluster: of each point. (n,) uint8. weight: of the components. (n, C) float16
+        basis: mean, then components of each cluster.
+        cluster: of each point. weight: of the components.
     """
 
-    basis: F16
-    cluster: NDArray[np.uint8]
-    weight: F16
+    basis: Shaped[F16, "clusters vectors K harmonics"]
+    cluster: Shaped[NDArray[np.uint8], " n"]
+    weight: Shaped[F16, "n components"]
 
     @classmethod
     def fit(
         cls, num_points: int, matrices: Callable[[NDArray[np.intp]], F32], rng: np.random.Generator
     ) -> ClusteredTransfer:
-        """Find clusters and components from some points, then the weights of all.
+        """Fit clusters and components to some points, then compute the weights of all.
 
         Args:
-            num_points: n. matrices: finds T of points by their numbers. (…, K, NUM_HARMONICS) float32
-            rng: chooses the points, and first means among them.
+            num_points: n. matrices: returns T of points by index. (…, K, NUM_HARMONICS) float32
+            rng: selects the points, and the first means among them.
         """
         sample = np.sort(rng.permutation(num_points)[:_MAX_FITTED_POINTS])
         fitted = matrices(sample)
@@ -124,14 +126,10 @@ class ClusteredTransfer(NamedTuple):
         basis = np.concatenate([pca.mean[:, None], pca.components], axis=1).astype(np.float16)
         return cls(basis.reshape(*basis.shape[:2], *fitted.shape[1:]), cluster_index, weight)
 
-    def incident_coefficients(self, smooth: F32, rows: NDArray[np.intp]) -> F32:
-        """Find light vectors of some points in smooth light.
-
-        Args:
-            smooth: its coefficients. (NUM_HARMONICS, 3) float32. rows: the points. (m,)
-        Returns:
-            t. (m, 3, K) float32
-        """
+    def incident_coefficients(
+        self, smooth: Shaped[F32, "harmonics 3"], rows: Shaped[NDArray[np.intp], " m"]
+    ) -> Shaped[F32, "m 3 K"]:
+        """Compute the incident radiance coefficients of points `rows` in low-frequency light `smooth`."""
         transferred = np.ascontiguousarray(np.einsum("ajkl,lc->ajck", self.basis.astype(np.float32), smooth))
         out = np.empty((len(rows), *transferred.shape[2:]), np.float32)
         flat, flat_out = transferred.reshape(*transferred.shape[:2], -1), out.reshape(len(rows), -1)

@@ -1,4 +1,4 @@
-"""Points that light arrives at, and the rays along which it comes from other surfaces and from local lights."""
+"""Shading points, and the rays along which light reaches them from other surfaces and from local lights."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import NamedTuple, Protocol, TypeGuard
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.lights.light_sampling import EmitterParts, LightStrata
@@ -23,42 +24,37 @@ F32 = NDArray[np.float32]
 
 
 class ReceiverList(NamedTuple):
-    """Memory that rays of a range of points are listed in; see `relume.transport.ray_kernel`."""
+    """Memory for the listed rays of a range of points; see `relume.transport.ray_kernel`."""
 
-    first: NDArray[np.int64]
-    wi: F32
-    wo: F32
-    irradiance: F32
+    first: Shaped[NDArray[np.int64], " ends"]
+    wi: Shaped[F32, "3 K"]
+    wo: Shaped[F32, "3 K"]
+    irradiance: Shaped[F32, "3 K"]
 
 
 class RayList(Protocol):
-    """Rays of n points, at most the same number for each."""
+    """Rays of n points, with a common maximum per point."""
 
     @property
     def max_rays_per_point(self) -> int:
-        """The most rays that any point has."""
+        """Maximum number of rays of a point."""
         ...
 
-    def unshared(self, rows: NDArray[np.integer]) -> RayList:
-        """Choose those of some points, which do not share them."""
+    def unshared(self, rows: Shaped[NDArray[np.integer], " m"]) -> RayList:
+        """Select the rays of some points, without sharing among neighbors."""
         ...
 
     def list_into(self, receiver_list: ReceiverList, receivers: ShadingPoints, start: int, stop: int) -> int:
-        """List the rays of points [start, stop) that bring light; returns their number.
+        """List the rays of points [start, stop) that carry light; return their number.
 
         Args:
-            receiver_list: memory for them, written. receivers: all points that the rays belong to.
-            start, stop: those whose rays are listed.
+            receiver_list: memory for the rays, written. receivers: all points. start, stop: range of points.
         """
         ...
 
 
 def build_ray_lists(rays: RayList, receivers: ShadingPoints, start: int, stop: int) -> ReceiverList:
-    """List rays in memory of their own.
-
-    Args:
-        rays: that are listed. receivers, start, stop: as of `Rays.list_into`.
-    """
+    """List rays in newly allocated memory; see `RayList.list_into`."""
     max_rays = (stop - start) * rays.max_rays_per_point
     receiver_list = ReceiverList(
         np.empty(stop - start + 1, np.int64), *(np.empty((3, max_rays), np.float32) for _ in range(3))
@@ -69,26 +65,26 @@ def build_ray_lists(rays: RayList, receivers: ShadingPoints, start: int, stop: i
 
 @dataclass(frozen=True)
 class GatherRays:
-    """Rays that bring the light of cells.
+    """Rays that carry the light of patches.
 
     Attributes:
-        gather_hits: cell that each hits. (n, rays) uint16. pattern: their directions, shifted by the points' seeds.
-        outgoing: by cells.
-        sharing: among the points; None: each alone.
+        gather_hits: patch that each ray hits. pattern: ray directions, shifted by the points' seeds.
+        outgoing: outgoing radiance of the patches.
+        sharing: filter over neighboring points; None: each point uses its own rays.
     """
 
-    gather_hits: NDArray[np.uint16]
+    gather_hits: Shaped[NDArray[np.uint16], "n rays"]
     pattern: RayPattern
     outgoing: OutgoingLight
     sharing: NeighborFilter | None = None
 
     @property
     def max_rays_per_point(self) -> int:
-        """The most rays that any point has."""
+        """Maximum number of rays of a point."""
         return int(self.gather_hits.shape[1])
 
-    def unshared(self, rows: NDArray[np.integer]) -> GatherRays:
-        """Choose those of some points, which do not share them."""
+    def unshared(self, rows: Shaped[NDArray[np.integer], " m"]) -> GatherRays:
+        """Select the rays of some points, without sharing among neighbors."""
         return replace(self, gather_hits=self.gather_hits[rows], sharing=None)
 
     def list_into(self, receiver_list: ReceiverList, receivers: ShadingPoints, start: int, stop: int) -> int:
@@ -96,8 +92,8 @@ class GatherRays:
         ray_arrays = self.gather_hits, self.pattern, self.outgoing
         return int(list_gather_rays(receivers.points, receivers.wo, *ray_arrays, start, stop, *receiver_list))
 
-    def sum(self, receivers: ShadingPoints, start: int, stop: int) -> F32:
-        """Sum the light of the rays of `receivers` [start, stop), wherever it comes from. (stop - start, 3)"""
+    def sum(self, receivers: ShadingPoints, start: int, stop: int) -> Shaped[F32, "m 3"]:
+        """Return the irradiance of `receivers` [start, stop) from all of their rays."""
         total = np.empty((stop - start, 3), np.float32)
         sum_gather_rays(
             receivers.points, receivers.wo, self.gather_hits, self.pattern, self.outgoing, start, stop, total
@@ -107,31 +103,31 @@ class GatherRays:
 
 @dataclass(frozen=True)
 class LocalRays:
-    """Rays that bring a local light.
+    """Rays that carry the light of a local light.
 
     Attributes:
         light: of unit emission. strata: its samples, shifted by the points' seeds.
-        gain: times the light's unit emission. (3,) float32
-        visible: sample k of a point in bit k & 7 of byte k >> 3. (n, bytes) uint8
+        gain: factor on the light's unit emission.
+        visible: sample k of a point in bit k & 7 of byte k >> 3.
     """
 
     light: LocalLight
     strata: LightStrata
-    gain: F32
-    visible: NDArray[np.uint8]
+    gain: Shaped[F32, " 3"]
+    visible: Shaped[NDArray[np.uint8], "n bytes"]
 
     @cached_property
     def emitter_parts(self) -> EmitterParts:
-        """LampParts of that surface."""
+        """Hierarchy of parts of the light's surface."""
         return make_emitter_parts(self.light, self.strata)
 
     @property
     def max_rays_per_point(self) -> int:
-        """The most rays that any point has."""
+        """Maximum number of rays of a point."""
         return len(self.strata.uv)
 
-    def unshared(self, rows: NDArray[np.integer]) -> LocalRays:
-        """Choose those of some points; see `RayList`."""
+    def unshared(self, rows: Shaped[NDArray[np.integer], " m"]) -> LocalRays:
+        """Select the rays of some points; see `RayList`."""
         return replace(self, visible=self.visible[rows])
 
     def list_into(self, receiver_list: ReceiverList, receivers: ShadingPoints, start: int, stop: int) -> int:
@@ -142,25 +138,25 @@ class LocalRays:
 
 @dataclass(frozen=True)
 class MirrorRays:
-    """Rays that bring what flat mirrors throw: one from each light that is seen in them.
+    """Rays that carry light reflected by planar mirrors: one per light.
 
     Attributes:
-        direction: in which each is seen, unit. (K, 3) float32
-        normal_irradiance: what each brings to a surface across its way. (K, 3) float32
-        visible: light k of a point in bit k & 7 of byte k >> 3. (n, bytes) uint8
+        direction: unit, toward the mirror image of each light.
+        normal_irradiance: irradiance from each on a surface perpendicular to it.
+        visible: light k of a point in bit k & 7 of byte k >> 3.
     """
 
-    direction: F32
-    normal_irradiance: F32
-    visible: NDArray[np.uint8]
+    direction: Shaped[F32, "K 3"]
+    normal_irradiance: Shaped[F32, "K 3"]
+    visible: Shaped[NDArray[np.uint8], "n bytes"]
 
     @property
     def max_rays_per_point(self) -> int:
-        """The most rays that any point has."""
+        """Maximum number of rays of a point."""
         return len(self.direction)
 
-    def unshared(self, rows: NDArray[np.integer]) -> MirrorRays:
-        """Choose those of some points; see `RayList`."""
+    def unshared(self, rows: Shaped[NDArray[np.integer], " m"]) -> MirrorRays:
+        """Select the rays of some points; see `RayList`."""
         return replace(self, visible=self.visible[rows])
 
     def list_into(self, receiver_list: ReceiverList, receivers: ShadingPoints, start: int, stop: int) -> int:
@@ -170,51 +166,50 @@ class MirrorRays:
 
 
 def is_area_light(rays: RayList, num_curves: int) -> TypeGuard[LocalRays]:
-    """Whether rays come from a surface of which a term with so many curves lists parts as triangles.
+    """True if rays come from an area light that a term with this number of curves lists as triangles.
 
-    Where no curve asks where light comes from, its samples are rays as others are.
+    If no curve depends on the light direction, samples of the light are listed as rays.
     """
     return num_curves > 0 and isinstance(rays, LocalRays) and rays.light.kind == SURFACE and bool(rays.light.area > 0)
 
 
 @dataclass(frozen=True)
 class ShadingPoints:
-    """Points that light arrives at, each seen from one direction.
+    """Points to shade, each with one view direction.
 
     Attributes:
-        points: where it arrives. wo: towards the viewer, unit, world space. (n, 3) float32
-        visible: light m of a point in bit m & 7 of byte m >> 3; set only above the horizon. (n, bytes) uint8
-        rays: light that arrives along rays; none where only the environment's triangles are meant.
-        uv: where they lie in textures, see `relume.raytrace.surface_interaction.SurfaceInteraction`; None where that is
-            not known. (n, 5) float32
-        level: of roughness, see `relume.transport.roughness_ranges`; None where all are alike. (n,) uint8
+        points: the surface points. wo: view directions, unit, world space.
+        visible: light m of a point in bit m & 7 of byte m >> 3; set only above the horizon.
+        rays: light along rays; empty for the environment's triangles alone.
+        uv: see `relume.raytrace.surface_interaction.SurfaceInteraction`; None if unknown.
+        level: of roughness, see `relume.transport.roughness_ranges`; None if all have the same.
     """
 
     points: SurfacePoints
-    wo: F32
-    visible: NDArray[np.uint8]
+    wo: Shaped[F32, "n 3"]
+    visible: Shaped[NDArray[np.uint8], "n bytes"]
     rays: Sequence[RayList] = ()
-    uv: F32 | None = None
-    level: NDArray[np.uint8] | None = None
+    uv: Shaped[F32, "n 5"] | None = None
+    level: Shaped[NDArray[np.uint8], " n"] | None = None
 
     @property
-    def normal(self) -> F32:
-        """The points' normals. (n, 3) float32"""
+    def normal(self) -> Shaped[F32, "n 3"]:
+        """Shading normals of the points."""
         return self.points.normal
 
     @property
-    def tangent(self) -> F32:
-        """The points' tangents. (n, 3) float32"""
+    def tangent(self) -> Shaped[F32, "n 3"]:
+        """Tangents of the points."""
         return self.points.tangent
 
-    def without_light(self, rows: NDArray[np.integer]) -> ShadingPoints:
-        """Choose some of them, without their light."""
+    def without_light(self, rows: Shaped[NDArray[np.integer], " m"]) -> ShadingPoints:
+        """Select points without their visibility and rays."""
         uv = None if self.uv is None else self.uv[rows]
         level = None if self.level is None else self.level[rows]
         no_visibility = np.empty((len(rows), 0), np.uint8)
         return ShadingPoints(self.points.rows(rows), self.wo[rows], no_visibility, uv=uv, level=level)
 
-    def subset(self, rows: NDArray[np.integer]) -> ShadingPoints:
-        """Choose some of them, with the light of each alone."""
+    def subset(self, rows: Shaped[NDArray[np.integer], " m"]) -> ShadingPoints:
+        """Select points with the visibility and rays of each, not shared among neighbors."""
         rays = tuple(rays.unshared(rows) for rays in self.rays)
         return replace(self.without_light(rows), visible=self.visible[rows], rays=rays)

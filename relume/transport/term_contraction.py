@@ -1,4 +1,4 @@
-"""A term made ready to be projected: which curve stays free, and the bands of those that do not."""
+"""Contraction of a term before projection: the free curve, and the bands of the fixed curves."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
@@ -16,7 +17,7 @@ from relume.core.simd import NUM as EIGHT
 F32 = NDArray[np.float32]
 
 _NOTHING = 1e-9
-_MIN_STEP = 1e-30  # of a curve; with numbers near the smallest float32 a processor is several times slower
+_MIN_STEP = 1e-30  # of a curve; denormal floats are several times slower
 _FLAT = 1e-12  # band averages of a constant differ by rounding
 
 
@@ -25,61 +26,59 @@ class WholeCurves(NamedTuple):
 
     Attributes:
         kinds, num_rows, num_bands: as in `Contraction`.
-        steps: each band's value; the sum of the values from it on; how much they vary from it on. (C, 3, J or more, 3)
-            float32. Summed from the end, where curves mostly are small, for what is small is their difference there.
+        steps: per band: its value; sum of the values from it on; total variation from it on. Summed from the end, where
+            curves mostly are small, so that differences of small values stay accurate.
     """
 
-    kinds: NDArray[np.int64]
-    steps: F32
-    num_rows: NDArray[np.int64]
-    num_bands: NDArray[np.int64]
+    kinds: Shaped[NDArray[np.int64], " C"]
+    steps: Shaped[F32, "C bands 3 3"]
+    num_rows: Shaped[NDArray[np.int64], " C"]
+    num_bands: Shaped[NDArray[np.int64], " C"]
 
 
 @dataclass(frozen=True)
 class Contraction:
-    """A term made ready for the kernel: which curve stays free, and the bands of those that do not.
+    """A term prepared for the kernels: the free curve, and the bands of the fixed curves.
 
     Attributes:
-        kinds: `Angle` of each curve that depends on wi. (C,) int64
-        axes: `Curve.axes` of each. (C, 3) float32
-        num_bands: (C,) int64
-        bands: padded with the last band. (C, 3, max J + 8) float32
-        num_rows: 1 where a curve is the same in all channels, else 3. (C,) int64
-        settings: the curves that have several, settings last: N, padded with zeros to a multiple of eight, or three
-            times as many where channels differ. (V, max J + 8, 8 n or 24 n) float32
-        setting_index: row of each curve in `settings`, -1 for none. (C,) int64
-        support: bands beyond which a dormant curve is nothing; infinite for the free one. (C,) float32
-        constant: product of the curves, where all are flat and none is listed. (3,) float32
+        kinds: `Angle` of each curve that depends on wi. axes: `Curve.axes` of each.
+        bands: padded by 8, with the last band.
+        num_rows: 1 if a curve is equal in all channels, else 3.
+        settings: of the V curves with several settings, settings last: N, padded with zeros to a multiple of eight, or
+            three times as many if channels differ.
+        setting_index: row of each curve in `settings`, -1 for none.
+        support: bands beyond which a fixed curve is zero; infinite for the free one.
+        constant: product of the curves, if all are flat and none is listed.
         active: index of the free curve, -1 for none.
-        num_settings: N, settings of the curves that are contracted at once; 1 where a curve is free.
+        num_settings: N, settings of the curves that are contracted at once; 1 with a free curve.
     """
 
-    kinds: NDArray[np.int64]
-    axes: F32
-    num_bands: NDArray[np.int64]
-    bands: F32
-    num_rows: NDArray[np.int64]
-    settings: F32
-    setting_index: NDArray[np.int64]
-    support: F32
-    constant: F32
+    kinds: Shaped[NDArray[np.int64], " C"]
+    axes: Shaped[F32, "C 3"]
+    num_bands: Shaped[NDArray[np.int64], " C"]
+    bands: Shaped[F32, "C 3 padded"]
+    num_rows: Shaped[NDArray[np.int64], " C"]
+    settings: Shaped[F32, "V padded columns"]
+    setting_index: Shaped[NDArray[np.int64], " C"]
+    support: Shaped[F32, " C"]
+    constant: Shaped[F32, " 3"]
     active: int
     num_settings: int
 
     @property
     def num_columns(self) -> int:
-        """Columns of what is projected: J of the free curve, or N."""
+        """Number of projected columns: J of the free curve, or N."""
         return int(self.num_bands[self.active]) if self.active >= 0 else self.num_settings
 
     @cached_property
-    def decrements(self) -> F32:
-        """By how much each band is less than the one before it. (C, 3, max J + 8) float32"""
+    def decrements(self) -> Shaped[F32, "C 3 padded"]:
+        """Decrease of each band from the previous one."""
         bands = self.bands.astype(np.float64)
         return -np.diff(bands, axis=2, prepend=bands[:, :, :1]).astype(np.float32)
 
     @cached_property
     def whole(self) -> WholeCurves:
-        """Its curves where none is free and each has one setting."""
+        """All curves, if none is free and each has one setting."""
         steps = np.zeros((*self.bands.shape, 3), np.float32)
         for curve_steps, bands, num in zip(steps, self.bands.astype(np.float64), self.num_bands, strict=True):
             values = bands[:, :num][:, ::-1]
@@ -90,14 +89,14 @@ class Contraction:
 
 
 def _support(rows: NDArray[np.float64]) -> float:
-    """Count the bands after which each of a curve's rows (..., J) stays below a billionth of its own peak."""
+    """Count the bands beyond which every row of a curve (..., J) stays below a billionth of its peak."""
     above = rows > _NOTHING * rows.max(axis=-1, keepdims=True)
     nonzero_bands = np.nonzero(above.reshape(-1, rows.shape[-1]).any(axis=0))[0]
     return float(nonzero_bands[-1] + 1) if len(nonzero_bands) else 0.0
 
 
 def _is_flat(bands: NDArray[np.float64]) -> bool:
-    """Tell whether a curve (3, J) is the same everywhere, but for rounding."""
+    """Return True if a curve (3, J) is constant up to rounding."""
     return bands.ndim == 2 and bool(np.all(np.ptp(bands, axis=1) <= _FLAT * np.abs(bands[:, 0])))
 
 
@@ -114,18 +113,17 @@ def _settings(curves: Sequence[NDArray[np.float64]], widest: int) -> F32:
 
 
 def contract(term: Term, bands: Mapping[str, NDArray[np.float64]], active: str | None) -> Contraction:
-    """Make a term ready: curves of the outgoing angle are left out (they multiply the finished sample).
+    """Contract a term; curves of the outgoing angle are omitted (they multiply the finished sample).
 
     Args:
-        term: whose curves these are.
-        bands: of each curve by name. (3, J) float64, or (3, N, J) for N settings of it at once
-        active: the curve that stays free, None to contract all.
+        term: with these curves. bands: of each curve by name. (3, J) float64, or (3, N, J) for N settings at once
+        active: the free curve, None to contract all.
     """
     curves = [curve for curve in term.curves if not curve.depends_on_view]
     constant = np.ones(3)
     if active is None and all(_is_flat(bands[curve.name]) for curve in curves):
-        # nothing depends on an angle; with any other curve flat ones stay, for every angle decides where triangles are
-        # divided, and a curve that becomes flat must not change that
+        # no dependence on an angle; beside any other curve flat ones stay, since every angle decides where triangles
+        # are divided, and this must not change when a curve becomes flat
         constant = np.prod([constant, *(bands[curve.name].mean(axis=1) for curve in curves)], axis=0)
         curves = []
     all_bands = [bands[curve.name] for curve in curves]

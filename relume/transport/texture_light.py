@@ -1,10 +1,10 @@
-"""Light that arrives at points, shared out to the directions in which a BTF is known: all that its texels ask of light.
+"""Incident light in the direction basis of a BTF: everything that its texels need from the light.
 
     a_l = Σ_s w_s hat_l(ω_s)
 
-A BTF's values are linear between the directions l (`relume.assets.btf.direction_rings`), so that a sum over light is
-exact for what is known. The weights w have no cosine: it is in the BTF's values. No texel changes a,
-nor how often a texture repeats.
+A BTF is interpolated linearly between the directions l (`relume.assets.btf.direction_rings`), so that sums over light
+are exact. The weights w have no cosine: the BTF's values include it. a depends neither on the texel nor on the
+tiling of the texture.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import math
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.btf.direction_rings import DirectionGrid, interpolation_weights
@@ -22,18 +23,18 @@ from relume.transport.shading_points import RayList, ShadingPoints, build_ray_li
 
 F32 = NDArray[np.float32]
 
-_MIN_COSINE = np.float32(1e-3)  # of rays, whose light was weighed by it
+_MIN_COSINE = np.float32(1e-3)  # of rays, to remove the cosine from their weights
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def to_texture_frame(x, y, axis):  # type: ignore[no-untyped-def]
-    """Bring a direction of a shading frame into the texture's, whose x and y axes are there axis[:2] and axis[2:]."""
+    """Rotate a direction from a shading frame into the texture's, with x axis axis[:2] and y axis axis[2:]."""
     return axis[0] * x + axis[1] * y, axis[2] * x + axis[3] * y
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _from_triangles(grid, normal, tangent, axes, visible, direction, irradiance, out):  # type: ignore[no-untyped-def]
-    """Add light triangles that n points see. out: (n, 3, L)"""
+    """Add the visible light triangles of n points. out: (n, 3, L)"""
     index, weight = np.empty(4, np.int32), np.empty(4, np.float32)
     for p in range(out.shape[0]):
         n, t = normal[p], tangent[p]
@@ -54,7 +55,7 @@ def _from_triangles(grid, normal, tangent, axes, visible, direction, irradiance,
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _from_listed(grid, axes, first, wi, irradiance, out):  # type: ignore[no-untyped-def]
-    """Add listed rays, whose light has been weighed by the cosine, to their points. out: (n, 3, L)"""
+    """Add listed rays, weighted by the cosine, to their points. out: (n, 3, L)"""
     index, weight = np.empty(4, np.int32), np.empty(4, np.float32)
     for p in range(out.shape[0]):
         for ray in range(first[p], first[p + 1]):
@@ -66,13 +67,11 @@ def _from_listed(grid, axes, first, wi, irradiance, out):  # type: ignore[no-unt
                     out[p, channel, index[k]] += scale * weight[k] * irradiance[channel, ray]
 
 
-def texture_axes(rotation: float, uv: F32) -> F32:
-    """Axes of a texture in the shading frames of points that are covered with it.
+def texture_axes(rotation: float, uv: Shaped[F32, "n 5"]) -> Shaped[F32, "n 4"]:
+    """Return the axes of a texture in the shading frames of points, for `to_texture_frame`.
 
     Args:
-        rotation: of the texture, radians. uv: of the points, see `ShadingPoints`. (n, 5)
-    Returns:
-        (n, 4) float32, as `to_texture_frame` wants them
+        rotation: of the texture, radians. uv: of the points, see `ShadingPoints`.
     """
     cosine, sine = math.cos(rotation), math.sin(rotation)
     x = np.stack([np.cos(uv[:, 3]), np.sin(uv[:, 3])], axis=1)
@@ -83,15 +82,14 @@ def texture_axes(rotation: float, uv: F32) -> F32:
 
 def texture_light_rows(
     btf_ref: BtfRef, lights: TriangleLights | None, receivers: ShadingPoints, start: int, stop: int
-) -> F32:
-    """Share light out to directions in the frames of a texture.
+) -> Shaped[F32, "m 3 L"]:
+    """Project light onto the direction basis of a BTF in its texture frame.
 
     Args:
-        btf_ref: how points are covered. lights: of the environment, None for rays alone.
-        receivers: all points; `uv` says where they are.
-        start, stop: those that are asked about.
+        btf_ref: the BTF and its mapping. lights: of the environment, None for rays alone.
+        receivers: all points, with `uv`. start, stop: range of points.
     Returns:
-        a of each point, channel and direction. (stop - start, 3, L) float32
+        a of each point, channel and direction; without the cosine.
     """
     assert receivers.uv is not None
     rows, grid = slice(start, stop), btf_ref.btf.grid
@@ -113,14 +111,14 @@ def _add_rays(
     _from_listed(grid, axes, ray_list.first, ray_list.wi, ray_list.irradiance, out)
 
 
-def rotated_tables(grid: DirectionGrid, tables: F32, angle: float) -> F32:
-    """Tables for a texture that is turned further than light was shared out for.
+def rotated_tables(grid: DirectionGrid, tables: Shaped[F32, "*batch L"], angle: float) -> Shaped[F32, "*batch L"]:
+    """Resample tables for a texture that is rotated relative to the binned light.
 
-    On each ring a direction takes the mean of the two that were where it is now: light is spread by up to a step of
-    the ring. (..., L) as `tables`
+    On each ring a direction takes the mean of the two directions at its rotated position, which blurs light by up to
+    one step of the ring.
 
     Args:
-        grid: of the BTF. tables: see `LocalPcaBtf.tables`. (..., L). angle: by which it is turned, radians.
+        grid: of the BTF. tables: see `LocalPcaBtf.tables`. angle: of the additional rotation, radians.
     """
     rotation = np.zeros((grid.num_directions, grid.num_directions), np.float32)
     for first, stop in zip(grid.first[:-1], grid.first[1:], strict=True):

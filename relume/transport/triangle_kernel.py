@@ -1,6 +1,6 @@
-"""The kernels of leaves: weighed, multiplied by the means of dormant curves, shared out to the bands of the free one.
+"""Kernels of subtriangles: weighted, multiplied by averages of the fixed curves, distributed to bands of the free one.
 
-Leaves are made in `relume.transport.project_kernel`, where every angle is linear over each.
+Subtriangles are made in `relume.transport.project_kernel`, so that every angle is linear over each.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _ONE_MINUS_EPSILON = np.float32(1 - 2**-24)
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _overlaps(corner, num_bands, num, overlaps):  # type: ignore[no-untyped-def]
-    """Find `overlap` leaves, angles held below the last band's end. corner: (3, n), overlap: (5, n), written."""
+    """Compute `overlap` of subtriangles, angles clamped to the last band. corner: (3, n), overlaps: (5, n), written."""
     end = np.float32(num_bands) * _ONE_MINUS_EPSILON
     for n in range(num):
         low, middle, high, rise, fall = overlap(min(corner[0, n], end), min(corner[1, n], end), min(corner[2, n], end))
@@ -27,11 +27,11 @@ def _overlaps(corner, num_bands, num, overlaps):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _multiply_means(overlaps, bands, decrements, num_bands, num_rows, num, weight):  # type: ignore[no-untyped-def]
-    """Multiply the weights (3, n) of leaves by the mean of a dormant curve over each.
+    """Multiply the weights (3, n) of subtriangles by the average of a fixed curve over each.
 
     Args:
         overlaps: from `_overlaps`. bands, decrements: of the curve, padded. (≥ num_rows, ≥ num_bands + 8) each
-        num_rows: 1 where the channels are alike, else 3.
+        num_rows: 1 if the channels are equal, else 3.
     """
     last = num_bands - 1
     for n in range(num):
@@ -52,7 +52,7 @@ def _multiply_means(overlaps, bands, decrements, num_bands, num_rows, num, weigh
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _deposit(overlaps, num_bands, num, weight, out):  # type: ignore[no-untyped-def]
-    """Share leaves out to the bands of the free curve (eq. 22). weight: (3, n), out: (3, ≥ J + 8)."""
+    """Distribute subtriangles to the bands of the free curve (eq. 22). weight: (3, n), out: (3, ≥ J + 8)."""
     last = num_bands - 1
     for n in range(num):
         first_band, last_band = min(np.int64(overlaps[0, n]), last), min(np.int64(overlaps[2, n]), last)
@@ -66,7 +66,7 @@ def _deposit(overlaps, num_bands, num, weight, out):  # type: ignore[no-untyped-
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _multiply_settings(overlaps, settings, num_bands, num, mean, product):  # type: ignore[no-untyped-def]
-    """Multiply each leaf's product (n, rows) by the means of a dormant curve at all its settings over that leaf.
+    """Multiply each subtriangle's product (n, rows) by its averages of a fixed curve at all settings.
 
     Args:
         overlaps: from `_overlaps`. settings: of the curve, padded. (≥ num_bands + 8, rows)
@@ -85,9 +85,9 @@ def _multiply_settings(overlaps, settings, num_bands, num, mean, product):  # ty
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _add_settings(subtriangles, num, num_bands, settings, setting_index, overlaps, weight, mean, product, out):  # type: ignore[no-untyped-def]
-    """Add the leaves' weights (3, n) times their curves at all settings. out: (3, N)
+    """Add the subtriangles' weights (3, n) times their curves at all settings. out: (3, N)
 
-    A handful of leaves at a time, whose products stay in a core's first-level cache.
+    Processes few subtriangles at a time, so that their products stay in a core's first-level cache.
     """
     num_settings = out.shape[1]
     offset = num_settings if mean.shape[0] > num_settings else 0
@@ -107,12 +107,12 @@ def _add_settings(subtriangles, num, num_bands, settings, setting_index, overlap
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def weight_subtriangles(irradiance, light, shading, begin, entry_index, area_fractions, num, weight):  # type: ignore[no-untyped-def]
-    """Weigh the light of each leaf: irradiance · q cos θi · its share of the triangle.
+    """Weight the light of each subtriangle: irradiance · q cos θi · its fraction of the triangle.
 
     Args:
-        irradiance: of all lights. (m, 3). light: of each listed pair. shading: q cos θi of these. (1 or 3, pairs)
-        begin, entry_index: pair of each leaf, from `begin` on. area_fractions: of the leaves in its triangle.
-        num: of leaves. weight: written. (3, ≥ num)
+        irradiance: of all lights. (m, 3). light: of each listed entry. shading: q cos θi of these. (1 or 3, entries)
+        begin, entry_index: entry of each subtriangle, relative to `begin`. area_fractions: of the whole triangle.
+        num: of subtriangles. weight: written. (3, ≥ num)
     """
     blue_row = shading.shape[0] - 1
     for n in range(num):
@@ -128,14 +128,14 @@ def add_subtriangles(  # type: ignore[no-untyped-def]
     subtriangles, num, num_bands, bands, decrements, num_rows, settings, setting_index, active, overlaps, weight, mean,
     product, out
 ):  # fmt: skip
-    """Weigh the leaves by the dormant curves and share them out.
+    """Weight the subtriangles by the fixed curves and add them to bands, settings or a sum.
 
     Args:
-        subtriangles: where each lies along each curve. num: of them.
+        subtriangles: angles at the corners, per curve. num: number of subtriangles.
         num_bands, bands, decrements, num_rows: of the curves; see `_multiply_means`.
-        settings, setting_index: see `_add_settings`. active: curve that stays, −1 for none.
-        overlaps, mean, product: room for what leaves share with bands, and what it comes to.
-        weight: of the leaves, changed. (3, ≥ num). out: added to.
+        settings, setting_index: see `_add_settings`. active: the free curve, −1 for none.
+        overlaps, mean, product: scratch.
+        weight: of the subtriangles, modified. (3, ≥ num). out: added to.
     """
     for k in range(subtriangles.shape[0]):
         if k != active and setting_index[k] < 0:

@@ -1,1 +1,1 @@
-"""Opened bakes of fixed cameras: stored arrays as the transfer that images are made from."""
+"""Opened bakes of fixed cameras: transfer for images from the arrays of a store."""

@@ -1,4 +1,4 @@
-"""What a store says of itself, as the fields of opened bakes."""
+"""Fields of opened bakes, from the attributes of a store."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from relume.views.view import open_view
 
 
 def read_fields(store: StoreReader, key: str, cache: Cache) -> dict[str, Any]:
-    """The fields of `BakedFixedViews` as a store has them.
+    """Read the fields of `BakedFixedViews` from a store.
 
     Args:
-        store: an open one. key: of the bake in the memory. cache: of all that is made from the bake.
+        store: an open store. key: of the bake in the cache. cache: of results computed from the bake.
     Raises:
-        StoreError: its description is not of this form. ChunkDamagedError: its arrays do not fit each other.
+        StoreError: its description is invalid. ChunkDamagedError: its arrays do not match.
     """
     fields = read_light_fields(store, key, cache)
     views = (open_view(store, k, cache, key) for k in range(len(store.attributes["views"])))
@@ -25,12 +25,12 @@ def read_fields(store: StoreReader, key: str, cache: Cache) -> dict[str, Any]:
 
 
 def read_light_fields(store: StoreReader, key: str, cache: Cache) -> dict[str, Any]:
-    """Those of them that light needs: no views.
+    """Read the fields that do not depend on views.
 
     Args:
-        store: an open one. key: of the bake in the memory. cache: of all that is made from the bake.
+        store: an open store. key: of the bake in the cache. cache: of results computed from the bake.
     Raises:
-        StoreError: its description is not of this form.
+        StoreError: its description is invalid.
     """
     attributes = store.attributes
     try:
@@ -46,6 +46,4 @@ def read_light_fields(store: StoreReader, key: str, cache: Cache) -> dict[str, A
             "views": {},
         }
     except (KeyError, TypeError, IndexError, ParameterError) as error:
-        raise StoreError(
-            f"the store's description is not of this form ({error}); delete the bake, bake again"
-        ) from error
+        raise StoreError(f"the store's description is invalid ({error}); delete the bake and bake again") from error

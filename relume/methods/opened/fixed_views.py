@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets import environments
@@ -40,17 +41,17 @@ PREVIEW_WIDTH = 256
 _EDITED_BYTES = 256 << 20
 
 F32 = NDArray[np.float32]
-LightFinder = Callable[[EnvironmentKey], TriangleLights]
-"""Finds the triangles of an environment."""
+IntegrateEnvironment = Callable[[EnvironmentKey], TriangleLights]
+"""Returns the triangles of an environment."""
 
 
 @dataclass(frozen=True)
 class BakedFixedViews:
-    """One bake of fixed views in which light comes straight; a `relume.live.fixed_camera.protocols.FixedViewTransfer`.
+    """One bake of fixed views with direct illumination; a `relume.live.fixed_camera.protocols.FixedViewTransfer`.
 
     Attributes:
-        cache: of all that is made from the bake and may be made again.
-        key: path of the store; tells this bake's entries from other bakes' in the memory.
+        cache: of results computed from the bake.
+        key: path of the store; identifies this bake's entries in the cache.
         default_look: the complete look of the scene as it was imported.
     """
 
@@ -69,26 +70,26 @@ class BakedFixedViews:
 
     @cached_property
     def derived(self) -> ImageFiles:
-        """Images of the default look, made once."""
+        """Images of the default look, computed once."""
         return ImageFiles(Path(self.key) / "derived", image_code())
 
     @cached_property
     def edited(self) -> ImageFiles:
-        """Those of other looks, the newest of them, for when the same look is opened after a restart."""
+        """The newest images of other looks, to open the same look after a restart."""
         return ImageFiles(Path(self.key) / "edited", image_code(), _EDITED_BYTES)
 
     def has_image(self, key: Hashable) -> bool:
-        """Whether the image of a term is beside the store, under the name of a job without the store's own."""
+        """True if the image of a term is saved beside the store; the key does not include the store's."""
         return self.derived.has(key) or self.edited.has(key)
 
     @cached_property
     def local(self) -> LocalLights:
-        """What local lights need."""
+        """Local lights of the scene."""
         return LocalLights(self.store, self.cache, self.key)
 
     @cached_property
     def tracer(self) -> NormalRetracer:
-        """Rays for normals that the bake did not know."""
+        """Tracer for normals that were not baked."""
         return NormalRetracer(self.store, self.local, None)
 
     @cached_property
@@ -96,11 +97,11 @@ class BakedFixedViews:
         """The environment's triangles."""
         return read_lights(self.store)
 
-    def environment_radiance(self, name: str | None) -> NDArray[np.float32]:
-        """Radiance of an environment, None for the scene's own. (height, width, 3) float32
+    def environment_radiance(self, name: str | None) -> Shaped[NDArray[np.float32], "height width 3"]:
+        """Return the radiance of an environment, None for the scene's own.
 
         Raises:
-            NotFoundError: it is not here. SceneError: its files are damaged.
+            NotFoundError: it does not exist here. SceneError: its files are damaged.
         """
         return environments.load_environment(name).radiance if name is not None else self._scene_radiance()
 
@@ -111,15 +112,15 @@ class BakedFixedViews:
         return self.cache.get_value((self.key, "environment"), read)
 
     def light_of_environment(self, environment: EnvironmentKey) -> TriangleLights:
-        """The triangles of an environment: the tiles of the bake, weighed again."""
+        """Return the triangles of an environment: the tiles of the bake with new weights."""
         return self.lights if environment == BAKED_ENVIRONMENT else self._integrate_environment(environment)
 
     def lights_for(self, light: Illumination) -> TriangleLights:
-        """Those of them by which light comes straight to the picture."""
+        """Return the environment triangles for direct illumination of the image."""
         return displayed_of(self.light_of_environment(light.environment), light)
 
     def clustered_lights(self, light: Illumination) -> TriangleLights:
-        """The same, merged into a few. See `FixedViewTransfer`."""
+        """Return the triangles of `lights_for`, merged into a few. See `FixedViewTransfer`."""
 
         def merge_lights() -> TriangleLights:
             return cluster_lights(
@@ -129,7 +130,7 @@ class BakedFixedViews:
         return displayed_of(self.cache.get_value((self.key, "merged lights", light.environment), merge_lights), light)
 
     def preview_lights_for(self, light: Illumination) -> TriangleLights:
-        """The same, found quickly."""
+        """Approximate the triangles of `lights_for`."""
         return displayed_of(self.preview_light_of_environment(light.environment), light)
 
     def _integrate_environment(self, environment: EnvironmentKey) -> TriangleLights:
@@ -143,16 +144,16 @@ class BakedFixedViews:
         return self.cache.get_value((self.key, "lights", environment), integrate)
 
     def preview_light_of_environment(self, environment: EnvironmentKey) -> TriangleLights:
-        """The triangles of an environment from a map of at most 256 texels' width: a large one takes seconds."""
+        """Return an environment's triangles from a map of at most 256 texels' width: a large one takes seconds."""
         return self.coarse_weights("lights", environment, self.environment_radiance)
 
     def coarse_weights(
         self, label: str, environment: EnvironmentKey, find_radiance: Callable[[str | None], F32]
     ) -> TriangleLights:
-        """The same of a part of an environment; what stays while it is turned is kept.
+        """Approximate the triangles of a part of an environment; caches everything that rotation does not change.
 
         Args:
-            label: of it, in words. environment: whose. find_radiance: finds the part by the environment's name.
+            label: name of the part. environment: with that part. find_radiance: returns the part by environment name.
         """
         key = self.cache_owner(environment.map), f"texels of preview {label}", environment.map
 
@@ -166,52 +167,54 @@ class BakedFixedViews:
         return self.cache.transient.get_value((self.key, f"preview {label}", environment), integrate)
 
     def cache_owner(self, name: str | None) -> str:
-        """Whose entries in the memory those made of an environment are: the bake's where it is its own."""
+        """Return the owner of cache entries of an environment: the bake, if it is the scene's own."""
         return self.key if name is None else "environments"
 
     @cached_property
-    def shadow_ray_directions(self) -> F32:
-        """Where shadow rays went. (M, 3) float32"""
+    def shadow_ray_directions(self) -> Shaped[F32, "M 3"]:
+        """Directions of the baked shadow rays."""
         return read_shadow_ray_directions(self.store)
 
     @cached_property
     def tiles(self) -> Tiles:
-        """Of the sphere, that lights were chosen in."""
+        """Spherical tiles of the lights."""
         return read_tiles(self.store)
 
     @property
     def indirect(self) -> IndirectSolver | None:
-        """Light between surfaces: none was baked."""
+        """Indirect illumination: none was baked."""
         return None
 
     def outgoing_patch_light(self, light: Illumination) -> OutgoingLight | None:
-        """What the gather cells send; None where nothing of it comes to the picture."""
+        """Return the outgoing light of patches; None if no indirect light reaches the image."""
         return self.indirect.exact(light) if self.indirect is not None and light.paths.has_indirect else None
 
     def solve_indirect_cache(self, light: Illumination, is_canceled: Callable[[], bool]) -> None:
-        """Trace what gather cells lack: there are none. See `FixedViewTransfer`."""
+        """Trace missing rays of patches: there are none. See `FixedViewTransfer`."""
 
     def indirect_rays(
-        self, light: Illumination, gather_rays: GatherRays, mirror_visibility: NDArray[np.uint8] | None
+        self,
+        light: Illumination,
+        gather_rays: GatherRays,
+        mirror_visibility: Shaped[NDArray[np.uint8], "n bytes"] | None,
     ) -> tuple[RayList, ...]:
-        """The rays of samples that bring what surfaces send.
+        """Return the rays that carry indirect illumination to samples.
 
         Args:
-            light: all that shines.
-            gather_rays: their gather rays, of which `sent` does not count. mirror_visibility: what they see in flat
-                mirrors.
+            light: all light of the scene. gather_rays: of the samples; their `outgoing` is replaced.
+            mirror_visibility: lights that the samples see in planar mirrors.
         """
         outgoing = self.outgoing_patch_light(light)
         return () if outgoing is None else (replace(gather_rays, outgoing=outgoing),)
 
     def incident_light(self, view: View, material: int, light: Illumination, cache: Cache) -> LightsAndPoints:
-        """Incident light of a material's samples; shadows that the cache lacks are traced. See `FixedViewTransfer`."""
+        """Return incident light of a material's samples; traces shadows not in the cache. See `FixedViewTransfer`."""
         lights = self.lights_for(light)
         receivers = view.receivers(material, is_lit=lights.num_lights > 0)
         return lights, replace(receivers, rays=self._rays(view, material, light, cache))
 
     def _rays(self, view: View, material: int, light: Illumination, cache: Cache) -> Sequence[RayList]:
-        """The rays among what arrives: those of local lights."""
+        """Return the rays of incident light: those of local lights."""
         if not light.local:
             return ()
 
@@ -222,18 +225,18 @@ class BakedFixedViews:
 
         return self.local.rays_to(light, view.surface_points(material), cached_shadows)
 
-    def mirror_lights_of(self, view: View, material: int) -> NDArray[np.uint8] | None:
-        """Lights that a material's samples see in flat mirrors: none without gather rays. See `FixedViewTransfer`."""
+    def mirror_lights_of(self, view: View, material: int) -> Shaped[NDArray[np.uint8], "n bytes"] | None:
+        """Return lights visible in planar mirrors: none without gather rays. See `FixedViewTransfer`."""
         return None
 
     def mirror_lights_delta(self, before: Illumination, after: Illumination) -> AddedMirrorLights | None:
-        """How much more flat mirrors throw after than before: nothing. See `FixedViewTransfer`."""
+        """Return the change of light from planar mirrors: none. See `FixedViewTransfer`."""
         return None
 
     def subset(
-        self, view: View, material: int, sample_indices: NDArray[np.integer], *, has_indirect: bool
+        self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " m"], *, has_indirect: bool
     ) -> SampledTransfer:
-        """Some of a material's samples. See `FixedViewTransfer`."""
+        """Select samples of a material. See `FixedViewTransfer`."""
         shading_points = view.receivers(material, is_lit=False).without_light(sample_indices)
         visible = np.asarray(view.read_rows("visibility", material, sample_indices), np.uint8)
         return SampledTransfer(self, replace(shading_points, visible=visible))
@@ -241,7 +244,7 @@ class BakedFixedViews:
     def unoccluded_environment(
         self, light: Illumination, points: SurfacePoints, *, is_preview: bool
     ) -> LightsAndPoints:
-        """Unoccluded light of the environment at points, seen along their normals. See `FixedViewTransfer`."""
+        """Return unoccluded light of the environment at points, viewed along the normals. See `FixedViewTransfer`."""
         direct_light = light._replace(paths=light.paths._replace(direct=True).without_reflections())
         above = points.normal @ self.shadow_ray_directions.T > 0
         visible = np.packbits(above, axis=1, bitorder="little")
@@ -249,30 +252,32 @@ class BakedFixedViews:
         return lights, ShadingPoints(points, points.normal, visible)
 
     def downsampled(self, view_name: str, step: int) -> Self:
-        """One view of the bake with 1 / step² of its pixels. Its images are not kept: no folder is beside its key."""
+        """Return one view with 1 / step² of its pixels. Its images are not saved: its key is no folder."""
         index = self.views[view_name].index
         store, key = DownsampledStore(self.store, index, step), f"{self.key}/{step}"
         return replace(self, key=key, store=store, views={view_name: open_view(store, index, self.cache, key)})
 
-    def is_emissive_at(self, view: View, material: int) -> NDArray[np.bool_]:
-        """Whether the samples of a material that shines are seen from a side that does."""
+    def is_emissive_at(self, view: View, material: int) -> Shaped[NDArray[np.bool_], " n"]:
+        """True for samples of an emissive material that are visible from an emissive side."""
         return self.local.is_emissive_at(
             material, view.ray_origins(view.rows(material)), view.surface_points(material).position
         )
 
-    def background_in(self, environment: EnvironmentKey, view: View) -> NDArray[np.float32]:
-        """Radiance of a view's samples of an environment. (n, 3) float32"""
+    def background_in(self, environment: EnvironmentKey, view: View) -> Shaped[NDArray[np.float32], "n 3"]:
+        """Return the radiance of a view's background samples."""
         if environment == BAKED_ENVIRONMENT:
             return view.background()
         return self.environment_along(environment, view.background_directions())
 
-    def environment_along(self, environment: EnvironmentKey, directions: NDArray[np.float64], blur: float = 0) -> F32:
-        """Radiance of an environment in unit directions (n, 3), blurred by `blur` degrees. (n, 3) float32"""
+    def environment_along(
+        self, environment: EnvironmentKey, directions: Shaped[NDArray[np.float64], "n 3"], blur: float = 0
+    ) -> Shaped[F32, "n 3"]:
+        """Return the radiance of an environment in unit directions, blurred by `blur` degrees."""
         radiance = self.environment_map(environment.map, blur)
         return lookup(radiance, rotate_about_y(directions, -environment.rotation).astype(np.float32))
 
-    def environment_map(self, name: str | None, blur: float = 0) -> F32:
-        """Radiance of an environment, None for the scene's own, blurred by `blur` degrees. (height, width, 3)"""
+    def environment_map(self, name: str | None, blur: float = 0) -> Shaped[F32, "height width 3"]:
+        """Return the radiance of an environment, None for the scene's own, blurred by `blur` degrees."""
         return self._prefiltered_map(name, blur) if blur else self.environment_radiance(name)
 
     def _prefiltered_map(self, name: str | None, degrees: float) -> F32:
@@ -282,37 +287,39 @@ class BakedFixedViews:
             return downsampled(self.environment_radiance(name))
 
         def prefilter() -> F32:
-            return prefiltered(self.cache.get_value((owner, "reduced environment", name), downsample), degrees)
+            return prefiltered(self.cache.get_value((owner, "downsampled environment", name), downsample), degrees)
 
         return self.cache.transient.get_value((owner, "blurred environment", name, degrees), prefilter)
 
 
 @dataclass(frozen=True)
 class SampledTransfer:
-    """A few samples of a material, shaded at once in any light; a `relume.live.fixed_camera.protocols.SampledShading`.
+    """Selected samples of a material, shaded in any light; a `relume.live.fixed_camera.protocols.SampledShading`.
 
     Attributes:
-        receivers: without any rays.
-        gather_rays: their gather rays, where those were baked; they bring nothing yet.
-        mirror_visibility: the lights that they see in flat mirrors, where those were baked. (n, bytes) uint8
+        receivers: without rays.
+        gather_rays: their gather rays, if baked; without outgoing light.
+        mirror_visibility: the lights that they see in planar mirrors, if baked.
     """
 
     transfer: BakedFixedViews
     receivers: ShadingPoints
     gather_rays: GatherRays | None = None
-    mirror_visibility: NDArray[np.uint8] | None = None
+    mirror_visibility: Shaped[NDArray[np.uint8], "n bytes"] | None = None
 
     @property
     def num_bytes(self) -> int:
-        """Memory they hold."""
+        """Memory in use."""
         points, hit_bytes = self.receivers, 0 if self.gather_rays is None else self.gather_rays.gather_hits.nbytes
         return int(
             2 * points.normal.nbytes + points.tangent.nbytes + points.wo.nbytes + points.visible.nbytes + hit_bytes
         )
 
     def incident_light(self, light: Illumination) -> LightsAndPoints:
-        """What arrives at them in a light; the environment from a small map, local lights exactly, what surfaces send
-        as if they leant as they were baked: tracing how they do now takes longer than a preview."""
+        """Return incident light for a preview: a small map of the environment, exact local lights, indirect light.
+
+        Indirect light uses the baked normals, since tracing it for overridden normals takes too long.
+        """
         transfer, indirect_rays = self.transfer, tuple[RayList, ...]()
         if self.gather_rays is not None:
             indirect_rays = transfer.indirect_rays(with_baked_normals(light), self.gather_rays, self.mirror_visibility)
@@ -321,7 +328,7 @@ class SampledTransfer:
 
 
 def displayed_of(lights: TriangleLights, light: Illumination) -> TriangleLights:
-    """The triangles of an environment by which light comes straight to the picture, beside local lights."""
+    """Return the environment triangles for direct illumination; local lights are separate."""
     if not light.has_direct_environment:
         return lights.empty()
     if light.environment_gain == (1.0, 1.0, 1.0):

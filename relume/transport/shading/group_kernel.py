@@ -1,4 +1,4 @@
-"""The kernels of groups of lights: which of them points see wholly, and which are near enough to one light each."""
+"""Kernels of light groups: which groups a point sees entirely, and which are accurate enough as one light."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from relume.transport.shading.table_averages import CHUNK, sum_up
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def select_groups(visibility_words, first, group_lights, whole):  # type: ignore[no-untyped-def]
-    """Find groups all of whose lights a point sees, and take these lights away from it.
+    """Find groups of which a point sees all lights, and clear these lights' visibility.
 
     Args:
-        visibility_words: of each light, bit k for point k; lights of whole groups are taken out. (M,) uint64
-        first, group_lights: of `relume.lights.spherical_triangles.LightGroups`. whole: of each group, written. (G,)
-        uint64
+        visibility_words: of each light, bit k for point k; cleared for lights of entirely visible groups. (M,) uint64
+        first, group_lights: of `relume.lights.spherical_triangles.LightGroups`. whole: visibility of each group,
+            written. (G,) uint64
     """
     for g in range(whole.shape[0]):
         begin, end = first[g], first[g + 1]
@@ -39,7 +39,7 @@ def select_groups(visibility_words, first, group_lights, whole):  # type: ignore
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _restore_lights(bits, first, group_lights, group):  # type: ignore[no-untyped-def]
-    """Let a point see the lights of a group by themselves."""
+    """Set the visibility of a group's lights, to shade them individually."""
     for k in range(first[group], first[group + 1]):
         bits[group_lights[k] >> 3] |= np.uint8(1) << np.uint8(group_lights[k] & 7)
 
@@ -48,13 +48,14 @@ def _restore_lights(bits, first, group_lights, group):  # type: ignore[no-untype
 def add_groups(  # type: ignore[no-untyped-def]
     normal, tangent, light_list, local_wo, lights, groups, axes, curves, start, stop, visible, out
 ):
-    """Add what those groups bring to points that are near enough to one light; lights of others are given back.
+    """Add groups that are accurate enough as one light; restore the lights of the others.
 
     Args:
         normal, tangent, axes, curves, start, stop, out: as in `shade_points`.
-        light_list: first, light and shading of it, for groups. local_wo: of it as well.
-        lights: nodes, brings and `between` of the groups. groups: first and part of them, see `LightGroups`.
-        visible: of the points, lights of listed groups that are to be shaded one by one are set. (points, bytes)
+        light_list: first, light and shading of the listed groups. local_wo: of the same list.
+        lights: nodes, irradiance_radius and `between_variance` of the groups. groups: first and light_index, see
+            `LightGroups`.
+        visible: of the points; lights to shade individually are set. (points, bytes)
     """
     num_curves, (scale, num_rows) = axes.shape[0], band_scales(curves)
     chunks = allocate_chunks(lights[0].shape[0] // CHUNK + 1, num_rows)
@@ -82,7 +83,7 @@ def add_groups(  # type: ignore[no-untyped-def]
 def _add(  # type: ignore[no-untyped-def]
     normal, tangent, light_list, local_wo, lights, groups, axes, curves, start, stop, scratch_arrays, visible, out
 ):
-    """Do what `add_groups` is for, in the memory that it has made."""
+    """Implement `add_groups` in the memory that it allocates."""
     (first, light, shading), (curves, scale) = light_list, curves
     chunks, local, scratch, wo, total, chunk_range = scratch_arrays
     weight, _, deferred, value, error = chunks

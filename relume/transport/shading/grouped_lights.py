@@ -1,12 +1,13 @@
-"""Lights that points see in whole groups, and that are as good as one light to them.
+"""Groups of lights that points see entirely, shaded as one light each.
 
-What a group brings is evaluated as one light's; where its curves vary so much within it that this may be wrong, its
-lights are left to be shaded one by one. What of a group a dormant curve does not see brings nothing.
+If a group's curves vary too much within it, its lights are shaded individually. A group outside the support of a fixed
+curve contributes nothing.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
@@ -25,8 +26,8 @@ class GroupedLights:
     """Shades groups of lights at blocks of receivers; holds the scratch memory of one thread.
 
     Args:
-        term, contraction, receivers: as `relume.transport.shading.shader.Shader` takes them.
-        groups: of the lights that receivers see. num_lights: of these.
+        term, contraction, receivers: as in `relume.transport.shading.shader.Shader`.
+        groups: of the lights. num_lights: number of individual lights.
     """
 
     def __init__(
@@ -39,13 +40,13 @@ class GroupedLights:
             np.empty(groups.lights.num_lights, np.uint64),
         )
 
-    def add(self, start: int, stop: int, out: F32) -> Bits:
-        """Add what groups bring to points [start, stop), at most a block.
+    def add(self, start: int, stop: int, out: Shaped[F32, "m 3 1"]) -> Shaped[Bits, "m bytes"]:
+        """Add groups to points [start, stop), at most a block.
 
         Args:
-            out: (points, 3, 1) float32, added to.
+            out: added to.
         Returns:
-            The lights that are left, as in `ShadingPoints`. (stop - start, bytes) uint8
+            Visibility of the lights that remain to be shaded, as in `ShadingPoints`.
         """
         r, c, groups, light_list = self._receivers, self._contraction, self._groups, self._light_list
         remaining = np.empty_like(r.visible[start:stop])

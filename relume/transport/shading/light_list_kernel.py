@@ -1,4 +1,4 @@
-"""The kernels of what a point's listed lights bring, lights and groups of them alike, and which are not near enough."""
+"""Kernels that evaluate a point's listed lights or groups, and find those that are not accurate enough."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from relume.core.numba_options import UNCOUNTED
 from relume.transport.shading.table_averages import CHUNK, evaluate, load_midpoints, load_weights, rotate_nodes, sum_up
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
-# Not near enough is whose error may be above both: a share of what it brings, and of all that the point receives.
+# A triangle is too inaccurate if its error exceeds both: a fraction of its own contribution, and of all light.
 _TOLERANCE, _TOLERANCE_OF_ALL = np.float32(0.02), np.float32(1e-3)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def band_scales(curves):  # type: ignore[no-untyped-def]
-    """Find bands per radian of each curve, and how many rows their product has. curves: see `evaluate`."""
+    """Return the bands per radian of each curve, and the number of rows of their product. curves: see `evaluate`."""
     _, _, num_rows, num_bands = curves
     scale, max_rows = np.empty(num_bands.shape[0], np.float32), 1
     for k in range(num_bands.shape[0]):
@@ -25,10 +25,10 @@ def band_scales(curves):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def per_axis(axes, local_wo, entry, out):  # type: ignore[no-untyped-def]
-    """Weigh wo by the axes of each curve.
+    """Multiply wo by the axes of each curve.
 
     Args:
-        axes: of the curves. (C, 3). local_wo: of all entries. (3, entries). entry: which. out: written. (C, 3)
+        axes: of the curves. (C, 3). local_wo: of all entries. (3, entries). entry: its index. out: written. (C, 3)
     """
     for k in range(axes.shape[0]):
         for axis in range(3):
@@ -37,7 +37,7 @@ def per_axis(axes, local_wo, entry, out):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def allocate_chunks(num, num_rows):  # type: ignore[no-untyped-def]
-    """Make room for `num` chunks of triangles: weight, radius, which are not near enough, value, error."""
+    """Allocate `num` chunks of triangles: weight, radius, deferred indices, value, error."""
     weight, radius = np.empty((num, 3, CHUNK), np.float32), np.empty((num, CHUNK), np.float32)
     value, error = np.empty((num, num_rows, CHUNK), np.float32), np.empty((num, CHUNK), np.float32)
     return weight, radius, np.empty((num, CHUNK + 1), np.int64), value, error
@@ -47,14 +47,14 @@ def allocate_chunks(num, num_rows):  # type: ignore[no-untyped-def]
 def evaluate_listed(  # type: ignore[no-untyped-def]
     n, t, light_list, begin, end, lights, curves, scale, wo, local, scratch, chunk_range, chunks, total
 ):
-    """Evaluate what a point's listed lights [begin, end) bring, chunk by chunk.
+    """Evaluate a point's listed lights [begin, end), chunk by chunk.
 
     Args:
         n, t: normal and tangent of the point. light_list: light and shading of its list.
-        lights: nodes and brings, see `shade_points`, and `between`, see `evaluate`, of all lights.
+        lights: nodes and irradiance_radius, see `shade_points`, and group_range, see `evaluate`, of all lights.
         curves, scale, wo, scratch: as in `evaluate`. local: of one chunk, written.
-        chunk_range: scratch for `between` of a chunk; empty where that is. (CHUNK,)
-        chunks: `room`, written but for which are not near enough. total: what all bring, added to. (3,)
+        chunk_range: scratch for the group_range of a chunk; unused if that is empty. (CHUNK,)
+        chunks: from `allocate_chunks`, written except for the deferred indices. total: added to. (3,)
     """
     light, shading = light_list
     nodes, irradiance_radius, group_range = lights
@@ -75,17 +75,17 @@ def evaluate_listed(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def error_tolerance(total, row):  # type: ignore[no-untyped-def]
-    """Find what may be wrong where so much arrives. total: (3,) row: what the point has already. (3,)"""
+    """Return the tolerated error given all light of a point. total: (3,) row: light it has already. (3,)"""
     return _TOLERANCE_OF_ALL * (total[0] + total[1] + total[2] + abs(row[0]) + abs(row[1]) + abs(row[2]))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def defer_triangles(value, weight, error, num, tolerance, deferred):  # type: ignore[no-untyped-def]
-    """List the triangles that are not near enough, and let them bring nothing as they are; returns their number.
+    """List the triangles that are not accurate enough and set their values to zero; return their number.
 
     Args:
-        value, weight, error: as from `evaluate` and `weigh`; errors are spoilt. tolerance: what may be wrong.
-        deferred: written. (> num,)
+        value, weight, error: from `evaluate` and `load_weights`; errors are overwritten. tolerance: tolerated error.
+        deferred: indices, written. (> num,)
     """
     blue_row = value.shape[0] - 1
     red, green, blue = value[0], value[blue_row // 2], value[blue_row]

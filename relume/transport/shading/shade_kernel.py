@@ -1,7 +1,7 @@
-"""The kernels of a term with all its curves contracted: light triangles weighed by the means of its curves.
+"""Kernels of a term with all curves contracted: light triangles weighted by the averages of its curves.
 
-A curve's mean over a triangle is that over a box (`relume.transport.shading.table_averages`). Triangles over which that
-would not do are divided, where they matter to the point at all.
+The average of a curve over a triangle is approximated by that over a box (`relume.transport.shading.table_averages`).
+Triangles for which this is too inaccurate are divided, if they matter at the point.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ def _add_to(row, total):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _divide(local, weight, radius, indices, parent, to_local, to_weight, to_radius):  # type: ignore[no-untyped-def]
-    """Make the four children of the listed triangles; returns their number.
+    """Create the four children of the listed triangles; return their number.
 
     Args:
-        local, weight, radius: of a generation, as in `evaluate` and `weigh`. indices: the listed. (n,)
+        local, weight, radius: of a generation, as in `evaluate` and `load_weights`. indices: the listed. (n,)
         parent: scratch. (22, ≥ n) to_local, to_weight, to_radius: of the children, written.
     """
     count = indices.shape[0]
@@ -83,13 +83,14 @@ def _divide(local, weight, radius, indices, parent, to_local, to_weight, to_radi
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _add_divided(curves, scale, wo, no_group_range, num, tolerance, generations, division_scratch, scratch, total):  # type: ignore[no-untyped-def]
-    """Add triangles that are divided: the first `num` of the first generation, and what comes of them.
+    """Add divided triangles: the first `num` of the first generation, and recursively their children.
 
     Args:
-        curves, scale, wo, scratch: as in `evaluate`. no_group_range: its `between` of what is no group.
+        curves, scale, wo, scratch: as in `evaluate`. no_group_range: its group_range, empty.
         tolerance: as in `defer_triangles`.
-        generations: local, weight, radius, which, value and error of each, written but for the first's first three.
-        division_scratch: scratch for parents, and for how many of each generation there are, and are done, see
+        generations: local, weight, radius, indices, value and error of each, written except for the first three of the
+            first.
+        division_scratch: scratch for parents, and for the number of triangles and of finished ones per generation, see
             `shade_points`.
         total: added to. (3,)
     """
@@ -145,7 +146,7 @@ def _add_divided(curves, scale, wo, no_group_range, num, tolerance, generations,
 def shade_points(  # type: ignore[no-untyped-def]
     normal, tangent, first, light, shading, local_wo, nodes, irradiance_radius, axes, curves, start, stop, out
 ):
-    """Add what the listed lights bring to points [start, stop).
+    """Add the contributions of the listed lights to points [start, stop).
 
     Args:
         normal, tangent, first, light, shading, local_wo, start, stop: as in `project_points`.
@@ -153,10 +154,10 @@ def shade_points(  # type: ignore[no-untyped-def]
             float32
         axes: `Curve.axes` of each. (C, 3) float32
         curves: see `evaluate`.
-        out: added to; what is there is part of what a point receives. (points, 3, ≥ 1) float32
+        out: added to; its content counts as part of a point's light. (points, 3, ≥ 1) float32
     """
     num_curves, (scale, num_rows) = axes.shape[0], band_scales(curves)
-    # made here: a constant could not be written, and what it is handed to would be compiled once more for that
+    # allocated here: a constant is not writable and would compile its users once more
     wo, total, no_group_range = np.empty((num_curves, 3), np.float32), np.empty(3, np.float32), np.empty(0, np.float32)
     chunks, child_arrays = (
         allocate_chunks(nodes.shape[0] // CHUNK + 1, num_rows),
@@ -174,7 +175,7 @@ def shade_points(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _shade(normal, tangent, entries, local_wo, lights, axes, curves, start, stop, scratch_arrays, out):  # type: ignore[no-untyped-def]
-    """Do what `shade_points` is for, in the memory that it has made."""
+    """Implement `shade_points` in the memory that it allocates."""
     (first, light, shading), (nodes, _, no_group_range), (curves, scale) = entries, lights, curves
     wo, total, deferred_lights, chunks, generations, division_scratch, scratch = scratch_arrays
     weight, reach, deferred, value, error = chunks
@@ -194,7 +195,7 @@ def _shade(normal, tangent, entries, local_wo, lights, axes, curves, start, stop
         if axes.shape[0] == 0:
             _add_to(row, total)
             continue
-        tolerance = error_tolerance(total, row)  # what is there already counts as well
+        tolerance = error_tolerance(total, row)  # including the light already in the row
         total[:] = 0
         for chunk in range((end - begin + CHUNK - 1) // CHUNK):
             at = begin + chunk * CHUNK

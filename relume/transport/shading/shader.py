@@ -1,14 +1,15 @@
-"""The projector of pictures: no curve is free, so that what arrives is summed without sharing it out to bands.
+"""Shading of images: no curve is free, so that light is summed without binning.
 
     R(x) = Σ_m V(x, m) L_m Ω_m cos θi · q(x, ω_m) · Π_f mean_m(f)
 
-The sums of `relume.transport.projector`, by a quadrature that need not be right for whatever a curve may become: the
-pictures are the same to a thousandth or two (docs/direct-light.md#algorithm).
+The sums of `relume.transport.projector`, by a faster quadrature for the given curves only: images agree within one or
+two thousandths (docs/direct-light.md#algorithm).
 """
 
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
@@ -28,11 +29,9 @@ class Shader:
     """Shades ranges of receivers; holds the scratch memory of one thread.
 
     Args:
-        term: the BRDF term. contraction: its curves, none of them free and each of one setting, from `contract`.
-        lights: triangles of the environment; `receivers` tell which of them each point sees.
-        receivers: all points, and what arrives at them.
-        base_radiance: what the term makes of other light, where that is known: beside much of it little need be found
-            less finely. (n, 3) float32
+        term: the BRDF term. contraction: its curves, none of them free, with one setting each, from `contract`.
+        lights: triangles of the environment. receivers: all points, with their visibility and rays.
+        base_radiance: reflected radiance of other light, if known: the more there is, the coarser the tolerance.
     """
 
     def __init__(
@@ -41,7 +40,7 @@ class Shader:
         contraction: Contraction,
         lights: TriangleLights,
         receivers: ShadingPoints,
-        base_radiance: F32 | None = None,
+        base_radiance: Shaped[F32, "n 3"] | None = None,
     ) -> None:
         self._contraction, self._lights, self._receivers, self._base_radiance = (
             contraction,
@@ -52,14 +51,14 @@ class Shader:
         self._light_list = LightList(term, contraction, lights, receivers)
         is_diffuse = term.is_lambertian and contraction.kinds.size == 0
         self._diffuse = DiffuseProjector(term, contraction.constant, lights) if is_diffuse else None
-        is_groupable = contraction.kinds.size > 0 and not term.is_steep  # by curves, how the term varies within a group
+        is_groupable = contraction.kinds.size > 0 and not term.is_steep  # curves bound the variation within a group
         groups = lights.groups if is_groupable else None
         self._grouped = groups and GroupedLights(term, contraction, groups, lights.num_lights, receivers)
         self._rays = RayProjector(term, contraction, receivers, POINTS_PER_BLOCK)
         self._area_lights = area_light_lists(term, contraction, receivers)
 
-    def project(self, start: int, stop: int) -> F32:
-        """Shade points [start, stop). (stop - start, 1, 3) float32, as `Projector.project` returns it"""
+    def project(self, start: int, stop: int) -> Shaped[F32, "m 1 3"]:
+        """Return the reflected radiance of points [start, stop), with the layout of `Projector.project`."""
         base_radiance = (
             np.zeros((stop - start, 3), np.float32) if self._base_radiance is None else self._base_radiance[start:stop]
         )
@@ -84,7 +83,7 @@ class Shader:
             )  # fmt: skip
 
     def _add_listed(self, start: int, stop: int, out: F32) -> None:
-        """Add the environment, of which lists are made."""
+        """Add the environment by lists of lights."""
         r, c, light_list = self._receivers, self._contraction, self._light_list
         for block in range(start, stop, POINTS_PER_BLOCK):
             end = min(block + POINTS_PER_BLOCK, stop)

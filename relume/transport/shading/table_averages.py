@@ -1,11 +1,10 @@
-"""The kernels of means over boxes: what a term's curves make of light triangles, and how wrong that may be.
+"""Kernels that average a term's curves over boxes in place of light triangles, with an error estimate.
 
-Nothing is shared out to bands, so a triangle needs only where its angles lie and how far they spread: a curve's mean is
-taken over a box about the mean angle, as wide as the angle varies (first and second moments, from the midpoints of
-the edges).
+Without binning, a triangle needs only the mean of its angles and their spread: a curve is averaged over a box about the
+mean angle, as wide as the angle varies (first and second moments, from the edge midpoints).
 
-Most loops write one array: for more the compiler's vectoriser would need more checks of what may alias than it is
-allowed. Those that look something up cannot be vectorised; they do as much as they can with what they loaded.
+Most loops write one array each: for more the compiler's vectorizer would exceed its limit of alias checks. Loops with
+lookups cannot be vectorized; they do as much as possible with the loaded values.
 """
 
 from __future__ import annotations
@@ -20,29 +19,29 @@ from relume.core.numba_options import UNCOUNTED
 
 _ZERO, _HALF, _THIRD = np.float32(0), np.float32(0.5), np.float32(1 / 3)
 CHUNK = 256  # triangles evaluated together: their scratch memory stays in a core's first-level cache
-# Half of a box has at least this width, in bands: sums of bands are differences of larger ones.
+# Minimum half width of a box, in bands: integrals over bands are differences of larger sums.
 _MIN_HALF = np.float32(0.025)
 _CORNER = np.float32(1.64)
-# Two moments tell nothing of a peak within a box: what a leaning cosine changes is no more than this share, which the
-# error that is estimated for such a peak exceeds. Else light would be taken away, and be too little to be looked at.
+# Two moments cannot describe a peak within a box: the correction by a varying cosine is limited to this fraction, which
+# is less than the error that is estimated for such a peak. A larger one could remove light that is then never refined.
 _MAX_COSINE_CORRECTION = np.float32(0.5)
-# A mean over a box beside a lobe may be nothing at all, and a share of nothing is nothing: it is this share of what the
-# curve varies by within reach at least, which adds up to some millionths.
+# A mean over a box beside a lobe may be zero, for which no relative error exists: the mean is at least this fraction of
+# the curve's variation within reach, which adds up to a few millionths.
 _MIN_MEAN = np.float32(1e-9)
-# A curve that varies by its own mean within a triangle's reach gives it at most about this share of that as an error:
-# where the angle is linear, since a box is no triangle; by an angle's pole in the ratio of reach and distance.
+# Relative error of a curve that varies by its own mean within a triangle's reach: about _SHAPE if the angle is linear,
+# since a box is not a triangle; near an angle's pole in the ratio of reach and distance.
 _SHAPE, _BEND, _MAX_BEND = np.float32(0.08), np.float32(0.05), np.float32(0.5)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _spread(gamma, num, mean, half):  # type: ignore[no-untyped-def]
-    """Find mean angles of triangles, and half the widths of boxes in which angles vary alike. gamma: (3, ≥ num)"""
+    """Return mean angles of triangles, and half widths of boxes with the same variance. gamma: (3, ≥ num)"""
     a, b, c = gamma[0], gamma[1], gamma[2]
     for n in range(num):
         mean[n] = (a[n] + b[n] + c[n]) * _THIRD
     for n in range(num):
         ab, bc, ca = a[n] - b[n], b[n] - c[n], c[n] - a[n]
-        # the variance over a triangle, from midpoints of its edges, is a ninth of this; a box has a third of half²
+        # a triangle's variance, from its edge midpoints, is a ninth of this; the variance of a box is half² / 3
         half[n] = max(math.sqrt((ab * ab + bc * bc + ca * ca) * _THIRD), _MIN_HALF)
 
 
@@ -52,7 +51,7 @@ def _compute_reach(kind, scale, wo, local, radius, half, num, reach):  # type: i
 
     Args:
         kind: an `Angle`. scale: bands per radian. wo: times `Curve.axes`. (3,) local, radius: as in `evaluate`.
-        half: from `_spread`: corners are 1.63 of it away at most, where the angle is linear. reach: written. (≥ num,)
+        half: from `_spread`: corners are within 1.63 half widths if the angle is linear. reach: written. (≥ num,)
     """
     if kind in (THETA_I, THETA_R, LOBE):
         for n in range(num):
@@ -60,7 +59,7 @@ def _compute_reach(kind, scale, wo, local, radius, half, num, reach):  # type: i
     elif kind == THETA_D:
         for n in range(num):
             reach[n] = max(_HALF * scale * radius[n], _CORNER * half[n])
-    else:  # the half vector turns by half as much, or by more across the plane of wi and wo: 1 / (2 cos θd)
+    else:  # the half vector rotates by half as much, or by more across the plane of wi and wo: 1 / (2 cos θd)
         x, y, z = local[0, 3], local[1, 3], local[2, 3]
         for n in range(num):
             cosine = wo[0] * x[n] + wo[1] * y[n] + wo[2] * z[n]
@@ -70,7 +69,7 @@ def _compute_reach(kind, scale, wo, local, radius, half, num, reach):  # type: i
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _ends(mean, half, last, num, low, high):  # type: ignore[no-untyped-def]
-    """Find where boxes begin and end, in bands. last: angle in the last band."""
+    """Return the ends of boxes, in bands. last: angle in the last band."""
     for n in range(num):
         low[n] = min(max(mean[n] - half[n], _ZERO), last - _MIN_HALF)
     for n in range(num):
@@ -79,7 +78,7 @@ def _ends(mean, half, last, num, low, high):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _compute_cosine_shift(gamma, mean, local, group_range, num, cosine_shift):  # type: ignore[no-untyped-def]
-    """Find how an angle varies with cos θi between the lights of groups: their covariance over the mean cosine.
+    """Compute how an angle varies with cos θi between the lights of groups: covariance over mean cosine.
 
     Args:
         gamma, mean: as in `_spread`. local, group_range: as in `evaluate`. cosine_shift: in bands, written. (≥ num,)
@@ -90,7 +89,7 @@ def _compute_cosine_shift(gamma, mean, local, group_range, num, cosine_shift):  
         cosine = (z_a[n] + z_b[n] + z_c[n]) * _THIRD
         by_a, by_b, by_c = z_a[n] - cosine, z_b[n] - cosine, z_c[n] - cosine
         covariance = (a[n] - mean[n]) * by_a + (b[n] - mean[n]) * by_b + (c[n] - mean[n]) * by_c
-        # a triangle across the horizon leans no more than one that reaches it
+        # a triangle across the horizon has no more slope than one that reaches it
         cosine_shift[n] = (
             group_range[n] * covariance * _THIRD / max(cosine, abs(by_a) + abs(by_b) + abs(by_c) + np.float32(1e-6))
         )
@@ -98,7 +97,7 @@ def _compute_cosine_shift(gamma, mean, local, group_range, num, cosine_shift):  
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _integrals(steps, low, high, cosine_shift, num, integral):  # type: ignore[no-untyped-def]
-    """Integrate a curve times cos θi from where boxes begin to where they end, over the mean cosine.
+    """Integrate a curve times cos θi over boxes, relative to the mean cosine.
 
     Args:
         steps: of the curve, see `WholeCurves`. (≥ J, 3) low, high: from `_ends`. cosine_shift: from
@@ -110,7 +109,7 @@ def _integrals(steps, low, high, cosine_shift, num, integral):  # type: ignore[n
         begins, ends = low[n] - np.float32(first), high[n] - np.float32(final)
         at_first, at_final = steps[first, 0], steps[final, 0]
         base = steps[first, 1] - steps[final, 1] - begins * at_first + ends * at_final
-        # what a curve rises by over the box, times how the cosine leans: the second of the two moments
+        # rise of the curve over the box times slope of the cosine: the second of the two moments
         correction, max_correction = cosine_shift[n] * (at_final - at_first), _MAX_COSINE_CORRECTION * abs(base)
         integral[n] = base + min(max(correction, -max_correction), max_correction)
 
@@ -124,7 +123,7 @@ def _means(low, high, num, value):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _variations(steps, mean, reach, last, num, variation):  # type: ignore[no-untyped-def]
-    """Find by how much a curve varies within reach of mean angles.
+    """Compute the variation of a curve within reach of mean angles.
 
     Args:
         steps: as in `_integrals`. mean, reach: in bands. last: angle in the last band. variation: written.
@@ -136,11 +135,11 @@ def _variations(steps, mean, reach, last, num, variation):  # type: ignore[no-un
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _add_errors(mean, reach, variation, value, num, error):  # type: ignore[no-untyped-def]
-    """Add what a curve's means over boxes may be wrong by, as a share of them.
+    """Add the relative errors of a curve's averages over boxes.
 
     Args:
-        mean, reach, variation: as in `_variations`. value: the means; the least that a share can be told of is written
-            where there is less. error: added to. (≥ num,) each
+        mean, reach, variation: as in `_variations`. value: the averages, raised to the minimum for relative errors.
+        error: added to. (≥ num,) each
     """
     for n in range(num):
         value[n] = max(value[n], _MIN_MEAN * variation[n])
@@ -157,16 +156,16 @@ def _multiply(factor, num, value):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def evaluate(curves, scale, wo, local, radius, group_range, num, scratch, value, error):  # type: ignore[no-untyped-def]
-    """Multiply the means of all curves over triangles.
+    """Multiply the averages of all curves over triangles.
 
     Args:
         curves: kinds, steps, numbers of rows and of bands, see `WholeCurves`. scale: bands per radian. (C,)
         wo: times `Curve.axes`, one for each curve. (C, 3)
-        local: corners and midpoints of edges, of which only these are read. (3 axes, 6, ≥ num)
+        local: corners and edge midpoints; only the midpoints are read. (3 axes, 6, ≥ num)
         radius: of the triangles, radians. (≥ num,)
-        group_range: of groups, how much of their extent lies between their lights, of which each has one cos θi; of
-            lights that have one themselves, empty. (≥ num,)
-        scratch: (11, ≥ num). value: written. (1 or 3, ≥ num) error: share of it, written. (≥ num,)
+        group_range: of groups, variance between their lights, each with one cos θi; empty for individual lights.
+            (≥ num,)
+        scratch: (11, ≥ num). value: written. (1 or 3, ≥ num) error: relative, written. (≥ num,)
     """
     kinds, steps, num_rows, _ = curves
     gamma, mean, half, reach, low = scratch[:3], scratch[3], scratch[4], scratch[5], scratch[6]
@@ -200,7 +199,7 @@ def load_nodes(nodes, node, light, begin, num, x, y, z):  # type: ignore[no-unty
     """Look up a node of listed lights [begin, begin + num).
 
     Args:
-        nodes: of all lights. (M, 6, 3) node: which. light: the listed. (K,) begin, num: of them.
+        nodes: of all lights. (M, 6, 3) node: its index. light: listed lights. (K,) begin, num: range of the list.
         x, y, z: written. (≥ num,) each
     """
     for k in range(num):
@@ -210,7 +209,7 @@ def load_nodes(nodes, node, light, begin, num, x, y, z):  # type: ignore[no-unty
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def load_midpoints(nodes, light, begin, num, local):  # type: ignore[no-untyped-def]
-    """Look up the midpoints of edges of listed lights [begin, begin + num).
+    """Look up the edge midpoints of listed lights [begin, begin + num).
 
     Args:
         nodes, light, begin, num: as in `load_nodes`. local: written. (3, 6, ≥ num)
@@ -218,7 +217,7 @@ def load_midpoints(nodes, light, begin, num, local):  # type: ignore[no-untyped-
     ab_x, bc_x, ca_x = local[0, 3], local[0, 4], local[0, 5]
     ab_y, bc_y, ca_y = local[1, 3], local[1, 4], local[1, 5]
     ab_z, bc_z, ca_z = local[2, 3], local[2, 4], local[2, 5]
-    for k in range(num):  # no vectors, whatever the order: so all of a light, which lies together
+    for k in range(num):  # not vectorizable in any order: load all of a light, which is contiguous
         m = np.uint32(light[begin + k])
         ab_x[k], ab_y[k], ab_z[k] = nodes[m, 3, 0], nodes[m, 3, 1], nodes[m, 3, 2]
         bc_x[k], bc_y[k], bc_z[k] = nodes[m, 4, 0], nodes[m, 4, 1], nodes[m, 4, 2]
@@ -227,7 +226,7 @@ def load_midpoints(nodes, light, begin, num, local):  # type: ignore[no-untyped-
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def rotate_nodes(n, t, first_node, num, local):  # type: ignore[no-untyped-def]
-    """Turn nodes [first_node, 6) into the frame of normal n and tangent t. local: (3, 6, ≥ num)"""
+    """Rotate nodes [first_node, 6) into the frame of normal n and tangent t. local: (3, 6, ≥ num)"""
     bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
     tx, ty, tz, nx, ny, nz = t[0], t[1], t[2], n[0], n[1], n[2]
     for node in range(first_node, 6):
@@ -241,7 +240,7 @@ def rotate_nodes(n, t, first_node, num, local):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def load_weights(irradiance_radius, light, shading, begin, num, weight, reach):  # type: ignore[no-untyped-def]
-    """Look up what listed lights [begin, begin + num) bring, and how wide they are.
+    """Look up irradiance and radius of listed lights [begin, begin + num).
 
     Args:
         irradiance_radius: irradiance, radius. (M, 4) light: (K,). shading: (1 or 3, K).
