@@ -1,4 +1,4 @@
-"""What moving pictures ask of an opened bake; `relume.methods.free_camera_transfer` implements it."""
+"""Protocol of an opened bake with a free camera; `relume.methods.free_camera_transfer` implements it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.live.fixed_camera.illumination import Illumination
@@ -25,14 +26,14 @@ F32 = NDArray[np.float32]
 
 
 class FreeCameraTransfer(OpenBake, Protocol):
-    """What it asks of an opened bake."""
+    """An opened bake with a free camera."""
 
     @property
     def views(self) -> Mapping[str, FreeView]: ...
     @property
     def stored_scene(self) -> StoredScene: ...
     def stored_scene_with(self, overrides: tuple[ProbeMapOverrides, ...]) -> StoredScene:
-        """What it is where a look names images in the place of the materials' own. wears: of each material"""
+        """Return the stored scene with map overrides, one per material."""
         ...
 
     @property
@@ -40,86 +41,91 @@ class FreeCameraTransfer(OpenBake, Protocol):
     @property
     def has_alpha_tested_surfaces(self) -> bool: ...
     @property
-    def positions(self) -> F32:
-        """Of the triangles' corners, metres. (corners, 3) float32"""
+    def positions(self) -> Shaped[F32, "corners 3"]:
+        """Positions of triangle corners, meters."""
         ...
 
     @property
     def occlusion_mesh(self) -> OcclusionMesh:
-        """What rays between places on surfaces meet."""
+        """Mesh for rays between surface points."""
         ...
 
     @property
-    def has_occluded_neighbor(self) -> NDArray[np.uint8]:
-        """Nodes with an occluded neighbor, from `relume.live.free_camera.occluded_probes`. (nodes,) uint8"""
+    def has_occluded_neighbor(self) -> Shaped[NDArray[np.uint8], " nodes"]:
+        """Nonzero for nodes with an occluded neighbor, from `relume.live.free_camera.occluded_probes`."""
         ...
 
     @property
     def vectors_shape(self) -> tuple[int, int, int]: ...
     @property
-    def light_visibility_bits(self) -> NDArray[np.uint8]:
-        """Which light triangles points see, in the order of `lobe_lights`: triangle l in bit l & 7 of byte l >> 3.
-        (points, bytes) uint8"""
+    def light_visibility_bits(self) -> Shaped[NDArray[np.uint8], "probes bytes"]:
+        """Visibility of light triangles from probes, in the order of `lobe_lights`: triangle l in bit l & 7 of byte l
+        >> 3.
+        """
         ...
 
     def lobe_lights(self, environment: EnvironmentKey, widths: tuple[int, ...]) -> LobeLightLists:
-        """The light triangles of an environment, as lobes of some widths look for them."""
+        """Return the light triangles of an environment, listed for lobes of some widths."""
         ...
 
     def environment_lights(self, environment: EnvironmentKey, *, is_preview: bool) -> EnvironmentLights:
-        """The same, as highlights are summed over them. is_preview: of another sky than the baked one, quickly."""
+        """Light triangles for sums over highlights. is_preview: fast, for an environment that was not baked."""
         ...
 
     def prefiltered(self, name: str | None) -> EnvironmentLookup:
-        """An environment, None for the scene's own, and what it is when it is blurred without its lamps."""
+        """Return an environment, None for the scene's own, with its prefiltered levels without bright lights."""
         ...
 
-    def bright_lights(self, environment: EnvironmentKey) -> F32:
-        """Bright lights of an environment, turned; see `PrefilteredEnvironment`. (lights, 7) float32"""
+    def bright_lights(self, environment: EnvironmentKey) -> Shaped[F32, "lights 7"]:
+        """Bright lights of a rotated environment; see `PrefilteredEnvironment`."""
         ...
 
-    def vectors(self, element: Illumination, without_sun_disks: bool) -> F32:
-        """Light vectors of all points in a light of one source and one kind of way. (points, 3, K) float32
+    def vectors(self, element: Illumination, without_sun_disks: bool) -> Shaped[F32, "probes 3 functions"]:
+        """Incident radiance coefficients of all probes for one light source and one kind of path.
 
         Args:
-            element: that light. without_sun_disks: what comes straight from suns of the sky is left out.
+            element: the light. without_sun_disks: exclude direct light of sun disks.
         """
         ...
 
     def has_vectors(self, element: Illumination, without_sun_disks: bool) -> bool:
-        """Whether they have been made, and are there at once."""
+        """True if these coefficients are cached."""
         ...
 
-    def fast_vectors(self, element: Illumination, probe_indices: NDArray[np.intp], without_sun_disks: bool) -> F32:
-        """The same of some points alone, of fewer functions, found quickly. (chosen, 3, ≤ K) float32
+    def fast_vectors(
+        self, element: Illumination, probe_indices: Shaped[NDArray[np.intp], " n"], without_sun_disks: bool
+    ) -> Shaped[F32, "n 3 functions"]:
+        """Approximate coefficients of some probes, of fewer functions.
 
         Args:
-            element, without_sun_disks: as of `vectors`. probe_indices: the points.
+            element, without_sun_disks: as in `vectors`. probe_indices: the probes.
         """
         ...
 
-    def indirect_delta(self, before: Illumination, after: Illumination, probe_indices: NDArray[np.intp]) -> F32:
-        """How what surfaces send to some points changes, found quickly. (chosen, 3, ≤ K) float32
+    def indirect_delta(
+        self, before: Illumination, after: Illumination, probe_indices: Shaped[NDArray[np.intp], " n"]
+    ) -> Shaped[F32, "n 3 functions"]:
+        """Approximate change of indirect incident radiance at some probes.
 
         Args:
-            before, after: lights of equal sources. probe_indices: the points.
+            before, after: lights with the same sources. probe_indices: the probes.
         """
         ...
 
     def hard_shadow_lights(
         self, light: Illumination, probe_indices: NDArray[np.intp] | None
     ) -> tuple[HardShadowLight, ...]:
-        """Suns and small lamps of a light, and what they bring to some points, None for all, if nothing hides them."""
+        """Return sun disks and small local lights, with their unoccluded irradiance at some probes; None: at all."""
         ...
 
-    def unoccluded(self, light: Illumination, material: int, *, is_preview: bool) -> F32:
-        """What white points of a material would send if nothing were in the light's way. (points, 3) float32
+    def unoccluded(self, light: Illumination, material: int, *, is_preview: bool) -> Shaped[F32, "probes 3"]:
+        """Radiance that white probes of a material would reflect if nothing occluded the light.
 
         Args:
-            light: straight from the sky and from lamps. is_preview: of another sky than the baked one, quickly.
+            light: direct light. is_preview: fast, for an environment that was not baked.
         """
         ...
 
-    def environment_map(self, name: str | None, blur: float = 0) -> F32:
-        """Radiance of an environment, None for the scene's own, blurred by `blur` degrees. (height, width, 3)"""
+    def environment_map(self, name: str | None, blur: float = 0) -> Shaped[F32, "height width 3"]:
+        """Radiance of an environment, None for the scene's own, blurred by `blur` degrees."""
         ...

@@ -1,9 +1,10 @@
-"""How vertices of a lattice follow from points.
+"""Interpolation weights of lattice nodes.
 
-A mesh may be much finer than points are dense: its corners take what a few points about them send, by Shepard's weights
-((R − d) / (R d))², where R is the distance of the first point that is left out, changed by as little as it takes for
-light that is linear in the tangent plane to be met. A corner that is a point itself takes its own. Nodes inside a face
-whose points are farther apart than its nodes lie on the straight line between those.
+A mesh may be much finer than the probe spacing: its corners interpolate a few nearby probes by Shepard's weights
+((R − d) / (R d))², where R is the distance of the first probe that is left out, minimally corrected so that light
+linear
+in the tangent plane is reproduced. A corner that is a probe itself takes its own value. Nodes inside a face whose
+probes are farther apart than its nodes are interpolated along edges.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
@@ -21,30 +23,33 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 PROBES_PER_NODE = 4
-MATERIAL_SEPARATION = 1e3  # spacings between materials, and between sides
-_REGULARIZATION = 0.05  # how far off what is linear may stay, beside how far weights change
+MATERIAL_SEPARATION = 1e3  # distance, in spacings, between materials, and between sides
+_REGULARIZATION = 0.05  # of the linear constraint, against the change of weights
 _MIN_WEIGHT = 2e-3
-_NODES_PER_BATCH = 1 << 16  # vertices
+_NODES_PER_BATCH = 1 << 16  # nodes
 
 
 class NodeWeights(NamedTuple):
-    """Points and weights of vertices.
+    """Interpolation probes and weights of nodes.
 
     Attributes:
-        probe: unlike each other or of no weight. (V, `PROBES_PER_NODE`) uint32
-        weight: of each, one in sum. (V, `PROBES_PER_NODE`) float32
+        probe: distinct unless of zero weight. weight: sum 1.
     """
 
-    probe: NDArray[np.uint32]
-    weight: F32
+    probe: Shaped[NDArray[np.uint32], "nodes probes_per_node"]
+    weight: Shaped[F32, "nodes probes_per_node"]
 
 
-def weights_from_nearby_probes(probe_features: F64, node_features: F64, normals: F32) -> NodeWeights:
-    """Weigh the points about some places.
+def weights_from_nearby_probes(
+    probe_features: Shaped[F64, "probes features"],
+    node_features: Shaped[F64, "nodes features"],
+    normals: Shaped[F32, "nodes 3"],
+) -> NodeWeights:
+    """Interpolation weights of the nearest probes.
 
     Args:
-        probe_features, node_features: in spacings; coordinates, then what makes them unlike. (n, d), (V, d)
-        normals: at the places, unit. (V, 3)
+        probe_features, node_features: in spacings; position, then the features that separate surfaces.
+        normals: of the nodes, unit.
     """
     tree = cKDTree(probe_features)
     num_neighbors = min(len(probe_features), PROBES_PER_NODE + 1)
@@ -56,7 +61,7 @@ def weights_from_nearby_probes(probe_features: F64, node_features: F64, normals:
     reach = np.maximum(distance[:, -1:], 1e-12)
     inside = np.clip(distance[:, :-1], 1e-6 * reach, None) if num_neighbors > 1 else np.ones((len(node_features), 1))
     raw = np.square((reach - inside) / (reach * inside)) if num_neighbors > 1 else inside
-    raw[distance[:, : raw.shape[1]] > MATERIAL_SEPARATION / 2] = 0  # another material's, where there are so few
+    raw[distance[:, : raw.shape[1]] > MATERIAL_SEPARATION / 2] = 0  # of another material, if its own has too few probes
     raw[:, 0] = np.maximum(raw[:, 0], 1e-12)
     node_weights = _empty_weights(len(node_features))
     node_weights.weight[:, : raw.shape[1]] = raw / raw.sum(axis=1, keepdims=True)
@@ -70,16 +75,17 @@ def weights_from_nearby_probes(probe_features: F64, node_features: F64, normals:
     return node_weights
 
 
-def make_weights_linear(weight: F64, towards: F64, normal: F64) -> F64:
-    """Change weights as little as it takes for the points' mean to lie under their vertex, Σ w x = 0, nearly.
+def make_weights_linear(
+    weight: Shaped[F64, "nodes p"], towards: Shaped[F64, "nodes 3 p"], normal: Shaped[F64, "nodes 3"]
+) -> Shaped[F64, "nodes p"]:
+    """Correct weights minimally so that the weighted mean of the probes is at their node, Σ w x ≈ 0.
 
-    With W the weights on a diagonal, F the x, in units of their spread, above a row of ones, and b = (0, 0, 0, 1):
-    w − W Fᵀ (F W Fᵀ + λ)⁻¹ (F w − b).
+    With W = diag(w), F the scaled x above a row of ones, and b = (0, 0, 0, 1): w − W Fᵀ (F W Fᵀ + λ)⁻¹ (F w − b).
 
     Args:
-        weight: of points, one in sum. (V, p) towards: where they are. (V, 3, p) normal: unit. (V, 3)
+        weight: sum 1. towards: positions of the probes relative to the node. normal: unit.
     Returns:
-        None below nothing: where points lie on one side alone, what is linear is met less. (V, p)
+        Non-negative weights: if all probes lie on one side, linear light is reproduced less well.
     """
     x = towards - normal[:, :, None] * np.einsum("vc,vcp->vp", normal, towards)[:, None]
     x *= weight[:, None] > 0
@@ -95,13 +101,15 @@ def make_weights_linear(weight: F64, towards: F64, normal: F64) -> F64:
 
 
 def weights_from_edge_ends(
-    seed_weights: NodeWeights, seed_nodes: NDArray[np.intp], node_index: NDArray[np.intp], probe_grid: ProbeGrid
+    seed_weights: NodeWeights,
+    seed_nodes: NDArray[np.intp],
+    node_index: Shaped[NDArray[np.intp], " grid_nodes"],
+    probe_grid: ProbeGrid,
 ) -> NodeWeights:
-    """Let the other vertices be the mean of both ends of the edges that they are in the middle of, coarse ones first.
+    """Interpolate the remaining nodes as midpoints of edges, coarse edges first.
 
     Args:
-        seed_weights: of the vertices `seed_nodes`. node_index: that each node of the lattice is. (nodes,)
-        probe_grid: whose nodes they are.
+        seed_weights: of the nodes `seed_nodes`. node_index: lattice node of each grid node. probe_grid: of the nodes.
     """
     num_lattice_nodes, num_probes = int(node_index.max()) + 1, int(seed_weights.probe.max()) + 1
     coordinates = np.repeat(seed_nodes, PROBES_PER_NODE), seed_weights.probe.ravel().astype(np.intp)
@@ -125,7 +133,7 @@ def weights_from_edge_ends(
 
 
 def _select_heaviest(weights: csr_array) -> NodeWeights:
-    """Keep the points of the greatest weight in each row, as many as a vertex has."""
+    """Keep the largest weights of each row, at most `PROBES_PER_NODE`."""
     count = np.diff(weights.indptr)
     row = np.repeat(np.arange(len(count)), count)
     order = np.lexsort((-weights.data, row))
@@ -138,7 +146,7 @@ def _select_heaviest(weights: csr_array) -> NodeWeights:
 
 
 def _normalize(weight: NDArray[Any]) -> NDArray[Any]:
-    """Leave out what is below nothing, and what cannot be seen: each point that is asked sums all its lights."""
+    """Drop negative and negligible weights and normalize: each probe in use sums all its lights."""
     thresholded = np.where(weight < _MIN_WEIGHT, 0, weight)
     return np.asarray(thresholded / thresholded.sum(axis=1, keepdims=True), weight.dtype)
 

@@ -1,4 +1,4 @@
-"""Kernels that look textures up where a camera sees them, as `relume.raytrace.texture` does."""
+"""Texture lookup in kernels of the free camera, equal to `relume.raytrace.texture`."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from relume.core.numba_options import UNCOUNTED
 from relume.raytrace.texture import two_texels
 
 
-# Inlined, as what it calls: calls count the references of arrays, which is two thirds of the time of a look-up.
+# Inlined with its callees: calls would count references to arrays, which takes two thirds of the time of a lookup.
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _add_level(textures, texture, level, u, v, weight, out):  # type: ignore[no-untyped-def]
-    """Add a share of a bilinear lookup in one level of a texture. out: (3,)"""
+    """Add the weighted bilinear lookup of one mip level. out: (3,)"""
     row = textures.first[texture] + level
     first, height, width = textures.levels[row, 0], textures.levels[row, 1], textures.levels[row, 2]
     left, right, fx = two_texels(textures.wraps[texture, 0], np.float32(u), width)
@@ -37,11 +37,11 @@ def _add_level(textures, texture, level, u, v, weight, out):  # type: ignore[no-
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def sample_texture(textures, texture, u, v, footprint, out):  # type: ignore[no-untyped-def]
-    """Look a texture up, trilinear.
+    """Look up a texture, trilinear.
 
     Args:
-        textures: all of them. texture: number of one. u, v: the place. footprint: side of the filter in u and v.
-        out: written. (3,)
+        textures: all. texture: index. u, v: coordinates. footprint: side of the filter in texture units. out: written.
+            (3,)
     """
     first = textures.first[texture]
     last = textures.first[texture + 1] - first - 1

@@ -1,8 +1,7 @@
-"""Grids of nodes inside triangles: how many there are, how they are numbered, which are about a place, and how those
-that are no points follow from those that are.
+"""Grids of nodes inside triangles: node counts, numbering, surrounding nodes, and midpoints of coarser grids.
 
-A grid has R rows, parallel to the first edge of its face, and (R + 1)(R + 2) / 2 nodes. Nodes at every 2^l-th step of
-both ways are the grid of R / 2^l rows; each node that is none of them lies in the middle of an edge of that grid.
+A grid has R rows, parallel to the first edge of its face, and (R + 1)(R + 2) / 2 nodes. Nodes at every 2^l-th step in
+both directions form the grid of R / 2^l rows; every other node is the midpoint of an edge of that grid.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -21,40 +21,38 @@ I64 = NDArray[np.int64]
 
 
 class ProbeGrid(NamedTuple):
-    """The grid of every side of every face; side 0 is the one where the corners are counter-clockwise.
+    """The grids of all sides of all faces; side 0 is the one from which the corners are counterclockwise.
 
     Attributes:
-        num_rows: R; 0 where the side has no points. (faces, 2) uint8
-        first: where its nodes begin in `node_index`. (faces, 2) uint32
-        node_index: which vertex each is. (nodes,) uint32
+        num_rows: R; 0 if the side has no nodes. first: first node of each grid in `node_index`.
+        node_index: lattice node of each grid node.
     """
 
-    num_rows: NDArray[np.uint8]
-    first: NDArray[np.uint32]
-    node_index: NDArray[np.uint32]
+    num_rows: Shaped[NDArray[np.uint8], "faces 2"]
+    first: Shaped[NDArray[np.uint32], "faces 2"]
+    node_index: Shaped[NDArray[np.uint32], " grid_nodes"]
 
 
 class ProbeDensity(NamedTuple):
-    """How many times farther apart than a spacing points are, at the nodes of a lattice's grids.
+    """Spacing of probes relative to the finest, at the nodes of grids.
 
     Attributes:
-        probe_grid: whose nodes; they are no vertices yet.
-        power: of two. (nodes,) int8
+        probe_grid: of the nodes; not merged yet. power: of two.
     """
 
     probe_grid: ProbeGrid
-    power: NDArray[np.int8]
+    power: Shaped[NDArray[np.int8], " grid_nodes"]
 
-    def at(self, steps: GridSteps) -> NDArray[np.int8]:
-        """Find it at the nodes of other grids on the same faces, the least of the three about each. (n,) int8"""
+    def at(self, steps: GridSteps) -> Shaped[NDArray[np.int8], " n"]:
+        """Evaluate at the nodes of other grids on the same faces: the least of the three surrounding nodes."""
         out = np.empty(len(steps.grid), np.int8)
         parallel_for_chunks(
             lambda start, stop: _surrounding_minimum(self.probe_grid, self.power, steps, start, stop, out), len(out)
         )
         return out
 
-    def face_extremes(self) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
-        """Find the least and the most on each face, 0 where it has no nodes. (faces,) int8 each"""
+    def face_extremes(self) -> tuple[Shaped[NDArray[np.int8], " faces"], Shaped[NDArray[np.int8], " faces"]]:
+        """Return the least and the largest power on each face; 0 if it has no nodes."""
         rows = self.probe_grid.num_rows
         face = np.repeat(np.arange(rows.size) // 2, num_nodes(rows).ravel())
         lowest, highest = np.full(len(rows), 127, np.int8), np.full(len(rows), -128, np.int8)
@@ -64,44 +62,43 @@ class ProbeDensity(NamedTuple):
 
 
 class GridSteps(NamedTuple):
-    """Where nodes are in their grids.
+    """Positions of nodes in their grids.
 
     Attributes:
-        grid: face · 2 + side. (n,) int32
-        i, j: steps towards the second and the third corner. (n,) int32
-        rows: of the grid. (n,) int32
+        grid: face · 2 + side. i, j: steps toward the second and the third corner. rows: of the grid.
     """
 
-    grid: I32
-    i: I32
-    j: I32
-    rows: I32
+    grid: Shaped[I32, " n"]
+    i: Shaped[I32, " n"]
+    j: Shaped[I32, " n"]
+    rows: Shaped[I32, " n"]
 
 
 def num_nodes(rows: NDArray[np.integer]) -> I64:
-    """How many nodes grids with so many rows have; none where there are no rows."""
+    """Number of nodes of grids with so many rows; zero for no rows."""
     wide = rows.astype(np.int64)
     return np.where(wide > 0, (wide + 1) * (wide + 2) // 2, 0)
 
 
 def first_nodes(rows: NDArray[np.integer]) -> NDArray[np.uint32]:
-    """Where the nodes of each grid begin, one grid after another. rows: of each, any shape"""
+    """Offset of the first node of each grid in the concatenation. rows: of each, any shape"""
     counts = num_nodes(rows).ravel()
     return (np.cumsum(counts) - counts).reshape(rows.shape).astype(np.uint32)
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def node_index(rows, i, j):  # type: ignore[no-untyped-def]
-    """Number of a node in a grid of so many rows: i steps towards the second corner, j towards the third."""
+    """Index of a node in a grid: i steps toward the second corner, j toward the third."""
     return i * (rows + 1) - (i * (i - 1)) // 2 + j
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def surrounding_nodes(probe_grid, face, side, u, v):  # type: ignore[no-untyped-def]
-    """Find the three nodes about a place in a face, and their weights.
+    """Find the three nodes that surround a point in a face, and their weights.
 
     Args:
-        probe_grid: with nodes there. face, side: where. u, v: barycentric, of the second and third corner.
+        probe_grid: with nodes on this side. face, side: of the point. u, v: barycentric, of the second and third
+            corner.
     """
     rows = np.int64(probe_grid.num_rows[face, side])
     x: Any = u * rows
@@ -119,7 +116,7 @@ def surrounding_nodes(probe_grid, face, side, u, v):  # type: ignore[no-untyped-
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _surrounding_minimum(probe_grid, power, steps, start, stop, out):  # type: ignore[no-untyped-def]
-    """Find the least of the three nodes about each of the steps [start, stop)."""
+    """Compute the minimum over the three nodes that surround each of the steps [start, stop)."""
     for k in range(start, stop):
         rows = np.float32(steps.rows[k])
         u, v = np.float32(steps.i[k]) / rows, np.float32(steps.j[k]) / rows
@@ -141,14 +138,14 @@ def enumerate_nodes(num_rows: NDArray[np.integer]) -> GridSteps:
 
 
 def find_edge_midpoints(
-    steps: GridSteps, first: NDArray[np.integer], nodes: NDArray[np.intp], step: int
-) -> tuple[I64, I64, I64]:
-    """Find those nodes that lie in the middle of an edge of 2 · `step` steps, and the ends of it.
+    steps: GridSteps, first: NDArray[np.integer], nodes: Shaped[NDArray[np.intp], " n"], step: int
+) -> tuple[Shaped[I64, " m"], Shaped[I64, " m"], Shaped[I64, " m"]]:
+    """Select nodes that are midpoints of edges of 2 · `step` steps, with the ends of these edges.
 
     Args:
-        steps, first: of all grids. nodes: those that are asked for. step: a power of two.
+        steps, first: of all grids. nodes: to test. step: a power of two.
     Returns:
-        The nodes, and both ends. (m,) each
+        The midpoints, and both ends.
     """
     i, j = steps.i[nodes], steps.j[nodes]
     is_midpoint = (i % step == 0) & (j % step == 0) & ((i % (2 * step) != 0) | (j % (2 * step) != 0))

@@ -1,4 +1,4 @@
-"""What is made where an eye rests: a few exact samples, which correct the moving picture, then the exact picture."""
+"""Jobs that refine the image when the camera stops: sparse exact samples that correct it, then the static view."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from relume.scene.model import Camera
 F32 = NDArray[np.float32]
 SizedCamera = tuple[Camera, tuple[int, int]]
 
-TRACING_FRACTION = 0.5  # of what a still tells to be done; the rest is shading
-SAMPLE_SPACING = 8  # pixels from one sparse sample to the next
-_MIN_SPARSE_SAMPLES = 1000  # samples; with fewer the exact picture itself is as soon there
+TRACING_FRACTION = 0.5  # of the progress of a static view; the rest is shading
+SAMPLE_SPACING = 8  # pixels between sparse samples
+_MIN_SPARSE_SAMPLES = 1000  # with fewer the exact image is ready as early
 
 
 class StaticViewFactory(Protocol):
-    """Finds what an eye sees: an opened bake of this one fixed view."""
+    """Traces the view of a camera: an opened bake with this one fixed view."""
 
     def __call__(
         self,
@@ -42,17 +42,17 @@ class StaticViewFactory(Protocol):
         *,
         smooths_edges: bool = True,
     ) -> FixedViewTransfer:
-        """Trace it; see `relume.methods.static_views.StaticViewBuilder.make_static_view`."""
+        """Trace the view; see `relume.methods.static_views.StaticViewBuilder.make_static_view`."""
         ...
 
 
 @dataclass(frozen=True)
 class StaticViewState:
-    """What is to be seen exactly.
+    """Camera and look of an exact image.
 
     Attributes:
-        make_static_view: finds what it sees; heavy. cache: of what is made for the picture.
-        sized_camera: camera, and size of its picture. look, solo: that it is shown in.
+        make_static_view: traces the view; slow. cache: of the picture.
+        sized_camera: camera and image size. look, solo: to display.
     """
 
     make_static_view: StaticViewFactory
@@ -63,19 +63,19 @@ class StaticViewState:
 
     @property
     def is_indirect(self) -> bool:
-        """Whether light between surfaces is shown."""
+        """True if the look shows indirect light."""
         return self.look.transport.paths.has_indirect
 
     def static_picture(
         self, progress: ProgressCallback, is_canceled: CancelCheck, *, smooths_edges: bool = True
     ) -> Picture:
-        """Trace and shade it.
+        """Trace and shade the view.
 
         Args:
-            progress: called with about the share done. is_canceled: asked now and then.
-            smooths_edges: whether pixels across edges have several samples.
+            progress: called with the approximate fraction done. is_canceled: polled.
+            smooths_edges: take several samples in edge pixels.
         Raises:
-            CancelledError: `is_canceled` said so.
+            CancelledError: `is_canceled` returned true.
         """
         (camera, size), look = self.sized_camera, self.look
         transfer = self.make_static_view(
@@ -96,11 +96,13 @@ class StaticViewState:
 
 @dataclass(frozen=True)
 class SparseExactJob:
-    """By how much a moving picture's straight light is off, from few samples; a `relume.live.fixed_camera.jobs.Job`.
+    """Estimate the error of direct light in a free-camera image from sparse exact samples; a
+    `relume.live.fixed_camera.jobs.Job`.
 
     Attributes:
-        view_state: what is to be seen exactly. free_camera_picture: the picture that is off, for this job alone.
-        key: equal for jobs of one eye and look. on_done: gets what was made; None where nothing is to be corrected.
+        view_state: camera and look. free_camera_picture: a copy of the picture for this job alone.
+        key: equal for jobs of one camera and look. on_done: receives the residual image; None if nothing is to be
+            corrected.
     """
 
     view_state: StaticViewState
@@ -108,14 +110,14 @@ class SparseExactJob:
     key: tuple[Hashable, ...]
     on_done: Callable[[F32 | None], None]
 
-    label = "a first exact look from here"
+    label = "the first exact samples"
     state: ClassVar[Literal["shading"]] = "shading"
     is_refinement = True
     is_resumable = False
 
     @staticmethod
     def should_refine(view_state: StaticViewState) -> bool:
-        """Whether light comes straight, to a picture that is large enough."""
+        """True if direct light is shown in an image that is large enough."""
         width, height = view_state.sized_camera[1]
         return (
             view_state.look.transport.paths.direct
@@ -123,13 +125,13 @@ class SparseExactJob:
         )
 
     def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> F32 | None:
-        """Trace, shade and compare. (height, width, 3). Raises CancelledError where `is_canceled` said so."""
+        """Trace, shade and compare. (height, width, 3). Raises CancelledError if `is_canceled`."""
         picture, (camera, size), gbuffer = (
             self.free_camera_picture,
             self.view_state.sized_camera,
             self.free_camera_picture.gbuffer,
         )
-        if len(gbuffer.glass.ray):  # of what glass shows and what is behind it, each is off by something else
+        if len(gbuffer.glass.ray):  # the errors of a glass surface and of what is behind it differ
             return None
         transport = self.view_state.look.transport.model_copy(update={"show": "direct"})
         look = self.view_state.look.model_copy(update={"transport": transport})
@@ -139,7 +141,7 @@ class SparseExactJob:
             exact = direct_view.static_picture(progress, is_canceled, smooths_edges=False).image()
         except CancelledError:
             raise
-        except RelumeError:  # the scene is gone, or it needs more memory than there is
+        except RelumeError:  # the scene was deleted, or needs more memory than is free
             return None
         picture.set_look(look, solo=direct_view.solo)
         radiance, sample_gbuffer = picture.render_pixel_centers(coarse_size)
@@ -153,39 +155,38 @@ class SparseExactJob:
         return residual_image if residual_image.any() else None
 
     def install(self, result: F32 | None) -> None:
-        """Hand it over."""
+        """Deliver the result."""
         self.on_done(result)
 
 
 @dataclass(frozen=True)
 class StaticViewJob:
-    """The exact picture of where an eye rests, made beside the frames; a `relume.live.fixed_camera.jobs.Job`.
+    """Render the exact static view in the background; a `relume.live.fixed_camera.jobs.Job`.
 
     Attributes:
-        view_state: what is made; looks that came meanwhile are followed from there.
-        key: jobs of one eye and look are one: while hands edit, nothing takes a core from them.
-        on_done: gets whether light between surfaces can be shown, and the picture when it is there; None where it
-            cannot be had.
+        view_state: camera and look; the picture follows later looks from there.
+        key: equal for jobs of one camera and look, so that edits do not start further jobs.
+        on_done: receives whether indirect light can be shown, and the picture; None if it is unavailable.
     """
 
     view_state: StaticViewState
     key: tuple[Hashable, ...]
     on_done: Callable[[bool, Picture | None], None]
 
-    label = "the exact picture from here"
+    label = "the exact image from this camera"
     state: ClassVar[Literal["shading"]] = "shading"
     is_refinement = True
     is_resumable = False
 
     def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> Picture | ResultUnavailableError:
-        """Trace and shade it, or why not. Raises CancelledError where `is_canceled`, asked now and then, said so."""
+        """Trace and shade, or return why that failed. Raises CancelledError if `is_canceled`."""
         try:
             return self.view_state.static_picture(progress, is_canceled)
         except CancelledError:
             raise
-        except RelumeError as error:  # the scene is gone, or it needs more memory than there is
-            return ResultUnavailableError(f"the moving picture stays: {self.label} cannot be had, for {error}")
+        except RelumeError as error:  # the scene was deleted, or needs more memory than is free
+            return ResultUnavailableError(f"the approximate image stays; {self.label} cannot be rendered: {error}")
 
     def install(self, result: Picture | ResultUnavailableError) -> None:
-        """Hand it over."""
+        """Deliver the result."""
         self.on_done(self.view_state.is_indirect, None if isinstance(result, ResultUnavailableError) else result)
