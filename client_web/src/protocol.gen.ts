@@ -127,7 +127,7 @@ export interface FocusMessage {
   view: string;
 }
 
-/** client → server: show the pixels that an interval of a curve affects. Each visible view answers with a frame "highlight". */
+/** client → server: show the pixels that a curve's interval affects; each visible view answers "highlight". */
 export interface HighlightMessage {
   type: "highlight_curve_range";
   curve: string;
@@ -184,7 +184,7 @@ export interface PrepareMessage {
   parameter?: string | null;
 }
 
-/** client → server: own presence for others in the room: name, if the server has no login (left out: unchanged), and selected material. */
+/** client → server: own name, if the server has no login (left out: unchanged), and selected material. */
 export interface PresenceMessage {
   type: "presence";
   name?: string | null;
@@ -310,7 +310,7 @@ export interface BakeBody {
   plan: PlanBody | null;
 }
 
-/** server → client: another bake of the same scene is running or ready; to use it, open a session on it and send the look. */
+/** server → client: another bake of the scene is running or ready; to use it, open a session and send the look. */
 export interface BakeMessage {
   type: "bake";
   bake: string;
@@ -362,7 +362,7 @@ export interface CameraEntry {
   is_placed: boolean;
 }
 
-/** A camera that looks along its -Z. `to_world`: camera to world, 4 × 4, row by row, rigid, meters. `yfov`: vertical, radians. */
+/** A camera that looks along its -Z. `to_world`: 4 × 4, row by row, rigid, meters. `yfov`: vertical, radians. */
 export interface CameraInfo {
   to_world: number[];
   yfov: number;
@@ -539,7 +539,7 @@ export interface FreeCameraBody {
   arrays: string[];
 }
 
-/** Error of free-camera images, measured in the bake: relative RMS over the surfaces visible to a few cameras, in the scene's default look. */
+/** Error of free-camera images, measured in the bake: relative RMS over surfaces, in the scene's default look. */
 export interface FreeCameraError {
   value: number;
   standard_error: number;

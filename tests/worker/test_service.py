@@ -435,7 +435,7 @@ def test_what_is_left_of_a_deleted_bake_is_of_no_other_version(
     with open_service(tmp_path) as service:
         staging_path(service.data_dir, bake_id(SCENE.id, RECIPE)).mkdir(parents=True)
         assert follow(service, service.submit(SCENE.id, RECIPE)).problem is None
-    assert "relume has changed" not in caplog.text
+    assert "relume was updated" not in caplog.text
 
 
 def test_bakes_that_are_asked_for_while_their_scene_is_deleted_go_with_it(
