@@ -246,7 +246,7 @@ class StrategyScheduler:
         return operator_form(target.material, basis.num_columns, self._images.cache.budget_bytes)
 
     def _reaches_target(self, target: TermTarget, basis: EditBasis, changed: set[str]) -> bool:
-        """Return whether an operator would reach the target; a subsampled one does not include changes of other curves."""
+        """Return whether an operator would reach the target; a subsampled one excludes changes of other curves."""
         form = self._form(target, basis)
         return form is not None and (form.step == 1 or can_resume_from(target.live.ready, changed, basis))
 

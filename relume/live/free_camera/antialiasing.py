@@ -80,8 +80,8 @@ def samples_per_edge(num_edges: int, num_pixels: int) -> int:
 
 
 def resolve(
-    values: Shaped[F32, "rays *channels"], owner: Shaped[NDArray[np.int32], " m"], num_pixels: int
-) -> Shaped[F32, "pixels *channels"]:
+    values: Shaped[F32, " rays *channels"], owner: Shaped[NDArray[np.int32], " m"], num_pixels: int
+) -> Shaped[F32, " pixels *channels"]:
     """Average all rays of each pixel.
 
     Args:

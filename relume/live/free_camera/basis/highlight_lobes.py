@@ -68,7 +68,7 @@ _MIN_VIEW_COSINE = 0.3  # cos θo above which that is checked; at grazing angles
 
 
 class Lobes(NamedTuple):
-    """The lobes of all materials, at most one pair each. `R` = `NUM_ROWS`.
+    """The lobes of all materials, at most one pair each.
 
     Attributes:
         albedo: a, by groups of terms as in `relume.live.free_camera.shade_probes`.

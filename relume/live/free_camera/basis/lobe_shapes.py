@@ -155,7 +155,7 @@ def _build_shape(grid_density: F64, lobes: F64) -> tuple[F32, float, F64]:
 
 
 def _flatness(grid_density: F64) -> float:
-    """Estimate α², bounded below: x_h at which a highlight has fallen to a quarter, at moderate θo. (rows, directions)"""
+    """Estimate α², bounded below: x_h at which a highlight has fallen to a quarter, at moderate θo."""
     mean = grid_density[_MIDDLE_ROW].reshape(NUM_RINGS, NUM_AZIMUTHS).mean(axis=1)
     half_vector_distance = _half_vector_distances()[_MIDDLE_ROW].reshape(NUM_RINGS, NUM_AZIMUTHS).mean(axis=1)
     return max(float(half_vector_distance[np.argmax(mean < _PEAK_FRACTION * mean[0])]), _MIN_FLATNESS)

@@ -1,4 +1,4 @@
-"""Arrays from which a shader sums highlights: environment lights and highlight shapes (docs/free-camera.md#highlights)."""
+"""Environment lights and highlight shapes, as arrays for shaders (docs/free-camera.md#highlights)."""
 
 from __future__ import annotations
 
