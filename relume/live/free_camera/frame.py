@@ -240,7 +240,7 @@ def finish_rays(
 
 
 def only_materials_differ(before: FrameRequestState, after: FrameRequestState) -> bool:
-    """Return whether two frames of one camera differ only in materials, without shadow catchers and normal-map changes."""
+    """Return whether two frames of one camera differ only in materials, not in catchers or normal-map overrides."""
     first, second = before.look, after.look
     catchers = (material.shadow_catcher for look in (first, second) for material in look.materials.values())
     return (

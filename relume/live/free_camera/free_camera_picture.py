@@ -311,7 +311,7 @@ class FreeCameraPicture:
         )
 
     def array_blocks(self) -> tuple[dict[str, ArrayBlock], ShaderConstants]:
-        """Return the arrays and constants with which the browser renders the displayed look; call it after `advance`."""
+        """Return the arrays and constants with which a browser renders the displayed look; call it after `advance`."""
         assert self._look is not None
         incident = self._current_vectors(self._all_probes)
         self._vectors_version += incident is not self._published_vectors

@@ -1,4 +1,4 @@
-"""What moving pictures ask of an opened bake; `relume.methods.free_camera_transfer` implements it."""
+"""Interface of an open bake for free-camera images; `relume.methods.free_camera_transfer` implements it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.live.fixed_camera.illumination import Illumination
@@ -25,14 +26,14 @@ F32 = NDArray[np.float32]
 
 
 class FreeCameraTransfer(OpenBake, Protocol):
-    """What it asks of an opened bake."""
+    """One open bake of a free camera."""
 
     @property
     def views(self) -> Mapping[str, FreeView]: ...
     @property
     def stored_scene(self) -> StoredScene: ...
     def stored_scene_with(self, overrides: tuple[ProbeMapOverrides, ...]) -> StoredScene:
-        """What it is where a look names images in the place of the materials' own. wears: of each material"""
+        """Return the scene with map overrides of each material."""
         ...
 
     @property
@@ -40,86 +41,95 @@ class FreeCameraTransfer(OpenBake, Protocol):
     @property
     def has_alpha_tested_surfaces(self) -> bool: ...
     @property
-    def positions(self) -> F32:
-        """Of the triangles' corners, metres. (corners, 3) float32"""
+    def positions(self) -> Shaped[F32, "corners 3"]:
+        """Positions of the triangles' corners, meters."""
         ...
 
     @property
     def occlusion_mesh(self) -> OcclusionMesh:
-        """What rays between places on surfaces meet."""
+        """Geometry for rays between surface points."""
         ...
 
     @property
-    def has_occluded_neighbor(self) -> NDArray[np.uint8]:
-        """Nodes with an occluded neighbor, from `relume.live.free_camera.occluded_probes`. (nodes,) uint8"""
+    def has_occluded_neighbor(self) -> Shaped[NDArray[np.uint8], " nodes"]:
+        """Nodes with an occluded neighbor, from `relume.live.free_camera.occluded_probes`."""
         ...
 
     @property
     def vectors_shape(self) -> tuple[int, int, int]: ...
     @property
-    def light_visibility_bits(self) -> NDArray[np.uint8]:
-        """Which light triangles points see, in the order of `lobe_lights`: triangle l in bit l & 7 of byte l >> 3.
-        (points, bytes) uint8"""
+    def light_visibility_bits(self) -> Shaped[NDArray[np.uint8], "probes bytes"]:
+        """Visibility of environment triangles from probes, in the order of `lobe_lights`: triangle l in bit l & 7 of
+        byte l >> 3.
+        """
         ...
 
     def lobe_lights(self, environment: EnvironmentKey, widths: tuple[int, ...]) -> LobeLightLists:
-        """The light triangles of an environment, as lobes of some widths look for them."""
+        """Return lists of an environment's triangles for lobes of some widths."""
         ...
 
     def environment_lights(self, environment: EnvironmentKey, *, is_preview: bool) -> EnvironmentLights:
-        """The same, as highlights are summed over them. is_preview: of another sky than the baked one, quickly."""
+        """Return the triangles for sums over highlights. is_preview: approximate if the environment is not the baked
+        one.
+        """
         ...
 
     def prefiltered(self, name: str | None) -> EnvironmentLookup:
-        """An environment, None for the scene's own, and what it is when it is blurred without its lamps."""
+        """Return an environment, None for the scene's own, with levels that are blurred without bright lights."""
         ...
 
-    def bright_lights(self, environment: EnvironmentKey) -> F32:
-        """Bright lights of an environment, turned; see `PrefilteredEnvironment`. (lights, 7) float32"""
+    def bright_lights(self, environment: EnvironmentKey) -> Shaped[F32, "lights 7"]:
+        """Bright lights of an environment, rotated; see `PrefilteredEnvironment`."""
         ...
 
-    def vectors(self, element: Illumination, without_sun_disks: bool) -> F32:
-        """Light vectors of all points in a light of one source and one kind of way. (points, 3, K) float32
+    def vectors(self, element: Illumination, without_sun_disks: bool) -> Shaped[F32, "probes 3 K"]:
+        """Return the incident coefficients of all probes for one light element.
 
         Args:
-            element: that light. without_sun_disks: what comes straight from suns of the sky is left out.
+            element: the light element. without_sun_disks: exclude direct light of sun disks.
         """
         ...
 
     def has_vectors(self, element: Illumination, without_sun_disks: bool) -> bool:
-        """Whether they have been made, and are there at once."""
+        """Return whether these coefficients are cached."""
         ...
 
-    def fast_vectors(self, element: Illumination, probe_indices: NDArray[np.intp], without_sun_disks: bool) -> F32:
-        """The same of some points alone, of fewer functions, found quickly. (chosen, 3, ≤ K) float32
+    def fast_vectors(
+        self, element: Illumination, probe_indices: Shaped[NDArray[np.intp], " k"], without_sun_disks: bool
+    ) -> Shaped[F32, "k 3 functions"]:
+        """Return approximate coefficients of some probes, possibly for fewer functions.
 
         Args:
-            element, without_sun_disks: as of `vectors`. probe_indices: the points.
+            element, without_sun_disks: as in `vectors`. probe_indices: the probes.
         """
         ...
 
-    def indirect_delta(self, before: Illumination, after: Illumination, probe_indices: NDArray[np.intp]) -> F32:
-        """How what surfaces send to some points changes, found quickly. (chosen, 3, ≤ K) float32
+    def indirect_delta(
+        self, before: Illumination, after: Illumination, probe_indices: Shaped[NDArray[np.intp], " k"]
+    ) -> Shaped[F32, "k 3 functions"]:
+        """Return the approximate change of indirect light at some probes.
 
         Args:
-            before, after: lights of equal sources. probe_indices: the points.
+            before, after: lights of equal sources. probe_indices: the probes.
         """
         ...
 
     def hard_shadow_lights(
         self, light: Illumination, probe_indices: NDArray[np.intp] | None
     ) -> tuple[HardShadowLight, ...]:
-        """Suns and small lamps of a light, and what they bring to some points, None for all, if nothing hides them."""
+        """Return the sun disks and small lights of a light, with unoccluded light at some probes, None for all."""
         ...
 
-    def unoccluded(self, light: Illumination, material: int, *, is_preview: bool) -> F32:
-        """What white points of a material would send if nothing were in the light's way. (points, 3) float32
+    def unoccluded(self, light: Illumination, material: int, *, is_preview: bool) -> Shaped[F32, "probes 3"]:
+        """Return the outgoing radiance of white probes of a material in unoccluded light, zero at others.
 
         Args:
-            light: straight from the sky and from lamps. is_preview: of another sky than the baked one, quickly.
+            light: its direct environment and local lights count. is_preview: approximate if the environment is not the
+                baked
+                one.
         """
         ...
 
-    def environment_map(self, name: str | None, blur: float = 0) -> F32:
-        """Radiance of an environment, None for the scene's own, blurred by `blur` degrees. (height, width, 3)"""
+    def environment_map(self, name: str | None, blur: float = 0) -> Shaped[F32, "height width 3"]:
+        """Return the radiance of an environment, None for the scene's own, blurred by `blur` degrees."""
         ...

@@ -1,10 +1,11 @@
-"""The triangles of a moving picture as rays between their places meet them."""
+"""Geometry of a scene for rays between surface points."""
 
 from __future__ import annotations
 
 from typing import NamedTuple, Self
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.live.free_camera.probes.stored_scene import StoredScene
@@ -16,27 +17,26 @@ F32 = NDArray[np.float32]
 
 
 class OcclusionMesh(NamedTuple):
-    """What there is.
+    """Geometry for occlusion rays.
 
     Attributes:
-        stored_scene: that is seen. positions: of its triangles' corners, metres. (corners, 3) float32
-        embree: the triangles' search tree. surface_offset: metres that rays begin off surfaces.
-        edge_offset: least barycentric coordinates of where they begin, as in `relume.raytrace.surface_interaction`.
-            (faces, 3) float32
+        stored_scene: the scene. positions: of its triangles' corners, meters.
+        embree: the acceleration structure. surface_offset: distance of ray origins from surfaces, meters.
+        edge_offset: least barycentric coordinates of ray origins, as in `relume.raytrace.surface_interaction`.
     """
 
     stored_scene: StoredScene
-    positions: F32
+    positions: Shaped[F32, "corners 3"]
     embree: EmbreeScene
     surface_offset: float
-    edge_offset: F32
+    edge_offset: Shaped[F32, "faces 3"]
 
     @classmethod
-    def build(cls, stored_scene: StoredScene, positions: F32, embree: EmbreeScene) -> Self:
-        """Find what rays need besides.
+    def build(cls, stored_scene: StoredScene, positions: Shaped[F32, "corners 3"], embree: EmbreeScene) -> Self:
+        """Compute the offsets of ray origins.
 
         Args:
-            stored_scene: that is seen. positions: of its vertices. (vertices, 3) float32. embree: its tree.
+            stored_scene: the scene. positions: of its vertices. embree: the acceleration structure.
         """
         surface_offset, corners = offset_point(positions), positions[stored_scene.faces]
         twice_area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)

@@ -1,4 +1,4 @@
-"""The fine frame of a picture whose eye and look rest for a moment, made beside the frames."""
+"""Renders a fine frame in the background when camera and look pause."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ def render_fine_frame(
     size: tuple[int, int],
     shadow_visibility: Sequence[F32],
 ) -> Frame:
-    """Find what an eye sees, its rims too.
+    """Render a frame with antialiased highlight edges.
 
     Args:
-        transfer, state, gbuffer, camera, size, shadow_visibility: as of `relume.live.free_camera.frame.render_frame`;
-        `state` is fine.
+        transfer, state, gbuffer, camera, size, shadow_visibility: as in `relume.live.free_camera.frame.render_frame`;
+            `state` is fine.
     """
     frame = render_frame(transfer, state, gbuffer, camera, size, shadow_visibility)
     return add_samples(transfer, state, gbuffer, camera, frame, shadow_visibility)
@@ -39,11 +39,11 @@ def render_fine_frame(
 
 @dataclass(frozen=True)
 class RefineHighlights:
-    """Finds it; a `relume.live.fixed_camera.jobs.Job`.
+    """Renders a fine frame; a `relume.live.fixed_camera.jobs.Job`.
 
     Attributes:
-        render: makes the frame, of what was shown when the job was begun. key: equal for jobs of one eye and look.
-        on_done: gets it.
+        render: renders the frame of the look when the job was created. key: equal for jobs of one camera and look.
+        on_done: receives the frame.
     """
 
     render: Callable[[], Frame]
@@ -56,9 +56,9 @@ class RefineHighlights:
     is_resumable = False
 
     def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> Frame:
-        """Find it: as long as a few frames take."""
+        """Render the frame; takes as long as a few frames."""
         return self.render()
 
     def install(self, result: Frame) -> None:
-        """Hand it over."""
+        """Pass the result on."""
         self.on_done(result)

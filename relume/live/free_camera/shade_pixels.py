@@ -1,4 +1,4 @@
-"""From points to pixels: what is sent is interpolated; textures, slopes and mirrored light are found for each pixel."""
+"""Shades pixels: interpolates the radiance of probes, and evaluates textures, normal maps and lobes."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import LUMINANCE
@@ -26,39 +27,38 @@ from relume.live.free_camera.probes.texture_kernels import sample_texture
 
 F32 = NDArray[np.float32]
 
-_MIN_SLANT = np.float32(0.05)  # cosine, below which footprints grow no more
-_CHUNKS_PER_THREAD = 4  # for each thread: a ray that sees a highlight costs five times as much as others
-# by points, of what a pixel's lobe shows: more is an error of theirs, a black patch
+_MIN_SLANT = np.float32(0.05)  # cosine, below which footprints no longer grow
+_CHUNKS_PER_THREAD = 4  # for each thread: a ray with a highlight costs five times as much as others
+# of the pixel's lobe radiance: a more negative interpolated value is an error that would show as a black patch
 _MAX_NEGATIVE_RATIO = np.float32(0.5)
-_MAX_GRADIENT_RATIO = np.float32(0.125)  # of what a pixel shows, that turning its lobe may take or add
+_MAX_GRADIENT_RATIO = np.float32(0.125)  # of the pixel's radiance: limits the gradient term
 _RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE)
-_FULLY_ABOVE = np.float32(10)  # widths of a lobe, from which on all of it is above: a share of 4e-8 is missing
+_FULLY_ABOVE = np.float32(10)  # widths of a lobe above the horizon at which only a fraction of 4e-8 is below it
 
 
 class MirrorData(NamedTuple):
-    """What lobes send.
+    """Data of lobes.
 
     Attributes:
-        lobes: of all materials. environment: that they show where points see it.
-        lobe_visibility: of vertices along their lobes, from `relume.live.free_camera.highlights.lobe_visibility`.
-            (vertices, 3) float32
-        gradients: of vertices, from `relume.live.free_camera.highlights.lobe_gradients`. (vertices, 4) float32
-        is_fine: two lobes stand for each highlight, as at points, not for those alone that ask for it.
+        lobes: of all materials. environment: prefiltered.
+        lobe_visibility: of lattice nodes, from `relume.live.free_camera.highlights.lobe_visibility`.
+        gradients: of lattice nodes, from `relume.live.free_camera.highlights.lobe_gradients`.
+        is_fine: all highlights use two lobes, as at probes, not only those that need them.
     """
 
     lobes: Lobes
     environment: PrefilteredEnvironment
-    lobe_visibility: F32
-    gradients: F32
+    lobe_visibility: Shaped[F32, "nodes 3"]
+    gradients: Shaped[F32, "nodes 4"]
     is_fine: bool
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def blend(values, lattice_node, weight):  # type: ignore[no-untyped-def]
-    """Interpolate vectors between the three vertices about a pixel.
+    """Interpolate vectors between three lattice nodes.
 
     Args:
-        values: of all vertices. (vertices, 3). lattice_node: the three, a tuple. weight: of each, a tuple.
+        values: of all nodes. (nodes, 3). lattice_node: the three, a tuple. weight: of each, a tuple.
     """
     x = y = z = np.float32(0)
     for k in range(3):
@@ -69,7 +69,7 @@ def blend(values, lattice_node, weight):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _logistic_tail(x):  # type: ignore[no-untyped-def]
-    """Approximate b, with 1 / (1 + b) the share of a normal distribution above −x."""
+    """Approximate b, with 1 / (1 + b) the fraction of a normal distribution above −x."""
     if x > _FULLY_ABOVE:
         return np.float32(0)
     return math.exp(np.float32(-1.702) * max(x, np.float32(-20)))
@@ -77,14 +77,14 @@ def _logistic_tail(x):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _lobe_radiance(mirror_data, lattice_node, weight, direction, outward, lobe, n, light):  # type: ignore[no-untyped-def]
-    """Find what the lobe of a pixel sees.
+    """Evaluate the environment in the lobe of a pixel.
 
     Args:
         mirror_data, lattice_node, weight, direction, lobe: see `shade_pixels`; of the pixel.
-        outward: of its face, where it is not the way that `n`, its normal, leans.
+        outward: normal of its face, which differs from `n`, its shading normal.
         light: written, radiance. (3,)
     Returns:
-        A row of the lobe's table and the share of the next, for its albedo.
+        A row of the lobe's table and the fraction toward the next, for its albedo.
     """
     visibility = blend(mirror_data.lobe_visibility, lattice_node, weight)
     row, fraction, lobe_direction, sigma_1 = evaluate_lobe(mirror_data.lobes, lobe, n, direction)
@@ -92,7 +92,7 @@ def _lobe_radiance(mirror_data, lattice_node, weight, direction, outward, lobe, 
     lobe_cosine = (lobe_direction[0] * outward[0] + lobe_direction[1] * outward[1] + lobe_direction[2] * outward[2]) * (
         np.float32(-1) if view_cosine > 0 else np.float32(1)
     )
-    # points know what hides the sky from a lobe about their own normal; one that leans may look into its own surface
+    # lobe visibility is that of the probes' normals; a lobe of a perturbed normal may point into its own surface
     inverse_sigma = np.float32(1) / sigma_1
     lobe_tail, mirror_tail = (
         _logistic_tail(inverse_sigma * lobe_cosine),
@@ -119,7 +119,7 @@ def _lobe_radiance(mirror_data, lattice_node, weight, direction, outward, lobe, 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _albedo(lobes, lobe, row, fraction, group):  # type: ignore[no-untyped-def]
-    """The albedo of a lobe in a group of terms, three numbers; row, share: see `_mirror`."""
+    """Albedo of a lobe in a group of terms, three numbers; row, fraction: see `_lobe_radiance`."""
     lower, upper = lobes.albedo[lobe, row, group], lobes.albedo[lobe, row + 1, group]
     return (
         lower[0] + fraction * (upper[0] - lower[0]),
@@ -130,11 +130,11 @@ def _albedo(lobes, lobe, row, fraction, group):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _gradient_term(gradients, lattice_node, weight, direction, n):  # type: ignore[no-untyped-def]
-    """Find how much more other light a lobe sees than is interpolated: luminance, for an albedo of one.
+    """Difference of other light in a lobe from the interpolated value: luminance, for unit albedo.
 
     Args:
-        gradients: of all vertices. (vertices, 4). lattice_node, weight, direction: of the pixel, see `shade_pixels`.
-        n: its normal, before a normal map bends it, which points know nothing of.
+        gradients: of all nodes. (nodes, 4). lattice_node, weight, direction: of the pixel, see `shade_pixels`.
+        n: its normal without normal mapping.
     """
     x, y, z = blend(gradients, lattice_node, weight)
     probe_term = np.float32(0)
@@ -147,10 +147,10 @@ def _gradient_term(gradients, lattice_node, weight, direction, n):  # type: igno
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def interpolate_uv(uvs, corners, uv):  # type: ignore[no-untyped-def]
-    """Find the place in textures of a place in a triangle.
+    """Return the texture coordinates of a point in a triangle.
 
     Args:
-        uvs: of all corners. (corners, 2). corners: the triangle's three, a tuple. uv: the place in it, of two of them.
+        uvs: of all corners. (corners, 2). corners: the triangle's three, a tuple. uv: barycentric coordinates of two.
     """
     a, b, c = corners
     w0, w1, w2 = np.float32(1) - uv[0] - uv[1], uv[0], uv[1]
@@ -159,11 +159,11 @@ def interpolate_uv(uvs, corners, uv):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def texture_footprint(distance, pixel_angle, uv_scale, cosine):  # type: ignore[no-untyped-def]
-    """Find the side of what a pixel sees of a texture.
+    """Return the side of a pixel's footprint in a texture.
 
     Args:
-        distance: from the eye, metres. pixel_angle: that a pixel spans, radians.
-        uv_scale: side in the texture of a metre of the surface. cosine: cosine of the slant, of either sign.
+        distance: from the camera, meters. pixel_angle: of a pixel, radians.
+        uv_scale: texture units per meter. cosine: between view direction and normal, of either sign.
     """
     return distance * pixel_angle * uv_scale / math.sqrt(max(abs(cosine), _MIN_SLANT))
 
@@ -172,7 +172,7 @@ def texture_footprint(distance, pixel_angle, uv_scale, cosine):  # type: ignore[
 def _perturbed_normal(  # type: ignore[no-untyped-def]
     textures, texture, texture_uv, footprint, tangents, corners, uv, n, outward, is_back_face, scratch
 ):
-    """Look up where the normal n of a pixel leans. outward: of the face. is_behind: its other side is seen."""
+    """Return the mapped normal of a pixel. outward: of the face. is_back_face: its back side is visible."""
     a, b, c = corners
     w0, w1, w2 = np.float32(1) - uv[0] - uv[1], uv[0], uv[1]
     side = np.float32(-1) if is_back_face else np.float32(1)
@@ -191,7 +191,7 @@ def _shade_pixels(  # type: ignore[no-untyped-def]
     emission, mirror_data, rows,
     start, stop, out,
 ):  # fmt: skip
-    """Sum what vertices and lobes send along the rays that are [start, stop) of rows, and what surfaces emit."""
+    """Sum interpolated radiance, lobes and emission along rays rows[start:stop]."""
     textures, uvs, tangents, faces, uv_faces, face_material, face_normal, uv_scale, normals = scene_arrays
     face, uv, distance = hits
     lobes = mirror_data.lobes
@@ -203,7 +203,7 @@ def _shade_pixels(  # type: ignore[no-untyped-def]
             out[p, 0] = out[p, 1] = out[p, 2] = 0
             continue
         material = face_material[f]
-        # tuples, and helpers that are inlined: arrays handed over would be counted as references, several times a ray
+        # tuples and inlined helpers: passing arrays would count references, several times per ray
         outward = face_normal[f, 0], face_normal[f, 1], face_normal[f, 2]
         corners = faces[f, 0], faces[f, 1], faces[f, 2]
         nodes, weights = (
@@ -269,18 +269,17 @@ def _shade_pixels(  # type: ignore[no-untyped-def]
 
 
 class InterpolatedProbes(NamedTuple):
-    """What vertices send to an eye, and what leaning pixels about them make of it.
+    """Radiance at lattice nodes, interpolated from probes.
 
     Attributes:
-        radiance: radiance, untextured, then by each of `TEXTURES`. (vertices, groups, 3) float32
-        is_reflective: whether a material sends anything of a group at all, by lobes too. (materials, groups) bool
-        light_gradient: from `relume.live.free_camera.normal_mapping`; empty where no material has a normal map.
-            (vertices, 3) float32
+        radiance: without textures, then for each of `TEXTURES`.
+        is_reflective: a material reflects any light by a group of terms, lobes included.
+        light_gradient: from `relume.live.free_camera.normal_mapping`; empty if no material has a normal map.
     """
 
-    radiance: F32
-    is_reflective: NDArray[np.bool_]
-    light_gradient: F32
+    radiance: Shaped[F32, "nodes groups 3"]
+    is_reflective: Shaped[NDArray[np.bool_], "materials groups"]
+    light_gradient: Shaped[F32, "mapped_nodes 3"]
 
 
 def shade_pixels(
@@ -288,21 +287,19 @@ def shade_pixels(
     gbuffer: GBuffer,
     pixel_angle: float,
     interpolated_probes: InterpolatedProbes,
-    emission: F32,
+    emission: Shaped[F32, "materials 3"],
     mirror_data: MirrorData,
-    rows: NDArray[np.int32] | None = None,
-    out: F32 | None = None,
-) -> F32:
-    """Find the radiance along rays that see a surface; the others are black.
+    rows: Shaped[NDArray[np.int32], " n"] | None = None,
+    out: Shaped[F32, "rays 3"] | None = None,
+) -> Shaped[F32, "rays 3"]:
+    """Return the outgoing radiance along rays; 0 without a surface.
 
     Args:
-        stored_scene: that is seen. gbuffer: what rays see of it.
-        pixel_angle: angle that a pixel spans, radians.
-        interpolated_probes: by every vertex. mirror_data: what lobes send besides.
-        emission: radiance of each material's own, the mean over its surfaces. (materials, 3) float32
-        rows: rays that are asked; None: all. (n,) int32. out: written there; None: new.
-    Returns:
-        (rays, 3) float32
+        stored_scene: the scene. gbuffer: of the rays.
+        pixel_angle: of a pixel, radians.
+        interpolated_probes: at every lattice node. mirror_data: of lobes.
+        emission: radiance of each material, mean over its surfaces.
+        rows: rays to shade; None: all. out: written there; None: new.
     """
     radiance = np.empty((len(gbuffer.directions), 3), np.float32) if out is None else out
     ray_indices = np.arange(len(radiance), dtype=np.int32) if rows is None else rows

@@ -1,9 +1,9 @@
-"""What points send to an eye: B(x, ωo) = Σ_k p_k(ωo) t_k(x), for the points that a picture needs.
+"""Outgoing radiance of probes: B(x, ωo) = Σ_k p_k(ωo) t_k(x), for the probes that an image needs.
 
-What has a highlight sends the sky apart from other light
-(`relume.live.free_camera.highlights.interpolated_highlights`). Of other light it sends Σ_k w_k p_k t_k: functions cut
-off at a degree ring, black beside what is bright, which w takes away for a little blur
-(docs/free-camera.md#highlights).
+Highlights treat the environment separately from other light
+(`relume.live.free_camera.highlights.interpolated_highlights`).
+Other light in highlights is Σ_k w_k p_k t_k: truncation at a degree causes ringing, which is negative next to bright
+light, and the window w removes it at the cost of a little blur (docs/free-camera.md#highlights).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -28,7 +29,7 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 
-# In one piece: arrays that are handed to functions, even to inlined ones, are counted as references, at every point.
+# One function: arrays passed to functions, even inlined ones, are reference-counted, for every probe.
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _shade_probes(  # type: ignore[no-untyped-def]
     recurrence_table,
@@ -44,7 +45,7 @@ def _shade_probes(  # type: ignore[no-untyped-def]
     out,
     environment,
 ):
-    """Evaluate the points that are [start, stop) of rows. out, sky: (points, groups, 3), written there"""
+    """Shade probes rows[start:stop]. out, environment: (probes, groups, 3), written there"""
     position, normal, tangent, _, _ = probes
     num_groups, num_basis = out.shape[1], recurrence_table.order.shape[0]
     rotated_light, outgoing = np.empty((3, num_basis), np.float32), np.empty((num_groups, 3), np.float32)
@@ -95,7 +96,7 @@ def _shade_probes(  # type: ignore[no-untyped-def]
                                 lower[basis_index] + fraction * (upper[basis_index] - lower[basis_index])
                             ) * rotated_light[channel, basis_index]
                         outgoing[group, channel] = total
-            if is_anisotropic:  # apart: beside its loop the one above is four times slower
+            if is_anisotropic:  # a separate function: inlined, it makes the loop above four times slower
                 view_coordinates = row, fraction, cosine_phi, sine_phi
                 _add_anisotropic(
                     tables.anisotropic,
@@ -114,13 +115,13 @@ def _shade_probes(  # type: ignore[no-untyped-def]
                         out[p, group, channel] = outgoing[group, channel]
                     elif kind == 2:
                         environment[p, group, channel] = outgoing[group, channel]
-                    else:  # what rings below black would take from the sky beside it
+                    else:  # negative ringing would be subtracted from the environment
                         out[p, group, channel] += max(outgoing[group, channel], np.float32(0))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _add_anisotropic(tables, table_index, material, kind, view_coordinates, vectors, non_environment, p, out):  # type: ignore[no-untyped-def]
-    """Add sums of the light vector of point p with tables over θo and φo. out: (groups, 3)"""
+    """Add products of coefficients of probe p with tables over θo and φo. out: (groups, 3)"""
     row, fraction, cosine_phi, sine_phi = view_coordinates
     azimuth = math.atan2(sine_phi, cosine_phi) / (np.float32(2) * np.float32(math.pi))
     column_coordinate = (azimuth - math.floor(azimuth)) * np.float32(NUM_COLUMNS)
@@ -145,34 +146,34 @@ def _add_anisotropic(tables, table_index, material, kind, view_coordinates, vect
 
 
 class ProbeRadiance(NamedTuple):
-    """What points send, by groups of terms as in `Tables`.
+    """Outgoing radiance of probes, by groups of terms as in `Tables`.
 
     Attributes:
-        radiance: without the sky in highlights. (points, groups, 3) float32
-        environment: in highlights, as far as the in-basis tells it. (points, groups, 3) float32
+        radiance: without the environment in highlights.
+        environment: in highlights, as far as the basis represents it.
     """
 
-    radiance: F32
-    environment: F32
+    radiance: Shaped[F32, "probes groups 3"]
+    environment: Shaped[F32, "probes groups 3"]
 
 
 def shade_probes(
     stored_scene: StoredScene,
-    vectors: F32,
-    non_environment: F32 | None,
+    vectors: Shaped[F32, "probes 3 K"],
+    non_environment: Shaped[F32, "probes 3 K"] | None,
     tables: Tables,
-    camera_position: F32,
-    is_needed: NDArray[np.uint8],
+    camera_position: Shaped[F32, " 3"],
+    is_needed: Shaped[NDArray[np.uint8], " probes"],
     out: ProbeRadiance | None = None,
 ) -> ProbeRadiance:
-    """Find what points send to an eye.
+    """Return the outgoing radiance of probes toward a camera.
 
     Args:
-        stored_scene: whose points. vectors: t of each. (points, 3, K) float32
-        non_environment: t of all light but the sky's own, for terms with a highlight; None: they send nothing.
-        tables: of all materials. camera_position: where it is. (3,) float32
-        is_needed: points that are evaluated. (points,) uint8
-        out: written where needed; None: the others are black.
+        stored_scene: the scene. vectors: t of each probe.
+        non_environment: t of all light except the environment's own, for highlights; None: no highlights.
+        tables: of all materials. camera_position: of the camera.
+        is_needed: nonzero for probes to shade.
+        out: overwritten there; None: new, zero elsewhere.
     """
     shape = len(vectors), NUM_GROUPS, 3
     outgoing = ProbeRadiance(np.zeros(shape, np.float32), np.zeros(shape, np.float32)) if out is None else out

@@ -36,9 +36,9 @@ LIGHTS_PER_GROUP = 4  # adjacent lights that are merged if several are visible
 _MIN_SQUARED_DISTANCE = np.float32(2.0**MIN_EXPONENT)
 LEAST_BITS = np.int32(np.float32(_MIN_SQUARED_DISTANCE).view(np.int32))
 _HALF_OCTAVE = np.float32(2.0**-22)  # of bits of a float: one ring
-_LAST_RING, _LAST_SPOKE = np.float32(NUM_RINGS - 1.001), np.float32(NUM_AZIMUTHS - 1.001)
+_LAST_RING, _LAST_AZIMUTH = np.float32(NUM_RINGS - 1.001), np.float32(NUM_AZIMUTHS - 1.001)
 _RADIUS_TO_VARIANCE = 8.0  # a triangle's r² over that of the circle about it: of an equilateral one, along an axis
-_SPOKES_PER_RADIAN = np.float32(NUM_AZIMUTHS / math.pi)
+_AZIMUTHS_PER_RADIAN = np.float32(NUM_AZIMUTHS / math.pi)
 
 
 class EnvironmentLights(NamedTuple):
@@ -87,7 +87,7 @@ def _sum_lights(probes, material, visibility_bits, environment_lights, lobes, ca
     shape = lobes.shape.reshape(lobes.shape.shape[0], lobes.shape.shape[1], lobes.shape.shape[2] * NUM_GRID_DIRECTIONS)
     num_groups = lights.shape[0] >> LIGHTS_PER_GROUP
     visible_lights, ring = np.empty(num_groups, np.int32), np.empty(num_groups, np.float32)
-    spoke, scale = np.empty(num_groups, np.float32), np.empty(num_groups, np.float32)
+    azimuth, scale = np.empty(num_groups, np.float32), np.empty(num_groups, np.float32)
     ring_bits = ring.view(np.int32)
     for p in rows[start:stop]:
         out[p, 0] = out[p, 1] = out[p, 2] = 0
@@ -121,9 +121,9 @@ def _sum_lights(probes, material, visibility_bits, environment_lights, lobes, ca
                 num += 1
         for k in range(num):  # contiguous, so that the next loop vectorizes
             light = visible_lights[k]
-            ring[k], spoke[k], scale[k] = lights[light, 0], lights[light, 1], lights[light, 2]
+            ring[k], azimuth[k], scale[k] = lights[light, 0], lights[light, 1], lights[light, 2]
         for k in range(num):
-            lx, ly, lz = ring[k], spoke[k], scale[k]
+            lx, ly, lz = ring[k], azimuth[k], scale[k]
             mirror_cosine, cross_component = mx * lx + my * ly + mz * lz, ex * lx + ey * ly + ez * lz
             squared_distance: Any = min(
                 max(np.float32(2) - np.float32(2) * mirror_cosine, _MIN_SQUARED_DISTANCE), np.float32(4)
@@ -141,14 +141,14 @@ def _sum_lights(probes, material, visibility_bits, environment_lights, lobes, ca
             half = (nx * lx + ny * ly + nz * lz + facing) / math.sqrt(half_squared)
             denominator = max(np.float32(2) - np.float32(2) * half, np.float32(0)) + flatness
             ring[k] = squared_distance
-            spoke[k] = min(max(psi * _SPOKES_PER_RADIAN - np.float32(0.5), np.float32(0)), _LAST_SPOKE)
+            azimuth[k] = min(max(psi * _AZIMUTHS_PER_RADIAN - np.float32(0.5), np.float32(0)), _LAST_AZIMUTH)
             scale[k] = np.float32(1) / (denominator * denominator)
         red = green = blue = np.float32(0)
         for k in range(num):
             light = visible_lights[k]
             ring_coordinate: Any = min(np.float32(ring_bits[k] - LEAST_BITS) * _HALF_OCTAVE, _LAST_RING)
-            r, s = np.int32(ring_coordinate), np.int32(spoke[k])
-            fr, fs = ring_coordinate - np.float32(r), spoke[k] - np.float32(s)
+            r, s = np.int32(ring_coordinate), np.int32(azimuth[k])
+            fr, fs = ring_coordinate - np.float32(r), azimuth[k] - np.float32(s)
             at = table_start[light] + r * NUM_AZIMUTHS + s
             wa, wb = (np.float32(1) - fr) * (np.float32(1) - fs), (np.float32(1) - fr) * fs
             wc, wd = fr * (np.float32(1) - fs), fr * fs

@@ -1,9 +1,8 @@
-"""How densely points lie: more where eyes begin, where shadows end, and where surfaces turn.
+"""Density of probes: higher near initial cameras, at shadow edges, and on curved surfaces.
 
-What is between points is interpolated: off by as much as what they get differs over their distance s. With g what
-differs for each metre, Σ A g² s² over areas A is least where s ∝ 1 / √g. But g is known from points that may be farther
-apart than a shadow's edge is wide, and is then too small: a somewhat greater power leaves less
-(docs/free-camera.md#surface-probes).
+Interpolation between probes at a distance s has an error proportional to the light's gradient g: Σ A g² s² over areas A
+is least if s ∝ 1 / √g. But g is estimated from probes that may be farther apart than a shadow edge is wide, and is then
+too small: a somewhat larger power leaves less error (docs/free-camera.md#surface-probes).
 """
 
 from __future__ import annotations
@@ -12,6 +11,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import luminance
@@ -32,24 +32,26 @@ from relume.raytrace.visibility import trace_visibility
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_MAX_COARSENESS = 4.0  # or fine, beside a middling distance from the eye
+_MAX_COARSENESS = 4.0  # or fineness, relative to the RMS distance from the camera
 _POWER = 0.6
-_FINER, _COARSER = -4, 2  # powers of two, by what differs
-_OWN_WEIGHT = 0.9  # of a point's own; the rest is the mean of its face, whose shadows may lie between points
-_CURVATURE_WEIGHT = 2.0  # that surfaces which turn count beside shadows
-_NUM_UNIFORM_DIRECTIONS = 512  # directions: lights move
-_NUM_DIRECTIONS, _NUM_TRIAL_PROBES = 96, 1000  # that tell; points that choose them
-_MIN_VARIANCE = 0.02  # variance that counts where all tried points see a direction, or none
+_FINER, _COARSER = -4, 2  # powers of two, by the gradient
+_OWN_WEIGHT = 0.9  # of a probe's own gradient; the rest is the mean of its face, whose shadows may lie between probes
+_CURVATURE_WEIGHT = 2.0  # of curvature relative to shadows
+_NUM_UNIFORM_DIRECTIONS = 512  # directions, since lights move
+_NUM_DIRECTIONS, _NUM_TRIAL_PROBES = 96, 1000  # test directions; probes that select them
+_MIN_VARIANCE = 0.02  # added to the variance of visibility
 _PAIRS_PER_BATCH = 1 << 14  # pairs
 
 
-def density_from_distance(geometry: SceneBuffers, camera_positions: F64, probe_grid: ProbeGrid) -> ProbeDensity:
-    """Find how many times farther apart points are than those at a middling distance from the eyes.
+def density_from_distance(
+    geometry: SceneBuffers, camera_positions: Shaped[F64, "cameras 3"], probe_grid: ProbeGrid
+) -> ProbeDensity:
+    """Return probe spacings relative to those at the RMS distance from the cameras.
 
     Args:
-        geometry: the scene's triangles. camera_positions: places that the scene is seen from at first; what is twice as
-            far from them has a quarter of the points. (eyes, 3)
-        probe_grid: at whose nodes it is found; at the middle of faces with one row.
+        geometry: the scene's triangles. camera_positions: initial cameras; at twice the distance there is a quarter of
+            the probes.
+        probe_grid: its nodes get the density; faces with one row at their center.
     """
     steps = enumerate_nodes(probe_grid.num_rows)
     distance = np.min(
@@ -66,13 +68,16 @@ def density_from_distance(geometry: SceneBuffers, camera_positions: F64, probe_g
 
 
 def density_from_shadows(
-    geometry: SceneBuffers, placed_probes: PlacedProbes, camera_positions: F64, lights: TriangleLights
+    geometry: SceneBuffers,
+    placed_probes: PlacedProbes,
+    camera_positions: Shaped[F64, "cameras 3"],
+    lights: TriangleLights,
 ) -> ProbeDensity:
-    """The same, finer where points that lie next to each other do not see the same.
+    """Return the same, finer where adjacent probes have different visibility.
 
     Args:
-        geometry, camera_positions: as of `density_from_distance`. placed_probes: points on the triangles.
-        lights: of the environment, which count as much as light from everywhere.
+        geometry, camera_positions: as in `density_from_distance`. placed_probes: probes on the triangles.
+        lights: of the environment; they count as much as uniform light.
     """
     probe_grid, lattice_nodes = placed_probes.probe_grid, placed_probes.lattice_nodes
     steps = enumerate_nodes(probe_grid.num_rows)
@@ -93,18 +98,18 @@ def density_from_shadows(
 
 
 def _face_means(values: F64, steps: GridSteps, num_faces: int) -> F64:
-    """Average what nodes have over those of each face. (faces,)"""
+    """Mean of node values per face. (faces,)"""
     face = steps.grid // 2
     return np.bincount(face, values, num_faces) / np.maximum(np.bincount(face, minlength=num_faces), 1)
 
 
 def _node_areas(geometry: SceneBuffers, probe_grid: ProbeGrid, steps: GridSteps) -> F64:
-    """Share the areas of faces among their nodes, square metres. (n,)"""
+    """Divide the areas of faces among their nodes, square meters. (n,)"""
     return np.asarray(geometry.face_areas[steps.grid // 2] / num_nodes(probe_grid.num_rows).ravel()[steps.grid])
 
 
 def _node_positions(geometry: SceneBuffers, steps: GridSteps) -> F64:
-    """Find where nodes are, metres; of faces with one row, their middle. (n, 3)"""
+    """Positions of nodes, meters; the center of faces with one row. (n, 3)"""
     a, b, c = geometry.positions[geometry.faces[steps.grid // 2]].astype(np.float64).transpose(1, 0, 2)
     is_single_row = steps.rows == 1
     u, v = (np.where(is_single_row, 1 / 3, step / steps.rows)[:, None] for step in (steps.i, steps.j))
@@ -112,7 +117,7 @@ def _node_positions(geometry: SceneBuffers, steps: GridSteps) -> F64:
 
 
 def _neighbor_pairs(placed_probes: PlacedProbes) -> NDArray[np.int64]:
-    """Points that are next to each other on a face, each pair once. (pairs, 2)"""
+    """Pairs of probes that are adjacent on a face, each pair once. (pairs, 2)"""
     lattice_node, main_probe = (
         placed_probes.probe_grid.node_index,
         placed_probes.lattice_nodes.probe[:, 0].astype(np.int64),
@@ -128,7 +133,7 @@ def _neighbor_pairs(placed_probes: PlacedProbes) -> NDArray[np.int64]:
 
 
 def _grids_by_size(probe_grid: ProbeGrid) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
-    """Where grids of each size begin, and which of their nodes are next to each other. (grids,), (edges, 2)"""
+    """Yield the first nodes of grids of each size, and pairs of their adjacent nodes. (grids,), (edges, 2)"""
     num_rows, first = probe_grid.num_rows.ravel(), probe_grid.first.ravel().astype(np.int64)
     for rows in map(int, np.unique(num_rows[num_rows > 0])):
         inner = [(i, j) for i in range(rows) for j in range(rows - i)]
@@ -138,14 +143,14 @@ def _grids_by_size(probe_grid: ProbeGrid) -> Iterator[tuple[NDArray[np.int64], N
 
 
 class _TestDirections(NamedTuple):
-    """Directions whose shadows tell where light changes. direction: (d, 3). weight: of what each stands for. (d,)"""
+    """Directions whose visibility shows where light changes. direction: (d, 3). weight: of each. (d,)"""
 
     direction: F32
     weight: F64
 
 
 def _choose_directions(geometry: SceneBuffers, probes: SurfacePoints, lights: TriangleLights) -> _TestDirections:
-    """Choose directions, of lights and from everywhere, as often as some points see them and others do not."""
+    """Sample directions of lights and uniform ones by the variance of their visibility."""
     power = luminance(lights.irradiance.astype(np.float64))
     uniform_directions = _sphere(_NUM_UNIFORM_DIRECTIONS)
     direction = np.concatenate([lights.direction, uniform_directions]).astype(np.float32)
@@ -165,7 +170,7 @@ def _choose_directions(geometry: SceneBuffers, probes: SurfacePoints, lights: Tr
 
 
 def _visibility(geometry: SceneBuffers, probes: SurfacePoints, directions: F32) -> NDArray[np.bool_]:
-    """Find which directions points see. (n, d)"""
+    """Visibility of directions from probes. (n, d)"""
     traced = trace_visibility(geometry.embree, probes.position, probes.normal, directions)
     return np.unpackbits(traced.visible, axis=1, count=len(directions), bitorder="little").astype(np.bool_)
 
@@ -173,10 +178,10 @@ def _visibility(geometry: SceneBuffers, probes: SurfacePoints, directions: F32) 
 def _light_gradient(
     geometry: SceneBuffers, probes: SurfacePoints, pairs: NDArray[np.int64], lights: TriangleLights
 ) -> F64:
-    """How much each point gets otherwise than those next to it do, of all light, by the metre. (n,)
+    """Difference of light between each probe and its neighbors, relative to all light, per meter. (n,)
 
-    Of what one of a pair does not see, the smaller cosine counts; of what both see, the square of how its cosine
-    changes, since most of that is met by what is linear between points.
+    For directions visible from one of a pair, the smaller cosine counts; for those visible from both, the square of the
+    change of cosine, since linear interpolation handles most of it.
     """
     directions, weight = _choose_directions(geometry, probes, lights)
     is_visible = _visibility(geometry, probes, directions)
@@ -197,7 +202,7 @@ def _light_gradient(
 
 
 def _sphere(count: int) -> F32:
-    """Directions evenly over the sphere, by Fibonacci's spiral. (count, 3)"""
+    """Uniform directions on the sphere, by a Fibonacci spiral. (count, 3)"""
     z = 1 - (2 * np.arange(count) + 1) / count
     azimuth = np.pi * (3 - np.sqrt(5)) * np.arange(count)
     flat = np.sqrt(1 - z**2)

@@ -1,9 +1,9 @@
-"""How vertices of a lattice follow from points.
+"""Interpolation weights of lattice nodes from probes.
 
-A mesh may be much finer than points are dense: its corners take what a few points about them send, by Shepard's weights
-((R − d) / (R d))², where R is the distance of the first point that is left out, changed by as little as it takes for
-light that is linear in the tangent plane to be met. A corner that is a point itself takes its own. Nodes inside a face
-whose points are farther apart than its nodes lie on the straight line between those.
+A mesh may be much finer than the spacing of probes: its corners interpolate a few surrounding probes with Shepard's
+weights ((R − d) / (R d))², where R is the distance of the first excluded probe, corrected minimally to reproduce linear
+functions in the tangent plane. A corner that is a probe takes its own value. Nodes inside a face with a larger probe
+spacing are linear between those on its edges.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
@@ -21,30 +22,32 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 PROBES_PER_NODE = 4
-MATERIAL_SEPARATION = 1e3  # spacings between materials, and between sides
-_REGULARIZATION = 0.05  # how far off what is linear may stay, beside how far weights change
+MATERIAL_SEPARATION = 1e3  # distance of materials, and of sides, in spacings
+_REGULARIZATION = 0.05  # tolerance of linear reproduction against changes of weights
 _MIN_WEIGHT = 2e-3
 _NODES_PER_BATCH = 1 << 16  # vertices
 
 
 class NodeWeights(NamedTuple):
-    """Points and weights of vertices.
+    """Probes and weights of lattice nodes.
 
     Attributes:
-        probe: unlike each other or of no weight. (V, `PROBES_PER_NODE`) uint32
-        weight: of each, one in sum. (V, `PROBES_PER_NODE`) float32
+        probe: distinct, or of zero weight.
+        weight: of each, 1 in sum.
     """
 
-    probe: NDArray[np.uint32]
-    weight: F32
+    probe: Shaped[NDArray[np.uint32], "nodes probes_per_node"]
+    weight: Shaped[F32, "nodes probes_per_node"]
 
 
-def weights_from_nearby_probes(probe_features: F64, node_features: F64, normals: F32) -> NodeWeights:
-    """Weigh the points about some places.
+def weights_from_nearby_probes(
+    probe_features: Shaped[F64, "n d"], node_features: Shaped[F64, "nodes d"], normals: Shaped[F32, "nodes 3"]
+) -> NodeWeights:
+    """Return weights of the probes around some nodes.
 
     Args:
-        probe_features, node_features: in spacings; coordinates, then what makes them unlike. (n, d), (V, d)
-        normals: at the places, unit. (V, 3)
+        probe_features, node_features: in spacings; coordinates, then features that separate them.
+        normals: at the nodes, unit.
     """
     tree = cKDTree(probe_features)
     num_neighbors = min(len(probe_features), PROBES_PER_NODE + 1)
@@ -56,7 +59,7 @@ def weights_from_nearby_probes(probe_features: F64, node_features: F64, normals:
     reach = np.maximum(distance[:, -1:], 1e-12)
     inside = np.clip(distance[:, :-1], 1e-6 * reach, None) if num_neighbors > 1 else np.ones((len(node_features), 1))
     raw = np.square((reach - inside) / (reach * inside)) if num_neighbors > 1 else inside
-    raw[distance[:, : raw.shape[1]] > MATERIAL_SEPARATION / 2] = 0  # another material's, where there are so few
+    raw[distance[:, : raw.shape[1]] > MATERIAL_SEPARATION / 2] = 0  # of another material, if there are few probes
     raw[:, 0] = np.maximum(raw[:, 0], 1e-12)
     node_weights = _empty_weights(len(node_features))
     node_weights.weight[:, : raw.shape[1]] = raw / raw.sum(axis=1, keepdims=True)
@@ -70,16 +73,18 @@ def weights_from_nearby_probes(probe_features: F64, node_features: F64, normals:
     return node_weights
 
 
-def make_weights_linear(weight: F64, towards: F64, normal: F64) -> F64:
-    """Change weights as little as it takes for the points' mean to lie under their vertex, Σ w x = 0, nearly.
+def make_weights_linear(
+    weight: Shaped[F64, "nodes p"], towards: Shaped[F64, "nodes 3 p"], normal: Shaped[F64, "nodes 3"]
+) -> Shaped[F64, "nodes p"]:
+    """Correct weights minimally so that the probes' mean lies at their node, Σ w x ≈ 0, in the tangent plane.
 
-    With W the weights on a diagonal, F the x, in units of their spread, above a row of ones, and b = (0, 0, 0, 1):
+    With W the diagonal matrix of weights, F the x, in units of their spread, above a row of ones, and b = (0, 0, 0, 1):
     w − W Fᵀ (F W Fᵀ + λ)⁻¹ (F w − b).
 
     Args:
-        weight: of points, one in sum. (V, p) towards: where they are. (V, 3, p) normal: unit. (V, 3)
+        weight: of probes, 1 in sum. towards: vectors to the probes. normal: unit.
     Returns:
-        None below nothing: where points lie on one side alone, what is linear is met less. (V, p)
+        Nonnegative weights: if all probes lie on one side, linear functions are reproduced less well.
     """
     x = towards - normal[:, :, None] * np.einsum("vc,vcp->vp", normal, towards)[:, None]
     x *= weight[:, None] > 0
@@ -95,13 +100,16 @@ def make_weights_linear(weight: F64, towards: F64, normal: F64) -> F64:
 
 
 def weights_from_edge_ends(
-    seed_weights: NodeWeights, seed_nodes: NDArray[np.intp], node_index: NDArray[np.intp], probe_grid: ProbeGrid
+    seed_weights: NodeWeights,
+    seed_nodes: Shaped[NDArray[np.intp], " seeds"],
+    node_index: Shaped[NDArray[np.intp], " grid_nodes"],
+    probe_grid: ProbeGrid,
 ) -> NodeWeights:
-    """Let the other vertices be the mean of both ends of the edges that they are in the middle of, coarse ones first.
+    """Interpolate the other nodes as midpoints of grid edges, coarse edges first.
 
     Args:
-        seed_weights: of the vertices `seed_nodes`. node_index: that each node of the lattice is. (nodes,)
-        probe_grid: whose nodes they are.
+        seed_weights: of the nodes `seed_nodes`. node_index: lattice node of each grid node.
+        probe_grid: the grids.
     """
     num_lattice_nodes, num_probes = int(node_index.max()) + 1, int(seed_weights.probe.max()) + 1
     coordinates = np.repeat(seed_nodes, PROBES_PER_NODE), seed_weights.probe.ravel().astype(np.intp)
@@ -125,7 +133,7 @@ def weights_from_edge_ends(
 
 
 def _select_heaviest(weights: csr_array) -> NodeWeights:
-    """Keep the points of the greatest weight in each row, as many as a vertex has."""
+    """Retain the probes with the greatest weights of each node."""
     count = np.diff(weights.indptr)
     row = np.repeat(np.arange(len(count)), count)
     order = np.lexsort((-weights.data, row))
@@ -138,7 +146,7 @@ def _select_heaviest(weights: csr_array) -> NodeWeights:
 
 
 def _normalize(weight: NDArray[Any]) -> NDArray[Any]:
-    """Leave out what is below nothing, and what cannot be seen: each point that is asked sums all its lights."""
+    """Remove negative and negligible weights: each probe in use must sum all its lights."""
     thresholded = np.where(weight < _MIN_WEIGHT, 0, weight)
     return np.asarray(thresholded / thresholded.sum(axis=1, keepdims=True), weight.dtype)
 

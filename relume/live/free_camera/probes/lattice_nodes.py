@@ -1,6 +1,6 @@
-"""Which nodes of a lattice are one, which of them are points, and how the others follow from points nearby.
+"""Merges grid nodes to lattice nodes, selects those that are probes, and interpolates the others.
 
-Corners of a mesh that is finer than points are dense keep their own normals
+Corners of a mesh that is finer than the probe spacing have their own normals
 (`relume.live.free_camera.probes.interpolation_weights`).
 """
 
@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -26,51 +27,51 @@ from relume.raytrace.surface_points import SurfacePoints
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_MERGE_DISTANCE = 0.35  # of the spacing: nodes as near as this are one point
-_SAME_NODE_DISTANCE = 1e-3  # of it: nodes as near as this are one vertex
-_SAME_NODE_NORMAL_STEPS = 50  # steps of a unit normal's components, within which vertices look the same way
-_NORMAL_WEIGHT = 1.5  # spacings that a turn of the normal by a radian is worth
-_POSITION_BITS = 20  # of each coordinate: places finer than a millionth of the scene are one
+_MERGE_DISTANCE = 0.35  # of the spacing: nodes within this distance are one probe
+_SAME_NODE_DISTANCE = 1e-3  # of the spacing: nodes within this distance are one lattice node
+_SAME_NODE_NORMAL_STEPS = 50  # quantization of a unit normal's components; equal ones are merged
+_NORMAL_WEIGHT = 1.5  # distance per radian between normals, in spacings
+_POSITION_BITS = 20  # of each coordinate: a resolution of a millionth of the scene
 _U64 = np.uint64
 _HASH_MULTIPLIERS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F], np.uint64)  # odd
-_COMPONENT_SEPARATION = 4.0  # that a surface which does not hang together with another is farther away than it is
+_COMPONENT_SEPARATION = 4.0  # added distance of unconnected mesh components, in spacings
 
 
 class LatticeNodes(NamedTuple):
-    """Corners of all grids, each once.
+    """Nodes of all grids, each once.
 
     Attributes:
-        normal: unit, on the side that is seen. (V, 3) float32
-        probe: those about it, unlike each other or of no weight. (V, `PROBES_PER_NODE`) uint32
-        weight: of each, one in sum. (V, `PROBES_PER_NODE`) float32
+        normal: unit, on the visible side.
+        probe: surrounding ones, distinct or of zero weight.
+        weight: of each, 1 in sum.
     """
 
-    normal: F32
-    probe: NDArray[np.uint32]
-    weight: F32
+    normal: Shaped[F32, "nodes 3"]
+    probe: Shaped[NDArray[np.uint32], "nodes probes_per_node"]
+    weight: Shaped[F32, "nodes probes_per_node"]
 
 
 class NodeTable(NamedTuple):
-    """Nodes of all grids, before any are shared.
+    """Nodes of all grids, before merging.
 
     Attributes:
-        surface_points: where they are. material, side: of each. (n,)
-        spacing: of the points about each, metres; powers of two of one another. (n,)
-        is_candidate: whether it may be a point; others lie in the middle of nodes of coarser grids. (n,)
-        corner, extent: of what holds all of them, from `bounding_cube`.
+        surface_points: their surface points. material, side, component: of each.
+        spacing: of probes around each, meters; ratios are powers of two.
+        is_candidate: may be a probe; others are midpoints of coarser grids.
+        corner, extent: of the bounding cube, from `bounding_cube`.
     """
 
     surface_points: SurfacePoints
-    material: NDArray[np.uint16]
-    side: NDArray[np.uint8]
-    component: NDArray[np.int32]
-    spacing: F64
-    is_candidate: NDArray[np.bool_]
-    corner: F32
+    material: Shaped[NDArray[np.uint16], " n"]
+    side: Shaped[NDArray[np.uint8], " n"]
+    component: Shaped[NDArray[np.int32], " n"]
+    spacing: Shaped[F64, " n"]
+    is_candidate: Shaped[NDArray[np.bool_], " n"]
+    corner: Shaped[F32, " 3"]
     extent: float
 
-    def rows(self, indices: NDArray[np.intp]) -> NodeTable:
-        """Choose some of them."""
+    def rows(self, indices: Shaped[NDArray[np.intp], " k"]) -> NodeTable:
+        """Select some of the nodes."""
         return self._replace(
             surface_points=self.surface_points.rows(indices),
             material=self.material[indices],
@@ -81,11 +82,11 @@ class NodeTable(NamedTuple):
         )
 
 
-def representative_nodes(grid_nodes: NodeTable, normal_steps: int) -> NDArray[np.intp]:
-    """Find nodes that stand for all, material after material, neighbours mostly next to each other.
+def representative_nodes(grid_nodes: NodeTable, normal_steps: int) -> Shaped[NDArray[np.intp], " k"]:
+    """Return one node for each group of merged candidates, sorted by material and along a Morton curve.
 
     Args:
-        normal_steps: steps of a unit normal's components, within which points look the same way.
+        normal_steps: quantization of a unit normal's components; equal ones are merged.
     """
     candidates = np.flatnonzero(grid_nodes.is_candidate)
     representatives, _ = _merge_nodes(grid_nodes.rows(candidates), _MERGE_DISTANCE, normal_steps)
@@ -93,11 +94,11 @@ def representative_nodes(grid_nodes: NodeTable, normal_steps: int) -> NDArray[np
 
 
 def num_representatives(grid_nodes: NodeTable, normal_steps: int) -> int:
-    """How many `representative_nodes` finds, for whoever tries several spacings.
+    """Return the number of `representative_nodes`, to try several spacings quickly.
 
     Args:
-        grid_nodes: of all grids; their keys are mixed to one number each, which few that differ share by chance.
-        normal_steps: as of `representative_nodes`.
+        grid_nodes: of all grids; their keys are hashed, with few collisions.
+        normal_steps: as in `representative_nodes`.
     """
     position_key, attribute_key = _keys(
         grid_nodes.rows(np.flatnonzero(grid_nodes.is_candidate)), _MERGE_DISTANCE, normal_steps
@@ -110,14 +111,14 @@ def num_representatives(grid_nodes: NodeTable, normal_steps: int) -> int:
 
 
 def build_nodes(
-    grid_nodes: NodeTable, probe_nodes: NDArray[np.intp], probe_grid: ProbeGrid
-) -> tuple[LatticeNodes, NDArray[np.uint32]]:
-    """Find the vertices that nodes are, and how they follow from points.
+    grid_nodes: NodeTable, probe_nodes: Shaped[NDArray[np.intp], " k"], probe_grid: ProbeGrid
+) -> tuple[LatticeNodes, Shaped[NDArray[np.uint32], " n"]]:
+    """Merge grid nodes to lattice nodes, with their interpolation weights.
 
     Args:
-        grid_nodes: of all grids. probe_nodes: those that are points. probe_grid: of the nodes.
+        grid_nodes: of all grids. probe_nodes: those that are probes. probe_grid: of the nodes.
     Returns:
-        The vertices, and which of them each node is. (n,) uint32
+        The lattice nodes, and the lattice node of each grid node.
     """
     first, node_index = _merge_nodes(grid_nodes, _SAME_NODE_DISTANCE, _SAME_NODE_NORMAL_STEPS)
     features, seed_nodes = _features(grid_nodes), np.flatnonzero(grid_nodes.is_candidate[first])
@@ -135,7 +136,7 @@ def build_nodes(
 
 
 def _features(grid_nodes: NodeTable) -> F64:
-    """Where nodes are, in spacings, for what is near to be like. (n, 11)"""
+    """Features of nodes, in spacings: nearby features mean similar light. (n, 11)"""
     position = grid_nodes.surface_points.position.astype(np.float64) / grid_nodes.spacing.min()
     separation = MATERIAL_SEPARATION * np.column_stack([grid_nodes.material, grid_nodes.side])
     component_offset = np.random.default_rng(1).normal(size=(int(grid_nodes.component.max()) + 1, 3))
@@ -150,8 +151,8 @@ def _features(grid_nodes: NodeTable) -> F64:
     )
 
 
-def bounding_cube(surface_points: SurfacePoints) -> tuple[F32, float]:
-    """Find the least corner of what holds all points, (3,), and its longest side, metres. points: at least one"""
+def bounding_cube(surface_points: SurfacePoints) -> tuple[Shaped[F32, " 3"], float]:
+    """Return the lowest corner of the bounding box of points, and its longest side, meters. At least one point."""
     position = surface_points.position
     return position.min(axis=0), max(float(np.ptp(position, axis=0).max()), 1e-30)
 
@@ -160,7 +161,7 @@ def bounding_cube(surface_points: SurfacePoints) -> tuple[F32, float]:
 def _key_kernel(  # type: ignore[no-untyped-def]
     positions_normals, material, side, level, size, corner, normal_steps, start, stop, position_key, attribute_key
 ):
-    """Find the keys of nodes [start, stop). size: of the boxes in which they lie together. (n,) float64"""
+    """Compute the keys of nodes [start, stop). size: of the cells in which nodes are merged. (n,) float64"""
     position, normal = positions_normals
     base = 2 * normal_steps + 1
     for i in range(start, stop):
@@ -182,7 +183,7 @@ def _key_kernel(  # type: ignore[no-untyped-def]
 def _keys(
     grid_nodes: NodeTable, merge_distance: float, normal_steps: int
 ) -> tuple[NDArray[np.uint64], NDArray[np.uint64]]:
-    """Two numbers that nodes have alike which lie together. (n,) uint64 each"""
+    """Two keys, equal for nodes that are merged. (n,) uint64 each"""
     surface_points, corner, extent = grid_nodes.surface_points, grid_nodes.corner, grid_nodes.extent
     level = np.rint(np.log2(grid_nodes.spacing / grid_nodes.spacing.min())).astype(np.uint64)
     size = np.maximum(merge_distance * grid_nodes.spacing, extent / ((1 << _POSITION_BITS) - 1))
@@ -203,10 +204,10 @@ def _keys(
 def _merge_nodes(
     grid_nodes: NodeTable, merge_distance: float, normal_steps: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Find one of the nodes that lie together, in the order of their places, and for each node which it is."""
+    """Return one of each group of merged nodes, along a Morton curve, and the group of each node."""
     surface_points, corner, extent = grid_nodes.surface_points, grid_nodes.corner, grid_nodes.extent
     position_key, attribute_key = _keys(grid_nodes, merge_distance, normal_steps)
-    # stable: of equals a point, the one with the lowest number
+    # stable: of equal nodes a candidate, with the lowest index
     order = np.lexsort((~grid_nodes.is_candidate, attribute_key, position_key))
     is_new = np.concatenate(
         [
@@ -228,7 +229,7 @@ def _merge_nodes(
 
 
 def _morton_code(position: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """Order places along a Morton curve: neighbours come mostly next to each other. (n,) uint64"""
+    """Morton codes of positions: adjacent positions are mostly in succession. (n,) uint64"""
     code = np.zeros(len(position), np.uint64)
     for bit in range(_POSITION_BITS):
         for axis in range(3):

@@ -1,11 +1,10 @@
-"""Points on all surfaces of a scene: a grid inside each face, shared between faces (mesh colours, Yuksel 2010).
+"""Mesh lattice: grids of nodes on all faces of a scene, shared between faces (mesh colors, Yuksel 2010).
 
-A face whose longest edge is R of the least spacings on it long has R rows
-(`relume.live.free_camera.probes.probe_grid`); where points shall be 2^l times as far apart,
-every 2^l-th node of both ways is one. Nodes of different faces that lie
-together, look the same way and are of one material are one point, so that light is continuous across edges, and a mesh
-finer than the spacing has fewer points than corners. What is no point follows from those about it
-(`relume.live.free_camera.probes.interpolation_weights`). Each side of a face that can be seen has nodes of its own
+A face whose longest edge is R of the smallest spacings on it long has R rows
+(`relume.live.free_camera.probes.triangle_grids`); where the probe spacing is 2^l times as large, every 2^l-th node in
+both directions is a probe. Nodes of different faces with equal position, normal and material are one probe, so that
+light is continuous across edges, and a mesh finer than the spacing has fewer probes than corners. Other nodes are
+interpolated (`relume.live.free_camera.probes.interpolation_weights`). Each visible side of a face has its own nodes
 (`relume.live.free_camera.probes.visible_sides`).
 """
 
@@ -16,6 +15,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -46,43 +46,48 @@ F64 = NDArray[np.float64]
 
 MAX_PROBES = 2_000_000
 MAX_ROWS = 255  # of the grid in one face
-_NORMAL_STEPS, _MIN_NORMAL_STEPS = 3, 1  # steps of a unit normal's components, within which points look the same way
-_NUM_TRIALS, _MAX_TRIALS = 6, 40  # after the first, fewer points than asked for are good enough, and each is coarser
+_NORMAL_STEPS, _MIN_NORMAL_STEPS = 3, 1  # quantization of a unit normal's components; equal ones are merged
+_NUM_TRIALS, _MAX_TRIALS = (
+    6,
+    40,
+)  # after the first number of trials, fewer probes are accepted, and each trial is coarser
 _COARSENING = 1.25
-_MAX_SPACING = 16.0  # spacing, beside the longest edge: then all that may be shared is
+_MAX_SPACING = 16.0  # times the longest edge; beyond, no more nodes can be merged
 NODES_PER_PROBE = 8  # more where faces are thin
-_ENDS: tuple[tuple[Literal["left", "right"], int], ...] = (("left", 0), ("right", 1))  # of equals in order
-_NARROW_ASPECT = 8.0  # times as long as wide
-_COUNT_TOLERANCE = 0.05  # of the number of points asked for
+_ENDS: tuple[tuple[Literal["left", "right"], int], ...] = (
+    ("left", 0),
+    ("right", 1),
+)  # first and last of equal entries in sorted order
+_NARROW_ASPECT = 8.0  # length over width
+_COUNT_TOLERANCE = 0.05  # of the requested number of probes
 
 
 @dataclass(frozen=True)
 class PlacedProbes:
-    """Points on surfaces, and the lattice that takes from them what they send.
+    """Probes on surfaces, and the lattice that interpolates them.
 
     Attributes:
         lattice_nodes: of the lattice.
-        probes: n of them, neighbours mostly next to each other, material after material.
-        material: of each. (n,) uint16
-        spacing: about the distance of neighbours at a middling distance from the eye, metres.
+        probes: n of them, sorted by material and along a Morton curve.
+        material: of each.
+        spacing: approximate distance of adjacent probes at the RMS distance from the camera, meters.
     """
 
     probe_grid: ProbeGrid
     lattice_nodes: LatticeNodes
     probes: SurfacePoints
-    material: NDArray[np.uint16]
+    material: Shaped[NDArray[np.uint16], " n"]
     spacing: float
 
 
 def place_probes(
-    geometry: SceneBuffers, is_open: NDArray[np.bool_], density: ProbeDensity, num_probes: int
+    geometry: SceneBuffers, is_open: Shaped[NDArray[np.bool_], "faces 2"], density: ProbeDensity, num_probes: int
 ) -> PlacedProbes:
-    """Spread about `num_probes` points over all sides that can be seen.
+    """Distribute about `num_probes` probes over all visible sides.
 
     Args:
-        geometry: the scene's triangles. is_open: which sides of faces can be seen. (faces, 2)
-        density: how far apart points are, see `relume.live.free_camera.probes.pdf_table`; of `make_corner_grid` at
-            first.
+        geometry: the scene's triangles. is_open: visible sides of faces.
+        density: relative spacings, see `relume.live.free_camera.probes.density`; of `make_corner_grid` at first.
         num_probes: at most `MAX_PROBES`.
     Raises:
         PlanError: no surface has any area.
@@ -111,10 +116,10 @@ def place_probes(
     surfaces = _PlacementInput(geometry, geometry.face_normals, mesh_components(geometry), is_open, density, finest)
     rows, normal_steps = rows_at(spacing), _NORMAL_STEPS
     probe_grid, grid_nodes = _make_grids(surfaces, rows, spacing)
-    # of the spacing, that points are as many as; how many there were
+    # exponent of the number of probes over spacing; previous trial
     power, previous_count, previous_spacing = -2.0, 0, spacing
     for trial in range(_MAX_TRIALS):
-        # where directions alone are too many
+        # coarser normals if the number of distinct normals is too large
         normal_steps = max(_MIN_NORMAL_STEPS, _NORMAL_STEPS - max(0, trial - _NUM_TRIALS))
         num_merged = num_representatives(grid_nodes, normal_steps)
         ratio = num_merged / num_probes
@@ -134,7 +139,7 @@ def place_probes(
             spacing,
             min(finer_spacing, _MAX_SPACING * float(longest.max())),
         )
-        if np.array_equal(rows, new_rows := rows_at(spacing)):  # finer than points are dense: corners alone
+        if np.array_equal(rows, new_rows := rows_at(spacing)):  # finer than the probe spacing: only corners
             grid_nodes = grid_nodes._replace(spacing=grid_nodes.spacing * (spacing / previous_spacing))
         else:
             rows, (probe_grid, grid_nodes) = new_rows, _make_grids(surfaces, new_rows, spacing)
@@ -146,16 +151,15 @@ def place_probes(
     )
 
 
-def twin_faces(geometry: SceneBuffers, edges: F64) -> NDArray[np.intp]:
-    """Find the other half of the strip that each narrow face is of; else, and of all others, the face itself.
+def twin_faces(geometry: SceneBuffers, edges: Shaped[F64, "faces 3"]) -> Shaped[NDArray[np.intp], " faces"]:
+    """Return the other half of the strip of each narrow face; for others the face itself.
 
-    Both halves of a long narrow strip lie in the same place and shall have grids alike: where one knew a shadow that
-    the other had no nodes for, strips beside each other looked like a net.
+    Both halves of a long narrow strip lie in the same position and need equal grids: if one had nodes at a shadow and
+    the
+    other did not, adjacent strips showed a net pattern.
 
     Args:
-        edges: how long each is that begins at a face's corners. (faces, 3)
-    Returns:
-        (faces,)
+        edges: length of the edge that starts at each corner of a face.
     """
     position_index = geometry.position_index[geometry.faces].astype(np.int64)
     ends = np.sort(np.stack([position_index, np.roll(position_index, -1, axis=1)]), axis=0)
@@ -169,8 +173,8 @@ def twin_faces(geometry: SceneBuffers, edges: F64) -> NDArray[np.intp]:
     return np.asarray(np.where(is_narrow, np.where(first == own_face, last, first), own_face))
 
 
-def mesh_components(geometry: SceneBuffers) -> NDArray[np.int32]:
-    """Find which faces hang together by corners in the same place. (faces,) int32"""
+def mesh_components(geometry: SceneBuffers) -> Shaped[NDArray[np.int32], " faces"]:
+    """Return the connected component of each face; faces are connected by corners in equal positions."""
     position_index = geometry.position_index
     a, b, c = position_index[geometry.faces].T
     pairs = np.concatenate([a, b]), np.concatenate([b, c])
@@ -182,19 +186,19 @@ def mesh_components(geometry: SceneBuffers) -> NDArray[np.int32]:
 
 
 def max_grid_nodes(num_faces: int, num_probes: int) -> int:
-    """How many nodes a scene's lattice has at most: the corners of all sides, and what is between."""
+    """Return the greatest number of grid nodes of a scene: the corners of all sides, and nodes between them."""
     return 6 * num_faces + NODES_PER_PROBE * num_probes
 
 
 def _num_rows(longest: F64, spacing: float, power_range: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Find how many rows grids have: of those whose points are 2^levels times as far apart somewhere, a multiple."""
+    """Number of rows of grids; a multiple of 2^range if the spacing varies by that factor on the face."""
     rows = np.clip(np.ceil(longest / spacing), 1, MAX_ROWS).astype(np.int64)
     step = 1 << np.minimum(power_range, np.log2(rows).astype(np.int64))
     return np.asarray(np.minimum(-(-rows // step), MAX_ROWS // step) * step)
 
 
 class _PlacementInput(NamedTuple):
-    """Whose points are placed. normals, piece, least: of faces, see `ProbeDensity.face_extremes`."""
+    """Input of the placement. normals, component, finest_power: of faces, see `ProbeDensity.face_extremes`."""
 
     geometry: SceneBuffers
     normals: F32
@@ -207,7 +211,7 @@ class _PlacementInput(NamedTuple):
 def _make_grids(
     placement_input: _PlacementInput, rows: NDArray[np.int64], spacing: float
 ) -> tuple[ProbeGrid, NodeTable]:
-    """Place the nodes of all grids, which are not numbered as vertices yet."""
+    """Place the nodes of all grids, not yet numbered as lattice nodes."""
     geometry, normals, component, is_open, density, finest_power = placement_input
     num_rows = np.where(is_open, rows[:, None], 0).astype(np.uint8)
     steps = enumerate_nodes(num_rows)
@@ -217,7 +221,7 @@ def _make_grids(
     surface_points = surface_at(geometry, Hits(face, uv, np.ones(len(face), np.float32)), -normal).points
     power, node_finest = density.at(steps), finest_power[face]
     step = 1 << (power - node_finest).astype(np.int64)
-    step = np.minimum(step, steps.rows & -steps.rows)  # the most that divides the rows
+    step = np.minimum(step, steps.rows & -steps.rows)  # the largest that divides the rows
     is_candidate = (steps.i % step == 0) & (steps.j % step == 0)
     node_spacing = spacing * 2.0 ** (node_finest + np.log2(step))
     probe_grid = ProbeGrid(num_rows, first_nodes(num_rows), np.empty(0, np.uint32))
@@ -227,7 +231,7 @@ def _make_grids(
     )
 
 
-def make_corner_grid(is_open: NDArray[np.bool_]) -> ProbeGrid:
-    """Make a lattice of the corners alone. is_open: sides of faces that have them. (faces, 2)"""
+def make_corner_grid(is_open: Shaped[NDArray[np.bool_], "faces 2"]) -> ProbeGrid:
+    """Make a lattice of corners only. is_open: visible sides of faces"""
     rows = is_open.astype(np.uint8)
     return ProbeGrid(rows, first_nodes(rows), np.empty(0, np.uint32))

@@ -1,4 +1,4 @@
-"""What a moving eye sees of a store: triangles, the lattice of points on them, textures."""
+"""The scene of a store for a free camera: triangles, the lattice of probes, textures."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.texture_slots import TEXTURES
@@ -24,19 +25,19 @@ from relume.store.bake_protocol import StoreReader
 F16 = NDArray[np.float16]
 F32 = NDArray[np.float32]
 
-MAX_TEXTURE_SIDE = 2048  # what an eye that moves is shown; finer levels are left out
-_MAX_TEXELS = 1 << 25  # of all finest levels; values are kept as floats, 12 bytes each
-NORMAL_MAP, EMISSION = len(TEXTURES), len(TEXTURES) + 1  # their columns in `Textures.of_material`
+MAX_TEXTURE_SIDE = 2048  # for free cameras; finer levels are omitted
+_MAX_TEXELS = 1 << 25  # of all finest levels; stored as floats, 12 bytes each
+NORMAL_MAP, EMISSION = len(TEXTURES), len(TEXTURES) + 1  # their columns in `Textures.material_textures`
 _MAX_VALUE = 6e4  # of half precision
 
 
 class SceneTextures(NamedTuple):
-    """Textures as a store keeps them.
+    """Textures in the format of a store.
 
     Attributes:
         arrays: "textures/<k>", (height, width, 3) float16.
-        attributes: attributes of the store: which texture each material has in each of `TEXTURES`, which normal map and
-            which image of what it shines, −1 for none, and how each texture continues outside.
+        attributes: attributes of the store: index of the texture of each material in each of `TEXTURES`, of its normal
+            map and of its emission texture, −1 for none, and the wrap modes of each texture.
     """
 
     arrays: dict[str, NDArray[Any]]
@@ -68,18 +69,18 @@ def collect_textures(scene: Scene) -> SceneTextures:
     return SceneTextures(arrays, {**attributes, "wraps": wraps})
 
 
-def corner_tangents(scene: Scene, geometry: SceneBuffers) -> F16:
-    """What normal maps of a scene lie along: tangents of the triangles' corners, none where there is no such map.
+def corner_tangents(scene: Scene, geometry: SceneBuffers) -> Shaped[F16, "corners 4"]:
+    """Return the tangents of the triangles' corners for normal maps; empty if no material has one.
 
     Returns:
-        With the sign of the bitangent. (num_vertices or 0, 4)
+        Tangents with the sign of the bitangent.
     """
     has_maps = any(material.normal_map is not None for material in scene.materials)
     return (geometry.tangents if has_maps else geometry.tangents[:0]).astype(np.float16)
 
 
 def _max_side(textures: Sequence[Texture]) -> int:
-    """How wide and high they may be for all to have at most `_MAX_TEXELS`."""
+    """Greatest side of textures for which all have at most `_MAX_TEXELS`."""
     side, pyramids = MAX_TEXTURE_SIDE, [MipMap.for_texture(texture) for texture in textures]
     while side > 1 and sum(p.levels[_level_index(p, side)].size // 3 for p in pyramids) > _MAX_TEXELS:
         side //= 2
@@ -96,57 +97,58 @@ def _level_index(pyramid: MipMap, side: int) -> int:
 
 
 class Textures(NamedTuple):
-    """All textures with their halvings, one after another.
+    """All textures with their mip levels, concatenated.
 
     Attributes:
-        texels: (texels, 3) float32
-        levels: first texel, height, width of each level, finest first. (levels, 3) int64
-        first: of each texture, where its levels begin; one more at the end. (textures + 1,) int64
-        wraps: how u and v continue: repeat, mirror, clamp. (textures, 2) int64
-        material_textures: texture of each material in each of `TEXTURES`, then its normal map, then the image of what
-            it shines, −1 for none. (materials, 4) int64
+        texels: linear values.
+        levels: first texel, height, width of each level, finest first.
+        first: first level of each texture, and their total.
+        wraps: modes of u and v: repeat, mirror, clamp.
+        material_textures: texture of each material in each of `TEXTURES`, then its normal map, then its emission
+            texture,
+            −1 for none.
     """
 
-    texels: F32
-    levels: NDArray[np.int64]
-    first: NDArray[np.int64]
-    wraps: NDArray[np.int64]
-    material_textures: NDArray[np.int64]
+    texels: Shaped[F32, "texels 3"]
+    levels: Shaped[NDArray[np.int64], "levels 3"]
+    first: Shaped[NDArray[np.int64], " bounds"]
+    wraps: Shaped[NDArray[np.int64], "textures 2"]
+    material_textures: Shaped[NDArray[np.int64], "materials 4"]
 
 
 @dataclass(frozen=True)
 class StoredScene:
-    """The surfaces of a bake as an eye sees them.
+    """The surfaces of a bake for a free camera.
 
     Attributes:
-        lattice_nodes: of the lattice, which follow from points.
-        probes: that light is kept at. material: of each. (n,) uint16
-        uvs: places in textures, of the triangles' corners. (num_vertices, 2) float32
-        tangents: along u, of the same, with the sign of the bitangent; empty where no material has a normal map.
-            (num_vertices, 4) float32
-        faces: the triangles. (num_faces, 3) uint32. face_material: of each. (num_faces,) int32
-        uv_faces: the triangles' corners among `uvs`. (num_faces, 3) uint32
-        face_normal: where the corners are counter-clockwise, unit. (num_faces, 3) float32
-        uv_scale: side in textures of a square metre of each. (num_faces,) float32
+        lattice_nodes: of the lattice; they interpolate probes.
+        probes: surface points with incident coefficients. material: of each.
+        uvs: texture coordinates of the triangles' corners.
+        tangents: along u, of the same corners, with the sign of the bitangent; empty if no material has a normal map.
+        faces: the triangles. face_material: of each.
+        uv_faces: the triangles' corners as indices into `uvs`.
+        face_normal: on the side with counterclockwise corners, unit.
+        uv_scale: texture units per meter of each face.
     """
 
     probe_grid: ProbeGrid
     lattice_nodes: LatticeNodes
     probes: SurfacePoints
-    material: NDArray[np.uint16]
-    uvs: F32
-    tangents: F32
-    faces: NDArray[np.uint32]
-    face_material: NDArray[np.int32]
-    face_normal: F32
-    uv_scale: F32
+    material: Shaped[NDArray[np.uint16], " probes"]
+    uvs: Shaped[F32, "uv_corners 2"]
+    tangents: Shaped[F32, "corners 4"]
+    faces: Shaped[NDArray[np.uint32], "faces 3"]
+    face_material: Shaped[NDArray[np.int32], " faces"]
+    face_normal: Shaped[F32, "faces 3"]
+    uv_scale: Shaped[F32, " faces"]
     textures: Textures
-    uv_faces: NDArray[np.uint32]
+    uv_faces: Shaped[NDArray[np.uint32], "faces 3"]
 
     @cached_property
     def normal_variation(self) -> F32:
-        """The variance of the normals of each material about their mean, from its map's coarsest level; nothing where
-        it has no map. (materials,) float32"""
+        """Variance of the normals of each material about their mean, from the coarsest level of its map; 0 without a
+        map.
+        """
         textures = self.textures
         out = np.zeros(len(textures.material_textures), np.float32)
         for material, texture in enumerate(textures.material_textures[:, NORMAL_MAP]):
@@ -158,9 +160,9 @@ class StoredScene:
 
 
 def read_probes(store: StoreReader, start: int = 0, stop: int | None = None) -> SurfacePoints:
-    """Read points [start, stop) of a store.
+    """Read probes [start, stop) of a store.
 
-    All have one seed: their rays go alike, so that what few rays miss changes smoothly from point to point.
+    All have one seed: they share ray directions, so that sampling error varies smoothly between probes.
     """
     position, normal, tangent = (
         store.read(f"probes/{name}", start, stop) for name in ("position", "normal", "tangent")
@@ -169,15 +171,15 @@ def read_probes(store: StoreReader, start: int = 0, stop: int | None = None) -> 
 
 
 def ray_pattern(store: StoreReader, num_rays: int) -> RayPattern:
-    """Make the pattern of the points' gather rays again."""
+    """Return the pattern of the probes' gather rays."""
     return make_pattern(num_rays, 0, int(store.attributes["gather_seed"]) + 1)
 
 
 def read_stored_scene(store: StoreReader) -> StoredScene:
-    """Read all of it.
+    """Read the scene of a store.
 
     Raises:
-        ChunkDamagedError: arrays of the store do not fit each other. StoreError: its description is not of this form.
+        ChunkDamagedError: arrays of the store do not match. StoreError: its attributes have another format.
     """
     probe_grid = ProbeGrid(*(store.read(f"nodes/{name}") for name in ProbeGrid._fields))
     lattice_nodes = LatticeNodes(*(store.read(f"nodes/{name}") for name in LatticeNodes._fields))
@@ -193,7 +195,7 @@ def read_stored_scene(store: StoreReader) -> StoredScene:
     )
     has_maps = bool((surface.textures.material_textures[:, NORMAL_MAP] >= 0).any())
     if has_maps and len(surface.tangents) != len(surface.uvs):
-        raise ChunkDamagedError("scene/tangents", "there are normal maps, and corners without a tangent")
+        raise ChunkDamagedError("scene/tangents", "there are normal maps, but corners without tangents")
     num_probes, num_materials = surface.probes.num_points, len(store.attributes["materials"])
     ends = probe_grid.first.astype(np.int64) + num_nodes(probe_grid.num_rows)
     fits = probe_grid.num_rows.shape == probe_grid.first.shape == (len(surface.face_material), 2)
@@ -206,16 +208,16 @@ def read_stored_scene(store: StoreReader) -> StoredScene:
     if num_probes == 0 or int(lattice_nodes.probe.max(initial=0)) >= num_probes:
         raise ChunkDamagedError("nodes", "the lattice nodes do not fit the probes")
     if max(int(surface.material.max()), int(surface.face_material.max())) >= num_materials:
-        raise ChunkDamagedError("probes", "a probe has a material that the scene has not")
+        raise ChunkDamagedError("probes", "a probe has a material that is missing in the scene")
     return surface
 
 
 def _read_faces(store: StoreReader) -> tuple[F32, F32, NDArray[np.uint32], NDArray[np.int32], F32, F32]:
-    """The fields `uvs` to `uv_scale` of `Surface`."""
+    """Return the fields `uvs` to `uv_scale` of `StoredScene`."""
     positions, faces, uvs = (store.read(f"scene/{name}") for name in ("positions", "faces", "uvs"))
     tangents = store.read("scene/tangents").astype(np.float32)
     if int(faces.max(initial=0)) >= min(len(positions), len(uvs)):
-        raise ChunkDamagedError("scene/faces", "a triangle has a corner that the scene has not")
+        raise ChunkDamagedError("scene/faces", "a triangle has a corner that is missing in the scene")
     a, b, c = positions[faces].transpose(1, 0, 2)
     normal = np.cross(b - a, c - a)
     twice_area = np.maximum(np.linalg.norm(normal, axis=1), 1e-20)
@@ -228,7 +230,7 @@ def _read_faces(store: StoreReader) -> tuple[F32, F32, NDArray[np.uint32], NDArr
 def _read_textures(store: StoreReader) -> Textures:
     try:
         channel_textures = np.array(store.attributes["textures"], np.int64).reshape(-1, len(TEXTURES))
-        # older stores do not say
+        # older stores lack it
         emission_textures = store.attributes.get("emission_images", [-1] * len(channel_textures))
         material_textures = np.column_stack(
             [channel_textures, np.array([store.attributes["normal_maps"], emission_textures], np.int64).T]
@@ -237,24 +239,24 @@ def _read_textures(store: StoreReader) -> Textures:
     except (KeyError, TypeError, ValueError) as error:
         raise StoreError(f"the store does not describe its textures ({error}); bake the scene again") from error
     if material_textures.size and not -1 <= material_textures.min() <= material_textures.max() < len(wraps):
-        raise ChunkDamagedError("textures", "a material has a texture that the store has not")
+        raise ChunkDamagedError("textures", "a material has a texture that is missing in the store")
     textures = (Texture(store.read(f"textures/{k}").astype(np.float32)) for k in range(len(wraps)))
     return Textures(*concatenate_textures(textures), wraps, material_textures)
 
 
 class ConcatenatedTextures(NamedTuple):
-    """Levels of textures one after another, as in `Textures`."""
+    """Concatenated levels of textures, as in `Textures`."""
 
-    texels: F32
-    levels: NDArray[np.int64]
-    first: NDArray[np.int64]
+    texels: Shaped[F32, "texels 3"]
+    levels: Shaped[NDArray[np.int64], "levels 3"]
+    first: Shaped[NDArray[np.int64], " bounds"]
 
 
 def concatenate_textures(textures: Iterable[Texture], max_side: int = MAX_TEXTURE_SIDE) -> ConcatenatedTextures:
-    """Stack textures with their halvings.
+    """Concatenate textures with their mip levels.
 
     Args:
-        textures: in their order. max_side: texels; levels that are wider or higher are left out.
+        textures: in order. max_side: texels; larger levels are omitted.
     """
     texels, levels, first, end = [np.empty((0, 3), np.float32)], [], [0], 0
     for texture in textures:

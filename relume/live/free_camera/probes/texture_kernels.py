@@ -1,4 +1,4 @@
-"""Kernels that look textures up where a camera sees them, as `relume.raytrace.texture` does."""
+"""Kernels that sample textures, like `relume.raytrace.texture`."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from relume.core.numba_options import UNCOUNTED
 from relume.raytrace.texture import two_texels
 
 
-# Inlined, as what it calls: calls count the references of arrays, which is two thirds of the time of a look-up.
+# Inlined: calls would count references of arrays, which takes two thirds of the time of a lookup.
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _add_level(textures, texture, level, u, v, weight, out):  # type: ignore[no-untyped-def]
-    """Add a share of a bilinear lookup in one level of a texture. out: (3,)"""
+    """Add a weighted bilinear lookup in one level of a texture. out: (3,)"""
     row = textures.first[texture] + level
     first, height, width = textures.levels[row, 0], textures.levels[row, 1], textures.levels[row, 2]
     left, right, fx = two_texels(textures.wraps[texture, 0], np.float32(u), width)
@@ -37,10 +37,10 @@ def _add_level(textures, texture, level, u, v, weight, out):  # type: ignore[no-
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def sample_texture(textures, texture, u, v, footprint, out):  # type: ignore[no-untyped-def]
-    """Look a texture up, trilinear.
+    """Sample a texture, trilinear.
 
     Args:
-        textures: all of them. texture: number of one. u, v: the place. footprint: side of the filter in u and v.
+        textures: all of them. texture: index. u, v: texture coordinates. footprint: side of the filter in u and v.
         out: written. (3,)
     """
     first = textures.first[texture]

@@ -1,4 +1,4 @@
-"""Surfaces that wear images which a look names in the place of their own."""
+"""Material map overrides for a free camera."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.texture_slots import Images, NormalMap
@@ -18,15 +19,14 @@ F32 = NDArray[np.float32]
 
 
 class ProbeMapOverrides(NamedTuple):
-    """What a look names in the place of a material's images: of each of `TEXTURES`, and of its normal map; None for
-    its own."""
+    """Map overrides of a material in a look: of each of `TEXTURES`, and of its normal map; None for the original."""
 
     images: Images = (None, None)
     normals: NormalMap | None = None
 
     @property
     def columns(self) -> tuple[str | NormalMap | None, ...]:
-        """The same as columns of `Textures.material_textures`."""
+        """The overrides in the order of columns of `Textures.material_textures`."""
         return *self.images, self.normals
 
 
@@ -34,25 +34,25 @@ NO_OVERRIDES = ProbeMapOverrides()
 
 
 class OverriddenTextures(NamedTuple):
-    """What of a surface differs by such images: fields of `relume.live.free_camera.probes.stored_scene.StoredScene`."""
+    """Fields of `relume.live.free_camera.probes.stored_scene.StoredScene` that overrides change."""
 
     textures: Textures
-    uvs: F32
-    uv_faces: NDArray[np.uint32]
-    uv_scale: F32
-    tangents: F32
+    uvs: Shaped[F32, "uv_corners 2"]
+    uv_faces: Shaped[NDArray[np.uint32], "faces 3"]
+    uv_scale: Shaped[F32, " faces"]
+    tangents: Shaped[F32, "corners 4"]
 
 
 def overridden_textures(
-    stored_scene: StoredScene, positions: F32, overrides: Sequence[ProbeMapOverrides]
+    stored_scene: StoredScene, positions: Shaped[F32, "corners 3"], overrides: Sequence[ProbeMapOverrides]
 ) -> OverriddenTextures:
-    """Put images onto a surface.
+    """Apply map overrides to a scene.
 
     Args:
-        stored_scene: as it was baked. positions: of the triangles' corners. (corners, 3) float32
-        overrides: what a look names, of each material.
+        stored_scene: as baked. positions: of the triangles' corners.
+        overrides: of each material.
     Raises:
-        NotFoundError, SceneError: an image cannot be had.
+        NotFoundError, SceneError: an image is not available.
     """
     names = list(dict.fromkeys(name for override in overrides for name in override.columns if name is not None))
     override_textures = list(map(_load_texture, names))
@@ -86,11 +86,10 @@ def _load_texture(name: str | NormalMap) -> Texture:
 
 
 def _tangents(stored_scene: StoredScene, positions: F32, uv_coordinates: F32, has_normal_map: NDArray[np.bool_]) -> F32:
-    """Give corners tangents that have none: along u, averaged over the triangles about each, the larger ones more.
+    """Add missing tangents of corners: along u, an area-weighted mean over adjacent triangles.
 
     Args:
-        uv_coordinates: in textures, of each triangle's corners. (faces, 3, 2) has_normal_map: which materials need
-            them.
+        uv_coordinates: of each triangle's corners. (faces, 3, 2) has_normal_map: materials that need tangents.
     """
     if not has_normal_map.any():
         return stored_scene.tangents
@@ -115,10 +114,10 @@ def _tangents(stored_scene: StoredScene, positions: F32, uv_coordinates: F32, ha
 def _project_uvs(
     stored_scene: StoredScene, positions: F32, has_images: NDArray[np.bool_]
 ) -> tuple[F32, NDArray[np.uint32], F32]:
-    """Give triangles a place in textures that have none: along the axis of the world that they face most, in metres.
+    """Add missing texture coordinates by tri-planar mapping along the dominant axis of each face, in meters.
 
     Returns:
-        Fields `uvs`, `uv_faces` and `uv_scale` of the surface.
+        The fields `uvs`, `uv_faces` and `uv_scale` of `StoredScene`.
     """
     flat = np.flatnonzero((stored_scene.uv_scale == 0) & has_images[stored_scene.face_material])
     if not len(flat):

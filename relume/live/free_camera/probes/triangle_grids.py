@@ -1,8 +1,7 @@
-"""Grids of nodes inside triangles: how many there are, how they are numbered, which are about a place, and how those
-that are no points follow from those that are.
+"""Grids of nodes inside triangles: their numbering, the nodes around a point, and midpoints of coarser grids.
 
-A grid has R rows, parallel to the first edge of its face, and (R + 1)(R + 2) / 2 nodes. Nodes at every 2^l-th step of
-both ways are the grid of R / 2^l rows; each node that is none of them lies in the middle of an edge of that grid.
+A grid has R rows, parallel to the first edge of its face, and (R + 1)(R + 2) / 2 nodes. Every 2^l-th node in both
+directions forms the grid with R / 2^l rows; each other node of the next finer grid is the midpoint of one of its edges.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -21,40 +21,40 @@ I64 = NDArray[np.int64]
 
 
 class ProbeGrid(NamedTuple):
-    """The grid of every side of every face; side 0 is the one where the corners are counter-clockwise.
+    """The grid of every side of every face; on side 0 the corners are counterclockwise.
 
     Attributes:
-        num_rows: R; 0 where the side has no points. (faces, 2) uint8
-        first: where its nodes begin in `node_index`. (faces, 2) uint32
-        node_index: which vertex each is. (nodes,) uint32
+        num_rows: R; 0 if the side has no nodes.
+        first: its first node in `node_index`.
+        node_index: lattice node of each grid node.
     """
 
-    num_rows: NDArray[np.uint8]
-    first: NDArray[np.uint32]
-    node_index: NDArray[np.uint32]
+    num_rows: Shaped[NDArray[np.uint8], "faces 2"]
+    first: Shaped[NDArray[np.uint32], "faces 2"]
+    node_index: Shaped[NDArray[np.uint32], " nodes"]
 
 
 class ProbeDensity(NamedTuple):
-    """How many times farther apart than a spacing points are, at the nodes of a lattice's grids.
+    """Probe spacing at the nodes of grids, relative to a base spacing.
 
     Attributes:
-        probe_grid: whose nodes; they are no vertices yet.
-        power: of two. (nodes,) int8
+        probe_grid: the grids, without lattice nodes.
+        power: log2 of the relative spacing.
     """
 
     probe_grid: ProbeGrid
-    power: NDArray[np.int8]
+    power: Shaped[NDArray[np.int8], " nodes"]
 
-    def at(self, steps: GridSteps) -> NDArray[np.int8]:
-        """Find it at the nodes of other grids on the same faces, the least of the three about each. (n,) int8"""
+    def at(self, steps: GridSteps) -> Shaped[NDArray[np.int8], " n"]:
+        """Return the power at the nodes of other grids on the same faces, the least of the three surrounding nodes."""
         out = np.empty(len(steps.grid), np.int8)
         parallel_for_chunks(
             lambda start, stop: _surrounding_minimum(self.probe_grid, self.power, steps, start, stop, out), len(out)
         )
         return out
 
-    def face_extremes(self) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
-        """Find the least and the most on each face, 0 where it has no nodes. (faces,) int8 each"""
+    def face_extremes(self) -> tuple[Shaped[NDArray[np.int8], " faces"], Shaped[NDArray[np.int8], " faces"]]:
+        """Return the least and the greatest power on each face, 0 if it has no nodes."""
         rows = self.probe_grid.num_rows
         face = np.repeat(np.arange(rows.size) // 2, num_nodes(rows).ravel())
         lowest, highest = np.full(len(rows), 127, np.int8), np.full(len(rows), -128, np.int8)
@@ -64,44 +64,44 @@ class ProbeDensity(NamedTuple):
 
 
 class GridSteps(NamedTuple):
-    """Where nodes are in their grids.
+    """Positions of nodes in their grids.
 
     Attributes:
-        grid: face · 2 + side. (n,) int32
-        i, j: steps towards the second and the third corner. (n,) int32
-        rows: of the grid. (n,) int32
+        grid: face · 2 + side.
+        i, j: steps toward the second and the third corner.
+        rows: of the grid.
     """
 
-    grid: I32
-    i: I32
-    j: I32
-    rows: I32
+    grid: Shaped[I32, " n"]
+    i: Shaped[I32, " n"]
+    j: Shaped[I32, " n"]
+    rows: Shaped[I32, " n"]
 
 
-def num_nodes(rows: NDArray[np.integer]) -> I64:
-    """How many nodes grids with so many rows have; none where there are no rows."""
+def num_nodes(rows: Shaped[NDArray[np.integer], " *grids"]) -> Shaped[I64, " *grids"]:
+    """Return the number of nodes of grids; 0 without rows."""
     wide = rows.astype(np.int64)
     return np.where(wide > 0, (wide + 1) * (wide + 2) // 2, 0)
 
 
-def first_nodes(rows: NDArray[np.integer]) -> NDArray[np.uint32]:
-    """Where the nodes of each grid begin, one grid after another. rows: of each, any shape"""
+def first_nodes(rows: Shaped[NDArray[np.integer], " *grids"]) -> Shaped[NDArray[np.uint32], " *grids"]:
+    """Return the first node of each grid, for successive grids. rows: of each"""
     counts = num_nodes(rows).ravel()
     return (np.cumsum(counts) - counts).reshape(rows.shape).astype(np.uint32)
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def node_index(rows, i, j):  # type: ignore[no-untyped-def]
-    """Number of a node in a grid of so many rows: i steps towards the second corner, j towards the third."""
+    """Index of a node in a grid of `rows` rows: i steps toward the second corner, j toward the third."""
     return i * (rows + 1) - (i * (i - 1)) // 2 + j
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def surrounding_nodes(probe_grid, face, side, u, v):  # type: ignore[no-untyped-def]
-    """Find the three nodes about a place in a face, and their weights.
+    """Return the three nodes around a point in a face, and their weights.
 
     Args:
-        probe_grid: with nodes there. face, side: where. u, v: barycentric, of the second and third corner.
+        probe_grid: with nodes there. face, side: of the point. u, v: barycentric, of the second and third corner.
     """
     rows = np.int64(probe_grid.num_rows[face, side])
     x: Any = u * rows
@@ -119,7 +119,7 @@ def surrounding_nodes(probe_grid, face, side, u, v):  # type: ignore[no-untyped-
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _surrounding_minimum(probe_grid, power, steps, start, stop, out):  # type: ignore[no-untyped-def]
-    """Find the least of the three nodes about each of the steps [start, stop)."""
+    """Write the least power of the three nodes around each of the steps [start, stop)."""
     for k in range(start, stop):
         rows = np.float32(steps.rows[k])
         u, v = np.float32(steps.i[k]) / rows, np.float32(steps.j[k]) / rows
@@ -127,8 +127,8 @@ def _surrounding_minimum(probe_grid, power, steps, start, stop, out):  # type: i
         out[k] = min(power[a], power[b], power[c])
 
 
-def enumerate_nodes(num_rows: NDArray[np.integer]) -> GridSteps:
-    """List the nodes of all grids, in the order of `node_index`. num_rows: (faces, 2)"""
+def enumerate_nodes(num_rows: Shaped[NDArray[np.integer], " *grids"]) -> GridSteps:
+    """List the nodes of all grids in the order of `node_index`."""
     flat = num_rows.ravel().astype(np.int32)
     first = first_nodes(flat).astype(np.int64)
     grid = np.repeat(np.arange(len(flat), dtype=np.int32), num_nodes(flat))
@@ -141,14 +141,14 @@ def enumerate_nodes(num_rows: NDArray[np.integer]) -> GridSteps:
 
 
 def find_edge_midpoints(
-    steps: GridSteps, first: NDArray[np.integer], nodes: NDArray[np.intp], step: int
-) -> tuple[I64, I64, I64]:
-    """Find those nodes that lie in the middle of an edge of 2 · `step` steps, and the ends of it.
+    steps: GridSteps, first: Shaped[NDArray[np.integer], " *grids"], nodes: Shaped[NDArray[np.intp], " n"], step: int
+) -> tuple[Shaped[I64, " m"], Shaped[I64, " m"], Shaped[I64, " m"]]:
+    """Return the nodes that are midpoints of edges of 2 · `step` steps, and the ends of these edges.
 
     Args:
-        steps, first: of all grids. nodes: those that are asked for. step: a power of two.
+        steps, first: of all grids. nodes: candidates. step: a power of two.
     Returns:
-        The nodes, and both ends. (m,) each
+        The nodes, and both ends.
     """
     i, j = steps.i[nodes], steps.j[nodes]
     is_midpoint = (i % step == 0) & (j % step == 0) & ((i % (2 * step) != 0) | (j % (2 * step) != 0))

@@ -1,8 +1,8 @@
-"""Which sides of faces can be seen: those that light or an eye may reach from outside, or from a camera.
+"""Visible sides of faces: those that light or a camera can reach from outside, or that a camera of the scene sees.
 
-Rays leave both sides of every face; where one hits another side, the two see each other, and where it leaves the scene,
-the side sees the outside. Whatever is connected with the outside or with what a camera sees is open; the inner sides of
-solids are connected with each other alone.
+Rays start on both sides of every face. If a ray hits another side, both sides are connected; if it leaves the scene,
+the side is connected with the outside. Sides connected with the outside or with a camera are visible; the inner sides
+of solids are only connected with each other.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -28,13 +29,13 @@ _CAMERA_PIXELS = (64, 64)
 _RAYS_PER_BATCH = 250_000
 
 
-def visible_sides(geometry: SceneBuffers, cameras: Sequence[Camera], seed: int) -> NDArray[np.bool_]:
-    """Find the sides of faces that can be seen.
+def visible_sides(geometry: SceneBuffers, cameras: Sequence[Camera], seed: int) -> Shaped[NDArray[np.bool_], "faces 2"]:
+    """Return the visible sides of faces.
 
     Args:
-        geometry: the scene's triangles. cameras: from which something is seen. seed: of the rays.
+        geometry: the scene's triangles. cameras: of the scene. seed: of the rays.
     Returns:
-        (faces, 2); side 0 is the one where the corners are counter-clockwise.
+        On side 0 the corners are counterclockwise.
     """
     num_faces = len(geometry.faces)
     outside, rng, normals = 2 * num_faces, np.random.default_rng(seed), geometry.face_normals
@@ -50,7 +51,7 @@ def visible_sides(geometry: SceneBuffers, cameras: Sequence[Camera], seed: int) 
 
 
 def _hit_sides(normals: F32, hits: Hits, directions: F32, outside: int) -> NDArray[np.int64]:
-    """Find the sides that rays hit, `outside` where they leave the scene."""
+    """Sides that rays hit, `outside` if they leave the scene."""
     is_back_side = np.einsum("nc,nc->n", normals[np.maximum(hits.face, 0)], directions) > 0
     return np.where(hits.face >= 0, 2 * hits.face.astype(np.int64) + is_back_side, outside)
 
@@ -58,7 +59,7 @@ def _hit_sides(normals: F32, hits: Hits, directions: F32, outside: int) -> NDArr
 def _trace_from_sides(
     geometry: SceneBuffers, normals: F32, sides: NDArray[np.int64], outside: int, rng: np.random.Generator
 ) -> NDArray[np.int64]:
-    """Shoot one ray from a random place of each side. (2, rays): the side, and what it sees"""
+    """Trace one ray from a random point of each side. (2, rays): the side, and the side it hits"""
     face = (sides // 2).astype(np.int32)
     normal = normals[face] * np.where(sides % 2 == 0, 1, -1)[:, None].astype(np.float32)
     root, v = np.sqrt(rng.random(len(sides))), rng.random(len(sides))
@@ -69,7 +70,7 @@ def _trace_from_sides(
 
 
 def _trace_from_camera(geometry: SceneBuffers, normals: F32, camera: Camera, outside: int) -> NDArray[np.int64]:
-    """Link what a camera sees with the outside. (2, rays)"""
+    """Connect sides that a camera sees with the outside. (2, rays)"""
     width, height = _CAMERA_PIXELS
     y, x = np.divmod(np.arange(width * height), width)
     directions = camera_directions(camera, _CAMERA_PIXELS, (x + 0.5).astype(np.float32), (y + 0.5).astype(np.float32))

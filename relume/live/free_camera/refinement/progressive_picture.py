@@ -1,6 +1,6 @@
-"""A moving picture that becomes exact when its eye rests: a still of that place replaces it, until the eye moves on.
+"""A free-camera image that becomes exact when the camera stops: a static view replaces it until the camera moves.
 
-Until the still is there the moving picture is corrected by a few exact samples, which are there at once.
+Until the static view is ready, a few exact samples, which take little time, correct the image.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.cache import Cache
@@ -38,11 +39,11 @@ Tile = tuple[int, int, int, int]
 
 
 class ProgressivePicture:
-    """Two pictures of one view that take turns; one session's, used from one thread at a time.
+    """The free-camera image and the static view of one session; used from one thread at a time.
 
     Args:
-        free_camera_picture: shown while the eye moves, and until there is something better.
-        make_static_view: finds what an eye sees; heavy. cache: of what is made for stills.
+        free_camera_picture: displayed until there is a static view.
+        make_static_view: traces a fixed view; expensive. cache: for results of static views.
     """
 
     def __init__(
@@ -50,13 +51,11 @@ class ProgressivePicture:
     ) -> None:
         self._free_camera_picture, self._make_static_view, self._cache = free_camera_picture, make_static_view, cache
         self._camera_seq, self._look_seq, self._is_idle = 0, 0, True
-        self._corrected_for: tuple[int, int] | None = (
-            None  # numbers of eye and look that a few exact samples were found for
-        )
+        self._corrected_for: tuple[int, int] | None = None  # camera and look of the last residual
         self._static_picture: Picture | None = None
-        self._has_indirect = False  # the still, if a look wants them
-        self._is_static = False  # the still is what is shown
-        self._must_resend = False  # for a picture from the eye that it has
+        self._has_indirect = False  # the static view has indirect light, if the look shows it
+        self._is_static = False  # the static view is displayed
+        self._must_resend = False  # the client set the same camera again
         self._look: Look | None = None
         self._active_pointer: str | None = None
         self._prepared_pointer: str | None = None
@@ -69,20 +68,20 @@ class ProgressivePicture:
         )
 
     def check(self, look: Look) -> None:
-        """Whether a look can be shown at all; see `Picture.check`."""
+        """Check that a look can be shown; see `Picture.check`."""
         self._displayed.check(look)
 
     def set_look(self, look: Look, *, active_pointer: str | None = None, solo: Solo = None) -> None:
-        """A new target for both; nothing is computed yet.
+        """Set a new target for both images; nothing is computed yet.
 
         Args:
-            look: that is to be shown. active_pointer: pointer to what the user's hand is on, or None.
-            solo: names of sources of light that alone are shown; None: all.
+            look: the target. active_pointer: pointer to the active control, or None.
+            solo: names of the only light sources to show; None: all.
         Raises:
-            ParameterError, NotFoundError, SceneError: as by `Picture.set_look`; both stay as they were.
+            ParameterError, NotFoundError, SceneError: as `Picture.set_look`; both images are unchanged.
         """
         static_picture = self._static_picture if self._has_indirect or not _has_indirect(look) else None
-        if static_picture is not None:  # first, for it refuses whatever the other does
+        if static_picture is not None:  # first, since it raises whenever the other does
             static_picture.set_look(look, active_pointer=active_pointer, solo=solo)
         self._free_camera_picture.set_look(look, active_pointer=active_pointer, solo=solo)
         if static_picture is None:
@@ -91,11 +90,11 @@ class ProgressivePicture:
         self._look_seq += 1
 
     def set_camera(self, camera: Camera, size: tuple[int, int], *, is_idle: bool = True) -> None:
-        """See from elsewhere; nothing is computed yet.
+        """Set the camera and the image size; nothing is computed yet.
 
         Args:
-            camera: a rigid one. size: width and height in pixels.
-            is_idle: an exact picture is to follow.
+            camera: with a rigid transform. size: width and height in pixels.
+            is_idle: an exact image follows.
         """
         self._is_idle = is_idle
         if _is_same_camera(self._free_camera_picture.sized_camera, (camera, size)):
@@ -107,7 +106,7 @@ class ProgressivePicture:
 
     @property
     def renders_pixels(self) -> bool:
-        """Whether the pixels of the moving picture are wanted at every step; see `FreeCameraPicture`."""
+        """True if the server renders the free-camera image at every step; see `FreeCameraPicture`."""
         return self._free_camera_picture.renders_pixels
 
     @renders_pixels.setter
@@ -115,17 +114,17 @@ class ProgressivePicture:
         self._free_camera_picture.renders_pixels = draws
 
     def array_blocks(self) -> tuple[dict[str, ArrayBlock], ShaderConstants] | None:
-        """What a shader needs to draw the moving picture; None while it is corrected, or the still is shown."""
+        """Return the arrays for a browser's renderer; None while a residual or a static view is displayed."""
         is_server_rendered = self._displayed is self._static_picture or self._free_camera_picture.is_corrected
         return None if is_server_rendered else self._free_camera_picture.array_blocks()
 
     def prepare(self, pointer: str) -> None:
-        """Prepare what a hand takes hold of; see `Picture.touch`."""
+        """Prepare a control before its first edit; see `Picture.prepare`."""
         self._displayed.prepare(pointer)
         self._prepared_pointer = pointer
 
     def next_job(self) -> Any:
-        """What must be made next; a still last."""
+        """Return the next job; a static view comes last."""
         if self._static_picture is not None:
             return self._static_picture.next_job()
         job = self._free_camera_picture.next_job()
@@ -142,7 +141,7 @@ class ProgressivePicture:
         return StaticViewJob(view_state, ("still", *request), partial(self._install_static_picture, self._camera_seq))
 
     def _correct(self, request: tuple[int, int], residual_image: F32 | None) -> None:
-        if request == (self._camera_seq, self._look_seq):  # else the hand has moved on
+        if request == (self._camera_seq, self._look_seq):  # else the camera or look has changed
             self._corrected_for = request
             self._free_camera_picture.correct(residual_image)
 
@@ -152,7 +151,7 @@ class ProgressivePicture:
         if static_picture is None:
             self._is_idle = False
             return
-        if _has_indirect(self._look) and not has_indirect:  # asked for meanwhile: it goes on from what was traced
+        if _has_indirect(self._look) and not has_indirect:  # requested meanwhile: it reuses the traced rays
             return
         static_picture.set_look(self._look, active_pointer=self._active_pointer, solo=self._solo)
         if self._prepared_pointer is not None:
@@ -161,16 +160,16 @@ class ProgressivePicture:
         self._static_picture, self._has_indirect = static_picture, has_indirect
 
     def install(self, job: Any, result: Any) -> None:
-        """Go on with what a job has made."""
+        """Use the result of a job."""
         if isinstance(
             job, StaticViewJob | SparseExactJob | IncrementalProbeLightJob | ProbeLightJob | RefineHighlights
         ):
             job.install(result)
-        elif self._static_picture is not None:  # else it was made for one that is gone
+        elif self._static_picture is not None:  # else its static view was dropped
             self._static_picture.install(job, result)
 
     def advance(self, max_coefficients: int | None) -> Progress:
-        """Bring what is shown to its look and its eye; a still is shown once it is exact, and from then on."""
+        """Update the displayed image to its look and camera; a static view is displayed once it is exact."""
         step = self._step(max_coefficients)
         if not self._must_resend:
             return step
@@ -191,7 +190,9 @@ class ProgressivePicture:
         )
 
     def _relative_error(self, static_picture: Picture) -> float | None:
-        """How far the moving picture is from a still, relative RMS; None where it has not caught up, or all is dark."""
+        """Relative RMS difference between the free-camera image and a static view; None if the former is outdated or
+        black.
+        """
         self._free_camera_picture.correct(None)
         if self._free_camera_picture.advance(None).fidelity != "approximate":
             return None
@@ -200,38 +201,38 @@ class ProgressivePicture:
         return float(np.sqrt(np.mean((self._free_camera_picture.image() - exact) ** 2) / size)) if size else None
 
     def all_tiles(self) -> list[Tile]:
-        """Tiles that cover the picture."""
+        """Return the tiles that cover the image."""
         return self._displayed.all_tiles()
 
     def encode(self, tiles: Sequence[Tile], form: str) -> bytes:
-        """Payload of a frame; see `Picture.encode`."""
+        """Return the payload of a frame; see `Picture.encode`."""
         return self._displayed.encode(tiles, form)
 
     def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
-        """How much it hides of what is behind it; see `Picture.encode_alpha`."""
+        """Return the alpha of tiles; see `Picture.encode_alpha`."""
         return self._displayed.encode_alpha(tiles)
 
-    def image(self) -> F32:
-        """Linear radiance. (height, width, 3) float32"""
+    def image(self) -> Shaped[F32, "height width 3"]:
+        """Return linear radiance."""
         return self._displayed.image()
 
     def inspect(self, x: int, y: int) -> dict[str, Any]:
-        """What makes up a pixel; see `Picture.inspect`. Raises ParameterError where it lies outside the picture."""
+        """Probe a pixel; see `Picture.inspect`. Raises ParameterError if it lies outside the image."""
         return self._displayed.inspect(x, y)
 
-    def highlight_pixels(self, pointer: str, from_deg: float, to_deg: float) -> F32:
-        """Which pixels a stretch of a curve lights; see `Picture.brush`.
+    def highlight_pixels(self, pointer: str, from_deg: float, to_deg: float) -> Shaped[F32, "height width"]:
+        """Return the pixels lit by a range of a curve; see `Picture.highlight_pixels`.
 
         Args:
-            pointer: to a curve. from_deg, to_deg: ends of a stretch of it, degrees.
+            pointer: to a curve. from_deg, to_deg: ends of the range, degrees.
         Raises:
-            NotMadeError: no still is shown.
+            ResultUnavailableError: no static view is displayed.
         """
         return self._displayed.highlight_pixels(pointer, from_deg, to_deg)
 
 
 def _has_indirect(look: Look) -> bool:
-    """Whether a look shows light between surfaces."""
+    """Return whether a look shows indirect light."""
     return look.transport.paths.has_indirect
 
 

@@ -1,4 +1,4 @@
-"""What is made where an eye rests: a few exact samples, which correct the moving picture, then the exact picture."""
+"""Jobs when the camera stops: a few exact samples that correct the image, then the exact image."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, Protocol
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.cache import Cache
@@ -24,13 +25,13 @@ from relume.scene.model import Camera
 F32 = NDArray[np.float32]
 SizedCamera = tuple[Camera, tuple[int, int]]
 
-TRACING_FRACTION = 0.5  # of what a still tells to be done; the rest is shading
+TRACING_FRACTION = 0.5  # of the progress of a static view; the rest is shading
 SAMPLE_SPACING = 8  # pixels from one sparse sample to the next
-_MIN_SPARSE_SAMPLES = 1000  # samples; with fewer the exact picture itself is as soon there
+_MIN_SPARSE_SAMPLES = 1000  # with fewer samples, the exact image takes no longer
 
 
 class StaticViewFactory(Protocol):
-    """Finds what an eye sees: an opened bake of this one fixed view."""
+    """Traces a fixed view on demand, as an open bake."""
 
     def __call__(
         self,
@@ -42,17 +43,17 @@ class StaticViewFactory(Protocol):
         *,
         smooths_edges: bool = True,
     ) -> FixedViewTransfer:
-        """Trace it; see `relume.methods.static_views.StaticViewBuilder.make_static_view`."""
+        """Trace the view; see `relume.methods.static_views.StaticViewBuilder.make_static_view`."""
         ...
 
 
 @dataclass(frozen=True)
 class StaticViewState:
-    """What is to be seen exactly.
+    """The target of an exact image.
 
     Attributes:
-        make_static_view: finds what it sees; heavy. cache: of what is made for the picture.
-        sized_camera: camera, and size of its picture. look, solo: that it is shown in.
+        make_static_view: traces the view; expensive. cache: for its results.
+        sized_camera: camera and image size. look, solo: of the image.
     """
 
     make_static_view: StaticViewFactory
@@ -63,19 +64,19 @@ class StaticViewState:
 
     @property
     def is_indirect(self) -> bool:
-        """Whether light between surfaces is shown."""
+        """True if indirect light is shown."""
         return self.look.transport.paths.has_indirect
 
     def static_picture(
         self, progress: ProgressCallback, is_canceled: CancelCheck, *, smooths_edges: bool = True
     ) -> Picture:
-        """Trace and shade it.
+        """Trace and shade the view.
 
         Args:
-            progress: called with about the share done. is_canceled: asked now and then.
-            smooths_edges: whether pixels across edges have several samples.
+            progress: called with the approximate fraction done. is_canceled: polled regularly.
+            smooths_edges: pixels on edges have several samples.
         Raises:
-            CancelledError: `is_canceled` said so.
+            CancelledError: `is_canceled` returned true.
         """
         (camera, size), look = self.sized_camera, self.look
         transfer = self.make_static_view(
@@ -96,11 +97,11 @@ class StaticViewState:
 
 @dataclass(frozen=True)
 class SparseExactJob:
-    """By how much a moving picture's straight light is off, from few samples; a `relume.live.fixed_camera.jobs.Job`.
+    """Computes the residual of direct light from few exact samples; a `relume.live.fixed_camera.jobs.Job`.
 
     Attributes:
-        view_state: what is to be seen exactly. free_camera_picture: the picture that is off, for this job alone.
-        key: equal for jobs of one eye and look. on_done: gets what was made; None where nothing is to be corrected.
+        view_state: the exact target. free_camera_picture: the image to correct, a copy for this job alone.
+        key: equal for jobs of one camera and look. on_done: receives the residual; None if there is nothing to correct.
     """
 
     view_state: StaticViewState
@@ -108,28 +109,28 @@ class SparseExactJob:
     key: tuple[Hashable, ...]
     on_done: Callable[[F32 | None], None]
 
-    label = "a first exact look from here"
+    label = "exact samples of this camera"
     state: ClassVar[Literal["shading"]] = "shading"
     is_refinement = True
     is_resumable = False
 
     @staticmethod
     def should_refine(view_state: StaticViewState) -> bool:
-        """Whether light comes straight, to a picture that is large enough."""
+        """Return whether direct light is shown and the image is large enough."""
         width, height = view_state.sized_camera[1]
         return (
             view_state.look.transport.paths.direct
             and (width // SAMPLE_SPACING) * (height // SAMPLE_SPACING) >= _MIN_SPARSE_SAMPLES
         )
 
-    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> F32 | None:
-        """Trace, shade and compare. (height, width, 3). Raises CancelledError where `is_canceled` said so."""
+    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> Shaped[F32, "height width 3"] | None:
+        """Trace, shade and compare; None for no residual. Raises CancelledError if `is_canceled` returned true."""
         picture, (camera, size), gbuffer = (
             self.free_camera_picture,
             self.view_state.sized_camera,
             self.free_camera_picture.gbuffer,
         )
-        if len(gbuffer.glass.ray):  # of what glass shows and what is behind it, each is off by something else
+        if len(gbuffer.glass.ray):  # reflections and the background of glass have different residuals
             return None
         transport = self.view_state.look.transport.model_copy(update={"show": "direct"})
         look = self.view_state.look.model_copy(update={"transport": transport})
@@ -152,40 +153,39 @@ class SparseExactJob:
         residual_image = residual(radiance, exact, samples, pixels)
         return residual_image if residual_image.any() else None
 
-    def install(self, result: F32 | None) -> None:
-        """Hand it over."""
+    def install(self, result: Shaped[F32, "height width 3"] | None) -> None:
+        """Pass the result on."""
         self.on_done(result)
 
 
 @dataclass(frozen=True)
 class StaticViewJob:
-    """The exact picture of where an eye rests, made beside the frames; a `relume.live.fixed_camera.jobs.Job`.
+    """Renders the exact image of a stopped camera in the background; a `relume.live.fixed_camera.jobs.Job`.
 
     Attributes:
-        view_state: what is made; looks that came meanwhile are followed from there.
-        key: jobs of one eye and look are one: while hands edit, nothing takes a core from them.
-        on_done: gets whether light between surfaces can be shown, and the picture when it is there; None where it
-            cannot be had.
+        view_state: the target; the result continues with looks that were set meanwhile.
+        key: equal for jobs of one camera and look, so that edits replace it.
+        on_done: receives whether indirect light was traced, and the picture, or None if it is not available.
     """
 
     view_state: StaticViewState
     key: tuple[Hashable, ...]
     on_done: Callable[[bool, Picture | None], None]
 
-    label = "the exact picture from here"
+    label = "the exact image of this camera"
     state: ClassVar[Literal["shading"]] = "shading"
     is_refinement = True
     is_resumable = False
 
     def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> Picture | ResultUnavailableError:
-        """Trace and shade it, or why not. Raises CancelledError where `is_canceled`, asked now and then, said so."""
+        """Trace and shade it; an error if that fails. Raises CancelledError if `is_canceled` returned true."""
         try:
             return self.view_state.static_picture(progress, is_canceled)
         except CancelledError:
             raise
         except RelumeError as error:  # the scene is gone, or it needs more memory than there is
-            return ResultUnavailableError(f"the moving picture stays: {self.label} cannot be had, for {error}")
+            return ResultUnavailableError(f"{self.label} is not available: {error}")
 
     def install(self, result: Picture | ResultUnavailableError) -> None:
-        """Hand it over."""
+        """Pass the result on."""
         self.on_done(self.view_state.is_indirect, None if isinstance(result, ResultUnavailableError) else result)

@@ -1,4 +1,4 @@
-"""The tables of a BTF that a look shows for the first time, made beside the frames: until then its mean is shown."""
+"""Computes the tables of a BTF in the background; until then its mean is shown."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from relume.live.free_camera.texel_brdf.texel_tables import TexelTables, get_tex
 
 @dataclass(frozen=True)
 class TablesJob:
-    """Makes them; a `relume.live.fixed_camera.jobs.Job`.
+    """Computes the tables of a BTF; a `relume.live.fixed_camera.jobs.Job`.
 
     Attributes:
-        data, components: of `get_texel_tables`. on_done: called when they are there.
+        data, components: of `get_texel_tables`. on_done: called when they are available.
     """
 
     data: str
@@ -33,9 +33,9 @@ class TablesJob:
         return "tables of a BTF", self.data, self.components
 
     def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> TexelTables:
-        """Find the tables, or wait for whoever does: seconds for 128 x 128 texels."""
+        """Compute the tables, or wait for another thread that does; takes seconds for 128 × 128 texels."""
         return get_texel_tables(self.data, self.components)
 
     def install(self, result: TexelTables) -> None:
-        """Have them shown."""
+        """Display the BTF."""
         self.on_done()

@@ -1,6 +1,6 @@
-"""The two sums of a ray that sees a texel, as vectors of eight: of numbers over texels and sides, and under its light.
+"""SIMD intrinsics for BTF texels: sum coefficients over texels and view directions, and integrate them with light.
 
-As plain loops they take twice the time: see `relume.core.simd`.
+Plain loops take twice the time: see `relume.core.simd`.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from llvmlite import ir
 from numba.core import types
 from numpy.polynomial import chebyshev, polynomial
@@ -42,20 +43,20 @@ from relume.live.free_camera.texel_brdf.coefficient_packing import (
 
 _tuple: Any = types.UniTuple  # carries no types
 _TEXELS, _SIDES, _CORNERS, _CHANNELS = 4, 4, 3, 3
-_ORDERS = [int(order) for order in HAS_ORDER[:, :HALF].argmax(axis=0)]  # of a channel's pairs of lanes
-_SECONDARY_LANES = [int(lane) for lane in COEFFICIENT_LANE[2 * HALF :]]  # that the second and the third axis count for
+_ORDERS = [int(order) for order in HAS_ORDER[:, :HALF].argmax(axis=0)]  # of the lane pairs of a channel
+_SECONDARY_LANES = [int(lane) for lane in COEFFICIENT_LANE[2 * HALF :]]  # of the second and third color axis
 _MAX_ORDER = max(_ORDERS)
 
 
 @untyped_intrinsic
 def add_texels(typing_context, weight, step, view, view_weight, first_view, texel, texel_weight, first, is_more, out):  # type: ignore[no-untyped-def]
-    """Sum the numbers of four texels between four sides.
+    """Sum the coefficients of four texels and four view directions.
 
     Args:
         typing_context: Numba's. weight: (V, texels, 24) int8. step: (V, 24) float32.
-        view: sides, int32. view_weight: their weights, float32. first_view: the first of the four.
+        view: view directions, int32. view_weight: their weights, float32. first_view: the first of the four.
         texel: int32. texel_weight: of each, float32. first: of the four.
-        is_more: they are added to what is there. out: (24,) float32
+        is_more: add to `out`, which is otherwise overwritten. out: (24,) float32
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -93,17 +94,17 @@ def add_texels(typing_context, weight, step, view, view_weight, first_view, texe
 
 @untyped_intrinsic
 def integrate(typing_context, coefficients, axes, secondary_axes, vectors, nodes, weights, rotations, side):  # type: ignore[no-untyped-def]
-    """Sum numbers with the light between three vertices, each turned.
+    """Integrate coefficients with the light of three lattice nodes, each rotated.
 
-    `COEFFICIENT_AXIS` and `COEFFICIENT_LANE` say which.
+    See `COEFFICIENT_AXIS` and `COEFFICIENT_LANE` for the layout.
 
     Args:
-        typing_context: Numba's. coefficients: (24,) float32. axes: of colours. (3, 3) float32
-        secondary_axes: from `pack_secondary_axes`. vectors: light about vertices, in lanes. (vertices, 3 F) float32
-        nodes: the three vertices, a tuple of uint32. weights: of each, a tuple.
-        rotations: cosine and sine for each, a tuple of six. side: −1 where azimuths run the other way round, else 1.
+        typing_context: Numba's. coefficients: (24,) float32. axes: color axes. (3, 3) float32
+        secondary_axes: from `pack_secondary_axes`. vectors: light at nodes, in lanes. (nodes, 3 F) float32
+        nodes: the three nodes, a tuple of uint32. weights: of each, a tuple.
+        rotations: cosine and sine for each, a tuple of six. side: −1 if azimuths are mirrored, else 1.
     Returns:
-        Of each channel, a tuple of float32.
+        One value per channel, a tuple of float32.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -113,7 +114,7 @@ def integrate(typing_context, coefficients, axes, secondary_axes, vectors, nodes
         )
         nodes, weights, rotations, side = arguments[4:]
         corners = [builder.zext(builder.extract_value(nodes, k), WORD) for k in range(_CORNERS)]
-        ones = ir.Constant(VECTOR, [1.0] * NUM)  # what no order turns is not mirrored either
+        ones = ir.Constant(VECTOR, [1.0] * NUM)  # order 0 is neither rotated nor mirrored
         mirror = builder.select(_lane_mask(lambda order: order > 0), broadcast(builder, side), ones)
         cosines: list[Any] = []
         sines: list[Any] = []
@@ -139,7 +140,7 @@ def integrate(typing_context, coefficients, axes, secondary_axes, vectors, nodes
             )
             along = subtract(builder, dot(builder, cosines, a), dot(builder, mirrored[1], b))
             across = sum_values(builder, [dot(builder, sines, a), dot(builder, mirrored[0], b)])
-            # where a lane is empty its light is nothing
+            # the light of the empty lane is zero
             first = dot(builder, (low, high), (along, across))
             secondary_product = multiply(builder, secondary, shuffle(builder, along, across, _SECONDARY_LANES))
             axis_weights = (
@@ -168,13 +169,13 @@ def integrate(typing_context, coefficients, axes, secondary_axes, vectors, nodes
     return triple_type(coefficients, axes, secondary_axes, vectors, *node_types), generate
 
 
-def pack_secondary_axes(axes: NDArray[np.float32]) -> NDArray[np.float32]:
-    """What numbers of the second and third axis count for in each channel. axes: (3, 3). Returns (3, 8)"""
+def pack_secondary_axes(axes: Shaped[NDArray[np.float32], "3 3"]) -> Shaped[NDArray[np.float32], "3 8"]:
+    """Return the factor of each coefficient of the second and third color axis per channel."""
     return np.ascontiguousarray(axes[:, COEFFICIENT_AXIS[2 * HALF :]])
 
 
 def _lane_mask(predicate: Callable[[int], bool]) -> Any:
-    """Lanes of some orders."""
+    """Mask of lanes by their order."""
     return ir.Constant(ir.VectorType(ir.IntType(1), NUM), [int(predicate(order)) for order in _ORDERS])
 
 
@@ -197,5 +198,5 @@ def _rotation_factors(builder: Any, cosine: Any, sine: Any) -> tuple[Any, Any]:
 
 
 def _polynomial(coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Coefficients of a polynomial, up to the highest order of all."""
+    """Pad the coefficients of a polynomial to the highest order."""
     return np.pad(coefficients, (0, _MAX_ORDER + 1 - len(coefficients)))

@@ -1,9 +1,9 @@
-"""From the mean of all texels to each: what one sends more than all do on the mean, in the light that arrives there.
+"""Per-texel BTF shading: adds the difference of each texel from the mean texel.
 
     B(pixel) = B̄ + C Σ_k (p_k(ωo, x) − p̄_k(ωo)) t_k
 
-B̄ is what surfaces send by the mean of texels, by all that is known of light; C the term's colour and gain. At rest,
-each texel is summed over all light (`relume.transport.btf_kernel`).
+B̄ is the radiance with the mean texel, under all light; C the term's color and gain. In static views each texel is
+summed over all light (`relume.transport.btf_kernel`).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.btf.direction_rings import interpolation_weights_at
@@ -49,40 +50,40 @@ from relume.transport.btf_kernel import texels_at_level
 F32 = NDArray[np.float32]
 
 F = np.float32
-_CHUNKS_PER_THREAD = 4  # for each thread: rays that see fine texels cost more
+_CHUNKS_PER_THREAD = 4  # for each thread: rays with fine texels cost more
 
 
 class TextureFootprint(NamedTuple):
-    """Whose picture it is.
+    """Camera data for texture footprints.
 
     Attributes:
-        camera_position: where it is. (3,) float32. pixel_angle: that a pixel spans, radians.
-        gbuffer: by the rays.
+        camera_position: of the camera. pixel_angle: of a pixel, radians.
+        gbuffer: of the rays.
     """
 
-    camera_position: F32
+    camera_position: Shaped[F32, " 3"]
     pixel_angle: float
     gbuffer: GBuffer
 
 
 class IncidentTexelLight(NamedTuple):
-    """What arrives at points, and what has been made of it.
+    """Incident light of probes, and its cache for BTFs.
 
     Attributes:
-        vectors: light vectors. (points, 3, K) float32. light: about vertices, kept from frame to frame.
+        vectors: incident coefficients. light: at lattice nodes, cached between frames.
     """
 
-    vectors: F32
+    vectors: Shaped[F32, "probes 3 K"]
     light: TexelLight
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _list_rays(face, face_material, has_btf, reuses_center, lattice_node, first, rows, is_requested):  # type: ignore[no-untyped-def]
-    """List rays that see covered materials, material after material, and note the vertices about what they see.
+    """List rays that hit BTF materials, sorted by material, and mark the lattice nodes around their hits.
 
     Args:
-        has_btf: (materials,). reuses_center: of rays, which are left out where it is 1.
-        first: place of each material's in `rows`, written. (materials + 1,). rows: (rays,)
+        has_btf: (materials,). reuses_center: rays to skip.
+        first: first row of each material in `rows`, written. (materials + 1,). rows: (rays,)
     """
     first[:] = 0
     for ray in range(face.shape[0]):
@@ -104,11 +105,12 @@ def _list_rays(face, face_material, has_btf, reuses_center, lattice_node, first,
 def _subtract_center(  # type: ignore[no-untyped-def]
     owner, num_pixels, has_btf, face_material, face_normal, face, distance, directions, reuses_center, out
 ):
-    """Find rays across edges that see the texture of their pixel's middle, and take from them what that shows.
+    """Find extra rays that hit the same surface as their pixel's center, and subtract its radiance.
 
     Args:
-        owner: pixels of the rays. reuses_center: of all rays, written. out: what they show of the mean, written. (rays,
-            3)
+        owner: pixels of the extra rays. reuses_center: of all rays, written. out: radiance of the mean texel,
+            overwritten.
+            (rays, 3)
     """
     for k in range(owner.shape[0]):
         ray, p = num_pixels + k, owner[k]
@@ -123,22 +125,24 @@ def _subtract_center(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _add_center(owner, num_pixels, reuses_center, out):  # type: ignore[no-untyped-def]
-    """Give rays that `_subtract_center` found what their pixels' middles show by now."""
+    """Add the radiance of pixel centers to the rays that `_subtract_center` found."""
     for k in range(owner.shape[0]):
         if reuses_center[num_pixels + k]:
             for channel in range(3):
                 out[num_pixels + k, channel] = max(out[num_pixels + k, channel] + out[owner[k], channel], F(0))
 
 
-# Helpers are inlined, and get arrays, not what holds them: a call, or an attribute, would count references to arrays,
-# which threads share; that was three quarters of the kernel.
+# Helpers are inlined and take arrays, not containers: calls and attributes would count references of arrays, which
+# threads share; that took three quarters of the kernel's time.
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _fetch_texels(levels, direction_grid, weights, columns, num_rays, ray_buffers, batch_buffers, counts):  # type: ignore[no-untyped-def]
-    """Find the texels and the sides that rays show, and call for their numbers: they arrive while others are summed.
+    """Find the texels and view directions of rays, and prefetch their coefficients, which arrive while others are
+    summed.
 
     Args:
-        ray_buffers: room for what is found of one ray. batch_buffers: the same of all: texels, 8 a ray; shares of each,
-            8 a ray; sides, 4 a ray; shares of each, 4 a ray; written. counts: texels of each, written.
+        ray_buffers: scratch for one ray. batch_buffers: for all rays: texels, 8 per ray; their weights; view
+            directions, 4
+            per ray; their weights; written. counts: texels of each ray, written.
     """
     texel, texel_weight, view, view_weight = ray_buffers
     texels, texel_weights, views, view_weights = batch_buffers
@@ -149,17 +153,17 @@ def _fetch_texels(levels, direction_grid, weights, columns, num_rays, ray_buffer
             texels[8 * j + k], texel_weights[8 * j + k] = texel[k], texel_weight[k]
         for k in range(4):
             views[4 * j + k], view_weights[4 * j + k] = view[k], view_weight[k]
-            for first in range(0, counts[j], 2):  # two beside each other are two lines of the cache at most
+            for first in range(0, counts[j], 2):  # two adjacent texels take at most two cache lines
                 prefetch(weights, (view[k], texel[first], 0))
                 prefetch(weights, (view[k], texel[first + 1], NUM_COEFFICIENTS - 1))
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _integrate_nodes(coefficients, axes, secondary_axes, tangents, vectors, nodes, weights, x, y, side):  # type: ignore[no-untyped-def]
-    """Sum numbers with the light between three vertices, of each channel.
+    """Integrate coefficients with the light of three lattice nodes, per channel.
 
     Args:
-        coefficients, axes, secondary_axes, vectors, nodes, weights, side: of `integrate`. tangents: of vertices.
+        coefficients, axes, secondary_axes, vectors, nodes, weights, side: of `integrate`. tangents: of nodes.
         x, y: axes of the texture, tuples.
     """
     t, u, v = vector_row(tangents, nodes[0]), vector_row(tangents, nodes[1]), vector_row(tangents, nodes[2])
@@ -178,7 +182,7 @@ def _shade_texels(  # type: ignore[no-untyped-def]
     lattice_node, weight,
     light, camera_position, rows, start, stop, out,
 ):  # fmt: skip
-    """Show what rays rows[start:stop] see. out: (rays, 3)"""
+    """Add texel differences for rays rows[start:stop]. out: (rays, 3)"""
     face, uv, distance = hits
     levels, weights, step, axes = tables
     tangents, vectors = light
@@ -244,20 +248,19 @@ def _shade_texels(  # type: ignore[no-untyped-def]
 def shade_texels(
     btf_materials: Sequence[BtfMaterial],
     stored_scene: StoredScene,
-    positions: F32,
+    positions: Shaped[F32, "corners 3"],
     footprint: TextureFootprint,
     incident: IncidentTexelLight,
-    out: F32,
+    out: Shaped[F32, "rays 3"],
 ) -> None:
-    """Turn what rays see of the mean of texels into what each texel shows.
+    """Replace the mean texel by individual texels along rays.
 
-    Rays of one pixel that see the same surface show it more than the mean by as much: texels are as wide as its side.
+    Rays of one pixel that hit the same surface share the difference: texels are filtered to the pixel's footprint.
 
     Args:
-        btf_materials: what covers materials. stored_scene: that is seen. positions: of its corners, metres. (corners,
-            3) float32
-        footprint: of the eye. incident: at its points.
-        out: radiance along the rays, written. (rays, 3) float32
+        btf_materials: materials with a BTF. stored_scene: the scene. positions: of its corners, meters.
+        footprint: of the camera. incident: at its probes.
+        out: radiance along the rays, float32, overwritten.
     """
     if not btf_materials:
         return

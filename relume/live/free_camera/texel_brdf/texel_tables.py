@@ -1,11 +1,10 @@
-"""The out-factors of texels: what each sends to the eye of each function of the in-basis (Müller 2004).
+"""Outgoing coefficients of BTF texels in the hemispherical basis (Müller 2004).
 
     p_k(ωo, x) = Σ_v hat_v(ωo) Σ_j α_vj(x) ∫ E_vj(ωi) h_k(ωi) dωi
 
-E holds the cosine, by which light vectors are weighed, so that B(x, ωo) = Σ_k p_k(ωo, x) t_k as of other materials.
-Values of E are linear between the directions that it is known in; so are their integrals. From each side a texel has
-the numbers of `relume.live.free_camera.texel_light.numbers`, a byte each: by what its out-factors differ from those of
-the mean.
+E includes the cosine, like incident coefficients, so that B(x, ωo) = Σ_k p_k(ωo, x) t_k as for other materials. E is
+linear between its sampled directions; so are its integrals. Per view direction a texel has the coefficients of
+`relume.live.free_camera.texel_brdf.coefficient_packing`, one byte each: the difference from the mean texel.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.btf.btf_store import load_btf
@@ -39,46 +39,46 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 _NUM_AZIMUTHS, _NUM_ELEVATIONS = 180, 90  # directions of the quadrature
-_MAX_TABLE_BYTES = 1 << 30  # of a table; of larger ones the finest texels are left out
-_AXES_SUBSET = 9, 256  # views and texels of each that axes of colours are found by
+_MAX_TABLE_BYTES = 1 << 30  # of a table; larger ones omit the finest levels
+_AXES_SUBSET = 9, 256  # view directions, and texels of each, that determine color axes
 _EPSILON = np.float32(1e-30)
-_KIND = "BTF tables of the free camera"  # among what is stored
+_KIND = "BTF tables of the free camera"  # kind of asset in the asset store's cache
 
 
 class TexelTables(NamedTuple):
-    """The out-factors of a BTF.
+    """The outgoing coefficients of a BTF.
 
     Attributes:
-        levels: of the texels that are here, see `LocalPcaBtf`. (levels, 3) int32
-        weight: numbers of each, less the mean's, in steps. (V, texels, 24) int8. step: (V, 24) float32
-        axes: of colours; orthonormal columns. (3, 3) float32
+        levels: of the included texels, see `LocalPcaBtf`.
+        weight: coefficients minus those of the mean, in steps. step: quantization step.
+        axes: color axes, orthonormal columns.
     """
 
-    levels: NDArray[np.int32]
-    weight: NDArray[np.int8]
-    step: F32
-    axes: F32
+    levels: Shaped[NDArray[np.int32], "levels 3"]
+    weight: Shaped[NDArray[np.int8], "views texels 24"]
+    step: Shaped[F32, "views 24"]
+    axes: Shaped[F32, "3 3"]
 
 
 class BtfMaterial(NamedTuple):
     """A BTF on a material.
 
     Attributes:
-        material: its number. texels: how they lie on it. tables: of it.
-        color: that it is tinted with. (3,) float32
+        material: its index. texels: the BTF and its placement. tables: of the BTF.
+        color: tint.
     """
 
     material: int
     texels: BtfRef
     tables: TexelTables
-    color: F32
+    color: Shaped[F32, " 3"]
 
 
 class BtfMaterials(NamedTuple):
-    """What covers the materials of a look.
+    """The BTFs of a look.
 
     Attributes:
-        available: those whose tables are there. missing: texels whose tables are still to be made.
+        available: those with tables. missing: those whose tables must be computed.
     """
 
     available: Sequence[BtfMaterial]
@@ -88,12 +88,11 @@ class BtfMaterials(NamedTuple):
 def find_btf_materials(
     materials: Sequence[Sequence[Mapping[str, Any]]], previous: Sequence[BtfMaterial] = (), *, is_blocking: bool = True
 ) -> BtfMaterials:
-    """Find what covers materials.
+    """Find the BTFs of materials.
 
     Args:
-        materials: the terms of each, of a complete look. previous: what covered those of another look.
-        is_blocking: whether tables are made that nobody has made, which takes as long as many frames; else they are
-            missing.
+        materials: the terms of each, of a complete look. previous: the BTFs of another look.
+        is_blocking: compute tables that are not cached, which takes seconds; otherwise they are missing.
     """
     available, missing = list[BtfMaterial](), list[BtfRef]()
     cached_tables = {
@@ -117,7 +116,7 @@ def find_btf_materials(
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _texel_coefficients(factors, cluster, weight, view, texel, out):  # type: ignore[no-untyped-def]
-    """Sum the numbers of a texel from one side. factors: (K, 1 + C, 24) of that side. out: (24,)"""
+    """Sum the coefficients of a texel for one view direction. factors: (K, 1 + C, 24) of that view. out: (24,)"""
     cluster_index = cluster[view, texel]
     for i in range(NUM_COEFFICIENTS):
         out[i] = factors[cluster_index, 0, i]
@@ -129,7 +128,7 @@ def _texel_coefficients(factors, cluster, weight, view, texel, out):  # type: ig
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _quantize(factors, cluster, weight, view, step, out):  # type: ignore[no-untyped-def]
-    """Round the numbers of all texels of `out` from one side. out: (texels, 24) int8. step: (24,), both written"""
+    """Quantize the coefficients of all texels for one view. out: (texels, 24) int8. step: (24,), both written"""
     coefficients, largest = np.empty(NUM_COEFFICIENTS, np.float32), np.zeros(NUM_COEFFICIENTS, np.float32)
     for texel in range(out.shape[0]):
         _texel_coefficients(factors, cluster, weight, view, texel, coefficients)
@@ -145,16 +144,16 @@ def _quantize(factors, cluster, weight, view, step, out):  # type: ignore[no-unt
 
 @asset_cached(_KIND)
 def get_texel_tables(data: str, components: int) -> TexelTables:
-    """The tables of a BTF of which some components are used, by the name of its data; made once, which takes seconds.
+    """Return the tables of a BTF with some components, by the name of its data; computed once, which takes seconds.
 
     Raises:
-        NotFoundError: it is not here. MaterialError: its files are damaged.
+        NotFoundError: the data is missing. MaterialError: its files are damaged.
     """
     return compute_texel_tables(load_btf(data).with_components(components))
 
 
 def compute_texel_tables(pca_btf: LocalPcaBtf) -> TexelTables:
-    """Find the out-factors of all texels from all sides."""
+    """Compute the outgoing coefficients of all texels for all view directions."""
     integrals, num_views = filtered_factors(pca_btf.grid).astype(np.float32), pca_btf.grid.num_directions
     mean = np.einsum("vlc,lk->vck", pca_btf.average, integrals)
     axes, levels = _color_axes(pca_btf, mean, integrals), _fitting_levels(pca_btf)
@@ -173,7 +172,7 @@ def compute_texel_tables(pca_btf: LocalPcaBtf) -> TexelTables:
 
 
 def _fitting_levels(pca_btf: LocalPcaBtf) -> NDArray[np.int32]:
-    """Levels that there is room for, the first texel that is kept being number 0; the coarsest always."""
+    """Levels that fit the limit, with the first included texel at index 0; always the coarsest."""
     sizes = pca_btf.levels[:, 1].astype(np.int64) * pca_btf.levels[:, 2]
     first_level = 0
     while (
@@ -185,7 +184,7 @@ def _fitting_levels(pca_btf: LocalPcaBtf) -> NDArray[np.int32]:
 
 
 def _view_factors(pca_btf: LocalPcaBtf, mean: F32, integrals: F32, view: int) -> F32:
-    """Out-factors from one side less those of the mean: of each cluster, then of a step of each component.
+    """Coefficients for one view minus those of the mean: of each cluster, then of a step of each component.
 
     Returns:
         (K, 1 + C, 3, F)
@@ -198,7 +197,7 @@ def _view_factors(pca_btf: LocalPcaBtf, mean: F32, integrals: F32, view: int) ->
 
 
 def _color_axes(pca_btf: LocalPcaBtf, mean: F32, integrals: F32) -> F32:
-    """Axes of colours along which texels differ, those of most difference first, by some of them. (3, 3)"""
+    """Color axes of the differences between texels, largest variance first, from a subset. (3, 3)"""
     (num_views, max_texels), covariance = _AXES_SUBSET, np.zeros((3, 3))
     texels = np.arange(0, pca_btf.cluster.shape[1], max(1, pca_btf.cluster.shape[1] // max_texels))
     for view in range(0, pca_btf.grid.num_directions, max(1, pca_btf.grid.num_directions // num_views)):
@@ -209,25 +208,23 @@ def _color_axes(pca_btf: LocalPcaBtf, mean: F32, integrals: F32) -> F32:
     return np.ascontiguousarray(np.linalg.eigh(covariance)[1][:, ::-1], np.float32)
 
 
-def pack(factors: F32, axes: F32) -> F32:
-    """Bring out-factors to few numbers.
+def pack(factors: Shaped[F32, "*batch 3 F"], axes: Shaped[F32, "3 3"]) -> Shaped[F32, "*batch 24"]:
+    """Pack coefficients.
 
     Args:
-        factors: in lanes. (…, 3, F). axes: of colours. (3, 3)
-    Returns:
-        (…, 24) float32
+        factors: in lanes. axes: color axes.
     """
     along = np.einsum("...ck,cm->...mk", factors, axes)
     return np.ascontiguousarray(along[..., COEFFICIENT_AXIS, COEFFICIENT_LANE], np.float32)
 
 
-def filtered_factors(direction_grid: DirectionGrid) -> F64:
-    """Integrate functions of the in-basis with the weights by which values between directions are found.
+def filtered_factors(direction_grid: DirectionGrid) -> Shaped[F64, "directions F"]:
+    """Integrate basis functions with the interpolation weights of sampled directions.
 
     Args:
         direction_grid: of the directions.
     Returns:
-        In lanes. (L, F)
+        In lanes.
     """
     z, phi = (
         (np.arange(_NUM_ELEVATIONS) + 0.5) / _NUM_ELEVATIONS,
@@ -244,12 +241,6 @@ def filtered_factors(direction_grid: DirectionGrid) -> F64:
     return out
 
 
-def pack_lanes(values: F64) -> F64:
-    """Put what belongs to functions into lanes.
-
-    Args:
-        values: (…, functions)
-    Returns:
-        (…, F), nothing where no function is
-    """
+def pack_lanes(values: Shaped[F64, "*batch functions"]) -> Shaped[F64, "*batch F"]:
+    """Arrange values of functions in lanes; zero in the empty lane."""
     return np.asarray(np.where(FUNCTIONS >= 0, values[..., FUNCTIONS], 0))

@@ -1,8 +1,7 @@
-"""Where in their textures rays meet surfaces, and how textures lie there: of some rays at once.
+"""Texture coordinates and texture frames of ray hits, in batches.
 
-What rays see is gathered into columns, one for each number; then loops go along the columns, without branches, which
-are vector code. Columns lie in one flat array at constant places: of several arrays nobody could tell that they are
-not the same memory.
+Hits are gathered into columns, one per quantity; loops run along columns without branches, so that they vectorize.
+Columns lie in one flat array at constant offsets: the compiler could not rule out that several arrays overlap.
 """
 
 from __future__ import annotations
@@ -12,6 +11,7 @@ from typing import Any
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -23,20 +23,20 @@ from relume.transport.btf_kernel import mip_level
 F32 = NDArray[np.float32]
 
 _EPSILON = np.float32(1e-30)
-_MAX_REPEATS = np.float32(1 << 30)  # repeats: beyond, float32 knows no share of one
+_MAX_REPEATS = np.float32(1 << 30)  # repeats: beyond, float32 has no fractional part
 
-BATCH_SIZE = 64  # rays; all columns of them stay in the first cache
+BATCH_SIZE = 64  # rays; all their columns fit the L1 cache
 X, Y, N, SIDE, U, V, LEVEL, THETA, AZIMUTH = (BATCH_SIZE * k for k in (0, 3, 6, 9, 10, 11, 12, 13, 14))
-"""Where columns begin that `map_to_texture` fills: the texture's axes x and y and the normal, three columns each; −1
-where the texture is seen in a mirror, else 1; column and row in it, shares of a repeat; level of halvings, see
-`texels_at_level`; θ and share of a turn of the direction to the camera, see `interpolation_weights_at`."""
+"""Offsets of columns that `map_to_texture` fills: the texture's axes x and y and the normal, three columns each; −1
+if the texture is mirrored, else 1; u and v, fractions of a repeat; mip level, see `texels_at_level`; θ and azimuth in
+turns of the view direction, see `interpolation_weights_at`."""
 _TO1, _TO2, _OUTWARD, _UV_SCALE, _D, _UV, _DISTANCE = (BATCH_SIZE * k for k in (15, 17, 19, 22, 23, 26, 28))
 NUM_COLUMNS = 29
 _FACE_COLUMNS = np.array([
     X, X + BATCH_SIZE, X + 2 * BATCH_SIZE, SIDE, U, V, _TO1, _TO1 + BATCH_SIZE, _TO2, _TO2 + BATCH_SIZE,
     _OUTWARD, _OUTWARD + BATCH_SIZE, _OUTWARD + 2 * BATCH_SIZE, _UV_SCALE,
 ])  # fmt: skip
-"""Where the numbers of `face_placements` go."""
+"""Offsets of the columns of `face_placements`."""
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
@@ -53,20 +53,21 @@ def cross(a, b):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def vector_row(array, k):  # type: ignore[no-untyped-def]
-    """One of (n, 3) as a tuple, which is not counted as a reference."""
+    """Row k of an (n, 3) array as a tuple, without reference counting."""
     return array[k, 0], array[k, 1], array[k, 2]
 
 
-def face_placements(positions: F32, stored_scene: StoredScene) -> F32:
-    """Find what of triangles tells where in textures their places are: one row, one line of the cache, for each.
+def face_placements(positions: Shaped[F32, "corners 3"], stored_scene: StoredScene) -> Shaped[F32, "faces 16"]:
+    """Return texture placements of triangles: one row, one cache line, for each.
 
     Args:
-        positions: of the triangles' corners, metres. (corners, 3) float32. stored_scene: that they are.
+        positions: of the triangles' corners, meters. stored_scene: of these triangles.
     Returns:
-        The texture's x axis along the triangle, unit; the hand of its axes, 1 where y is to the left of x about the
-        normal of counter-clockwise corners, else −1, 0 without a place in textures; the place of the first corner; from
-        there to the second and to the third; the face's normal; texture side a metre; see
-        `relume.raytrace.surface_interaction`. (num_faces, 16) float32
+        The texture's x axis along the triangle, unit; handedness of its axes, 1 if y is to the left of x about the
+        normal
+        of counterclockwise corners, else −1, 0 without texture coordinates; coordinates of the first corner; from there
+        to the second and to the third; the face's normal; texture units per meter; see
+        `relume.raytrace.surface_interaction`. float32
     """
     p, uv = positions[stored_scene.faces], stored_scene.uvs[stored_scene.faces]
     e1, e2, to1, to2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
@@ -81,7 +82,7 @@ def face_placements(positions: F32, stored_scene: StoredScene) -> F32:
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _projected_axes(face_normal):  # type: ignore[no-untyped-def]
-    """Find the axes of a texture that is projected along the axis of the world that a face looks along most."""
+    """Return texture axes of tri-planar mapping along the dominant axis of a face normal."""
     a, b, c = abs(face_normal[0]), abs(face_normal[1]), abs(face_normal[2])
     zero, unit = np.float32(0), np.float32(1)
     if a >= b and a >= c:
@@ -98,12 +99,11 @@ def _projected_axes(face_normal):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def gather_hits(placements, normals, face, uv, distance, directions, lattice_node, weight, rows, start, num, columns):  # type: ignore[no-untyped-def]
-    """Gather what rays rows[start:start + num] see, at most `BATCH_SIZE`.
+    """Gather the hits of rays rows[start:start + num], at most `BATCH_SIZE`.
 
     Args:
-        placements: from `face_placements`. normals: of vertices. face, uv, distance: that rays meet. directions: of
-            them.
-        lattice_node, weight: about what they see. columns: written. (NUM_COLUMNS · AT_ONCE,)
+        placements: from `face_placements`. normals: of lattice nodes. face, uv, distance: of hits. directions: of rays.
+        lattice_node, weight: around hits. columns: written. (`NUM_COLUMNS` · `BATCH_SIZE`,)
     """
     for j in range(num):
         ray = rows[start + j]
@@ -119,7 +119,7 @@ def gather_hits(placements, normals, face, uv, distance, directions, lattice_nod
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def get_vector(columns, first, j):  # type: ignore[no-untyped-def]
-    """Row j of the three columns that begin at `first`, a tuple of what `columns` has."""
+    """Row j of three columns at the offset `first`, as a tuple."""
     return columns[first + j], columns[first + BATCH_SIZE + j], columns[first + 2 * BATCH_SIZE + j]
 
 
@@ -137,7 +137,7 @@ def _normalize(vector):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _tangent_frames(columns):  # type: ignore[no-untyped-def]
-    """Find axes across normals, and places in repeats, where faces have some."""
+    """Compute axes orthogonal to normals, and texture coordinates, for faces with coordinates."""
     for j in range(BATCH_SIZE):
         n, x_axis, outward = (
             _normalize(get_vector(columns, N, j)),
@@ -158,7 +158,7 @@ def _tangent_frames(columns):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _project_uv(columns, camera_position, num):  # type: ignore[no-untyped-def]
-    """Find axes and places of faces without any: textures are projected onto them, a metre for each repeat."""
+    """Compute axes and coordinates of faces without any: tri-planar mapping, one meter per repeat."""
     for j in range(num):
         if columns[SIDE + j] != 0:
             continue
@@ -178,7 +178,7 @@ def _project_uv(columns, camera_position, num):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _repeat_fraction(coordinate):  # type: ignore[no-untyped-def]
-    """What a place is beyond whole repeats, whatever it is; a floor would be a call."""
+    """Fractional part of a coordinate, without a call to floor."""
     clamped: Any = min(max(coordinate, -_MAX_REPEATS), _MAX_REPEATS)
     fraction = np.float32(clamped - np.float32(np.int32(clamped)))
     return fraction + np.float32(1) if fraction < 0 else fraction
@@ -186,13 +186,12 @@ def _repeat_fraction(coordinate):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def map_to_texture(columns, num, camera_position, pixel_angle, rotation, scale, finest):  # type: ignore[no-untyped-def]
-    """Find where gathered rays meet their texture, and how it lies there.
+    """Map gathered hits to their texture.
 
     Args:
-        columns: from `gather`; those of which the module tells are written. num: of rays. camera_position: where they
-            begin.
-        pixel_angle: that a pixel spans, radians. rotation: cosine and sine of the texture's rotation.
-        scale: repeats along a unit of texture coordinates. finest: side of the texture, in texels.
+        columns: from `gather_hits`; the columns above are written. num: of rays. camera_position: origin of the rays.
+        pixel_angle: of a pixel, radians. rotation: cosine and sine of the texture's rotation.
+        scale: repeats per unit of texture coordinates. finest: side of the texture, in texels.
     """
     _tangent_frames(columns)
     _project_uv(columns, camera_position, num)

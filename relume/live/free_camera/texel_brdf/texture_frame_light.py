@@ -1,6 +1,6 @@
-"""Light vectors where texels are: of points, turned into one frame about each vertex, then into the texture's.
+"""Incident coefficients in texture frames: rotated from probes to a frame at each lattice node, then to the texture.
 
-Light that is φ further round in one frame is φ + δ in another about the same normal:
+Light at azimuth φ in one frame is at φ + δ in another about the same normal:
 
     t_m^cos ← cos mδ t_m^cos − sin mδ t_m^sin,   t_m^sin ← sin mδ t_m^cos + cos mδ t_m^sin
 """
@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -29,21 +30,20 @@ _NO_VECTORS = np.empty((0, 3), np.float32)
 
 
 class NodeLight(NamedTuple):
-    """What arrives about vertices.
+    """Incident light at lattice nodes.
 
     Attributes:
-        tangent: that azimuths are counted from, about as unit. (vertices, 3) float32
-        vectors: the first functions of the in-basis, in lanes: the cosine parts of the three channels, then their sine
-            parts. (vertices, 3 F) float32
+        tangent: direction of azimuth 0, approximately unit.
+        vectors: the first basis functions, in lanes: the cosine parts of the three channels, then their sine parts.
     """
 
-    tangent: F32
-    vectors: F32
+    tangent: Shaped[F32, "nodes 3"]
+    vectors: Shaped[F32, "nodes lanes"]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def rotation_from_vector(x, y):  # type: ignore[no-untyped-def]
-    """Find cos δ and sin δ, of δ as a vector of any length; (0, 0) turns nothing."""
+    """Return cos δ and sin δ of a vector at angle δ, of any length; (0, 0) means no rotation."""
     squared_length = x * x + y * y
     if squared_length > _EPSILON:
         scale = np.float32(1) / math.sqrt(squared_length)
@@ -53,7 +53,7 @@ def rotation_from_vector(x, y):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _rotation_powers(x, y):  # type: ignore[no-untyped-def]
-    """Find cos mδ and sin mδ for m of 1 to 4, of δ as `rotation_from_vector` has it."""
+    """Return cos mδ and sin mδ for m from 1 to 4, see `rotation_from_vector`."""
     c1, s1 = rotation_from_vector(x, y)
     c2, s2 = c1 * c1 - s1 * s1, np.float32(2) * c1 * s1
     return c1, s1, c2, s2, c2 * c1 - s2 * s1, s2 * c1 + c2 * s1, c2 * c2 - s2 * s2, np.float32(2) * c2 * s2
@@ -61,20 +61,19 @@ def _rotation_powers(x, y):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def add_rotated(lanes, rotation, side, weight, is_added, out):  # type: ignore[no-untyped-def]
-    """Add a light vector, turned.
+    """Add a rotated coefficient vector.
 
     Args:
-        lanes: of it. (3 F,) float32. rotation: from `_rotation_powers`. side: −1 where azimuths run the other way
-            round, else 1.
-        weight: that it counts with. is_added: to what is in `out`, which is written. (3 F,) float32
+        lanes: the vector. (3 F,) float32. rotation: from `_rotation_powers`. side: −1 if azimuths are mirrored, else 1.
+        weight: a factor. is_added: add to `out`, which is otherwise overwritten. (3 F,) float32
     """
     c1, s1, c2, s2, c3, s3, c4, s4 = rotation
     for i in range(PAIRS):
-        # sums over orders, of which each lane has one: what is looked up in arrays that were just written stalls
+        # sums over orders, one per lane: lookups in arrays that were just written would stall
         is0, is1, is2, is3, is4 = HAS_ORDER[0, i], HAS_ORDER[1, i], HAS_ORDER[2, i], HAS_ORDER[3, i], HAS_ORDER[4, i]
         cosine = weight * (is0 + c1 * is1 + c2 * is2 + c3 * is3 + c4 * is4)
         sine = weight * (s1 * is1 + s2 * is2 + s3 * is3 + s4 * is4)
-        mirror = is0 + side * (np.float32(1) - is0)  # what no order turns is not mirrored either
+        mirror = is0 + side * (np.float32(1) - is0)  # order 0 is neither rotated nor mirrored
         a, b = lanes[i], mirror * lanes[PAIRS + i]
         cosine_sum, sine_sum = (out[i], out[PAIRS + i]) if is_added else (np.float32(0), np.float32(0))
         out[i] = cosine_sum + cosine * a - sine * b
@@ -83,18 +82,18 @@ def add_rotated(lanes, rotation, side, weight, is_added, out):  # type: ignore[n
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _fill_lanes(vectors, rows, start, stop, out):  # type: ignore[no-untyped-def]
-    """Lay the light vectors of the points that are [start, stop) of rows into lanes. out: (points, 3 F)"""
+    """Arrange the coefficients of probes rows[start:stop] in lanes. out: (probes, 3 F)"""
     for p in rows[start:stop]:
         for channel in range(3):
             for i in range(WIDTH):
-                if i != EMPTY_LANE:  # what that lane had at first, nothing, stays
+                if i != EMPTY_LANE:  # the empty lane stays zero
                     lane = i if i < HALF else PAIRS - HALF + i
                     out[p, channel * HALF + lane] = vectors[p, channel, FUNCTIONS[i]]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _sum_at_nodes(lattice_nodes, tangents, lanes, rows, start, stop, tangent, out):  # type: ignore[no-untyped-def]
-    """Find what arrives about the vertices that are [start, stop) of rows."""
+    """Interpolate light to lattice nodes rows[start:stop]."""
     normal, probes, weights = lattice_nodes
     lane_buffer, sums = np.empty(3 * WIDTH, np.float32), np.empty(3 * WIDTH, np.float32)
     for v in rows[start:stop]:
@@ -112,7 +111,7 @@ def _sum_at_nodes(lattice_nodes, tangents, lanes, rows, start, stop, tangent, ou
             if weight > 0:
                 probe_tangent = vector_row(tangents, probe)
                 rotation = _rotation_powers(dot(probe_tangent, t), dot(probe_tangent, b))
-                for i in range(3 * WIDTH):  # a row by itself would be counted as a reference
+                for i in range(3 * WIDTH):  # a slice would be reference-counted
                     lane_buffer[i] = lanes[probe, i]
                 add_rotated(lane_buffer, rotation, np.float32(1), weight, True, sums)
         for i in range(3 * WIDTH):
@@ -120,7 +119,7 @@ def _sum_at_nodes(lattice_nodes, tangents, lanes, rows, start, stop, tangent, ou
 
 
 class TexelLight:
-    """What arrives about the vertices that a moving picture has seen in a light, and where textures lie.
+    """Incident light at the visible lattice nodes of a free-camera image, and texture placements; a cache.
 
     Used from one thread at a time.
     """
@@ -134,22 +133,26 @@ class TexelLight:
             np.empty(0, np.uint8),
         )
 
-    def texture_placements(self, stored_scene: StoredScene, positions: F32) -> F32:
-        """Find where the surface's triangles lie in textures, once: it stays as it is.
+    def texture_placements(
+        self, stored_scene: StoredScene, positions: Shaped[F32, "corners 3"]
+    ) -> Shaped[F32, "faces 16"]:
+        """Return the texture placements of the scene's triangles, computed once.
 
         Args:
-            stored_scene, positions: as in `face_placements`, which is what is returned.
+            stored_scene, positions: as in `face_placements`.
         """
         if self._texture_placements is None:
             self._texture_placements = face_placements(positions, stored_scene)
         return self._texture_placements
 
-    def around_nodes(self, stored_scene: StoredScene, vectors: F32, is_requested: U8) -> NodeLight:
-        """Find what arrives about vertices, which is kept as long as the light is.
+    def around_nodes(
+        self, stored_scene: StoredScene, vectors: Shaped[F32, "probes 3 K"], is_requested: Shaped[U8, " nodes"]
+    ) -> NodeLight:
+        """Return incident light at lattice nodes, cached until the light changes.
 
         Args:
-            stored_scene: with them and their points. vectors: of the points, never written to. (points, 3, K) float32
-            is_requested: vertices that are asked about; the others have anything. (vertices,) uint8
+            stored_scene: the scene. vectors: of the probes, never overwritten.
+            is_requested: nonzero for nodes to evaluate; the others are undefined.
         """
         if vectors is not self._vectors:
             if len(self._is_current) != len(is_requested):
