@@ -284,5 +284,5 @@ def test_reflected_light_asked_for_while_a_still_without_it_is_made(moving, pict
 
 def test_while_the_eye_moves_no_curve_tells_what_it_lights(picture):
     picture.advance(None)
-    with pytest.raises(ResultUnavailableError, match="where the eye rests"):
+    with pytest.raises(ResultUnavailableError, match="when the camera stops"):
         picture.highlight_pixels("/materials/Floor/terms/0/curves/theta_i", 0.0, 9.0)

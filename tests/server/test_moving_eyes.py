@@ -271,10 +271,10 @@ def test_a_scene_deleted_under_a_moving_view_leaves_what_moves(client: TestClien
             session.send_message(**eye(view, number, aside))
             picture = shown(of_eye(session, number))
             assert np.abs(picture - before).max() > 0.01
-            session.wait_until_ready("the exact picture from here")  # given up: what it needs is gone
+            session.wait_until_ready("the exact image of this camera")  # given up: what it needs is gone
             problem = session.text("problem")["problem"]
             assert problem["type"].endswith("generation-failed")
-            assert "the moving picture stays" in problem["detail"]
+            assert "is not available" in problem["detail"]
         session.send_message(type="inspect", view=view["name"], x=SIZE[0] // 2, y=SIZE[1] // 2)
         assert session.text("inspect")["material"] is not None
 

@@ -1,4 +1,4 @@
-"""What the user's hand is on: said by the client with every edit, and when something is taken hold of before one."""
+"""The control that the user operates: sent by the client with each edit, and when a drag begins."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from relume.operators.edit_basis import EditBasis
 
 
 class HeldControl(NamedTuple):
-    """A curve or a parameter in hand.
+    """A curve or a parameter that the user edits.
 
     Attributes:
-        basis: what must be free for it to be moved; None where light has no part in it.
+        basis: the free coefficients of the edit; None if no operator depends on it.
     """
 
     target: TermTarget
@@ -23,12 +23,12 @@ class HeldControl(NamedTuple):
 
 
 class ActiveControl(NamedTuple):
-    """A hand in the look as it is now.
+    """The active control in the current look.
 
     Attributes:
-        prepared_control: the curve that the user has opened, or the parameter that was taken hold of last.
-        edited_control: the curve or the parameter that the last edit moved.
-        pointer: what the last edit was of, or what was taken hold of since.
+        prepared_control: the curve that the user opened, or the parameter that was prepared last.
+        edited_control: the curve or the parameter that the last edit changed.
+        pointer: target of the last edit, or of a later prepare message.
     """
 
     prepared_control: HeldControl | None = None
@@ -36,7 +36,7 @@ class ActiveControl(NamedTuple):
     pointer: Pointer | None = None
 
     def edit_basis(self, live: LiveTerm, curves: set[str]) -> EditBasis | None:
-        """What the hand moves where such curves of a term change: all of them together, else what is touched."""
+        """Return the basis of the active edit of a term: one that covers all changed curves if there is one."""
         bases = [
             control.basis
             for control in (self.edited_control, self.prepared_control)
@@ -49,15 +49,15 @@ class ActiveControl(NamedTuple):
 
     @property
     def edits_light(self) -> bool:
-        """Whether it is on what local lights or surfaces send out: a light, a colour, the bounces."""
+        """True if it changes the light from local lights or surfaces: a light, a color, the number of bounces."""
         return isinstance(self.pointer, ColorPointer | LightPointer | TransportPointer)
 
     @property
     def rotates_environment(self) -> bool:
-        """Whether it is on the environment's rotation."""
+        """True if it rotates the environment."""
         return self.pointer == ROTATION
 
     def dragged_light(self, look: Look) -> LightGeometry | None:
-        """The geometry of the local light that it is on, as that is in a look."""
+        """Return the geometry of the local light that is dragged, as in a look; None if no light is."""
         light = look.lights.get(self.pointer.name) if isinstance(self.pointer, LightPointer) else None
         return None if light is None else light.geometry

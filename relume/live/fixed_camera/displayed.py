@@ -1,4 +1,4 @@
-"""The one state of a term's image: what it shows, how truly, and from which exact image it can go on."""
+"""The state of a term's image: the look it shows, its fidelity, and the exact image that it can be updated from."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.live.fixed_camera.fidelity import Fidelity
@@ -20,31 +21,31 @@ F64 = NDArray[np.float64]
 
 UNIT_ROUNDOFF = 2.0**-24  # of float32
 
-# Share of an image's length that float32 sums may have left in it where it is called exact.
+# Greatest rounding error of float32 sums in an exact image, as a fraction of the image's norm.
 MAX_EXACT_ROUNDING = 2.0**-16
-_COLUMNS_PER_SUM = 4  # that `relume.operators.update_kernel` adds to an image at once
+_COLUMNS_PER_SUM = 4  # columns that `relume.operators.update_kernel` adds to an image at once
 
 
 @dataclass(frozen=True, eq=False)
 class DisplayedImage:
-    """What an image of one term shows, before colour, texture and outgoing curves.
+    """The image of one term, before color, texture and outgoing curves.
 
-    The image belongs to the picture's own thread: steps are added in place, and nothing else keeps it but its anchor.
+    The image belongs to the picture's own thread: steps are added in place, and only its reference image shares it.
 
     Attributes:
-        image: Σ_j c_j T_j. (tiles, 3, samples) float32
-        fidelity: how truly it shows `bands` under `light`.
-        bands: of each curve, (3, J) float64; not a number where only the most important coefficients have been moved.
-        light: what arrives; None where nothing is shown.
-        basis: what the operator in use leaves free. coefficients: c of it in `image`. (3, columns) float64
-        rounding: length of the errors to be expected in `image` of float32 sums, since it was shaded.
-        reference: the last image of which every coefficient was summed, where that was in another light.
-        exact_region: of what image, see `LiveTerm.image_key`, and in which region of the picture, it is the exact one.
-        detail: of a preview, how often it was made of more samples.
-        is_outdated: it is of another model than is wanted by now, or of other values of its fixed parameters.
+        image: Σ_j c_j T_j, in tiles of samples.
+        fidelity: how exactly it shows `bands` under `light`.
+        bands: (3, J) float64 of each curve; NaN if only the most important coefficients have been updated.
+        light: the illumination; None if nothing is shown.
+        basis: the free coefficients of the active operator. coefficients: c along it in `image`.
+        rounding: expected norm of the float32 rounding errors in `image` since it was shaded.
+        reference: the last converged image, if that was in another light.
+        exact_region: the image key (see `LiveTerm.image_key`) and the image region in which it is exact.
+        detail: number of refinements of a preview.
+        is_outdated: it shows another model than the target, or other values of fixed parameters.
     """
 
-    image: F32
+    image: Shaped[F32, "tiles 3 samples"]
     fidelity: Fidelity = Fidelity.NOTHING
     bands: Mapping[str, F64] = field(default_factory=dict)
     light: Illumination | None = None
@@ -58,25 +59,25 @@ class DisplayedImage:
 
     @property
     def is_converged(self) -> bool:
-        """Whether steps may be added to it: it is the sum of known coefficients in a known light."""
+        """True if steps may be added: it is the sum of known coefficients in a known light."""
         return self.fidelity >= Fidelity.COARSE
 
     def changed_curves(self, target_bands: Mapping[str, F64]) -> list[str]:
-        """Names of the wanted curves that the image does not show."""
+        """Return the names of the target curves that the image does not show."""
         return [name for name, bands in target_bands.items() if not np.array_equal(bands, self.bands.get(name, np.nan))]
 
     def reset_for_new_light(self) -> DisplayedImage:
-        """Nothing, from where changes of light can be followed."""
+        """Return an empty image whose reference allows incremental updates of light."""
         reference = replace(self, reference=None) if self.is_converged else self.reference
         return DisplayedImage(np.zeros_like(self.image), reference=reference)
 
     def evaluate_operator(
         self, operator: Operator, basis: EditBasis, target_bands: Mapping[str, F64], light: Illumination
     ) -> DisplayedImage:
-        """The image of a target from all coefficients of an operator, written where this one's image stood.
+        """Return the image of a target from all coefficients of an operator, written into this image's array.
 
         Args:
-            operator: the operator along `basis` in this light, of all samples, its dormant curves those of the target.
+            operator: along `basis` in this light, of all samples, with its fixed curves at their targets.
             target_bands: bands of each of the term's curves. (3, J) each
         """
         coefficients = basis.coefficients(target_bands)
@@ -88,33 +89,34 @@ class DisplayedImage:
         ).downgrade_if_inexact()
 
     def downgrade_if_inexact(self) -> DisplayedImage:
-        """The same image; sums that left more in it than may be in an exact one make it a near one."""
+        """Return the same image, nearly exact at most if rounding errors exceed the limit for exact images."""
         is_inexact = self.rounding > MAX_EXACT_ROUNDING * norm_of(self.image)
         return replace(self, fidelity=min(self.fidelity, Fidelity.NEARLY_EXACT)) if is_inexact else self
 
     def without_edit(self) -> DisplayedImage:
-        """The same image, which follows no operator any more."""
+        """Return the same image without an active operator."""
         return replace(self, basis=None, coefficients=None)
 
 
-def norm_of(image: F32) -> float:
-    """Of an image as a vector over all its samples and channels."""
+def norm_of(image: Shaped[F32, " ..."]) -> float:
+    """Return the Euclidean norm of an image over all its samples and channels."""
     flat = image.reshape(-1)
     return float(np.sqrt(np.dot(flat, flat)))
 
 
-def accumulated_error(norm: float, change: F64, operator: Operator) -> float:
-    """Length of the rounding errors to be expected of R + Σ_j Δc_j T_j in float32, with unit roundoff u.
+def accumulated_error(norm: float, change: Shaped[F64, "*levels 3 J"], operator: Operator) -> float:
+    """Expected norm of the rounding errors of R + Σ_j Δc_j T_j in float32, with unit roundoff u.
 
-    u √(Σ_k (‖R‖ + Σ_{j≤k} |Δc_j| ‖T_j‖)² / 3), k over the additions to the image: each rounds a sum that is at most
-    so long, by u/√3 of it on the mean; the sum of all of them, without the root, bounds it always, and is never met
-    (Higham and Mary 2019). Columns may cancel, so that little is left of long sums: then what is left is mostly this.
+    u √(Σ_k (‖R‖ + Σ_{j≤k} |Δc_j| ‖T_j‖)² / 3), k over the additions to the image: each addition rounds a sum of at most
+    this norm by u/√3 of it on average. The sum without the root is a strict bound that is never reached (Higham and
+    Mary
+    2019). Columns may cancel; the remaining image is then mostly rounding error.
 
     Args:
-        norm: of the image R. change: Δc. (3, J), or (L, 3, J). operator: has the columns.
+        norm: norm of the image R. change: Δc. operator: provides the norms of the columns.
     """
     added = np.cumsum(np.abs(change) * operator.importance, axis=-1)
-    # columns are added in fours, those that are left over one by one
+    # columns are added in groups of four, the remaining ones one by one
     column_number = np.cumsum(change != 0, axis=-1)
     is_last = (column_number % _COLUMNS_PER_SUM == 0) | (
         column_number > column_number[..., -1:] // _COLUMNS_PER_SUM * _COLUMNS_PER_SUM

@@ -1,4 +1,4 @@
-"""JSON Pointers to what a hand may hold: a curve or parameter of a term, a light, a field of the environment."""
+"""JSON Pointers to editable controls: a curve or parameter of a term, a light, a field of the environment."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class ParameterPointer(_TermPointer):
 
 @dataclass(frozen=True)
 class ColorPointer:
-    """The colour or texture of a term of a look: what share of light it reflects."""
+    """The color or texture of a term of a look: the fraction of light that it reflects."""
 
     material: str
     term: int
@@ -95,10 +95,10 @@ _ENVIRONMENT = re.compile(rf"/environment/(?P<field>{'|'.join(EnvironmentLook.mo
 
 
 def parse_pointer(pointer: str) -> Pointer:
-    """Read a pointer.
+    """Parse a pointer.
 
     Raises:
-        ParameterError: it points to nothing that a hand may hold.
+        ParameterError: it does not point to an editable control.
     """
     if term := _TERM.fullmatch(pointer):
         return _POINTER_TYPES[term["group"]](_unescape(term["material"]), int(term["term"]), term["name"])
@@ -126,10 +126,10 @@ def _unescape(token: str) -> str:
 
 
 def parse_curve(pointer: str) -> CurvePointer:
-    """Read a pointer to a curve.
+    """Parse a pointer to a curve.
 
     Raises:
-        ParameterError: it does not point to one.
+        ParameterError: it does not point to a curve.
     """
     parsed = parse_pointer(pointer)
     if not isinstance(parsed, CurvePointer):
@@ -138,7 +138,7 @@ def parse_curve(pointer: str) -> CurvePointer:
 
 
 def check_exists(pointer: CurvePointer | ParameterPointer, look: Look) -> None:
-    """Raises ParameterError where a pointer is to a term, a curve or a parameter that a look has not."""
+    """Raise ParameterError if a look has no such term, curve or parameter."""
     material = look.materials.get(pointer.material)
     if material is None or not 0 <= pointer.term < len(material.terms):
         raise ParameterError("pointer", str(pointer), "a term of this look")

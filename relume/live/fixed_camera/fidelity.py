@@ -1,4 +1,4 @@
-"""How truly an image shows what it shows, and how near a picture is to its look."""
+"""Fidelity of images, and the labels that frames report."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from typing import Literal, get_args
 
 
 class Fidelity(IntEnum):
-    """How truly an image shows the curves and the light that it is said to show, worst first.
+    """Exactness of an image with respect to its curves and its light, worst first.
 
-    NOTHING: nothing has been made. PREVIEW: interpolated between few samples. FOLLOWED: an exact image and what has
-    changed of light since, evaluated roughly. COARSE: an exact image and what has changed of a curve since, found at
-    some of its samples or in merged lights. NEAR: a sum along the few nodes of a parameter, or of packed columns.
-    EXACT: the whole sum.
+    NOTHING: not computed yet. PREVIEW: interpolated between few samples. INCREMENTAL: an exact image plus an
+    approximate
+    update of changed light. COARSE: an exact image plus the update of a changed curve, computed from some of its
+    samples
+    or from merged lights. NEARLY_EXACT: a sum along the few nodes of a parameter, or of quantized columns. EXACT: the
+    complete sum.
     """
 
     NOTHING = 0
@@ -25,13 +27,13 @@ class Fidelity(IntEnum):
 
 
 FidelityLabel = Literal["preview", "approximate", "incremental", "near_exact", "exact"]
-"""What a frame says of its picture, worst first; "approximate": it shows an older look, or not all coefficients yet."""
+"""Fidelity that a frame reports, worst first; "approximate": it shows an older look, or not all coefficients yet."""
 
 _ORDER: tuple[FidelityLabel, ...] = get_args(FidelityLabel)
 
 
 def fidelity_label(fidelity: Fidelity, *, is_current: bool) -> FidelityLabel:
-    """The word for an image of some fidelity; `is_current`: what it shows is what the look asks for."""
+    """Return the label of an image. is_current: it shows the target look."""
     if fidelity <= Fidelity.PREVIEW:
         return "preview"
     if not is_current:
@@ -42,5 +44,5 @@ def fidelity_label(fidelity: Fidelity, *, is_current: bool) -> FidelityLabel:
 
 
 def worst(labels: Iterable[FidelityLabel]) -> FidelityLabel:
-    """What can be said of several images together; "exact" of none."""
+    """Return the worst of several labels; "exact" if there are none."""
     return min(labels, key=_ORDER.index, default="exact")

@@ -1,4 +1,4 @@
-"""Brings a picture to its look exactly, with nobody watching."""
+"""Renders a look exactly, offline."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from relume.look import Look
 
 
 def render_exact(picture: Picture, look: Look, progress: ProgressCallback, is_canceled: CancelCheck) -> None:
-    """Make all that a picture lacks until it shows a look exactly.
+    """Run all jobs of a picture until it shows its look exactly.
 
     Args:
-        picture: that has been given the look. look: that it shall show.
-        progress: called with about the share done. is_canceled: asked now and then.
+        picture: its look has been set. look: the same look.
+        progress: called with the approximate fraction done. is_canceled: polled regularly.
     Raises:
-        CancelledError: `is_canceled` said so.
+        CancelledError: `is_canceled` returned true.
     """
     num_terms, num_images = sum(len(material.terms) for material in look.materials.values()), 0
     while True:
         if is_canceled():
-            raise CancelledError("the picture was cancelled")
+            raise CancelledError("the picture was canceled")
         exact = picture.advance(None).exact
         if picture.next_job() is None and exact:
             progress(1.0)
             return
 
         def report_overall(fraction: float, num_images: int = num_images) -> None:
-            # seldom is more made than an image a term
+            # most looks need at most one image per term
             progress(min(num_images + fraction, num_terms) / max(1, num_terms))
 
         picture.run_next_job(report_overall, is_canceled)

@@ -1,7 +1,7 @@
-"""What a picture needs made before it can go on: found by looking, made in any thread, installed by the picture's user.
+"""Jobs of a picture: found in the picture's thread, run in any thread, installed in the picture's thread.
 
-All that `make` reads was fixed when the job was found: the picture may be changed while it runs, and `install` looks
-whether what was made is still wanted.
+All input of `run` is fixed when the job is found: the picture may change while the job runs, and `install` checks
+whether the result is still needed.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from functools import partial
 from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
@@ -33,19 +34,19 @@ from relume.transport.shading_points import ShadingPoints
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
-_PARTIAL_SUFFIX = "begun"  # ends the names of images of which some is shaded
+_PARTIAL_SUFFIX = "begun"  # ends the keys of partially shaded images
 ProgressCallback = Callable[[float], None]
 CancelCheck = Callable[[], bool]
 
 
 class Job(Protocol):
-    """Something to be made.
+    """A computation that a picture needs.
 
     Attributes:
-        label: in words. key: equal keys are the same job.
-        state: what making it is called; what follows a hand takes a few frames, and nobody is told of it.
-        is_refinement: the picture is near its look without it, so that it can wait until the hand rests.
-        is_resumable: what is made of it is kept where it is cancelled.
+        label: text for the user. key: equal keys are the same job.
+        state: status while it runs; "updating" jobs take a few frames and are not reported.
+        is_refinement: the picture is close to its look without it, so it can wait until the drag ends.
+        is_resumable: a partial result is cached if it is canceled.
     """
 
     @property
@@ -59,20 +60,22 @@ class Job(Protocol):
     @property
     def is_resumable(self) -> bool: ...
     def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> Any:
-        """Make it, unless the cache has it.
+        """Compute the result, or return it from the cache.
 
-        Raises ResultUnavailableError where what is shown can stay, CancelledError where `is_canceled`, asked now and
-        then, said so.
+        Raises:
+            ResultUnavailableError: the displayed image can stay. CancelledError: `is_canceled`, polled regularly,
+                returned
+                true.
         """
         ...
 
     def install(self, result: Any) -> None:
-        """Go on with what `make` returned, unless the look has moved on to where it is of no use."""
+        """Use the result of `run`, unless the look has changed so that it is no longer needed."""
         ...
 
 
 class LightComponent(NamedTuple):
-    """Of a light. key: of the image in it alone. gain: how much of it there is, of each channel."""
+    """A component of a light. key: of the image in it alone. gain: per channel."""
 
     key: tuple[Hashable, ...]
     light: Illumination
@@ -80,7 +83,7 @@ class LightComponent(NamedTuple):
 
 
 class TermTarget(NamedTuple):
-    """A term of a picture: where it is, and the one that was there when a job was found."""
+    """A term of a picture: its view and material, and its state when a job was found."""
 
     images: ViewImages
     material: MaterialImage
@@ -88,21 +91,21 @@ class TermTarget(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The material's."""
+        """The name of the material."""
         return self.images.transfer.material_names[self.material.index]
 
     def exists(self) -> bool:
-        """Whether the look still has this term."""
+        """Return whether the look still contains this term."""
         return any(self.live is term for term in self.material.terms)
 
 
 @dataclass(frozen=True, eq=False)
 class PrecomputeOperator:
-    """The operator of a term along what an edit moves, everything else dormant (eq. 22, Ben-Artzi 2006).
+    """The operator of a term along the basis of an edit, all other factors fixed (eq. 22, Ben-Artzi 2006).
 
     Attributes:
-        bands: of the term's curves, (3, J) each. light: what arrives.
-        form: what it is made of.
+        bands: of the term's curves, (3, J) each. light: the illumination.
+        form: precision and sampling of the operator.
     """
 
     target: TermTarget
@@ -118,10 +121,10 @@ class PrecomputeOperator:
 
     @classmethod
     def for_target(cls, target: TermTarget, basis: EditBasis, form: OperatorForm) -> PrecomputeOperator:
-        """The operator for what is wanted of a term now.
+        """Return the job for the current target of a term.
 
         Args:
-            target: of the term. basis: what is free in it. form: from `operator_form`.
+            target: the term. basis: its free coefficients. form: from `operator_form`.
         """
         images, material, live = target
         key = images.operator_key(material, live, basis, live.target_bands, is_merged_light=form.is_merged_light)
@@ -130,12 +133,12 @@ class PrecomputeOperator:
 
     @property
     def label(self) -> str:
-        """In words."""
+        """Text for the user."""
         return f"{self.target.name}, {self.basis.label}"
 
     @property
     def num_bytes(self) -> int:
-        """Memory to keep it."""
+        """Memory of the result."""
         return self.form.num_bytes(self.target.material, self.basis.num_columns)
 
     def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> Operator:
@@ -161,10 +164,11 @@ class PrecomputeOperator:
         return images.cache.get(self.key, Operator, self.num_bytes, build_operator)  # type: ignore[type-abstract]
 
     def install(self, result: Operator) -> None:
-        """See `Job`; the dormant curves of the operator must be those that are wanted now.
+        """See `Job`; used only if the fixed curves of the operator are still those of the target.
 
-        Where the image shows other curves, or the operator can say them better, it is summed anew. An operator that is
-        not exact goes on from the image as it is, if that differs in nothing else.
+        If the image shows other curves, or the operator is more exact, the image is summed anew. An operator that is
+        not exact
+        continues from the current image, if that differs in nothing else.
         """
         images, material, live = self.target
         is_merged_light = self.form.is_merged_light
@@ -176,7 +180,7 @@ class PrecomputeOperator:
         if not self.target.exists() or self.key != current_key:
             return
         ready, changed = live.ready, set(live.changed_curves())
-        # its coefficients hold, also where only some were moved
+        # its coefficients are valid, even if only some were updated
         has_coefficients = live.is_converged and ready.basis == self.basis
         if not result.is_exact and can_resume_from(ready, changed, self.basis):
             if not has_coefficients:
@@ -192,10 +196,10 @@ class PrecomputeOperator:
 
 
 def can_resume_from(ready: DisplayedImage, changed: Collection[str], basis: EditBasis) -> bool:
-    """Whether changes along a basis may be added to what is ready: its curves are known, and no other one differs.
+    """Return whether changes along a basis may be added to a converged image: no other curve differs.
 
     Args:
-        ready: of a term. changed: curves whose target is not summed in it. basis: of an operator.
+        ready: image of a term. changed: curves whose target it does not show. basis: of an operator.
     """
     has_curves = all(not np.isnan(ready.bands.get(name, np.nan)).any() for name in basis.affected_curves)
     return ready.is_converged and has_curves and set(changed) <= set(basis.affected_curves)
@@ -203,11 +207,12 @@ def can_resume_from(ready: DisplayedImage, changed: Collection[str], basis: Edit
 
 @dataclass(frozen=True, eq=False)
 class Shade:
-    """The image of a term's target in some light, from nothing: what every route to EXACT must agree with.
+    """The image of a term's target in some light, shaded from scratch: every strategy with fidelity EXACT must match
+    it.
 
     Attributes:
-        model: of the term. bands: of its curves, (3, J) each. light_components: that the light is the sum of.
-        is_default: the look is the scene's own, whose images stay beside the store.
+        model: of the term. bands: of its curves, (3, J) each. light_components: their sum is the light.
+        is_default: the look is the scene's own, whose images are cached next to the store.
     """
 
     target: TermTarget
@@ -224,9 +229,10 @@ class Shade:
 
     @classmethod
     def for_target(cls, target: TermTarget, light: Illumination, *, is_refinement: bool | None = None) -> Shade:
-        """Shade the term of a target in some light.
+        """Return the job that shades a target in some light.
 
-        is_refinement: whether it can wait; None: where the term can be seen without it.
+        Args:
+            is_refinement: it can wait; None: it can if the term already has a preview.
         """
         images, material, live = target
         key, can_wait = (
@@ -242,16 +248,16 @@ class Shade:
 
     @property
     def label(self) -> str:
-        """In words."""
+        """Text for the user."""
         return f"{self.target.name}, {self.term.label}"
 
     @property
     def num_bytes(self) -> int:
-        """Memory to keep it."""
+        """Memory of the result."""
         return shaded_bytes(self.target.material.num_samples)
 
     def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> ShadedTerm:
-        """See `Job`; kept beside the store as well."""
+        """See `Job`; the result is cached on disk as well."""
         images = self.target.images
         image_files = images.transfer.derived if self.is_default else images.transfer.edited
         shape = self.target.live.ready.image.shape
@@ -262,7 +268,7 @@ class Shade:
         return images.cache.get(self.key, ShadedTerm, self.num_bytes, shaded)
 
     def _sum_components(self, progress: ProgressCallback, is_canceled: CancelCheck) -> ShadedTerm:
-        """Shade the parts of the light that no other image has had, and sum all."""
+        """Shade the components of the light that are not cached, and sum all."""
         images, material, live = self.target
         btf_ref = self.term.texels
         if btf_ref is not None and self.light == live.light and is_cacheable(images, material, btf_ref):
@@ -281,7 +287,7 @@ class Shade:
     def _complete_image(
         self, key: tuple[Hashable, ...], light: Illumination, progress: ProgressCallback, is_canceled: CancelCheck
     ) -> ShadedTerm:
-        """The image in a light, from what was begun of it."""
+        """Complete the image in a light from its partial result."""
         shaded = ShadedTerm.from_rows(self._partial_rows(key, light, progress, is_canceled, None))
         self.target.images.cache.evict((*key, _PARTIAL_SUFFIX))
         return shaded
@@ -294,7 +300,7 @@ class Shade:
         is_canceled: CancelCheck,
         sample_mask: NDArray[np.bool_] | None,
     ) -> F32:
-        """Rows of the image in a light, those of wanted samples shaded; None: all. (n, 3)"""
+        """Rows of the image in a light; only samples in the mask are shaded, None: all. (n, 3)"""
         images, material, _ = self.target
         num, transient = material.num_samples, images.cache.transient
         partial_image = transient.get(
@@ -311,16 +317,16 @@ class Shade:
         return partial_image.rows
 
     def _report(self, progress: ProgressCallback, done: int, fraction: float) -> None:
-        """How much of all parts of the light is done with a share of one."""
+        """Report the progress of one component as a fraction of all components."""
         progress((done + fraction) / max(1, len(self.light_components)))
 
     def shade_samples(
-        self, sample_mask: NDArray[np.bool_], progress: ProgressCallback, is_canceled: CancelCheck
-    ) -> F32:
-        """Rows of the same image of which only wanted samples are made; others may be anything. (n, 3)
+        self, sample_mask: Shaped[NDArray[np.bool_], " n"], progress: ProgressCallback, is_canceled: CancelCheck
+    ) -> Shaped[F32, "n 3"]:
+        """Shade only the samples of a mask; the other rows are undefined. Partial results are cached.
 
         Args:
-            sample_mask: samples of the material. (n,) progress, is_canceled: as of `make`; what is made is kept.
+            sample_mask: samples of the material. progress, is_canceled: as in `run`.
         """
         if len(self.light_components) < 2:
             return self._partial_rows(self.key, self.light, progress, is_canceled, sample_mask)
@@ -335,13 +341,13 @@ class Shade:
         return total
 
     def install(self, result: ShadedTerm) -> None:
-        """See `Job`; an image of older curves is shown where there is none: a hand may not rest for long."""
+        """See `Job`; an image of older curves is shown if there is no other, since a drag may rarely pause."""
         images, material, live = self.target
         if not self.target.exists() or (live.model, live.light) != (self.model, self.light):
             return
         is_current = self.key == images.image_key(material, live, self.light)
         if not live.is_converged or (is_current and (not live.is_exact() or live.ready.rounding > 0)):
-            basis = live.ready.basis  # a hand that is on something goes on from here
+            basis = live.ready.basis  # an active edit continues from here
             coefficients = None if basis is None else basis.coefficients(self.bands)
             live.set_ready(
                 DisplayedImage(result.image.copy(), Fidelity.EXACT, self.bands, self.light, basis, coefficients)
@@ -350,11 +356,11 @@ class Shade:
 
 @dataclass(frozen=True, eq=False)
 class Resum:
-    """An image that was summed from steps, summed once: at rest, exact is a fact.
+    """An image that was accumulated in steps, summed again to remove rounding errors.
 
     Attributes:
-        ready: the state that the steps led to. sum_into: writes the same image, summed once, over zeros.
-        rounding: that such a sum leaves, see `DisplayedImage`.
+        ready: the state after the steps. sum_into: adds the same image, summed once, to zeros.
+        rounding: of such a sum, see `DisplayedImage`.
     """
 
     target: TermTarget
@@ -368,29 +374,30 @@ class Resum:
 
     @property
     def label(self) -> str:
-        """In words."""
+        """Text for the user."""
         return f"{self.target.name}, {self.target.live.term.label}"
 
-    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> F32:
-        """See `Job`; takes as long as reading once what is summed."""
+    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> Shaped[F32, "tiles 3 samples"]:
+        """See `Job`; the cost is one pass over the summed arrays."""
         image = np.zeros_like(self.ready.image)
         self.sum_into(image)
         progress(1.0)
         return image
 
-    def install(self, result: F32) -> None:
-        """See `Job`; of no use where another step has been added."""
+    def install(self, result: Shaped[F32, "tiles 3 samples"]) -> None:
+        """See `Job`; ignored if another step has been added."""
         live = self.target.live
         if live.ready is self.ready:
             live.set_ready(replace(self.ready, image=result, rounding=self.rounding, fidelity=Fidelity.EXACT))
 
 
-def weighted_sum(start: F32, weighted_images: Sequence[tuple[F32, Rgb]]) -> F32:
-    """Σ g R, added to an image in place: transport is linear in light.
+def weighted_sum(
+    start: Shaped[F32, "tiles 3 samples"], weighted_images: Sequence[tuple[F32, Rgb]]
+) -> Shaped[F32, "tiles 3 samples"]:
+    """Add Σ g R to an image in place (transport is linear in light), and return it.
 
     Args:
-        start: (tiles, 3, samples) float32, written. weighted_images: images of the same shape, and the gain of each
-            channel.
+        start: the image, overwritten. weighted_images: images of the same shape, with a gain per channel.
     """
     for image, gain in weighted_images:
         start += np.array(gain, np.float32)[:, None] * image

@@ -6,6 +6,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.specular import specular_albedo
@@ -23,7 +24,7 @@ class MaterialImage:
     """State of one material in one view.
 
     Attributes:
-        num_composed: how often its radiance has been written: whoever has seen as many has seen it as it is.
+        num_composed: number of times that its radiance has been written; equal numbers mean equal radiance.
     """
 
     def __init__(self, view: View, index: int, documents: Sequence[Mapping[str, Any]], light: Illumination) -> None:
@@ -50,33 +51,33 @@ class MaterialImage:
         self._in_region: tuple[Tile, NDArray[np.bool_]] | None = None
 
     def set_view(self, view: View) -> None:
-        """The view has other samples of other materials, and the same of this one."""
+        """Set a view in which the samples of other materials have changed, but not those of this one."""
         self._view, self._is_current = view, False
 
-    def keep_displayed(self, before: MaterialImage, rows: NDArray[np.integer]) -> None:
-        """Show what the same material's image does, until something of this one is ready.
+    def keep_displayed(self, before: MaterialImage, rows: Shaped[NDArray[np.integer], " n"]) -> None:
+        """Display another image of the same material until an image of this one is ready.
 
         Args:
-            before: that image. rows: of its samples, which each of these is. (n,)
+            before: that image. rows: index of each sample of this image among its samples.
         """
         for term, previous_term in zip(self.terms, before.terms, strict=True):
             term.keep_displayed(previous_term, rows)
 
     def num_pixel_blocks(self, step: int) -> int:
-        """How many squares of step × step pixels it is seen in."""
+        """Return the number of blocks of step × step pixels in which it is visible."""
         if step not in self._num_pixel_blocks:
             self._num_pixel_blocks[step] = num_blocks(self._view, self.index, step)
         return self._num_pixel_blocks[step]
 
-    def lies_in(self, region: Tile) -> NDArray[np.bool_]:
-        """Which of its samples are seen in a region of the picture, see `View.lies_in`; the last answer is kept."""
+    def lies_in(self, region: Tile) -> Shaped[NDArray[np.bool_], " n"]:
+        """Return a mask of its samples in a region of the image, see `View.is_in_region`; the last result is cached."""
         cached = self._in_region
         if cached is None or cached[0] != region:
             self._in_region = cached = region, self._view.is_in_region(self.index, region)
         return cached[1]
 
     def set_documents(self, documents: Sequence[Mapping[str, Any]]) -> None:
-        """New targets; terms that stay as they are keep their images."""
+        """Set new targets; unchanged terms keep their images."""
         if list(documents) == self.documents:
             return
         num_terms = len(self.terms)
@@ -90,52 +91,58 @@ class MaterialImage:
         self._is_current = False
 
     def set_light(self, light: Illumination, *, is_solo: bool) -> None:
-        """It is lit by this from now on. is_solo: by some sources alone."""
+        """Set the target illumination. is_solo: it is of some sources alone."""
         self._light = light
         for term in self.terms:
             term.set_light(light, is_solo=is_solo)
 
     def set_emission(self, emission: tuple[float, float, float], emission_pattern: Callable[[int], F32]) -> None:
-        """The surfaces send this out themselves, as `emission_pattern` says of the material's samples, (n, 1 or 3)."""
+        """Set the emitted radiance, which multiplies `emission_pattern` of the material's samples, (n, 1 or 3)."""
         if emission == self._emission:
             return
         self._emission, self._is_current = emission, False
         if self._emission_pattern is None:
             self._emission_pattern = emission_pattern(self.index)
 
-    def set_factor(self, key: Hashable, factor: F32 | None, max_radiance: F32 | None, unlit: F32 | None) -> None:
-        """Every sample's finished radiance is multiplied, as on a ground that only catches shadows; None: by one.
+    def set_factor(
+        self,
+        key: Hashable,
+        factor: Shaped[F32, "3 n"] | None,
+        max_radiance: Shaped[F32, "3 n"] | None,
+        unlit: Shaped[F32, "3 n"] | None,
+    ) -> None:
+        """Set a factor on the radiance of every sample, as on a shadow catcher; None for 1.
 
         Args:
-            key: that tells it from others, None for none. factor: (3, n) float32
-            max_radiance: that samples become by it. (3, n) float32
-            unlit: added to what is multiplied: what samples show without any light. (3, n) float32 or None for nothing
+            key: identifies the factor, None for none. factor: float32 per sample.
+            max_radiance: upper limit of the product.
+            unlit: added to the product: radiance of samples that receive no light; None for zero.
         """
         if key != self.factor_key:
             self.factor_key, self._factor, self._max_radiance, self._unlit = key, factor, max_radiance, unlit
             self._is_current = False
 
-    def set_mirror_emission(self, mirror_emission: F32 | None) -> None:
-        """What shines between mirrors and samples that are seen in them, (3, n): the same array while it is the same.
+    def set_mirror_emission(self, mirror_emission: Shaped[F32, "3 m"] | None) -> None:
+        """Set the radiance of emitters between mirrors and the samples that are visible in them.
 
         Args:
-            mirror_emission: of all of the view that are seen in mirrors. (3, m) float32, None for nothing
+            mirror_emission: for all mirrored samples of the view, None for zero; the same array while nothing changes.
         """
         if mirror_emission is not self._mirror_emission:
             self._mirror_emission, self._is_current = mirror_emission, False
 
     @property
     def mirrors(self) -> Sequence[Mapping[str, Any]]:
-        """Its terms, as their mirrors are shown; those of a material of which nothing else is seen follow at once."""
+        """Documents of its terms whose mirrors are displayed; of a material without samples the newest ones."""
         return [term.mirror for term in self.terms] if self.num_samples else self.documents
 
     @property
     def is_shadow_catcher(self) -> bool:
-        """Whether only shadows on it are shown."""
+        """True if only shadows on it are shown."""
         return self._factor is not None
 
-    def compose(self, radiance: F32) -> bool:
-        """Write the material's samples into the view's radiance; False where nothing has changed since."""
+    def compose(self, radiance: Shaped[F32, "3 samples"]) -> bool:
+        """Write the material's samples into the view's radiance; False if nothing has changed."""
         for term in self.terms:
             term.update_mirror()
         if self._is_current and all(term.is_composed for term in self.terms):
@@ -163,13 +170,15 @@ class MaterialImage:
         self.num_composed += 1
         return True
 
-    def term_radiance(self, term: LiveTerm, image: F32, radiance: F32) -> None:
-        """Write what another image of one term would give alone to `radiance`, (3, samples); the term stays."""
+    def term_radiance(
+        self, term: LiveTerm, image: Shaped[F32, "tiles 3 lanes"], radiance: Shaped[F32, "3 samples"]
+    ) -> None:
+        """Write the radiance of another image of one term alone to `radiance`; the state of the term is unchanged."""
         color, texture = self._factors(term)
         add_term(image, color, texture, self._view_factor(term), self._first, self.num_samples, True, radiance)
 
-    def factors_at(self, term: LiveTerm, sample: int) -> NDArray[np.float64]:
-        """What multiplies a term's image at one of the material's samples. (3,) float64"""
+    def factors_at(self, term: LiveTerm, sample: int) -> Shaped[NDArray[np.float64], " 3"]:
+        """Return the factor on a term's image at one of the material's samples."""
         color, texture = self._factors(term)
         factor = color.astype(np.float64)
         if texture is not None:
@@ -178,19 +187,20 @@ class MaterialImage:
         return factor if view_factor is None else factor * view_factor[:, sample]
 
     def level_at(self, sample: int) -> int:
-        """The level of roughness of one of the material's samples."""
+        """Return the roughness level of one of the material's samples."""
         return int(self._levels.level[sample])
 
     def _view_factor(self, term: LiveTerm) -> F32 | None:
-        """What multiplies a term's finished samples, None for one: its outgoing curves; of mirrors, whose picture other
-        samples have, the share that is none. (3, n)"""
+        """Factor on a term's finished samples, None for 1: outgoing curves, and 1 minus the specular albedo of mirrors.
+        (3, n)
+        """
         if self._is_mirrored is None or not (specular := specular_albedo(term.mirror)).any():
             return term.view_factor
         lobe = np.where(self._is_mirrored, (1 - specular)[:, None], 1).astype(np.float32)
         return lobe if term.view_factor is None else lobe * term.view_factor
 
     def _factors(self, term: LiveTerm) -> tuple[F32, F32 | None]:
-        """What multiplies a term's image: its colour, and its texture per sample, None for one."""
+        """Factors on a term's image: its color, and its texture per sample, None for 1."""
         color = np.asarray(term.document["color"], np.float32)
         name = term.document.get("texture")
         if is_user_image(name):

@@ -1,6 +1,4 @@
-"""What mirrors send on of a picture: how samples that are seen in them count for their pixels, as the look has it; and
-rectangles that shine, which nothing but a mirror shows.
-"""
+"""Mirrors in an image: the weights of samples that are visible in them, and rectangles that only mirrors show."""
 
 from __future__ import annotations
 
@@ -8,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.specular import specular_terms
@@ -22,17 +21,16 @@ Documents = Sequence[Mapping[str, Any]]
 
 
 def lit_rectangles(light: Illumination) -> tuple[LightSource, ...]:
-    """The rectangles that are lit in a light."""
+    """Return the rectangles that emit direct light."""
     return tuple(source for source in light.local if source.geometry.kind == "rectangle" and light.paths.direct)
 
 
 class MirrorFactors:
-    """Of one picture.
+    """The mirrors of one image.
 
     Attributes:
-        gains: what the radiance of each sample is multiplied by for its pixel, in the view's order; see
-            `View.throughput`.
-        materials: those that anything is seen in.
+        gains: factor on the radiance of each sample for its pixel, in the view's order; see `View.throughput`.
+        materials: those with visible mirror reflections.
     """
 
     def __init__(self, view: View) -> None:
@@ -43,21 +41,23 @@ class MirrorFactors:
         self._specular_factors = None if chain is None else np.ones((*chain.material.shape, 3), np.float32)
         self.materials: list[int] = [] if chain is None else np.setdiff1d(chain.material, [NO_MIRROR]).tolist()
 
-    def mirror_emitters(self, light: Illumination) -> F32 | None:
-        """Radiance of the rectangles between mirrors and what is seen in them; the same array while they stay as they
-        are. (3, m) float32, None where there are none."""
+    def mirror_emitters(self, light: Illumination) -> Shaped[F32, "3 m"] | None:
+        """Return the radiance of rectangles between mirrors and the samples visible in them; None if there are none.
+
+        The same array is returned while nothing changes.
+        """
         sources = lit_rectangles(light)
         if self._mirror_samples is not None and sources != self._emitters[0]:
             self._emitters = sources, _emitter_radiance(self._mirror_samples, sources) if sources else None
         return self._emitters[1]
 
     def update_emission(self, documents: Mapping[int, Documents | None]) -> list[int]:
-        """Bring mirrors to a look.
+        """Update mirrors to a look.
 
         Args:
-            documents: terms of the materials that anything is seen in; None where none of them is shown.
+            documents: terms of the mirror materials; None if their mirrors are not shown.
         Returns:
-            Those of the materials that send on something else than before.
+            The materials whose specular albedo has changed.
         """
         changed = [
             index for index in documents if index not in self._documents or documents[index] != self._documents[index]
@@ -80,7 +80,7 @@ class MirrorFactors:
 
 
 def _emitter_radiance(mirror_samples: MirrorSamples, sources: Sequence[LightSource]) -> F32:
-    """Radiance of rectangles on the ways from mirrors to what is seen in them. (3, m)"""
+    """Radiance of rectangles on the ray paths from mirrors to mirrored samples. (3, m)"""
     radiance = np.zeros((3, len(mirror_samples.sample)), np.float32)
     for geometry, gain in sources:
         corner, edges = rectangle(geometry)

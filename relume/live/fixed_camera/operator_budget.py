@@ -1,12 +1,10 @@
-"""What a term's operator is made of: all of its samples in float32 where the memory has room for that, else less.
+"""Forms of a term's operator that fit the memory budget: all samples in float32 if possible, else compact forms.
 
-Where an operator would take a hand's patience, a rough one is there first, by which the picture goes on
-(docs/direct-light.md#algorithm).
+If the exact operator would delay a drag, a coarse one is computed first and updates the image meanwhile.
 
-What a hand is on is followed whatever the picture's size. An operator along a curve of 256 bands takes 3 kB a sample,
-6.4 GB where a material fills 1920×1080 pixels. In 16 bits it is half of that, to 10⁻⁴; where that is too much, one
-sample of each square of pixels says how the picture changes. At rest every sample is shaded
-(docs/direct-light.md#algorithm).
+A drag is followed at any image size. An operator along a curve of 256 bands takes 3 kB per sample, 6.4 GB if a material
+fills 1920×1080 pixels. 16 bits halve that, with an error of 10⁻⁴; if that is still too large, one sample per pixel
+block determines the change of the image. When the drag ends, every sample is shaded (docs/direct-light.md#algorithm).
 """
 
 from __future__ import annotations
@@ -29,26 +27,24 @@ from relume.views.pixel_blocks import nearest_chosen, one_per_block
 from relume.views.view import View
 
 _SPARE_BUDGET_DIVISOR = (
-    8  # of the budget, left beside a packed one: an image that is shaded at rest must not push it out
+    8  # fraction left free beside a quantized operator, so that a newly shaded image does not evict it
 )
 _SUBSAMPLED_BUDGET_DIVISOR = (
-    2  # an operator of some samples takes the budget over this: images have room beside it, another one follows
+    2  # a subsampled operator takes at most this fraction: images and a second operator need room
 )
 _MAX_STEP = 8
-_MIN_SAMPLES = 256  # samples; fewer do not say where a highlight is
-_SLOW_PAIRS_PER_THREAD = (
-    12_000_000  # pairs of samples and lights a thread, of which it takes a third of a second and more
-)
-_MIN_LIGHTS_TO_MERGE = 800  # lights, of which less than half would be left to merge into
-_SOFTENING = 0.05  # pixels²; what a chosen sample's own neighbours have of it
+_MIN_SAMPLES = 256  # samples; fewer do not resolve a highlight
+_SLOW_PAIRS_PER_THREAD = 12_000_000  # pairs of samples and lights per thread that take at least a third of a second
+_MIN_LIGHTS_TO_MERGE = 800  # with fewer lights, merging leaves more than half of the lights
+_SOFTENING = 0.05  # pixels²; smooths the interpolation weights near a shaded sample
 
 
 class OperatorForm(NamedTuple):
-    """What an operator is made of.
+    """Precision and sampling of an operator.
 
     Attributes:
-        step: one sample of each square of so many pixels; 1: all. is_quantized: in 16 bits.
-        is_merged_light: of merged lights.
+        step: one sample per block of step × step pixels; 1: all. is_quantized: stored in 16 bits.
+        is_merged_light: computed from merged lights.
     """
 
     step: int
@@ -56,7 +52,7 @@ class OperatorForm(NamedTuple):
     is_merged_light: bool = False
 
     def num_bytes(self, material: MaterialImage, num_columns: int) -> int:
-        """Memory that it takes of a material's term. num_columns: in each channel."""
+        """Return its memory for a term of a material. num_columns: in each channel."""
         if self.step > 1:
             return subsampled_bytes(material.num_samples, material.num_pixel_blocks(self.step), num_columns)
         return (quantized_bytes if self.is_quantized else operator_bytes)(material.num_samples, num_columns)
@@ -68,10 +64,10 @@ MERGED_LIGHT = OperatorForm(1, is_quantized=False, is_merged_light=True)
 
 
 def operator_form(material: MaterialImage, num_columns: int, budget_bytes: int) -> OperatorForm | None:
-    """The best form of an operator that fits; None where none does, and the hand has to be waited for.
+    """Return the best form of an operator that fits the budget; None if none does.
 
     Args:
-        material: whose samples. num_columns: of the operator, in each channel. budget_bytes: of the memory.
+        material: the image of a material. num_columns: of the operator, in each channel. budget_bytes: of the cache.
     """
     if EXACT.num_bytes(material, num_columns) <= budget_bytes:
         return EXACT
@@ -85,10 +81,10 @@ def operator_form(material: MaterialImage, num_columns: int, budget_bytes: int) 
 
 
 def use_coarse(material: MaterialImage, num_columns: int, num_lights: int, budget_bytes: int) -> bool:
-    """Whether an exact operator takes so long to be made that a rough one is to be there first, and both fit.
+    """Return whether the exact operator takes so long that a coarse one is computed first, and both fit the budget.
 
     Args:
-        material, num_columns, budget_bytes: as in `operator_form`. num_lights: that its samples may see.
+        material, num_columns, budget_bytes: as in `operator_form`. num_lights: number of lights of its samples.
     """
     is_slow = (
         num_lights >= _MIN_LIGHTS_TO_MERGE
@@ -104,12 +100,12 @@ def precompute_subsampled(
     receivers: ShadingPoints,
     precompute: Callable[[ShadingPoints], LinearOperator | QuantizedOperator],
 ) -> SubsampledOperator:
-    """An operator of one sample of each square of pixels.
+    """Precompute an operator from one sample per pixel block.
 
     Args:
-        view: whose samples. material: its index. step: side of a square.
-        receivers: all samples of the material, with what arrives at them.
-        precompute: makes the operator of those that are chosen.
+        view: the view. material: its index. step: side of a block.
+        receivers: all samples of the material, with their incident light.
+        precompute: computes the operator of the selected samples.
     """
     sample_indices = one_per_block(view, material, step)
     neighbors, weight = nearest_chosen(view, material, sample_indices, step, NUM_NEIGHBORS, _SOFTENING)
@@ -121,7 +117,7 @@ def precompute_subsampled(
 def _subsample(
     view: View, material: int, step: int, receivers: ShadingPoints, sample_indices: NDArray[np.intp]
 ) -> ShadingPoints:
-    """Some of a material's samples, which share gather rays as those of a picture do that is as much smaller."""
+    """Select samples of a material; they share gather rays like the samples of a smaller image."""
     subset = receivers.subset(sample_indices)
     y, x = np.divmod(view.pixel[view.rows(material)][sample_indices], np.uint32(view.width))
     width = -(-view.width // step)

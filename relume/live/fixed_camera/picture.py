@@ -1,4 +1,4 @@
-"""One live picture: a view under a look that changes while somebody drags."""
+"""The image of a view whose look changes interactively."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.curves import curve_bands, generated_bands
@@ -33,12 +34,12 @@ F32 = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Progress:
-    """What one step changed.
+    """The result of one step.
 
     Attributes:
-        tiles: x, y, width, height of the picture's tiles that are new. exact: the picture shows its look exactly.
-        fidelity: how nearly it shows it, in what is seen of it. complete: something of every term is shown.
-        previous_error: how far the picture that an exact one replaces was from it, relative RMS, where its eye moved.
+        tiles: x, y, width, height of the updated tiles. exact: the picture shows its look exactly.
+        fidelity: of the visible region. complete: every term has an image.
+        previous_error: relative RMS difference of an exact image from the image it replaces, for a free camera.
     """
 
     tiles: list[Tile]
@@ -49,15 +50,15 @@ class Progress:
 
     @property
     def changed(self) -> bool:
-        """Whether any pixel may be new."""
+        """True if any pixel may have changed."""
         return bool(self.tiles)
 
 
 class Picture:
-    """State of one session's picture; used from one thread at a time, while a `Job` is made in another.
+    """The image of one session; used from one thread at a time, while a `Job` may run in another.
 
     Args:
-        is_watched: somebody looks at it while it opens, and sees a rough picture first where a better one takes long.
+        is_watched: a user waits for it, so that previews are shown first if better images take long.
     """
 
     def __init__(self, transfer: FixedViewTransfer, view_name: str, cache: Cache, *, is_watched: bool = False) -> None:
@@ -65,7 +66,7 @@ class Picture:
         self._view = self._images.view
         self._look = self._images.default
         self._radiance = np.zeros((3, self._view.num_view_samples), np.float32)
-        self._gain = np.full(3, -1.0)  # no environment's: nothing is shown yet
+        self._gain = np.full(3, -1.0)  # invalid: nothing is shown yet
         self._background = Background(self._images)
         self._prepared_pointer: CurvePointer | ParameterPointer | None = None
         self._edited_pointer: CurvePointer | ParameterPointer | None = None
@@ -73,25 +74,25 @@ class Picture:
         self._scheduler = StrategyScheduler(self._images, is_watched=is_watched)
 
     def check(self, look: Look) -> None:
-        """Whether a look can be shown at all, before any picture is given it; nothing changes.
+        """Check that a look can be shown, without changing the picture.
 
         Raises:
-            MemoryBudgetError: the images of its terms are larger than the memory may be.
+            MemoryBudgetError: the images of its terms exceed the memory budget.
         """
         samples = ((m.num_samples, len(material_documents(look, name))) for name, m in self._images.by_name.items())
         self._images.cache.check(sum(shaded_bytes(num) * terms for num, terms in samples if num))
 
     def set_look(self, look: Look, *, active_pointer: str | None = None, solo: Solo = None) -> None:
-        """A new target; nothing is computed yet.
+        """Set a new target; nothing is computed yet.
 
         Args:
-            active_pointer: pointer to what the user's hand is on while it makes this look, see `parse_pointer`; None
-                where that is not known, as after an undo.
-            solo: names of sources of light that alone are shown, see `light_of`; None: all.
+            active_pointer: pointer to the control whose edit made this look, see `parse_pointer`; None if unknown, for
+                example after an undo.
+            solo: names of the only light sources to show, see `illumination_from_look`; None: all.
         Raises:
-            ParameterError: `active_pointer` points to nothing that a hand may hold. NotFoundError, SceneError: the
-                environment or an image cannot be had. StoreError: the bake is too old for images. The picture stays as
-                it was.
+            ParameterError: `active_pointer` does not point to an editable control. NotFoundError, SceneError: the
+                environment or an image is not available. StoreError: the bake is too old for images. The picture is
+                unchanged.
         """
         edited = None if active_pointer is None else parse_pointer(active_pointer)
         before, images = self._images.light, self._images.view_with_overrides(look)
@@ -101,11 +102,11 @@ class Picture:
         self._edited_pointer = edited if isinstance(edited, CurvePointer | ParameterPointer) else None
         self._active_pointer = edited or self._active_pointer
         if (images.light.environment, images.light.local) != (before.environment, before.local):
-            self._prepared_pointer = None  # the hand has moved on to a light
+            self._prepared_pointer = None  # the user edits a light now
         self._look = look
 
     def _switch_images(self, images: ViewImages) -> None:
-        """Go on with other images of the same view."""
+        """Replace the images with others of the same view."""
         self._images, self._view = images, images.view
         for material in images.by_name.values():
             material.set_view(images.view)
@@ -113,11 +114,11 @@ class Picture:
         self._scheduler.adopt(images)
 
     def look_at(self, region: Tile | None) -> None:
-        """What is seen of the picture, and is to be exact first: x, y, width, height in pixels; None: all."""
+        """Set the visible region, which becomes exact first: x, y, width, height in pixels; None: all."""
         self._images.region = region
 
     def prepare(self, pointer: str) -> None:
-        """Prepare what a hand takes hold of ahead of its first edit.
+        """Prepare a control before its first edit.
 
         Args:
             pointer: e.g. "/materials/Teapot/terms/1/curves/theta_h"; see `parse_pointer`.
@@ -131,34 +132,34 @@ class Picture:
         self._active_pointer = prepared
 
     def next_job(self) -> Job | None:
-        """What must be made next, for the look or for what was touched; None where nothing is lacking.
+        """Return the next job for the look or for the prepared control; None if nothing is missing.
 
-        The picture may be advanced meanwhile: all that does not depend on it follows the look.
+        The picture may advance while the job runs: everything that does not depend on it follows the look.
         """
         return self._scheduler.next_job(self._active_control(), self._look)
 
     def install(self, job: Job, result: Any) -> None:
-        """Go on with what a job has made, unless the look has moved on to where it is of no use."""
+        """Use the result of a job, unless the look has changed so that it is no longer needed."""
         self._scheduler.install(job, result)
         prepared = self._active_control().prepared_control
         if not isinstance(job, PrecomputeOperator) or prepared is None or prepared.target.live is not job.target.live:
             return
         if prepared.basis != job.basis and prepared.target.live.ready.basis == job.basis:
-            self._prepared_pointer = None  # the hand has moved on to something else of this term
+            self._prepared_pointer = None  # the user edits something else of this term now
 
     def run_next_job(self, progress: Callable[[float], None], is_canceled: Callable[[], bool]) -> None:
-        """Make what `next_job` names and install it.
+        """Run the next job and install its result.
 
         Raises:
-            CancelledError: `is_canceled` said so; the picture stays as it was.
-            MemoryBudgetError: it is larger than the cache may be.
+            CancelledError: `is_canceled` returned true; the picture is unchanged.
+            MemoryBudgetError: the result is larger than the cache.
         """
         job = self.next_job()
         if job is not None:
             self.install(job, job.run(progress, is_canceled))
 
     def advance(self, max_coefficients: int | None) -> Progress:
-        """Bring the picture towards its look: R += T · Δc with the most important coefficients, None for all."""
+        """Update the image toward its look: R += T · Δc with the most important coefficients, None for all."""
         images, scheduler = self._images, self._scheduler
         scheduler.advance(max_coefficients)
         tiles: set[Tile] = set()
@@ -183,47 +184,47 @@ class Picture:
         return Progress(in_order, exact, fidelity, complete)
 
     def all_tiles(self) -> list[Tile]:
-        """Tiles that cover the picture."""
+        """Return the tiles that cover the image."""
         return self._view.all_tiles
 
     def encode(self, tiles: Sequence[Tile], form: str) -> bytes:
-        """Payload of a frame, "rgb9e5" or "f32": the tiles one after another, row-major."""
+        """Return the payload of a frame, "rgb9e5" or "f32": the tiles in order, row-major."""
         return encode(self._view, self._radiance, tiles, form, self._gain, self._images.mirrors.gains)
 
     def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
-        """How much each pixel of tiles hides of display values behind it, a byte each; None where it hides all."""
+        """Return the alpha of each pixel in tiles over display values, one byte each; None if the image is opaque."""
         if not self._background.is_transparent:
             return None
         alpha = self._background.alpha(for_display=True)
         return encode_coverage(alpha, tiles)
 
-    def alpha(self, *, for_display: bool) -> F32 | None:
-        """The same of the whole picture, or how much it hides of linear radiance. (height, width) float32"""
+    def alpha(self, *, for_display: bool) -> Shaped[F32, "height width"] | None:
+        """Return the alpha of the whole image over display values or linear radiance, float32; None if it is opaque."""
         return self._background.alpha(for_display=for_display) if self._background.is_transparent else None
 
-    def image(self) -> F32:
-        """Linear radiance, nothing where it is transparent. (height, width, 3) float32"""
+    def image(self) -> Shaped[F32, "height width 3"]:
+        """Return linear radiance, zero where the image is transparent."""
         whole = [(0, 0, self._view.width, self._view.height)]
         pixels = resolve(self._view, self._radiance, whole, self._gain, self._images.mirrors.gains)
         return pixels.reshape(self._view.height, self._view.width, 3)
 
-    def curve(self, pointer: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Bands of a curve as displayed and as its parameters alone would give it. (3, J) each"""
+    def curve(self, pointer: str) -> tuple[Shaped[NDArray[np.float64], "3 J"], Shaped[NDArray[np.float64], "3 J"]]:
+        """Return the displayed bands of a curve, and the bands that its parameters alone generate."""
         curve_pointer = parse_curve(pointer)
         _, term = self._images.material_term(curve_pointer)
         declared = term.term.curve(curve_pointer.name)
         return curve_bands(term.document, declared), generated_bands(term.document, declared)
 
     def inspect(self, x: int, y: int) -> dict[str, Any]:
-        """What makes up a pixel, and where its surface is; see `relume.live.fixed_camera.pixel_probe.inspect`."""
+        """Probe a pixel: its radiance and surface; see `relume.live.fixed_camera.pixel_probe.probe`."""
         return probe(self._images, self._radiance, self._gain, self._prepared_pointer, x, y)
 
-    def highlight_pixels(self, pointer: str, from_deg: float, to_deg: float) -> F32:
-        """Which pixels a stretch of a curve lights. See `relume.live.fixed_camera.pixel_probe.highlight_pixels`."""
+    def highlight_pixels(self, pointer: str, from_deg: float, to_deg: float) -> Shaped[F32, "height width"]:
+        """Return the pixels lit by a range of a curve; see `relume.live.fixed_camera.pixel_probe.highlight_pixels`."""
         return highlight_pixels(self._images, self._radiance, parse_curve(pointer), from_deg, to_deg)
 
     def _active_control(self) -> ActiveControl:
-        """What the hand is on in the look as it is now."""
+        """Return the active control in the current look."""
         return ActiveControl(
             self._resolve_control(self._prepared_pointer),
             self._resolve_control(self._edited_pointer),
@@ -231,7 +232,7 @@ class Picture:
         )
 
     def _resolve_control(self, pointer: CurvePointer | ParameterPointer | None) -> HeldControl | None:
-        """What a pointer means in the look as it is now; None where an edit has removed it."""
+        """Resolve a pointer in the current look; None if an edit has removed its target."""
         if pointer is None:
             return None
         try:

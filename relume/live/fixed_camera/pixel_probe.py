@@ -1,10 +1,11 @@
-"""From a pixel to the curve behind it, and from a stretch of a curve to the pixels that it lights."""
+"""Map a pixel to the curve that lights it, and a range of a curve to the pixels that it lights."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import luminance
@@ -21,20 +22,20 @@ F32 = NDArray[np.float32]
 
 def probe(
     images: ViewImages,
-    radiance: F32,
-    gain: NDArray[np.float64],
+    radiance: Shaped[F32, "3 samples"],
+    gain: Shaped[NDArray[np.float64], " 3"],
     prepared_pointer: CurvePointer | ParameterPointer | None,
     x: int,
     y: int,
 ) -> dict[str, Any]:
-    """A pixel's material, where its surface is, radiance, and what each band of its active curve gives to it.
+    """Return a pixel's material, surface position, radiance, and the contribution of each band of its active curve.
 
     Args:
-        images: of the picture. x, y: of the pixel.
-        radiance: of every view sample. (3, samples) float32. gain: multiplies each channel. (3,)
-        prepared_pointer: of the term to answer for, where it is the pixel's material's.
+        images: of the picture. x, y: the pixel.
+        radiance: of every view sample, float32. gain: multiplies each channel.
+        prepared_pointer: the term to report, if it belongs to the pixel's material.
     Raises:
-        ParameterError: the pixel lies outside the picture.
+        ParameterError: the pixel lies outside the image.
     """
     view = images.view
     if not (0 <= x < view.width and 0 <= y < view.height):
@@ -78,7 +79,7 @@ def _prepared_first(
 def _contributions(
     images: ViewImages, name: str, term: LiveTerm, samples: NDArray[np.int32], gains: F32
 ) -> NDArray[np.float64] | None:
-    """T_j · c_j of the term's active curve, summed over a pixel's samples, (3, J); None where none is frozen."""
+    """T_j · c_j of the term's active curve, summed over a pixel's samples, (3, J); None if it has no operator."""
     material = images.by_name[name]
     operator = images.operator(material, term)
     ready = term.ready
@@ -96,18 +97,20 @@ def _contributions(
     return bands
 
 
-def highlight_pixels(images: ViewImages, radiance: F32, pointer: CurvePointer, from_deg: float, to_deg: float) -> F32:
-    """How much of each pixel comes from a stretch of a curve, 0 to 1. (height, width) float32
+def highlight_pixels(
+    images: ViewImages, radiance: Shaped[F32, "3 samples"], pointer: CurvePointer, from_deg: float, to_deg: float
+) -> Shaped[F32, "height width"]:
+    """Return the fraction of each pixel's luminance due to a range of a curve, 0 to 1, float32.
 
     Args:
-        images, radiance: as in `inspect`. pointer: to the curve. from_deg, to_deg: ends of the stretch, degrees.
+        images, radiance: as in `probe`. pointer: to the curve. from_deg, to_deg: ends of the range, degrees.
     Raises:
-        NotFrozenError: the curve is not frozen yet; touch it and freeze first.
+        NotPrecomputedError: the curve has no operator yet; prepare it and run the job first.
     """
     material, term = images.material_term(pointer)
     operator = images.operator(material, term)
     if operator is None or term.ready.basis != images.basis(pointer) or term.ready.coefficients is None:
-        raise NotPrecomputedError("this curve is not frozen yet; take it in hand, and brush over it once it is")
+        raise NotPrecomputedError("this curve is not precomputed yet; select it and wait until it is ready")
     bands = synthesis(term.ready.coefficients)
     edges = np.linspace(0, 90, bands.shape[-1] + 1)
     overlap = np.clip(np.minimum(edges[1:], to_deg) - np.maximum(edges[:-1], from_deg), 0, None) / np.diff(edges)

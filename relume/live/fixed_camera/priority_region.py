@@ -1,7 +1,7 @@
-"""What somebody sees of a picture is exact before the rest of it: samples in a region of its pixels are shaded first.
+"""The visible region of an image becomes exact first: its samples are shaded before all others.
 
-Where a large picture is zoomed into, or does not fit its window, most of its samples are out of sight. What was shaded
-of an image is kept, so that the whole of it costs no more than without.
+If a large image is zoomed or exceeds its window, most samples are not visible. Partial results are cached, so the
+complete image costs no more.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.live.fixed_camera.displayed import DisplayedImage
@@ -22,15 +23,15 @@ from relume.views.view import Tile
 
 F32 = NDArray[np.float32]
 
-_MIN_HIDDEN_SAMPLES = 20_000  # samples out of sight; shading fewer takes no longer than another frame is worth
+_MIN_HIDDEN_SAMPLES = 20_000  # samples outside the region; with fewer, an extra frame does not pay off
 
 
 @dataclass(frozen=True, eq=False)
 class ShadeRegion:
-    """The samples of a term in a region, before all others.
+    """Shade the samples of a term in a region first.
 
     Attributes:
-        whole: the image that they are of. region: x, y, width, height in pixels.
+        whole: the job of the complete image. region: x, y, width, height in pixels.
     """
 
     whole: Shade
@@ -40,7 +41,7 @@ class ShadeRegion:
 
     @property
     def label(self) -> str:
-        """In words."""
+        """Text for the user."""
         return self.whole.label
 
     @property
@@ -53,12 +54,12 @@ class ShadeRegion:
         """See `Job`."""
         return self.whole.is_refinement
 
-    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> F32:
-        """See `Job`. Returns rows of the image, of which those in the region are right. (n, 3)"""
+    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> Shaped[F32, "n 3"]:
+        """See `Job`. Returns rows of the image, valid in the region."""
         return self.whole.shade_samples(self.whole.target.material.lies_in(self.region), progress, is_canceled)
 
-    def install(self, result: F32) -> None:
-        """See `Job`; samples in the region show this from now on, others what they did."""
+    def install(self, result: Shaped[F32, "n 3"]) -> None:
+        """See `Job`; replaces the samples in the region."""
         images, material, live = self.whole.target
         key = images.image_key(material, live, live.light)
         if not self.whole.target.exists() or self.whole.key != key or not _allows_partial(live.ready, live.light):
@@ -68,21 +69,23 @@ class ShadeRegion:
 
 
 def _allows_partial(ready: DisplayedImage, light: Illumination) -> bool:
-    """Whether some of an image may be exact: it is shown, in this light, and nothing is added to it."""
+    """Return whether a part of an image may be replaced: it is shown in this light, and no steps are added to it."""
     return ready.fidelity in (Fidelity.PREVIEW, Fidelity.INCREMENTAL) and ready.light == light
 
 
-def with_samples(image: F32, rows: F32, mask: NDArray[np.bool_]) -> F32:
-    """A copy of an image in which some samples are those of rows.
+def with_samples(
+    image: Shaped[F32, "tiles 3 lanes"], rows: Shaped[F32, "n 3"], mask: Shaped[NDArray[np.bool_], " n"]
+) -> Shaped[F32, "tiles 3 lanes"]:
+    """Return a copy of an image with some samples replaced.
 
     Args:
-        image: (tiles, 3, samples) float32. rows: (n, 3) float32. mask: of the rows. (n,)
+        image: the image. rows: new values, float32. mask: the samples to replace.
     """
     return ShadedTerm.from_rows(np.where(mask[:, None], rows, ShadedTerm(image).rows(len(mask)))).image
 
 
 def is_exact_within(target: TermTarget, region: Tile | None) -> bool:
-    """Whether what a term has ready is exact in a region of the picture, though not in all of it."""
+    """Return whether the newest image of a term is exact in a region, though not everywhere."""
     images, material, live = target
     exact_region = live.ready.exact_region
     if region is None or exact_region is None or not _contains(exact_region[1], region):
@@ -91,22 +94,23 @@ def is_exact_within(target: TermTarget, region: Tile | None) -> bool:
 
 
 def fidelity_label_in(target: TermTarget, region: Tile | None) -> FidelityLabel:
-    """How near what is shown of a term in a region is to its look; None: in all of the picture."""
+    """Return the fidelity of the displayed image of a term in a region; None: everywhere."""
     live = target.live
     is_exact = live.displayed is live.ready and is_exact_within(target, region)
     return "exact" if is_exact or not is_visible(target, region) else live.fidelity_label
 
 
 def is_visible(target: TermTarget, region: Tile | None) -> bool:
-    """Whether any sample of a term's material lies in a region; None: in the picture."""
+    """Return whether any sample of a term's material lies in a region; None: in the image."""
     return region is None or bool(target.material.lies_in(region).any())
 
 
 def make_region_job(whole: Shade, candidates: Iterable[TermTarget], region: Tile | None) -> ShadeRegion | None:
-    """What of an image is to be shaded first; None where all of it is.
+    """Return the job that shades the visible region first; None if the complete image is shaded at once.
 
     Args:
-        whole: the image. candidates: terms of the picture that are shaded, this one among them. region: that is seen.
+        whole: job of the complete image. candidates: terms to be shaded, including this one. region: the visible
+            region.
     """
     images, material, live = target = whole.target
     if region is None or is_exact_within(target, region) or not _allows_partial(live.ready, live.light):

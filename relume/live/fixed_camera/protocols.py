@@ -1,4 +1,4 @@
-"""What a picture asks of an opened bake, whichever method made it; `relume.methods` implements it."""
+"""Interface of an open bake for pictures, independent of the method; `relume.methods` implements it."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from enum import Enum
 from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # a server that only describes its API loads no kernels
@@ -27,7 +28,7 @@ F32 = NDArray[np.float32]
 
 
 class EditAxis(Enum):
-    """What a person can change in the pictures of a bake while they look at them."""
+    """Edits that the pictures of a bake support."""
 
     CURVE = "curve"
     PARAMETER = "parameter"
@@ -38,78 +39,78 @@ class EditAxis(Enum):
 
 
 class CameraMode(Enum):
-    """Where its pictures are seen from: places that were baked, or any."""
+    """Cameras of the pictures: fixed ones of the bake, or a free camera."""
 
     FIXED = "fixed"
     FREE = "free"
 
 
 LightsAndPoints: TypeAlias = "tuple[TriangleLights, ShadingPoints]"
-"""The environment's triangles, and the points that they and rays bring light to."""
+"""The environment's triangles, and the shading points that they and rays illuminate."""
 
 
 class SampledShading(Protocol):
-    """A few samples of a material, kept so that they can be shaded in any light at once."""
+    """A subset of a material's samples, cached so that it can be shaded quickly in any light."""
 
     @property
     def num_bytes(self) -> int:
-        """Memory they hold."""
+        """Memory that it takes."""
         ...
 
     def incident_light(self, light: Illumination) -> LightsAndPoints:
-        """What arrives at them in a light, found quickly."""
+        """Return an approximation of their incident light."""
         ...
 
 
 class IndirectLight(Protocol):
-    """Light that surfaces send onto each other, as far as it can be followed while it changes."""
+    """Indirect illumination between patches, as far as interactive updates need it."""
 
     @property
     def num_patches(self) -> int:
-        """Pieces of surface that send it."""
+        """Number of patches."""
         ...
 
-    def preview(self, light: Illumination) -> F32:
-        """Radiance that they send out. (at least num_cells, 3)"""
+    def preview(self, light: Illumination) -> Shaped[F32, "rows 3"]:
+        """Return the approximate outgoing radiance of at least `num_patches` patches."""
         ...
 
-    def preview_delta(self, before: Illumination, after: Illumination) -> F32:
-        """How much more they send out after than before, found quickly. (num_cells, 3)"""
+    def preview_delta(self, before: Illumination, after: Illumination) -> Shaped[F32, "patches 3"]:
+        """Return the approximate change of outgoing radiance per patch."""
         ...
 
 
 class LocalLightTransport(Protocol):
-    """Local lights, as far as they can be followed while they move."""
+    """Transport of local lights that move."""
 
     def preview(self, geometry: LightGeometry, points: SurfacePoints) -> MovingLight:
-        """What comes to points from a light of unit emission, found quickly."""
+        """Return the approximate incident light at points from a light of unit emission."""
         ...
 
-    def preview_rays(self, source: LightSource, visible: NDArray[np.uint8]) -> LocalRays:
-        """The same as rays, for terms that ask where light comes from. seen: of `MovingLight`"""
+    def preview_rays(self, source: LightSource, visible: Shaped[NDArray[np.uint8], "n bytes"]) -> LocalRays:
+        """Return the same as rays, for terms that depend on the incident direction. visible: of `MovingLight`"""
         ...
 
-    def unoccluded(self, geometry: LightGeometry, points: SurfacePoints) -> F32:
-        """What would come to points from a light of unit emission if nothing were in its way. (n,)"""
+    def unoccluded(self, geometry: LightGeometry, points: SurfacePoints) -> Shaped[F32, " n"]:
+        """Return the unoccluded irradiance at points from a light of unit emission."""
         ...
 
 
 class MirrorLightsDelta(Protocol):
-    """How much more flat mirrors throw in one light than in another.
+    """Change of the light that planar mirrors reflect.
 
     Attributes:
-        patch_radiance: what of it cells on those mirrors send by lobes. (C, 3)
+        patch_radiance: its part that patches on those mirrors send by their lobes. (patches, 3)
     """
 
     @property
     def patch_radiance(self) -> F32: ...
-    def rays(self, visible: NDArray[np.uint8]) -> MirrorRays:
-        """What comes to samples. visible: from `FixedViewTransfer.thrown_to`. (n, bytes)"""
+    def rays(self, visible: Shaped[NDArray[np.uint8], "n bytes"]) -> MirrorRays:
+        """Return the rays to samples. visible: from `FixedViewTransfer.mirror_lights_of`"""
         ...
 
 
 class CameraView(Protocol):
-    """What is seen from a camera: where it is, or where it begins if it moves; and its size in pixels."""
+    """A view of a bake: its camera, or the initial camera if it is free, and its size in pixels."""
 
     @property
     def name(self) -> str: ...
@@ -122,13 +123,13 @@ class CameraView(Protocol):
 
 
 class OpenBake(Protocol):
-    """One opened bake, shared by all its pictures, whether their eyes move or not.
+    """One open bake, shared by all its pictures, with fixed or free cameras.
 
     Attributes:
-        cache: of all that is made from the bake and may be made again.
-        key: tells what is made from this bake from what is made from others in the memory.
+        cache: for everything that can be recomputed from the bake.
+        key: identifies results of this bake in the cache.
         default_look: the complete look of the scene as it was imported.
-        camera_mode, axes: what its pictures can do; nobody asks for the method's name.
+        camera_mode, axes: capabilities of its pictures; callers do not check the method's name.
     """
 
     @property
@@ -149,18 +150,18 @@ class OpenBake(Protocol):
     def camera_mode(self) -> CameraMode: ...
     @property
     def axes(self) -> frozenset[EditAxis]: ...
-    def environment_radiance(self, name: str | None) -> F32:
-        """Radiance of an environment, None for the scene's own. (height, width, 3)"""
+    def environment_radiance(self, name: str | None) -> Shaped[F32, "height width 3"]:
+        """Return the radiance map of an environment, None for the scene's own."""
         ...
 
 
 class FixedViewTransfer(OpenBake, Protocol):
-    """One opened bake of fixed views.
+    """One open bake of fixed views.
 
     Attributes:
-        num_lights: triangles that its environment was divided into, about.
-        derived, edited: images of the look that the scene was imported with, and of others.
-        indirect: light between surfaces; None where none was baked.
+        num_lights: approximate number of triangles of its environment.
+        derived, edited: image files of the imported look, and of other looks.
+        indirect: indirect illumination; None if it was not baked.
     """
 
     @property
@@ -179,77 +180,78 @@ class FixedViewTransfer(OpenBake, Protocol):
     def local(self) -> LocalLightTransport: ...
     @property
     def tracer(self) -> RayTracer:
-        """Rays for normals that the bake did not know."""
+        """Ray tracer for normals that differ from the baked ones."""
         ...
 
     def has_image(self, key: Any) -> bool:
-        """Whether the image of a term is kept beside the store, under the name of a job without the store's own."""
+        """Return whether the image of a term is cached on disk, by a job's key without the store's own."""
         ...
 
     def incident_light(self, view: View, material: int, light: Illumination, cache: Cache) -> LightsAndPoints:
-        """What arrives at a material's samples in a light.
+        """Return the incident light at a material's samples.
 
         Args:
-            view: whose samples. material: index of the material. cache: keeps shadows that must be traced.
+            view: the view. material: index of the material. cache: holds shadows that must be traced.
         """
         ...
 
     def solve_indirect_cache(self, light: Illumination, is_canceled: Callable[[], bool]) -> None:
-        """Trace what pieces of surfaces lack that send light in a look, where images lean them.
+        """Trace the rays that patches lack for indirect light if normal-map overrides change their normals.
 
         Args:
-            light: with what they reflect. is_canceled: asked now and then.
+            light: the illumination with its reflectances. is_canceled: polled regularly.
         Raises:
-            CancelledError: `is_canceled` said so.
+            CancelledError: `is_canceled` returned true.
         """
         ...
 
     def clustered_lights(self, light: Illumination) -> TriangleLights:
-        """The triangles by which light comes straight to a picture, merged into a few that know their parts."""
+        """Return the triangles of direct environment light, merged into a few that refer to their members."""
         ...
 
-    def mirror_lights_of(self, view: View, material: int) -> NDArray[np.uint8] | None:
-        """The lights that a material's samples see in flat mirrors; None where that was not baked. (n, bytes)"""
+    def mirror_lights_of(self, view: View, material: int) -> Shaped[NDArray[np.uint8], "n bytes"] | None:
+        """Return the mirror lights that are visible from a material's samples, as bits; None if they were not baked."""
         ...
 
     def mirror_lights_delta(self, before: Illumination, after: Illumination) -> MirrorLightsDelta | None:
-        """How much more flat mirrors throw after than before, in the same environment; None for nothing."""
+        """Return the change of the light that planar mirrors reflect, in the same environment; None for none."""
         ...
 
     def subset(
-        self, view: View, material: int, sample_indices: NDArray[np.integer], *, has_indirect: bool
+        self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " k"], *, has_indirect: bool
     ) -> SampledShading:
-        """Some of a material's samples.
+        """Return some of a material's samples.
 
         Args:
-            view: whose samples. material: index of the material. sample_indices: counted from the material's first.
-                (k,)
-            has_indirect: with light between surfaces, where that was baked; reading its rays takes longest.
+            view: the view. material: index of the material. sample_indices: counted from the material's first.
+            has_indirect: include indirect light if it was baked; reading its rays takes longest.
         """
         ...
 
     def unoccluded_environment(
         self, light: Illumination, points: SurfacePoints, *, is_preview: bool
     ) -> LightsAndPoints:
-        """What the environment of a light brings to points, seen along their normals, if nothing hides it.
+        """Return the unoccluded light of the environment at points that are viewed along their normals.
 
         Args:
-            is_preview: found quickly, from a small map.
+            is_preview: approximate it with a small map.
         """
         ...
 
     def downsampled(self, view_name: str, step: int) -> Self:
-        """One view of the bake with 1 / step² of its pixels, for small pictures."""
+        """Return one view of the bake with 1 / step² of its pixels, for thumbnails."""
         ...
 
-    def is_emissive_at(self, view: View, material: int) -> NDArray[np.bool_]:
-        """Whether the samples of a material that shines are seen from a side that does."""
+    def is_emissive_at(self, view: View, material: int) -> Shaped[NDArray[np.bool_], " n"]:
+        """Return whether the camera sees the emitting side of an emissive material, per sample."""
         ...
 
-    def background_in(self, environment: EnvironmentKey, view: View) -> F32:
-        """Radiance of a view's samples of an environment. (n, 3)"""
+    def background_in(self, environment: EnvironmentKey, view: View) -> Shaped[F32, "n 3"]:
+        """Return the radiance of an environment at a view's background samples."""
         ...
 
-    def environment_along(self, environment: EnvironmentKey, directions: NDArray[np.float64], blur: float = 0) -> F32:
-        """Radiance of an environment in unit directions (n, 3), blurred by `blur` degrees. (n, 3)"""
+    def environment_along(
+        self, environment: EnvironmentKey, directions: Shaped[NDArray[np.float64], "n 3"], blur: float = 0
+    ) -> Shaped[F32, "n 3"]:
+        """Return the radiance of an environment in unit directions, blurred by `blur` degrees."""
         ...

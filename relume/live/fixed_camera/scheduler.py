@@ -1,11 +1,10 @@
-"""The one transition: of the routes to what is wanted, the one of highest fidelity that lacks nothing makes the frame.
+"""Chooses the update strategy per frame: the one of highest fidelity that needs no further jobs.
 
-What the next better one lacks is made next: first what light needs to be followed, then what shows nothing at all, then
-what the hand is on, then what refines a picture at rest, then what can be made ahead.
+Jobs for better strategies run in this order: incremental light updates, terms without an image, the prepared control,
+refinement of a converged image, prefetching.
 
-One picture, one light: what a picture shows in another light it shows there all at once. When light changes, images of
-terms become ready one after another; until all of them are in one light the picture goes on showing those in the light
-before, with the background, the shining surfaces and the gain of that light.
+A picture shows one light at a time. After a change of light, images of terms become ready one after another; until all
+of them are in one light, the picture shows the previous light with its background, emissive surfaces and gain.
 """
 
 from __future__ import annotations
@@ -42,31 +41,31 @@ from relume.transport.roughness_ranges import contract_levels
 
 
 class StrategyScheduler:
-    """Of one picture.
+    """The scheduler of one picture.
 
     Attributes:
-        light: in which the picture is shown. gain: what multiplies it.
+        light: the displayed illumination. gain: of the finished image.
     """
 
     def __init__(self, images: ViewImages, *, is_watched: bool) -> None:
         self._images, self._is_watched = images, is_watched
         self._linear_mix, self._incremental = LinearMix(), IncrementalLight(images)
-        # highest fidelity first, and of equal ones what costs least
+        # highest fidelity first; at equal fidelity the cheapest first
         self._strategies: Sequence[LightStrategy] = (CachedImage(), self._linear_mix, self._incremental)
         self._previewed: tuple[Illumination, Rgb] | None = None
         self.light, self.gain = images.light, images.gain
         images.set_emission(self.light)
 
     def adopt(self, images: ViewImages) -> None:
-        """Bring other images of the same picture to what is wanted from now on: some of its samples are sorted anew."""
+        """Continue with other images of the same picture, some of whose samples are in another order."""
         self._images, self._incremental, self._previewed = images, IncrementalLight(images), None
         self._strategies = (CachedImage(), self._linear_mix, self._incremental)
         images.set_emission(self.light)
 
-    # what a frame shows
+    # displayed images
 
     def advance(self, max_coefficients: int | None) -> None:
-        """Bring every term as near to what is wanted as it can be now."""
+        """Update every term as close to its target as possible now."""
         for target in self._targets():
             texel_sum.step(target)
         self._change_light()
@@ -75,14 +74,14 @@ class StrategyScheduler:
                 operator.step(target, max_coefficients)
 
     def install(self, job: Job, result: object) -> None:
-        """Go on with what a job has made."""
+        """Install the result of a job."""
         job.install(result)
         if isinstance(job, SparsePreview):
             self._previewed = job.light, job.gain
         self._change_light()
 
     def _change_light(self) -> None:
-        """Bring terms to the light that is wanted, if all can be; else those that can to the light of a preview."""
+        """Update terms to the target light if all can be updated; else update those that can to the preview's light."""
         target_light = self._images.light
         unconverged = self._unconverged_targets()
         outdated = [p for p in unconverged if not p.live.is_empty and p.live.ready.light != target_light]
@@ -99,7 +98,7 @@ class StrategyScheduler:
                 strategy.evaluate(target, light)
 
     def _best_strategy(self, target: TermTarget, light: Illumination) -> LightStrategy | None:
-        """The best way to bring a term's curves to a light at once; none where it would not show them exactly."""
+        """Return the best strategy that can update a term to a light at once; None if its curves would not be exact."""
         if not target.live.needs_only_light():
             return None
         target_light = self._images.light
@@ -107,7 +106,7 @@ class StrategyScheduler:
         return next((r for r in allowed if r.applicable(target, light) and not r.prepare(target, light)), None)
 
     def _display_latest(self) -> None:
-        """Show every term's newest image, if all are in one light; those that show nothing at all are in any."""
+        """Display every term's newest image, if all images are in one light; empty terms do not count."""
         images, before = self._images, self.light
         lit = {target.live.latest.light for target in self._targets() if not target.live.is_empty}
         if lit <= {images.light}:
@@ -121,10 +120,10 @@ class StrategyScheduler:
         if self.light != before:
             images.set_emission(self.light)
 
-    # what is made next
+    # jobs
 
     def next_job(self, control: ActiveControl, look: Look) -> Job | None:
-        """The most urgent job; None where nothing is lacking. hand: what the user is on. look: as it is now."""
+        """Return the most urgent job; None if nothing is missing. control: the active one. look: the current one."""
         stages: Sequence[Callable[[ActiveControl], Job | None]] = (
             self._changed_light_job, self._preview_job, self._element_job, self._missing_image_job, self._prepared_job,
             self._exact_operator_job,
@@ -136,13 +135,13 @@ class StrategyScheduler:
         return self._refinement_job() or self._prefetch_job(control, look)
 
     def _changed_light_job(self, control: ActiveControl) -> Job | None:
-        """Light has changed under a hand, and only rows can follow it."""
+        """Return the next rows if the light changes during a drag and only rows can follow it."""
         if not control.edits_light or not self._needs_incremental():
             return None
         return self._rows_job()
 
     def _preview_job(self, control: ActiveControl) -> Job | None:
-        """The picture is in another light than is wanted, or opens; or samples are chosen before the light turns."""
+        """Return a preview if the target light differs or the picture opens, or to select samples before a rotation."""
         images = self._images
         if self._needs_preview(control):
             is_opening = all(target.live.is_empty for target in self._targets())
@@ -171,7 +170,7 @@ class StrategyScheduler:
         return not is_immediate and not (control.edits_light and self._needs_incremental())
 
     def _needs_incremental(self) -> bool:
-        """Whether every term shows what is wanted, or will, roughly, with rows; and gains alone do not explain it."""
+        """Return whether transport rows can bring every term to the target light, and gains alone cannot."""
         target_light, incremental = self._images.light, self._incremental
         unconverged = self._unconverged_targets()
         is_reached = all(p.live.needs_only_light() and incremental.applicable(p, target_light) for p in unconverged)
@@ -179,13 +178,15 @@ class StrategyScheduler:
         return bool(unconverged) and is_reached and is_moved and incremental.fits_budget()
 
     def _element_job(self, control: ActiveControl) -> Job | None:
-        """The image of a source that is lacking to mix a term, of a material with few samples first."""
+        """Return the job for a missing image of a light element, of the material with the fewest samples first."""
         unconverged = (target for target in self._targets() if target.live.needs_only_light())
         return _first_missing_job(self._linear_mix, unconverged, self._images.light)
 
     def _missing_image_job(self, control: ActiveControl) -> Job | None:
-        """One job for each term whose image is not what is wanted and follows no operator towards it; those first of
-        which something is to be seen that is not exact; of them those of the touched material, and cheap ones."""
+        """Return a job for a term whose image differs from the target and has no operator that updates it.
+
+        Visible terms that are not exact come first; among them those of the edited material, and cheap ones.
+        """
         candidates, region = list(self._missing_bases(control)), self._images.region
         if not candidates:
             return None
@@ -198,15 +199,17 @@ class StrategyScheduler:
         form = None if basis is None else self._form(target, basis)
         if basis is not None and form is not None:
             return self._operator_job(target, basis, form)
-        # where no operator fits, an image that shows older curves stands until the hand rests
+        # if no operator fits, the image of older curves remains until the drag ends
         whole = Shade.for_target(
             target, self._images.light, is_refinement=target.live.is_converged or target.live.has_preview()
         )
         return self._early_job(whole, [candidate for candidate, basis in candidates if basis is None]) or whole
 
     def _early_job(self, whole: Shade, candidates: Sequence[TermTarget]) -> Job | None:
-        """What is seen sooner than the whole image of a term, where many samples are to be shaded: what of it is in
-        sight, or all that is lacking in more detail. lacking: terms that are to be shaded, this one among them."""
+        """Return a job that shows a costly term sooner: its visible region, or a finer preview of all costly terms.
+
+        candidates: terms to be shaded, including that of `whole`.
+        """
         region_job = make_region_job(whole, candidates, self._images.region)
         own_target = whole.target
         detail = own_target.live.ready.detail
@@ -239,17 +242,18 @@ class StrategyScheduler:
                 yield target, new_basis if self._reaches_target(target, new_basis, changed) else None
 
     def _form(self, target: TermTarget, basis: EditBasis) -> OperatorForm | None:
-        """What the memory may hold an operator of; where of nothing, the term is shaded."""
+        """Return the operator form that fits the memory budget; None: the term is shaded instead."""
         return operator_form(target.material, basis.num_columns, self._images.cache.budget_bytes)
 
     def _reaches_target(self, target: TermTarget, basis: EditBasis, changed: set[str]) -> bool:
-        """Whether an operator would bring an image to its target; one of some samples does not sum others' curves."""
+        """Return whether an operator would reach the target; a subsampled one excludes changes of other curves."""
         form = self._form(target, basis)
         return form is not None and (form.step == 1 or can_resume_from(target.live.ready, changed, basis))
 
     def _continues_with_operator(self, target: TermTarget, basis: EditBasis | None) -> bool:
-        """Whether the operator in use is the one to go on with: what differs is free in it, or some of it, and no other
-        is better."""
+        """Return whether the active operator should be reused: it covers some changed curves, and no other basis is
+        better.
+        """
         live = target.live
         active, changed = live.ready.basis, set(live.changed_curves())
         if active is None or changed.isdisjoint(active.affected_curves):
@@ -259,9 +263,9 @@ class StrategyScheduler:
         return changed <= set(active.affected_curves) or basis is None or not changed <= set(basis.affected_curves)
 
     def _prepared_job(self, control: ActiveControl) -> Job | None:
-        """The operator that a hand must wait for before it can move what it has touched.
+        """Return the operator job for the prepared control.
 
-        A parameter whose only curve is free in all its wavelets needs no nodes: that curve's operator is there, exact.
+        A parameter whose only curve has a complete operator needs no other: that operator is exact.
         """
         prepared = control.prepared_control
         if prepared is None or not prepared.target.material.num_samples:
@@ -279,7 +283,7 @@ class StrategyScheduler:
         return None if has_operator and is_enough else self._operator_job(prepared.target, basis, form)
 
     def _exact_operator_job(self, control: ActiveControl) -> Job | None:
-        """The exact operator of what is followed by a rough one; frames go on meanwhile."""
+        """Return the job for the exact operator of a term with a coarse one; frames continue meanwhile."""
         for target in self._targets():
             basis = target.live.ready.basis
             if basis is not None and isinstance(
@@ -289,7 +293,7 @@ class StrategyScheduler:
         return None
 
     def _operator_job(self, target: TermTarget, basis: EditBasis, form: OperatorForm) -> PrecomputeOperator:
-        """An operator; the rough one first, where a hand would wait long for the exact one, and can go on by it."""
+        """Return an operator job; a coarse operator comes first if the exact one takes long and the edit can use it."""
         images, (_, material, live) = self._images, target
         if form != EXACT or images.cache.contains(images.operator_key(material, live, basis, live.target_bands)):
             return PrecomputeOperator.for_target(target, basis, form)
@@ -299,7 +303,7 @@ class StrategyScheduler:
         return PrecomputeOperator.for_target(target, basis, MERGED_LIGHT if is_merged_first and can_go_on else form)
 
     def _refinement_job(self) -> Job | None:
-        """What makes an image exact that is near it already."""
+        """Return a job that makes a nearly exact image exact."""
         for target in self._targets():
             live = target.live
             if live.is_converged and not live.changed_curves():
@@ -311,11 +315,11 @@ class StrategyScheduler:
         return None
 
     def _resum_job(self, target: TermTarget) -> Job | None:
-        """What sums an image once that was summed from steps, from where they came."""
+        """Return the job that resums an image that was accumulated in steps."""
         return self._linear_mix.resum_job(target) if target.live.ready.basis is None else operator.resum_job(target)
 
     def _prefetch_job(self, control: ActiveControl, look: Look) -> Job | None:
-        """What can be made ahead for what a hand is on, when nothing else is lacking."""
+        """Return a job that prefetches results for the active control, if nothing else is missing."""
         if control.edits_light and self._incremental.fits_budget():
             rows_job = self._rows_job()
             if rows_job is not None:
@@ -323,24 +327,26 @@ class StrategyScheduler:
         return self._dragged_light_job(control, look)
 
     def _rows_job(self) -> Job | None:
-        """The next rows to be made, those of few samples first; None where there are all.
+        """Return the next missing rows, of the material with the fewest samples first; None if there are none.
 
-        A term whose own curve moves would want other rows after every edit, and could not add them to anything.
+        A term whose own curve moves would need other rows after each edit, so it is skipped.
         """
         extensible = (p for p in self._targets() if p.live.is_converged or p.live.needs_only_light())
         return _first_missing_job(self._incremental, extensible, self._images.light)
 
     def _dragged_light_job(self, control: ActiveControl, look: Look) -> Job | None:
-        """An image of the light that a hand is on, of a material with few samples first; it can wait for all else.
+        """Return the job for an image of the dragged light, of the material with the fewest samples first; lowest
+        priority.
 
-        What comes straight from it is taken off as soon as it moves; all that comes from it is what it is dimmed by.
-        None where that light is elsewhere by now, or where the memory has no room to spare.
+        The direct image is subtracted when the light moves; the complete image serves changes of its gain. None if the
+        light
+        has moved already, or if the memory budget is used up.
         """
         images = self._images
         dragged = control.dragged_light(look)
         if dragged is None or all(source.geometry != dragged for source in images.light.local):
             return None
-        elements = list(element_gains(single_source(images.light, dragged)))  # what comes straight is first
+        elements = list(element_gains(single_source(images.light, dragged)))  # direct light comes first
         targets = list(self._targets())
         missing = [(e, p) for e in elements for p in targets if images.image_in(p.material, p.live, e) is None]
         num_bytes = sum(shaded_bytes(target.material.num_samples) for _, target in missing)
@@ -350,27 +356,27 @@ class StrategyScheduler:
         return Shade.for_target(target, element, is_refinement=True)
 
     def _targets(self) -> Iterator[TermTarget]:
-        """All terms that this view sees anything of."""
+        """Yield all terms that are visible in this view."""
         return (TermTarget(self._images, material, live) for material, live in self._images.terms())
 
     def _unconverged_targets(self) -> list[TermTarget]:
-        """Those that show nothing firm in the light that is wanted."""
+        """Return the terms without a converged image in the target light."""
         return [target for target in self._targets() if not target.live.is_converged]
 
 
 def _first_missing_job(strategy: LightStrategy, targets: Iterable[TermTarget], light: Illumination) -> Job | None:
-    """The first thing that a route lacks to bring places to a light, of a material with few samples first."""
+    """Return the first job that a strategy needs, of the material with the fewest samples first."""
     missing = [(target, jobs[0]) for target in targets if (jobs := strategy.prepare(target, light))]
     return min(missing, key=lambda item: item[0].material.num_samples)[1] if missing else None
 
 
 def _cost(target: TermTarget, basis: EditBasis | None, control: ActiveControl) -> tuple[bool, bool, int]:
-    """Sorts what is to be made: a term whose curves are all flat needs no angles, which take nearly all the time."""
+    """Sort key of jobs: terms with only flat curves are cheap, since evaluating angles takes nearly all the time."""
     prepared = control.prepared_control
     is_other_material = prepared is None or prepared.target.material is not target.material
     return is_other_material, basis is not None or _needs_angles(target), target.material.num_samples
 
 
 def _needs_angles(target: TermTarget) -> bool:
-    """Whether any curve of a term is not flat."""
+    """Return whether a term has a curve that is not flat."""
     return any(c.kinds.size for c in contract_levels(target.live.term, target.live.target_bands, None))

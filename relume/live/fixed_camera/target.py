@@ -1,4 +1,4 @@
-"""What a look wants of one term of one material, read once from its document."""
+"""Target of one term of one material, parsed from its document."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.registry import TERMS
@@ -19,31 +20,31 @@ F64 = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TargetTerm:
-    """A term as it should be shown.
+    """The target state of a term.
 
     Attributes:
-        document: of the term in a look. term: the declaration of its model, fixed parameters put in.
-        model: what tells it from other models.
-        bands: of each curve that depends on where light comes from. (3, J) float64 each, or (L, 3, J) where a map of
-            roughness makes it differ from level to level
-        view_factor: product of the curves of the outgoing angle, per sample. (3, samples) float32, or None for 1
+        document: of the term in a look. term: the declaration of its model with its fixed parameters.
+        model: identifies the model and these parameters.
+        bands: of each curve that depends on the incident direction. (3, J) float64 each, or (L, 3, J) if it differs
+            between roughness levels
+        view_factor: product of the curves of the outgoing angle, per sample; None for 1.
     """
 
     document: Mapping[str, Any]
     term: Term
     model: Hashable
     bands: Mapping[str, F64]
-    view_factor: F32 | None
+    view_factor: Shaped[F32, "3 samples"] | None
 
     @classmethod
     def from_document(
         cls, document: Mapping[str, Any], theta_o: Callable[[], F64], levels: RoughnessLevels = NO_LEVELS
     ) -> TargetTerm:
-        """Read a term document.
+        """Parse a term document.
 
         Args:
-            theta_o: finds the angle at which each sample is seen, radians, (samples,), where a curve wants it.
-            levels: of roughness, of the samples.
+            theta_o: returns the outgoing angle of each sample, radians, (samples,); called only if a curve needs it.
+            levels: roughness levels of the samples.
         """
         declared = TERMS[document["model"]]
         term = declared.normalized(document)

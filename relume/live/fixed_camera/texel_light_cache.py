@@ -1,4 +1,4 @@
-"""What the memory knows of light at textures that look different from every side: it serves all their texels."""
+"""Cached incident light of BTFs; it serves all their texels."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from relume.live.fixed_camera.material_image import MaterialImage
 from relume.live.fixed_camera.view_images import ViewImages
 from relume.operators.texel_light import BtfIncidentLight, collect_light, incident_light_bytes
 
-_BUDGET_DIVISOR = 4  # of the memory that one may take
+_BUDGET_DIVISOR = 4  # each takes at most this fraction of the memory budget
 
 
 def _key(images: ViewImages, material: MaterialImage, btf_ref: BtfRef, light: Illumination) -> tuple[Hashable, ...]:
@@ -19,10 +19,10 @@ def _key(images: ViewImages, material: MaterialImage, btf_ref: BtfRef, light: Il
 
 
 def is_cacheable(images: ViewImages, material: MaterialImage, btf_ref: BtfRef) -> bool:
-    """Whether the memory has room for what arrives at a material, beside other things.
+    """Return whether the incident light of a material fits the memory budget.
 
     Args:
-        images: of a view. material: of these. btf_ref: how it is covered.
+        images: of a view. material: its image. btf_ref: its BTF.
     """
     return _BUDGET_DIVISOR * incident_light_bytes(btf_ref, material.num_samples) <= images.cache.budget_bytes
 
@@ -30,10 +30,10 @@ def is_cacheable(images: ViewImages, material: MaterialImage, btf_ref: BtfRef) -
 def get_texel_light(
     images: ViewImages, material: MaterialImage, btf_ref: BtfRef, light: Illumination
 ) -> BtfIncidentLight | None:
-    """What arrives at a material in a light, where the memory has it; for a texture that may be turned otherwise.
+    """Return the cached incident light of a material, or None; the rotation of the BTF may differ.
 
     Args:
-        images: of a view. material: of these. btf_ref: how it is covered. light: what arrives.
+        images: of a view. material: its image. btf_ref: its BTF. light: the illumination.
     """
     return images.cache.get_cached(_key(images, material, btf_ref, light), BtfIncidentLight)
 
@@ -46,14 +46,13 @@ def put_texel_light(
     progress: Callable[[float], None],
     is_canceled: Callable[[], bool],
 ) -> BtfIncidentLight:
-    """What arrives at a material in a light, in the frames of a texture as it is turned now; kept in place of what was
-    known of it turned otherwise.
+    """Return the incident light of a material in the frames of its BTF, computed and cached; replaces another rotation.
 
     Args:
-        images: of a view. material: of these. btf_ref: how it is covered. light: what arrives.
-        progress: called with the share done. is_canceled: asked now and then.
+        images: of a view. material: its image. btf_ref: its BTF. light: the illumination.
+        progress: called with the fraction done. is_canceled: polled regularly.
     Raises:
-        CancelledError: `is_canceled` said so.
+        CancelledError: `is_canceled` returned true.
     """
     cached = get_texel_light(images, material, btf_ref, light)
     if cached is not None and cached.rotation == btf_ref.rotation:
@@ -62,4 +61,4 @@ def put_texel_light(
     key = _key(images, material, btf_ref, light)
     images.cache.evict(key)
     images.cache.get(key, BtfIncidentLight, incident.num_bytes, lambda: incident)
-    return incident  # another session may have put a texture that is turned otherwise into its place
+    return incident  # another session may have cached another rotation

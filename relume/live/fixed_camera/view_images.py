@@ -1,4 +1,4 @@
-"""The live terms of all materials in one view, and what the memory knows of them."""
+"""The live terms of all materials in one view, and their cached results."""
 
 from __future__ import annotations
 
@@ -41,25 +41,25 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 MERGED_LIGHT_SUFFIX = "roughly"
-"""Ends the names of operators of merged lights."""
+"""Suffix of the keys of operators from merged lights."""
 
 _WHITE = complete_term(("terms", 0), {"model": "lambert", "texture": None}, None)
 
 
 def material_documents(look: Look, material: str) -> Sequence[TermLook]:
-    """The terms whose images make a material's picture; of a catcher what arrives at it, as a white surface has it."""
+    """Return the terms that a material's image needs; for a shadow catcher a white diffuse term."""
     material_look = look.materials[material]
     return (cast(TermLook, _WHITE),) if material_look.shadow_catcher else material_look.terms
 
 
 class ViewImages:
-    """Found by name, by pointer, and by what the cache knows them as.
+    """Material images of one view, by name, by pointer, and with their cache keys.
 
     Attributes:
         default: the scene's own look. by_name: the materials in the scene's order.
-        light: what arrives at them. default_light: what does under the scene's own look.
-        gain: what multiplies the finished picture. mirrors: what they send on of it.
-        region: pixels that are seen of the picture: x, y, width, height; None: all.
+        light: the illumination. default_light: that of the scene's own look.
+        gain: of the finished image. mirrors: the mirrors of the image.
+        region: visible pixels of the image: x, y, width, height; None: all.
     """
 
     def __init__(self, transfer: FixedViewTransfer, view_name: str, cache: Cache) -> None:
@@ -76,9 +76,10 @@ class ViewImages:
         self.region: Tile | None = None
 
     def view_with_overrides(self, look: Look) -> ViewImages:
-        """The images of the view whose samples wear the images that a look names in the place of maps of roughness and
-        of normals; the same where none is named that was not before. Materials whose images are others go on showing
-        what they do; others are shared.
+        """Return the images of the view with the roughness- and normal-map overrides of a look; self if they are
+        unchanged.
+
+        Materials with changed overrides still display their previous images; others are shared.
 
         Raises what `relume.views.map_override.with_overrides` raises; then nothing has changed.
         """
@@ -88,7 +89,7 @@ class ViewImages:
         changed, view = copy(self), with_overrides(self.transfer.views[self.view.name], maps, self.transfer.tracer)
         changed.view, changed.mirrors, changed.by_name = view, MirrorFactors(view), {}
         baked_to_view = np.empty(view.num_surface_samples, np.int64)
-        # of the samples as they were baked, in this view
+        # sample index in this view, per baked sample
         baked_to_view[self.view.unmodified()] = np.arange(len(baked_to_view))
         for index, (name, before) in enumerate(self.by_name.items()):
             image = before
@@ -100,7 +101,7 @@ class ViewImages:
         return changed
 
     def _map_overrides(self, look: Look, material: str) -> MapOverrides | None:
-        """What a look names in the place of a material's maps; None for nothing."""
+        """Return the map overrides of a material in a look; None for none."""
         documents, normals = material_documents(look, material), look.materials[material].normals
         roughness = roughness_image(documents)
         if roughness is None and normals is None:
@@ -110,23 +111,23 @@ class ViewImages:
         )
 
     def _base_roughness(self, material: str) -> float | None:
-        """The roughness of a material's terms in the scene, that bumps below a pixel widen."""
+        """Return the scene's roughness of a material's terms, which normal variation within a pixel widens."""
         values = (term["params"].get("roughness") for term in material_documents(self.default, material))
         return next((float(np.mean(value)) for value in values if value is not None), None)
 
     def terms(self) -> Iterator[tuple[MaterialImage, LiveTerm]]:
-        """All that this view sees anything of."""
+        """Yield the terms that are visible in this view."""
         materials = self.by_name.values()
         return ((material, image) for material in materials if material.num_samples for image in material.terms)
 
     def image_bytes(self) -> int:
-        """Memory of one image of every term."""
+        """Return the memory of one image of every term."""
         return sum(shaded_bytes(material.num_samples) for material, _ in self.terms())
 
     def set_look(self, look: Look, solo: Solo = None) -> None:
-        """A new target for every term, in the light of some sources alone where `solo` names them.
+        """Set a new target for every term; `solo` restricts the light to some sources.
 
-        Raises what `FixedViewTransfer.radiance_of` raises; then nothing has changed.
+        Raises what `FixedViewTransfer.environment_radiance` raises; then nothing has changed.
         """
         light = self._illumination_from_look(look, solo)
         if light != self.light:
@@ -140,13 +141,12 @@ class ViewImages:
         self.gain = picture_gain(look, solo)
 
     def set_emission(self, light: Illumination) -> None:
-        """Surfaces send out themselves what they do in this light."""
+        """Set the emission of surfaces in this light."""
         for name, material in self.by_name.items():
             material.set_emission(material_emission(light, name), self._emission_pattern)
 
     def update_mirrors(self, look: Look) -> list[int]:
-        """Bring mirrors to a look, as far as their materials are shown in it; returns the materials that send on
-        something else than before."""
+        """Update the mirrors to the displayed documents; returns the materials whose specular albedo changed."""
         names = {index: self.transfer.material_names[index] for index in self.mirrors.materials}
         documents = {
             k: None if look.materials[name].shadow_catcher else self.by_name[name].mirrors for k, name in names.items()
@@ -156,12 +156,12 @@ class ViewImages:
     def incident_light(
         self, material: MaterialImage, light: Illumination, is_canceled: Callable[[], bool]
     ) -> tuple[TriangleLights, ShadingPoints]:
-        """What arrives at the samples of a material in a light; what the memory lacks is traced.
+        """Return the incident light at the samples of a material; missing rays are traced.
 
         Args:
-            material: of these. light: what arrives. is_canceled: asked now and then.
+            material: its image. light: the illumination. is_canceled: polled regularly.
         Raises:
-            CancelledError: `is_canceled` said so.
+            CancelledError: `is_canceled` returned true.
         """
         if light.paths.has_indirect and material.num_samples:
             self.view.trace_gather_rays(material.index, is_canceled)
@@ -169,7 +169,7 @@ class ViewImages:
         return self.transfer.incident_light(self.view, material.index, light, self.cache)
 
     def unlit_samples(self, material: MaterialImage) -> ShadingPoints:
-        """The samples of a material, without what arrives at them."""
+        """Return the samples of a material without incident light."""
 
         def read() -> ShadingPoints:
             return self.view.receivers(material.index, is_lit=False)
@@ -178,7 +178,9 @@ class ViewImages:
         return self.cache.get_value(key, read)
 
     def is_default(self, material: MaterialImage, live: LiveTerm, light: Illumination) -> bool:
-        """Whether a material's live term in some light is of the scene's own look: its image stays beside the store."""
+        """Return whether a term in some light belongs to the scene's own look, whose images are cached next to the
+        store.
+        """
         name = self.transfer.material_names[material.index]
         is_without_overrides = not any(self.view.maps[material.index : material.index + 1])
         return (
@@ -192,11 +194,11 @@ class ViewImages:
         return illumination_from_look(look, self.transfer.material_names, has_bounces=has_bounces, solo=solo)
 
     def _emission_pattern(self, material: int) -> F32:
-        """How brightly the samples of a material shine, over its mean; nothing on sides that do not. (n, 1 or 3)"""
+        """Emission of a material's samples relative to its mean; zero on sides that do not emit. (n, 1 or 3)"""
         return self.transfer.is_emissive_at(self.view, material)[:, None] * self.view.emissive(material)
 
     def material_term(self, pointer: CurvePointer | ParameterPointer) -> tuple[MaterialImage, LiveTerm]:
-        """The material and the term of a pointer in the look as it is now.
+        """Return the material and the term of a pointer in the current look.
 
         Raises:
             ParameterError: there is no such curve or parameter.
@@ -212,7 +214,7 @@ class ViewImages:
         return material, term
 
     def basis(self, pointer: CurvePointer | ParameterPointer) -> EditBasis | None:
-        """What must be free for what a pointer means to be moved; None where light has no part in it.
+        """Return the free coefficients for edits of a curve or parameter; None if no operator depends on it.
 
         Raises:
             ParameterError: there is no such curve or parameter.
@@ -224,7 +226,7 @@ class ViewImages:
         return None if curve.depends_on_view else CurveBasis.from_curve(curve)
 
     def _sample_key(self, material: MaterialImage) -> tuple[Hashable, ...]:
-        # the store comes first: a memory asks whose it is
+        # the store comes first: the cache groups entries by it
         return self.transfer.key, *self.view.sample_key(material.index)
 
     def operator_key(
@@ -236,10 +238,10 @@ class ViewImages:
         *,
         is_merged_light: bool = False,
     ) -> tuple[Hashable, ...]:
-        """Name of the operator of a material's live term along a basis in the memory.
+        """Cache key of a term's operator along a basis.
 
         Args:
-            bands: of the term's curves, (3, J) each; those that it moves are free. is_merged_light: of that of merged
+            bands: of the term's curves, (3, J) each; those of the basis are free. is_merged_light: it is from merged
                 lights.
         """
         return (
@@ -249,20 +251,20 @@ class ViewImages:
         )
 
     def image_key(self, material: MaterialImage, live: LiveTerm, light: Illumination) -> tuple[Hashable, ...]:
-        """Name of the image of a material's live term, of its target in some light."""
+        """Cache key of the image of a term's target in some light."""
         return *self._sample_key(material), live.image_key(light)
 
     def image_in(self, material: MaterialImage, live: LiveTerm, light: Illumination) -> ShadedTerm | None:
-        """The image of a material's live term, of its target in some light, where the memory has it."""
+        """Return the cached image of a term's target in some light, or None."""
         return self.cache.get_cached(self.image_key(material, live, light), ShadedTerm)
 
     def is_cached(self, material: MaterialImage, live: LiveTerm) -> bool:
-        """Whether the image of a term's target need not be made: it is in the memory, or was kept with the store."""
+        """Return whether the image of a term's target is in the cache or on disk."""
         key = self.image_key(material, live, self.light)
         return self.cache.get_cached(key, ShadedTerm) is not None or self.transfer.has_image(key[1:])
 
     def operator(self, material: MaterialImage, live: LiveTerm) -> Operator | None:
-        """The operator that a term follows now, a rough one until the other is there; none if the memory dropped it."""
+        """Return the active operator of a term, a coarse one until the exact one is ready; None if it was evicted."""
         ready = live.ready
         if ready.basis is None or not live.is_converged:
             return None

@@ -1,13 +1,14 @@
-"""Smooth edges while the eye moves: pixels across which what is seen changes get a few more rays, and the mean of all.
+"""Antialiasing for the free camera: pixels on geometric edges get a few more rays and average them.
 
-A cheaper kin of what fixed views do (`relume.camera.view_samples`): the pixels are found from the middles of their
-neighbours, and the rays are as many as a frame has time for.
+A cheaper variant of the adaptive sampling of fixed views (`relume.camera.view_samples`): edges are detected from the
+centers of adjacent pixels, and the number of rays is limited by the frame time.
 """
 
 from __future__ import annotations
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -17,29 +18,29 @@ from relume.raytrace.camera_rays import Hits
 
 F32 = NDArray[np.float32]
 
-# four positions that no row or column shares, pixel units
+# four positions in distinct rows and columns, pixel units
 EDGE_SAMPLE_POSITIONS = ((np.array([(1, 0), (3, 1), (0, 2), (2, 3)]) + 0.5) / 4).astype(np.float32)
-_MAX_EXTRA_RAYS = 0.5  # rays, for each pixel of the picture
+_MAX_EXTRA_RAYS = 0.5  # per pixel of the image
 _COS_CREASE = np.float32(np.cos(np.radians(20.0)))
-_DEPTH_EDGE = np.float32(0.02)  # of the distance, off the plane of the surface beside
+_DEPTH_EDGE = np.float32(0.02)  # offset from the plane of the adjacent surface, as a fraction of the distance
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def is_edge(material, normals, faces, distance, directions, p, q):  # type: ignore[no-untyped-def]
-    """Tell whether two pixels see different things, or one thing turned or offset.
+    """Return whether two pixels show different materials, or one material with another normal or offset.
 
     Args:
-        material, normals: of faces. (faces,), (faces, 3). faces: that pixels see, −1 for none. (pixels,)
-        distance, directions: of the rays through pixels. (pixels,), (pixels, 3) float32. p, q: the pixels.
+        material, normals: of faces. (faces,), (faces, 3). faces: visible in pixels, −1 for none. (pixels,)
+        distance, directions: of the pixels' rays. (pixels,), (pixels, 3) float32. p, q: the pixels.
     """
-    # no branches: references to arrays would be counted in each, which was two thirds of what this takes
+    # no branches: Numba would count array references in each, which took two thirds of the time
     f, g = faces[p], faces[q]
     a, b = max(f, 0), max(g, 0)
     cosine = plane_distance = np.float32(0)
     for axis in range(3):
         cosine += normals[a, axis] * normals[b, axis]
         plane_distance += normals[a, axis] * (distance[q] * directions[q, axis] - distance[p] * directions[p, axis])
-    # what is seen from behind has no other side beside it but across an edge
+    # abs: a front face and a back face are adjacent only across an edge
     is_bent = (abs(cosine) < _COS_CREASE) | (abs(plane_distance) > _DEPTH_EDGE * min(distance[p], distance[q]))
     is_environment, is_different = (f < 0) | (g < 0), (material[a] != material[b]) | is_bent
     return (f != g) & (is_environment | is_different)
@@ -47,7 +48,7 @@ def is_edge(material, normals, faces, distance, directions, p, q):  # type: igno
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _mark(material, normals, faces, distance, directions, width, height, start, stop, edge_mask):  # type: ignore[no-untyped-def]
-    """Mark pixels [start, stop) and those to the right and below that differ from them; shares may mark one twice."""
+    """Mark pixels [start, stop) and their right and lower neighbors across edges; threads may mark a pixel twice."""
     column = start % width
     for p in range(start, stop):
         if column < width - 1 and is_edge(material, normals, faces, distance, directions, p, p + 1):
@@ -57,11 +58,13 @@ def _mark(material, normals, faces, distance, directions, width, height, start, 
             edge_mask[p] = edge_mask[p + width] = True
 
 
-def find_edges(stored_scene: StoredScene, hits: Hits, directions: F32, size: tuple[int, int]) -> NDArray[np.int32]:
-    """Find the pixels that lie across edges, row after row. (m,) int32
+def find_edges(
+    stored_scene: StoredScene, hits: Hits, directions: Shaped[F32, "n 3"], size: tuple[int, int]
+) -> Shaped[NDArray[np.int32], " m"]:
+    """Return the pixels on edges in row-major order.
 
     Args:
-        stored_scene: that is seen. hits: of the rays through the middles of all pixels. directions: of these. (n, 3)
+        stored_scene: the scene. hits: of the rays through all pixel centers. directions: of these rays.
         size: width and height in pixels.
     """
     width, height = size
@@ -72,18 +75,20 @@ def find_edges(stored_scene: StoredScene, hits: Hits, directions: F32, size: tup
 
 
 def samples_per_edge(num_edges: int, num_pixels: int) -> int:
-    """How many more rays each pixel across an edge may have, so that a frame of foliage takes no longer than others."""
+    """Return the number of extra rays per edge pixel, limited so that frames of foliage take no longer than others."""
     return min(len(EDGE_SAMPLE_POSITIONS), int(_MAX_EXTRA_RAYS * num_pixels) // max(1, num_edges))
 
 
-def resolve(values: F32, owner: NDArray[np.int32], num_pixels: int) -> F32:
-    """Take the mean of all rays of each pixel.
+def resolve(
+    values: Shaped[F32, " rays *channels"], owner: Shaped[NDArray[np.int32], " m"], num_pixels: int
+) -> Shaped[F32, " pixels *channels"]:
+    """Average all rays of each pixel.
 
     Args:
-        values: of the rays through the middles of all pixels, then of the others. (rays, …) float32
-        owner: pixels of the others. (m,) int32
+        values: of the rays through all pixel centers, then of the extra rays.
+        owner: pixels of the extra rays.
     Returns:
-        (num_pixels, …) float32
+        The mean per pixel, num_pixels in all.
     """
     if not len(owner):
         return values

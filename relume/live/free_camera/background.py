@@ -1,7 +1,7 @@
-"""What a moving eye sees past surfaces, and on grounds that only catch shadows.
+"""Background compositing for the free camera, and on shadow catchers.
 
-As in fixed views (`relume.live.fixed_camera.background.background`), a catcher shows what lies behind it times what
-arrives there over what would arrive if nothing but the ground were there; where nothing would, nothing is hidden.
+As in fixed views (`relume.live.fixed_camera.background.background`), a shadow catcher shows the background times the
+ratio of incident light with and without the objects; if no light would arrive, nothing is occluded.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import LUMINANCE, srgb_encode
@@ -29,31 +30,32 @@ _MAX_CATCHER_RATIO = np.float32(MAX_CATCHER_RATIO)
 
 
 class ShadowCatcher(NamedTuple):
-    """What catchers compare with.
+    """The shadow catchers of a scene.
 
     Attributes:
-        is_shadow_catcher: of every material. (materials,) bool
-        unoccluded: what a white surface at each vertex of catchers would send if nothing were in the light's way.
-            (vertices or 0, 3) float32
+        is_shadow_catcher: per material.
+        unoccluded: outgoing radiance of a white surface at each lattice node of a catcher, in unoccluded light; empty
+            if
+            there is no catcher.
     """
 
-    is_shadow_catcher: NDArray[np.bool_]
-    unoccluded: F32
+    is_shadow_catcher: Shaped[NDArray[np.bool_], " materials"]
+    unoccluded: Shaped[F32, "nodes 3"]
 
 
 def background_radiance(
     transfer: FreeCameraTransfer,
     background: BackgroundLook,
     light: Illumination,
-    gain: F32,
+    gain: Shaped[F32, " 3"],
     gbuffer: GBuffer,
-    is_shadow_catcher: NDArray[np.bool_],
-) -> F32:
-    """Find what lies behind, where the background or a catcher is seen. (rays, 3) float32
+    is_shadow_catcher: Shaped[NDArray[np.bool_], " materials"],
+) -> Shaped[F32, "rays 3"]:
+    """Return the background along rays that show it or a shadow catcher, float32; zero elsewhere.
 
     Args:
-        transfer: of the picture. background, light: of its look. gain: of the finished picture, in each channel. (3,)
-        gbuffer: by the rays. is_shadow_catcher: of every material. (materials,)
+        transfer: of the picture. background, light: of its look. gain: of the finished image per channel.
+        gbuffer: of the rays. is_shadow_catcher: per material.
     """
     num_rays = len(gbuffer.directions)
     if background.kind == "color":
@@ -76,23 +78,23 @@ def background_radiance(
 def composite_over(
     stored_scene: StoredScene,
     gbuffer: GBuffer,
-    background: F32,
+    background: Shaped[F32, "rays 3"],
     shadow_catcher: ShadowCatcher,
-    gain: F32,
+    gain: Shaped[F32, " 3"],
     *,
     is_direct: bool,
-    out: F32,
-) -> F32:
-    """Put surfaces over what is behind them, and shadows of catchers onto it.
+    out: Shaped[F32, "rays 3"],
+) -> Shaped[F32, " rays"]:
+    """Composite surfaces over the background, and shadows of catchers onto it.
 
     Args:
-        stored_scene: that is seen. gbuffer: by the rays. background: from `background_radiance`. shadow_catcher: by
-            catchers.
-        gain: that `out` has been multiplied by. (3,) float32
-        is_direct: light that comes straight is shown, and with it the background.
-        out: radiance of surfaces, of catchers as white ones; changed to the picture. (rays, 3) float32
+        stored_scene: the scene. gbuffer: of the rays. background: from `background_radiance`. shadow_catcher: data of
+            shadow catchers.
+        gain: that `out` has been multiplied by.
+        is_direct: direct light is shown, and with it the background.
+        out: radiance of surfaces, with catchers as white surfaces; overwritten with the composite.
     Returns:
-        How much of the light behind it is hidden along each ray. (rays,) float32
+        Coverage along each ray.
     """
     coverage = np.empty(len(out), np.float32)
     args = (
@@ -110,7 +112,7 @@ def _composite_over(  # type: ignore[no-untyped-def]
     start, stop, out,
     coverage,
 ):  # fmt: skip
-    """Do so for rays [start, stop)."""
+    """Composite rays [start, stop)."""
     direct_factor = np.float32(1) if is_direct else np.float32(0)
     for p in range(start, stop):
         if face[p] < 0:
@@ -127,7 +129,7 @@ def _composite_over(  # type: ignore[no-untyped-def]
                     node_value = unoccluded[lattice_node[p, k], channel]
                     unoccluded_radiance += weight[p, k] * node_value
                     is_lit &= node_value > 0
-                # beside the rim of a cone, what surfaces reflect would be held against next to nothing
+                # at the edge of a cone, indirect light would be divided by nearly zero
                 shadow_ratio = (
                     min(out[p, channel] / (gain[channel] * unoccluded_radiance), _MAX_CATCHER_RATIO)
                     if is_lit
@@ -137,6 +139,6 @@ def _composite_over(  # type: ignore[no-untyped-def]
                 coverage[p] -= luminance[channel] * min(shadow_ratio, np.float32(1))
 
 
-def alpha(coverage: F32, *, for_display: bool) -> F32:
-    """Tell how much pixels hide of display values (sRGB) behind them, or of linear ones. See `composite_over`."""
+def alpha(coverage: Shaped[F32, " ..."], *, for_display: bool) -> Shaped[F32, " ..."]:
+    """Return the alpha of pixels over display values (sRGB) or linear values. See `composite_over`."""
     return np.asarray(1 - srgb_encode(1 - coverage), np.float32) if for_display else coverage

@@ -1,4 +1,4 @@
-"""Ways that an eye goes: once around what there is to see, or from camera to camera."""
+"""Camera paths: a turntable, or a path through given cameras."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation, RotationSpline
@@ -18,17 +19,16 @@ from relume.scene.model import Camera
 F64 = NDArray[np.float64]
 
 
-def pivot_of(transfer: FreeCameraTransfer, camera: Camera) -> F64:
-    """What a camera's picture is about: a place straight before it.
+def pivot_of(transfer: FreeCameraTransfer, camera: Camera) -> Shaped[F64, " 3"]:
+    """Return the pivot of a camera's view, a point on its optical axis, in meters.
 
-    It is as deep as the middle of all that is of the material in the middle of the picture, which is an object's axis
-    rather than its front; a scene's table or backdrop is often far larger than what stands there. Where the middle
-    shows nothing it is as deep as the scene's; the middle itself where that is behind.
+    Its depth is that of the center of all geometry with the material at the image center, which is close to an object's
+    axis rather than its front; a scene's table or backdrop is often far larger than the object. If the image center
+    shows
+    nothing, it is the depth of the scene's center; if that center is behind the camera, the pivot is the center itself.
 
     Args:
         transfer: of a bake. camera: any.
-    Returns:
-        Metres. (3,)
     """
     position, forward, stored_scene = camera.to_world[:3, 3], -camera.to_world[:3, 2], transfer.stored_scene
     ray = position.astype(np.float32), forward[None].astype(np.float32)
@@ -44,12 +44,12 @@ def pivot_of(transfer: FreeCameraTransfer, camera: Camera) -> F64:
     return pivot
 
 
-def turntable(camera: Camera, pivot: F64, num_cameras: int) -> list[Camera]:
-    """Go once around an upright line, to the right, ending one step before the start.
+def turntable(camera: Camera, pivot: Shaped[F64, " 3"], num_cameras: int) -> list[Camera]:
+    """Return cameras of one turn about a vertical axis, to the right, ending one step before the start.
 
     Args:
-        camera: that it begins at; height, distance and what is above stay.
-        pivot: a place on the line, metres. (3,). num_cameras: of cameras, at least 1.
+        camera: the first one; height, distance and elevation stay.
+        pivot: a point on the axis, meters. num_cameras: at least 1.
     """
     cameras = []
     for angle in 2 * np.pi * np.arange(num_cameras) / num_cameras:
@@ -61,13 +61,13 @@ def turntable(camera: Camera, pivot: F64, num_cameras: int) -> list[Camera]:
 
 
 def interpolate_cameras(cameras: Sequence[Camera], num_cameras: int) -> list[Camera]:
-    """Go from the first camera to the last, through those between, at even shares of the frames.
+    """Interpolate from the first camera to the last through all others, at equal time steps.
 
-    Places follow cubics that do not overshoot, directions a spline of rotations, fields of view cubics of their
+    Positions follow monotone cubics (PCHIP), orientations a rotation spline, and fields of view cubics of their
     logarithm.
 
     Args:
-        cameras: at least one. num_cameras: of cameras on the way, ends included.
+        cameras: at least one. num_cameras: of cameras on the path, ends included.
     """
     if len(cameras) == num_cameras or len(cameras) == 1:
         return list(cameras) if len(cameras) == num_cameras else [cameras[0]] * num_cameras

@@ -1,4 +1,4 @@
-"""The environment as an eye sees it past all surfaces, and blurred, as lobes do."""
+"""Environment lookups: sharp for the background, and prefiltered for lobes."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -16,29 +17,31 @@ from relume.math.fast_math import acos_clamped, azimuth_fraction
 
 F32 = NDArray[np.float32]
 
-_MIN_BLUR_DEG = 2.0  # σ of the first level that is blurred, degrees
-_LEVELS_PER_OCTAVE = 2  # levels until σ is twice as large: what is between two is a sum of both, and no blur
+_MIN_BLUR_DEG = 2.0  # σ of the first blurred level, degrees
+_LEVELS_PER_OCTAVE = 2  # levels until σ doubles; between levels, lookups interpolate
 _NUM_BLURRED = 9
 
 
 class EnvironmentLookup(NamedTuple):
-    """An environment and its blurred levels, one after another.
+    """An environment and its blurred levels, concatenated.
 
     Attributes:
-        texels: (texels, 3) float32
-        levels: first texel, height, width of each, sharpest first. (levels, 3) int64
+        texels: radiance of all levels.
+        levels: first texel, height, width of each, sharpest first.
     """
 
-    texels: F32
-    levels: NDArray[np.int64]
+    texels: Shaped[F32, "texels 3"]
+    levels: Shaped[NDArray[np.int64], "levels 3"]
 
 
-def build_environment_lookup(sharp: F32, blurred_map: Callable[[float], F32]) -> EnvironmentLookup:
-    """Blur an environment by steps.
+def build_environment_lookup(
+    sharp: Shaped[F32, "height width 3"], blurred_map: Callable[[float], F32]
+) -> EnvironmentLookup:
+    """Blur an environment in steps.
 
     Args:
-        sharp: its radiance. (height, width, 3) float32
-        blurred_map: what of it is blurred, by degrees. (height, width, 3) float32
+        sharp: its radiance.
+        blurred_map: returns it blurred by an angle in degrees. (height, width, 3) float32
     """
     maps = [sharp, *(blurred_map(_MIN_BLUR_DEG * 2 ** (k / _LEVELS_PER_OCTAVE)) for k in range(_NUM_BLURRED))]
     ends = np.cumsum([0, *(radiance.shape[0] * radiance.shape[1] for radiance in maps)])
@@ -48,7 +51,7 @@ def build_environment_lookup(sharp: F32, blurred_map: Callable[[float], F32]) ->
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _direction_to_uv(rotation, dx, dy, dz):  # type: ignore[no-untyped-def]
-    """Find u and v of a direction, both in [0, 1]."""
+    """Return u and v of a direction, both in [0, 1]."""
     u = azimuth_fraction(dx, dz) + rotation
     whole = np.int64(u)
     from_pole = np.float32(1 / math.pi) * acos_clamped(abs(dy))
@@ -58,11 +61,11 @@ def _direction_to_uv(rotation, dx, dy, dz):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _sample_level(environment, level, u, v):  # type: ignore[no-untyped-def]
-    """Look up one level in a place; bilinear, round about in u. Returns three numbers."""
+    """Sample one level, bilinear and periodic in u. Returns three numbers."""
     first, height, width = environment.levels[level, 0], environment.levels[level, 1], environment.levels[level, 2]
     x = u * np.float32(width) - np.float32(0.5)
     y: Any = min(max(v * np.float32(height) - np.float32(0.5), np.float32(0)), np.float32(height - 1))
-    # rounded down without a call: x is −½ at least
+    # floor without a call: x is at least −½
     column, row = np.int64(x + np.float32(1)) - 1, np.int64(y)
     fx, fy = x - np.float32(column), y - np.float32(row)
     next_column, next_row = (column + 1 if column + 1 < width else column + 1 - width), min(row + 1, height - 1)
@@ -81,21 +84,21 @@ def _sample_level(environment, level, u, v):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def blur_level(sigma):  # type: ignore[no-untyped-def]
-    """Find the level of a blur of σ radians, as if there were any number of them."""
+    """Return the level of a blur of σ radians, without an upper limit."""
     step = np.float32(_LEVELS_PER_OCTAVE) * math.log2(
         max(sigma * np.float32(180 / math.pi / _MIN_BLUR_DEG), np.float32(1e-3))
     )
     return max(step + np.float32(1), np.float32(0))
 
 
-# Inlined, as what it calls: calls would count the references of arrays, for which threads wait for each other.
+# Inlined: calls would count references of arrays, for which threads wait for each other.
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def add_environment(environment, rotation, direction, level, gain, out):  # type: ignore[no-untyped-def]
-    """Add the light about a direction.
+    """Add the prefiltered radiance in a direction.
 
     Args:
-        environment: its levels. rotation: of the map, as a share of a whole turn, and a half.
-        direction: unit, a tuple. level: of the blur, from `blur_level`. gain: that it is multiplied by.
+        environment: its levels. rotation: of the map, in turns, plus one half.
+        direction: unit, a tuple. level: of the blur, from `blur_level`. gain: a factor.
         out: added to. (3,)
     """
     level_coordinate: Any = min(level, np.float32(environment.levels.shape[0] - 1))
@@ -110,7 +113,7 @@ def add_environment(environment, rotation, direction, level, gain, out):  # type
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _sample(environment, rotation, gain, face, directions, start, stop, out):  # type: ignore[no-untyped-def]
-    """Fill pixels [start, stop) that see nothing."""
+    """Write the environment to pixels [start, stop) without a surface."""
     for p in range(start, stop):
         if face[p] >= 0:
             continue
@@ -121,18 +124,25 @@ def _sample(environment, rotation, gain, face, directions, start, stop, out):  #
 
 
 def rotation_of(rotation: float) -> np.float32:
-    """The turn of a map, as kernels take it, from its rotation in degrees."""
+    """Return the rotation of a map for kernels, from degrees."""
     return np.float32(0.5 + rotation / 360)
 
 
-def sample(radiance: F32, rotation: float, gain: F32, face: NDArray[np.int32], directions: F32, out: F32) -> None:
-    """Fill the pixels that see no surface.
+def sample(
+    radiance: Shaped[F32, "height width 3"],
+    rotation: float,
+    gain: Shaped[F32, " 3"],
+    face: Shaped[NDArray[np.int32], " n"],
+    directions: Shaped[F32, "n 3"],
+    out: Shaped[F32, "n 3"],
+) -> None:
+    """Write the environment to pixels without a surface.
 
     Args:
-        radiance: of the environment, equirectangular. (height, width, 3) float32
-        rotation: of it about +Y, degrees, counter-clockwise seen from above. gain: of each channel. (3,) float32
-        face: that each pixel sees, −1 for none. (n,) int32. directions: of their rays, unit. (n, 3) float32
-        out: written there. (n, 3) float32
+        radiance: of the environment, equirectangular.
+        rotation: about +Y, degrees, counterclockwise from above. gain: per channel.
+        face: of each pixel, −1 for none. directions: unit, of the rays.
+        out: radiance, float32, written there.
     """
     environment = EnvironmentLookup(
         np.ascontiguousarray(radiance).reshape(-1, 3), np.array([[0, *radiance.shape[:2]]], np.int64)

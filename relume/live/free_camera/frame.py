@@ -1,4 +1,4 @@
-"""One frame of a moving picture: what points send, what lies behind, all that an eye sees of both."""
+"""Renders a frame of the free camera: probes, lattice nodes, pixels, background."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Self
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.texture_slots import NormalMap, user_images
@@ -43,7 +44,7 @@ F32 = NDArray[np.float32]
 
 
 class ProjectedMaterial(NamedTuple):
-    """The terms of one material, and what the in-basis and lobes make of them."""
+    """The terms of one material, projected to the basis and to lobes."""
 
     terms: Sequence[Mapping[str, Any]]
     tables: Tables
@@ -51,26 +52,26 @@ class ProjectedMaterial(NamedTuple):
 
 
 def _project_terms(terms: Sequence[Mapping[str, Any]], cached: ProjectedMaterial | None) -> ProjectedMaterial:
-    """Project the terms of one. before: what has been projected of it."""
+    """Project the terms of a material. cached: its previous projection."""
     if cached is not None and cached.terms == terms:
         return cached
     return ProjectedMaterial(terms, build_tables([terms]), build_lobes([terms]))
 
 
 class MaterialState(NamedTuple):
-    """What materials send.
+    """The materials of a look, projected.
 
     Attributes:
-        tables: of what the in-basis tells. lobes: of the rest.
-        is_reflective: whether a material sends anything of a group of terms. (materials, groups) bool
-        btf_materials: of materials whose every texel sends something else.
+        tables: outgoing coefficients. lobes: of narrow terms.
+        is_reflective: a material reflects any light by a group of terms.
+        btf_materials: materials with a BTF.
         projected: the terms of each, projected.
-        overrides: what a look names in the place of each one's images.
+        overrides: map overrides of each.
     """
 
     tables: Tables
     lobes: Lobes
-    is_reflective: NDArray[np.bool_]
+    is_reflective: Shaped[NDArray[np.bool_], "materials groups"]
     btf_materials: BtfMaterials
     projected: Sequence[ProjectedMaterial]
     overrides: tuple[ProbeMapOverrides, ...]
@@ -84,11 +85,11 @@ class MaterialState(NamedTuple):
         *,
         is_blocking: bool = True,
     ) -> Self:
-        """Project the terms of each, of a complete look.
+        """Project the terms of each material, of a complete look.
 
         Args:
-            terms: of each. previous: those of another, which hold what has not changed.
-            normals: in the place of the normal maps of each; None: all have their own.
+            terms: of each. previous: an earlier state, to reuse what has not changed.
+            normals: normal-map overrides of each; None: none.
             is_blocking: see `find_btf_materials`.
         """
         normal_maps = [None] * len(terms) if normals is None else normals
@@ -118,20 +119,20 @@ class MaterialState(NamedTuple):
 
 
 class FrameRequestState(NamedTuple):
-    """What a frame shall show.
+    """The target of a frame.
 
     Attributes:
-        look: whose materials and background. light: what arrives, by its sources. gain: of all, in each channel. (3,)
-        incident: light vectors of that light. is_coarse: they were found quickly.
-        texel_light: what was made of them for texels, in frames of before.
-        is_fine: highlights are found for each pixel as for points, and rims of them smoothed
+        look: its materials and background are used. light: the illumination. gain: of the finished image, per channel.
+        incident: incident radiance coefficients of that light. is_coarse: they are approximate.
+        texel_light: cached incident light of BTF texels.
+        is_fine: pixels use two lobes like probes, and highlight edges are antialiased
             (`relume.live.free_camera.highlight_edges`).
     """
 
     look: Look
     materials: MaterialState
     light: Illumination
-    gain: F32
+    gain: Shaped[F32, " 3"]
     incident: IncidentCoefficients
     is_coarse: bool
     texel_light: TexelLight
@@ -139,34 +140,35 @@ class FrameRequestState(NamedTuple):
 
 
 class ShadingBuffers(NamedTuple):
-    """What a frame was summed from.
+    """Intermediate results of a frame.
 
     Attributes:
-        lobe_visibility: of points along their lobes. (points, 3) float32. outgoing: by points.
-        gradients: of points, from `relume.live.free_camera.highlights.lobe_gradients`. (points, 4) float32
-        node_values: all three of vertices. light_gradient: of vertices, see `InterpolatedProbes`.
-        radiance: along the rays. (rays, 3) float32
+        lobe_visibility: of probes along their lobes. outgoing: radiance of probes.
+        gradients: of probes, from `relume.live.free_camera.highlights.lobe_gradients`.
+        node_values: outgoing radiance, lobe visibility and gradients of lattice nodes.
+        light_gradient: of lattice nodes, see `InterpolatedProbes`.
+        radiance: along the rays.
     """
 
-    lobe_visibility: F32
+    lobe_visibility: Shaped[F32, "probes 3"]
     outgoing: ProbeRadiance
-    gradients: F32
+    gradients: Shaped[F32, "probes 4"]
     node_values: tuple[F32, F32, F32]
     light_gradient: F32
-    radiance: F32
+    radiance: Shaped[F32, "rays 3"]
 
 
 class Frame(NamedTuple):
-    """A finished one.
+    """A finished frame.
 
     Attributes:
-        image: linear radiance. (height, width, 3) float32
-        coverage: how much of what is behind it, where the background is transparent, else None. (height, width) float32
-        buffers: what it was summed from.
+        image: linear radiance.
+        coverage: alpha if the background is transparent, else None.
+        buffers: intermediate results.
     """
 
-    image: F32
-    coverage: F32 | None
+    image: Shaped[F32, "height width 3"]
+    coverage: Shaped[F32, "height width"] | None
     buffers: ShadingBuffers
 
 
@@ -178,12 +180,12 @@ def render_frame(
     size: tuple[int, int],
     shadow_visibility: Sequence[F32] = (),
 ) -> Frame:
-    """Find what an eye sees, but for rims.
+    """Render a frame without antialiasing of highlight edges.
 
     Args:
-        transfer: of the bake. state: what is shown.
-        gbuffer: by the rays of the camera. size: width and height in pixels.
-        shadow_visibility: of each beam that arrives, seen by the rays. (rays,) float32 each
+        transfer: of the bake. state: the target.
+        gbuffer: of the camera's rays. size: width and height in pixels.
+        shadow_visibility: of each hard-shadow light along the rays. (rays,) float32 each
     """
     width, height = size
     final_frame = finish_rays(transfer, state, gbuffer, camera, height, shadow_visibility)
@@ -196,15 +198,15 @@ def render_frame(
 
 
 class FinalFrame(NamedTuple):
-    """What rays show.
+    """Radiance of rays.
 
     Attributes:
-        radiance: with the background. (rays, 3) float32. coverage: how much of what is behind them. (rays,) float32
-        buffers: what it was summed from.
+        radiance: with the background. coverage: alpha.
+        buffers: intermediate results.
     """
 
-    radiance: F32
-    coverage: F32
+    radiance: Shaped[F32, "rays 3"]
+    coverage: Shaped[F32, " rays"]
     buffers: ShadingBuffers
 
 
@@ -216,10 +218,10 @@ def finish_rays(
     height: int,
     shadow_visibility: Sequence[F32] = (),
 ) -> FinalFrame:
-    """Find what rays show, glass and background included.
+    """Return the radiance of rays, with glass and background.
 
     Args:
-        transfer, state, gbuffer, camera, shadow_visibility: as of `render_frame`. height: of the picture, pixels.
+        transfer, state, gbuffer, camera, shadow_visibility: as in `render_frame`. height: of the image, pixels.
     """
     stored_scene, light = transfer.stored_scene, state.light
     buffers = _shade(transfer, state, gbuffer, DirtyRegion(gbuffer.is_needed, gbuffer.is_visible, None), camera, height)
@@ -238,7 +240,7 @@ def finish_rays(
 
 
 def only_materials_differ(before: FrameRequestState, after: FrameRequestState) -> bool:
-    """Whether two frames of one eye differ in what materials send alone, without any whose light comes otherwise."""
+    """Return whether two frames of one camera differ only in materials, not in catchers or normal-map overrides."""
     first, second = before.look, after.look
     catchers = (material.shadow_catcher for look in (first, second) for material in look.materials.values())
     return (
@@ -254,7 +256,7 @@ def only_materials_differ(before: FrameRequestState, after: FrameRequestState) -
 
 
 def _same_btf_materials(before: MaterialState, after: MaterialState) -> bool:
-    """Whether the same BTFs lie on the same materials, none of which was edited."""
+    """Return whether both states have the same BTFs on the same, unedited materials."""
     first, second = before.btf_materials.available, after.btf_materials.available
     return len(first) == len(second) and all(
         a.material == b.material
@@ -265,10 +267,10 @@ def _same_btf_materials(before: MaterialState, after: MaterialState) -> bool:
 
 
 def shows_btf(transfer: FreeCameraTransfer, materials: MaterialState, gbuffer: GBuffer, region: DirtyRegion) -> bool:
-    """Whether any ray of a part of a picture sees a material that a BTF covers.
+    """Return whether any ray of a region hits a material with a BTF.
 
     Args:
-        transfer: of the bake. materials: of the look. gbuffer: by the rays of the picture. region: of it.
+        transfer: of the bake. materials: of the look. gbuffer: of the image's rays. region: of the image.
     """
     if not materials.btf_materials.available:
         return False
@@ -284,15 +286,15 @@ def update_for_materials(
     camera: Camera,
     frame: Frame,
     dirty: DirtyPixels,
-    rgb9e5: NDArray[np.uint32],
+    rgb9e5: Shaped[NDArray[np.uint32], " pixels"],
     shadow_visibility: Sequence[F32] = (),
 ) -> None:
-    """Bring a frame to what materials send now, where `only_materials_differ` and the part `shows_btf` of no BTF.
+    """Update a frame to edited materials, if `only_materials_differ` and the region `shows_btf` of no BTF.
 
     Args:
-        transfer, gbuffer, camera, shadow_visibility: as in `render_frame`. state: what is shown from now on.
-        frame: changed. rgb9e5: its pixels, packed; changed too. (pixels,) uint32
-        dirty: what of it shows those materials.
+        transfer, gbuffer, camera, shadow_visibility: as in `render_frame`. state: the target.
+        frame: overwritten. rgb9e5: its packed pixels; overwritten.
+        dirty: region that shows the edited materials.
     """
     height, radiance, rays = len(frame.image), frame.buffers.radiance, dirty.region.rays
     _shade(transfer, state, gbuffer, dirty.region, camera, height, frame.buffers)
@@ -311,7 +313,9 @@ def _shade(
     height: int,
     buffers: ShadingBuffers | None = None,
 ) -> ShadingBuffers:
-    """What surfaces send along the rays of a part, and on the way there. into: written there; None: new."""
+    """Return the radiance of surfaces along the rays of a region, with intermediate results. buffers: overwritten;
+    None: new.
+    """
     materials, incident = state.materials, state.incident
     stored_scene = transfer.stored_scene_with(materials.overrides)
     lobes, camera_position, (probe_mask, node_mask, rays) = (
@@ -359,7 +363,7 @@ def _shade(
     )
     mirror_data = MirrorData(lobes, environment, node_visibility, node_gradients, state.is_fine)
     out = shade_pixels(stored_scene, gbuffer, pixel_angle, interpolated_probes, emission, mirror_data, rays, out)
-    if rays is None:  # else none of them sees a texel
+    if rays is None:  # otherwise no ray hits a BTF
         footprint, texel_incident = (
             TextureFootprint(camera_position, pixel_angle, gbuffer),
             IncidentTexelLight(incident.total, state.texel_light),
@@ -379,7 +383,7 @@ def _lobe_visibility(
     probe_mask: NDArray[np.uint8],
     out: F32 | None,
 ) -> F32:
-    """Look from points along their lobes. out: written; None: new."""
+    """Return the visibility of probes along their lobes. out: overwritten; None: new."""
     lobes, light = state.materials.lobes, state.light
     widths = lobe_widths(lobes) if light.has_direct_environment else ()
     if not widths:
@@ -393,7 +397,7 @@ def _lobe_visibility(
 def _highlight_light_sums(
     transfer: FreeCameraTransfer, state: FrameRequestState, camera_position: F32, probe_mask: NDArray[np.uint8]
 ) -> F32:
-    """What points send of the lights that they see in their highlights."""
+    """Return the highlights of probes, summed over visible environment lights."""
     lobes, light = state.materials.lobes, state.light
     if not (lobes.max_ratio == 1).any() or not light.has_direct_environment:
         return np.zeros((len(probe_mask), 3), np.float32)
@@ -411,7 +415,7 @@ def _add_hard_shadow_lights(
     rays: NDArray[np.int32] | None,
     out: F32,
 ) -> None:
-    """Add what beams bring along some rays, None for all. out: added to. (rays, 3)"""
+    """Add the direct light of hard-shadow lights along some rays, None for all. out: added to. (rays, 3)"""
     if not state.incident.hard_shadow_lights:
         return
     hard_shadow_lights, environment = state.incident.hard_shadow_lights, _prefiltered_environment(transfer, state.light)
@@ -429,7 +433,7 @@ def _add_hard_shadow_lights(
 
 
 def _node_light_gradient(stored_scene: StoredScene, incident: IncidentCoefficients, gbuffer: GBuffer) -> F32:
-    """Where the light of vertices comes from, which matters under normal maps alone. (vertices or 0, 3)"""
+    """Mean direction of light at lattice nodes, needed only for normal maps. (nodes or 0, 3)"""
     if not len(stored_scene.tangents):
         return np.empty((0, 3), np.float32)
     return interpolate_to_nodes(
@@ -438,14 +442,14 @@ def _node_light_gradient(stored_scene: StoredScene, incident: IncidentCoefficien
 
 
 def _prefiltered_environment(transfer: FreeCameraTransfer, light: Illumination) -> PrefilteredEnvironment:
-    """What lobes see where nothing hides it: the sky, its turn, its gain; none where no light comes straight."""
+    """The environment in lobes, with rotation and gain; gain 0 if its direct light is not shown."""
     gain = np.array(light.environment_gain if light.has_direct_environment else (0.0, 0.0, 0.0), np.float32)
     environment, bright_lights = transfer.prefiltered(light.environment.map), transfer.bright_lights(light.environment)
     return PrefilteredEnvironment(environment, bright_lights, rotation_of(light.environment.rotation), gain)
 
 
 def _shadow_catcher(transfer: FreeCameraTransfer, state: FrameRequestState, gbuffer: GBuffer) -> ShadowCatcher:
-    """What would arrive at catchers if nothing were in the way."""
+    """Return the unoccluded radiance of shadow catchers."""
     is_shadow_catcher = np.array([state.look.materials[name].shadow_catcher for name in transfer.material_names])
     if not is_shadow_catcher.any():
         return ShadowCatcher(is_shadow_catcher, np.empty((0, 3), np.float32))

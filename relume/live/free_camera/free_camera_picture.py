@@ -1,4 +1,4 @@
-"""One live picture whose eye moves, under a look that changes: evaluated whole for every frame."""
+"""The image of a free camera under a look that changes; rendered as a whole for every frame."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import ParameterError, ResultUnavailableError
@@ -50,102 +51,103 @@ Tile = tuple[int, int, int, int]
 
 
 class FreeCameraPicture:
-    """State of one session's picture; used from one thread at a time.
+    """The image of one session; used from one thread at a time.
 
     Args:
-        is_watched: somebody looks at it while it changes, and sees a rough picture first where a better one takes long,
-            and its highlights finely only once eye and light rest.
+        is_watched: a user waits for it, so that approximate images are shown first if better ones take long, and fine
+            highlights only when camera and light have stopped.
 
     Attributes:
-        renders_pixels: its pixels are wanted at every step; else a shader elsewhere finds them from `array_blocks`, and
-            they are drawn when somebody asks.
+        renders_pixels: its pixels are needed at every step; otherwise a browser renders from `array_blocks`, and pixels
+            are
+            rendered on request.
     """
 
     def __init__(self, transfer: FreeCameraTransfer, view_name: str, *, is_watched: bool = False) -> None:
         view = transfer.views[view_name]
         self._transfer, self._camera, self._size = transfer, view.camera, (view.width, view.height)
-        self._camera_seq = 0  # that it has been given: tells them apart
+        self._camera_seq = 0  # increases with each camera
         self._look: Look | None = None
         self._light: Illumination | None = None
         self._solo: Solo = None
         self._is_watched = is_watched
-        self._is_coarse = False  # what is shown was found quickly
+        self._is_coarse = False  # the displayed light is approximate
         self._displayed: tuple[Any, ...] | None = None
         self._previous: PreviousImage | None = None
         self._dirty_cache: tuple[GBuffer, bytes, DirtyPixels] | None = None
         self._gbuffer: tuple[int, GBuffer] | None = None
         self._materials: tuple[Look | None, MaterialState | None] = None, None
         self._probe_light, self._all_probes = ProbeLightState(transfer), np.ones(transfer.vectors_shape[0], np.uint8)
-        self._shadow_visibility: tuple[int, dict[Hashable, F32]] = 0, {}  # of beams that an eye sees
-        self._is_stale = False  # the frame is not of what is shown: nobody has asked for its pixels
+        self._shadow_visibility: tuple[int, dict[Hashable, F32]] = 0, {}  # of hard-shadow lights, for a camera
+        self._is_stale = False  # the frame is outdated: its pixels were not requested
         self._texel_light = TexelLight()
-        self._residual_image: F32 | None = None  # what is added to the frame
-        self._is_corrected = False  # what is shown has it
-        self._is_refined = False  # than it was when somebody saw it
+        self._residual_image: F32 | None = None  # residual that is added to the frame
+        self._is_corrected = False  # the displayed image includes the residual
+        self._is_refined = False  # the frame has been refined since it was sent
         self.renders_pixels = True
         self._published_vectors: IncidentCoefficients | None = None
         self._vectors_version = self._materials_version = 0
 
     def check(self, look: Look) -> None:
-        """Whether a look can be shown at all: what its terms send is found in tables, of any number of terms."""
+        """Check that a look can be shown: always true, since tables represent any number of terms."""
 
     def set_look(self, look: Look, *, active_pointer: str | None = None, solo: Solo = None) -> None:
-        """A new target; nothing is computed yet.
+        """Set a new target; nothing is computed yet.
 
         Args:
-            look: that is to be shown. active_pointer: pointer to what the user's hand is on, or None.
-            solo: names of sources of light that alone are shown, see `light_of`; None: all.
+            look: the target. active_pointer: pointer to the active control, or None.
+            solo: names of the only light sources to show, see `illumination_from_look`; None: all.
         Raises:
-            ParameterError: `active_pointer` points to nothing that a hand may hold. NotFoundError, SceneError: the
-                environment cannot be had. The picture stays as it was.
+            ParameterError: `active_pointer` does not point to an editable control. NotFoundError, SceneError: the
+                environment is not available. The picture is unchanged.
         """
         if active_pointer is not None:
             parse_pointer(active_pointer)
         light = illumination_from_look(look, self._transfer.material_names, has_bounces=True, solo=solo)
-        self._transfer.environment_map(light.environment.map)  # what cannot be had is said now
+        self._transfer.environment_map(light.environment.map)  # raises now if it is not available
         self._look, self._light, self._solo = look, light, solo
         self._residual_image = None
 
     def set_camera(self, camera: Camera, size: tuple[int, int]) -> None:
-        """See from elsewhere, in a picture of another size; nothing is computed yet.
+        """Set the camera and the image size; nothing is computed yet.
 
         Args:
-            camera: a rigid one. size: width and height in pixels.
+            camera: with a rigid transform. size: width and height in pixels.
         """
         self._camera, self._size = camera, size
         self._camera_seq += 1
         self._residual_image = None
 
-    def correct(self, residual_image: F32 | None) -> None:
-        """Add what it is off by, see `relume.live.free_camera.residual`, until another look or eye is given.
+    def correct(self, residual_image: Shaped[F32, "height width 3"] | None) -> None:
+        """Add a residual until the look or camera changes, see `relume.live.free_camera.residual_correction`.
 
         Args:
-            residual_image: of each pixel, (height, width, 3) float32; None: nothing.
+            residual_image: per pixel, float32; None: none.
         """
         self._residual_image = residual_image
 
     @property
     def is_corrected(self) -> bool:
-        """Whether something is added that only this picture knows, no shader elsewhere."""
+        """True if a residual is added, which the browser's renderer does not have."""
         return self._residual_image is not None
 
     @property
     def sized_camera(self) -> tuple[Camera, tuple[int, int]]:
-        """Where it is seen from, and the size of the picture."""
+        """The camera and the image size."""
         return self._camera, self._size
 
     def prepare(self, pointer: str) -> None:
-        """Take note of what a hand holds; nothing needs to be prepared.
+        """Validate a pointer to a control; nothing needs to be prepared.
 
         Raises:
-            ParameterError: there is no such thing.
+            ParameterError: there is no such control.
         """
         parsed = parse_pointer(pointer)
         if isinstance(parsed, CurvePointer | ParameterPointer) and self._look is not None:
             check_exists(parsed, self._look)
 
     def next_job(self) -> IncrementalProbeLightJob | ProbeLightJob | TablesJob | RefineHighlights | None:
-        """What makes a rough picture as good as it gets: the light vectors that it lacks; BTFs; then its highlights."""
+        """Return the next refinement: missing incident coefficients, then BTFs, then highlight edges."""
         if self._is_coarse and self._must_be_coarse():
             return self._probe_light.next_job(self._light_request(), self._needed_probes)
         if self._look is not None and (missing := self._material_state(self._look).btf_materials.missing):
@@ -153,11 +155,11 @@ class FreeCameraPicture:
         return self._refine_job() if self._is_watched and self.renders_pixels else None
 
     def _display_btf(self) -> None:
-        """Show texels whose tables are there by now."""
+        """Display BTFs whose tables are available now."""
         self._materials, self._displayed = (None, self._materials[1]), None
 
     def _refine_job(self) -> RefineHighlights | None:
-        """Find highlights finely in what is shown, if they were not."""
+        """Return the job that refines highlights in the displayed image, if they are not fine."""
         previous = self._previous
         if (
             previous is None
@@ -167,7 +169,7 @@ class FreeCameraPicture:
             or self._target != self._displayed
         ):
             return None
-        # made beside frames, which go on with the relief that they have
+        # runs in the background; frames keep their own cached texel light
         fine_state = previous.state._replace(is_fine=True, texel_light=TexelLight())
         args = self._transfer, fine_state, previous.gbuffer, self._camera, self._size, previous.shadow_visibility
 
@@ -184,15 +186,15 @@ class FreeCameraPicture:
 
     @property
     def _target(self) -> tuple[Any, ...]:
-        """What has been asked for; equal to `_displayed` where that is shown."""
+        """The requested state; equal to `_displayed` if it is displayed."""
         return self._look, self._solo, self._camera_seq, self._probe_light.version
 
     def install(self, job: Any, result: Any) -> None:
-        """Go on with what a job has made."""
+        """Use the result of a job."""
         job.install(result)
 
     def advance(self, max_coefficients: int | None) -> Progress:
-        """Bring the picture to its look and its eye."""
+        """Update the image to its look and camera."""
         target = self._target
         is_displayed = target == self._displayed and self._is_coarse == self._must_be_coarse()
         if self._look is None or (is_displayed and self._is_corrected == self.is_corrected and not self._is_refined):
@@ -210,11 +212,11 @@ class FreeCameraPicture:
         return "preview" if self._is_coarse else "approximate"
 
     def _must_be_coarse(self) -> bool:
-        """Whether somebody would wait for light vectors that nobody has."""
+        """Return whether a user would wait for incident coefficients that are not cached."""
         return self._is_watched and not self._probe_light.is_available(self._light_request())
 
     def _light_request(self) -> LightRequest:
-        """What is to arrive; pixels find no shadows of beams where a shader draws, nor on BTFs."""
+        """Return the light request; hard shadows per pixel are not available in the browser's renderer or on BTFs."""
         assert self._look is not None
         return LightRequest(
             self._current_light(), self.renders_pixels and not any(self._material_state(self._look).btf_materials)
@@ -222,11 +224,11 @@ class FreeCameraPicture:
 
     @property
     def _needed_probes(self) -> NDArray[np.uint8]:
-        """Points whose light is asked about: those that the eye sees, or all where a shader draws from anywhere."""
+        """Probes that need light: those of the camera, or all if the browser renders from any camera."""
         return self._current_gbuffer().is_needed if self.renders_pixels else self._all_probes
 
     def _render(self) -> PreviousImage | None:
-        """What is shown, evaluated where that has not been done; None before there is a look."""
+        """Return the displayed frame, rendered if it is outdated; None before a look is set."""
         if not self._is_stale or self._look is None:
             return self._previous
         gbuffer, previous = self._current_gbuffer(), self._previous
@@ -256,7 +258,7 @@ class FreeCameraPicture:
         return self._previous
 
     def _can_update(self, previous: PreviousImage, state: FrameRequestState, gbuffer: GBuffer) -> bool:
-        """Whether what was drawn may be changed; where nobody waits for it, all rims are found anew."""
+        """Return whether the previous frame may be updated; offline, all highlight edges are rendered anew."""
         is_same = (
             previous.gbuffer is gbuffer and not len(gbuffer.glass.ray) and only_materials_differ(previous.state, state)
         )
@@ -266,7 +268,7 @@ class FreeCameraPicture:
         return not shows_btf(self._transfer, state.materials, gbuffer, dirty.region)
 
     def _dirty_pixels(self, before: MaterialState, after: MaterialState, gbuffer: GBuffer) -> DirtyPixels:
-        """What shows materials that were edited; found once while a hand is on them."""
+        """Return the pixels that show edited materials; cached during a drag."""
         is_changed = np.array([old is not new for old, new in zip(before.projected, after.projected, strict=True)])
         key = is_changed.tobytes()
         if self._dirty_cache is None or self._dirty_cache[0] is not gbuffer or self._dirty_cache[1] != key:
@@ -279,7 +281,7 @@ class FreeCameraPicture:
         return self._dirty_cache[2]
 
     def _trace_shadow_visibility(self, hard_shadow_lights: Sequence[HardShadowLight], gbuffer: GBuffer) -> list[F32]:
-        """What the rays of the eye see of each beam, found again where the eye or the beam has moved."""
+        """Return the visibility of each hard-shadow light along camera rays; cached until the camera or light moves."""
         cached = self._shadow_visibility[1] if self._shadow_visibility[0] == self._camera_seq else {}
         args = self._transfer.occlusion_mesh, gbuffer, self._camera, self._size
         visibility = [
@@ -295,7 +297,7 @@ class FreeCameraPicture:
         gain = np.array(picture_gain(look, self._solo), np.float32)
         only_indirect_pending = self._probe_light.only_indirect_pending(self._light_request())
         is_coarse = self._is_coarse and not only_indirect_pending
-        # what is added to a frame is the error of a fine one
+        # the residual is that of a fine frame
         is_fine = not self._is_watched or self.is_corrected
         return FrameRequestState(
             look,
@@ -309,28 +311,30 @@ class FreeCameraPicture:
         )
 
     def array_blocks(self) -> tuple[dict[str, ArrayBlock], ShaderConstants]:
-        """What a shader needs to draw what is shown, from anywhere; after a step."""
+        """Return the arrays and constants with which a browser renders the displayed look; call it after `advance`."""
         assert self._look is not None
         incident = self._current_vectors(self._all_probes)
         self._vectors_version += incident is not self._published_vectors
         self._published_vectors = incident
         state = self._request_state(self._look, incident)
-        # what is exact follows from its light alone: it is not sent again after pictures that were drawn here meanwhile
+        # exact coefficients depend on the light alone: they are not sent again after frames rendered here meanwhile
         versions = self._materials_version, self._vectors_version if self._is_coarse else self._light_request()
         return array_blocks(self._transfer, state, versions), shader_constants(self._transfer, state)
 
     @property
     def gbuffer(self) -> GBuffer:
-        """What its rays see."""
+        """The G-buffer of its rays."""
         return self._current_gbuffer()
 
-    def render_pixel_centers(self, size: tuple[int, int], *, is_fine: bool = True) -> tuple[F32, GBuffer]:
-        """What it shows along the rays through the middles of the pixels of a picture of another size.
+    def render_pixel_centers(
+        self, size: tuple[int, int], *, is_fine: bool = True
+    ) -> tuple[Shaped[F32, "height width 3"], GBuffer]:
+        """Render the look along rays through the pixel centers of an image of another size.
 
         Args:
-            size: width and height in pixels. is_fine: with highlights as where the eye rests, not as while it moves.
+            size: width and height in pixels. is_fine: with the highlights of a stopped camera.
         Returns:
-            Linear radiance (height, width, 3) float32, and what the rays see.
+            Linear radiance, float32, and the G-buffer.
         """
         assert self._look is not None
         gbuffer = self._trace_gbuffer(size).pixel_centers(size[0] * size[1])
@@ -341,7 +345,7 @@ class FreeCameraPicture:
 
     @property
     def stored_scene(self) -> StoredScene:
-        """What is seen."""
+        """The scene."""
         return self._transfer.stored_scene
 
     def _current_light(self) -> Illumination:
@@ -371,16 +375,16 @@ class FreeCameraPicture:
         return previous
 
     def _current_vectors(self, is_needed: NDArray[np.uint8]) -> IncidentCoefficients:
-        """Light vectors in the light of the look; where they may be rough, of what is needed alone."""
+        """Incident coefficients of the look's light; approximate ones only for needed probes."""
         request = self._light_request()
         return self._probe_light.fast(request, is_needed) if self._is_coarse else self._probe_light.exact(request)
 
     def all_tiles(self) -> list[Tile]:
-        """Tiles that cover the picture: one, for all of it changes together."""
+        """Return the tiles that cover the image: one, since all pixels change together."""
         return [(0, 0, *self._size)]
 
     def encode(self, tiles: Sequence[Tile], form: str) -> bytes:
-        """Payload of a frame: the tiles one after another, row-major."""
+        """Return the payload of a frame: the tiles in order, row-major."""
         previous = self._render()
         if (
             previous is not None
@@ -394,18 +398,18 @@ class FreeCameraPicture:
         return encode_pixels(np.ascontiguousarray(np.concatenate(pixels)), form)
 
     def encode_alpha(self, tiles: Sequence[Tile]) -> bytes | None:
-        """How much each pixel of tiles hides of display values behind it; see `Picture.encode_alpha`."""
+        """Return the alpha of each pixel in tiles over display values; see `Picture.encode_alpha`."""
         alpha = self.alpha(for_display=True)
         return None if alpha is None else encode_coverage(alpha, tiles)
 
-    def alpha(self, *, for_display: bool) -> F32 | None:
-        """The same of the whole picture, or of linear radiance; None where it hides all. (height, width) float32"""
+    def alpha(self, *, for_display: bool) -> Shaped[F32, "height width"] | None:
+        """Return the alpha of the whole image over display values or linear radiance; None if it is opaque."""
         previous = self._render()
         coverage = None if previous is None else previous.frame.coverage
         return None if coverage is None else alpha(coverage, for_display=for_display)
 
-    def image(self) -> F32:
-        """Linear radiance. (height, width, 3) float32"""
+    def image(self) -> Shaped[F32, "height width 3"]:
+        """Return linear radiance."""
         return self._image().copy()  # the next edit writes to it
 
     def _image(self) -> F32:
@@ -419,10 +423,10 @@ class FreeCameraPicture:
         )
 
     def inspect(self, x: int, y: int) -> dict[str, Any]:
-        """What a pixel shows, and where its surface is.
+        """Probe a pixel: its radiance and surface.
 
         Raises:
-            ParameterError: it lies outside the picture.
+            ParameterError: it lies outside the image.
         """
         image = self._image()
         height, width, _ = image.shape
@@ -446,14 +450,14 @@ class FreeCameraPicture:
         }
 
     def highlight_pixels(self, pointer: str, from_deg: float, to_deg: float) -> F32:
-        """Refuse: no curve is frozen in pictures whose eye moves.
+        """Raise an error: there are no operators for a free camera.
 
         Args:
-            pointer: to a curve. from_deg, to_deg: ends of a stretch of it, degrees.
+            pointer: to a curve. from_deg, to_deg: ends of a range, degrees.
 
         Raises:
-            NotMadeError: always.
+            ResultUnavailableError: always.
         """
         raise ResultUnavailableError(
-            "which pixels a curve lights is known where the eye rests; ask when its picture is exact"
+            "the pixels that a curve lights are available when the camera stops; ask again when the image is exact"
         )

@@ -1,10 +1,11 @@
-"""A view whose eye moves: a name, and where it begins."""
+"""A view of a free camera: its name and initial camera."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.scene.model import Camera
@@ -14,16 +15,16 @@ F64 = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FreeView:
-    """Where a moving eye begins, and how large its picture is at first, pixels.
+    """The initial camera of a view, and its image size in pixels.
 
     Attributes:
-        bounds: the lowest and the highest corner of what there is to see, metres. (3,) each
+        bounds: lowest and highest corner of the scene, meters.
     """
 
     camera: Camera
     width: int
     height: int
-    bounds: tuple[F64, F64]
+    bounds: tuple[Shaped[F64, " 3"], Shaped[F64, " 3"]]
 
     @property
     def name(self) -> str:

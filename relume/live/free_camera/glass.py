@@ -1,10 +1,11 @@
-"""Glass while the eye moves: its own highlights are laid over what is straight behind it; nothing is bent."""
+"""Glass for the free camera: its reflections are added to the attenuated light behind it; there is no refraction."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.fresnel import schlick
@@ -18,22 +19,22 @@ F32 = NDArray[np.float32]
 
 
 class GlassLayers(NamedTuple):
-    """The glass before rays of an eye, nearest first.
+    """The glass in front of camera rays, nearest first.
 
     Attributes:
-        ray: that each is before. (g,) int64
-        transmittance: share of what is behind it that comes to the eye. (g, 3) float32
+        ray: index of the ray behind each.
+        transmittance: fraction of light behind it that reaches the camera.
     """
 
-    ray: NDArray[np.int64]
-    transmittance: F32
+    ray: Shaped[NDArray[np.int64], " g"]
+    transmittance: Shaped[F32, "g 3"]
 
 
-def trace_glass(embree: EmbreeScene, camera_position: F32, directions: F32) -> Hits | None:
-    """Find what rays of an eye meet first, glass included; None where a scene has none.
+def trace_glass(embree: EmbreeScene, camera_position: Shaped[F32, " 3"], directions: Shaped[F32, "n 3"]) -> Hits | None:
+    """Return the first hits of camera rays including glass; None if the scene has no glass.
 
     Args:
-        embree: the triangles. camera_position: (3,) float32. directions: of the rays, unit. (n, 3) float32
+        embree: the triangles. camera_position: origin of the rays. directions: of the rays, unit.
     """
     alpha_test = embree.alpha_test
     if alpha_test is None or not (alpha_test.alpha_masks.rules[:, 0] == GLASS_RULE).any():
@@ -41,12 +42,13 @@ def trace_glass(embree: EmbreeScene, camera_position: F32, directions: F32) -> H
     return trace_rays(embree, camera_position, directions, STOP_AT_OPAQUE)
 
 
-def find_glass_layers(embree: EmbreeScene, stored_scene: StoredScene, glass_hits: Hits, directions: F32) -> GlassLayers:
-    """Tell which rays glass is before.
+def find_glass_layers(
+    embree: EmbreeScene, stored_scene: StoredScene, glass_hits: Hits, directions: Shaped[F32, "n 3"]
+) -> GlassLayers:
+    """Return the glass in front of rays.
 
     Args:
-        embree: the triangles. stored_scene: of the scene. glass_hits: from `trace_glass`. directions: of the rays. (n,
-            3) float32
+        embree: the triangles. stored_scene: the scene. glass_hits: from `trace_glass`. directions: of the rays.
     """
     assert embree.alpha_test is not None
     cutouts = embree.alpha_test.alpha_masks
@@ -61,13 +63,13 @@ def find_glass_layers(embree: EmbreeScene, stored_scene: StoredScene, glass_hits
     return GlassLayers(ray, (transmittance ** sides[:, None]).astype(np.float32))
 
 
-def composite_glass(glass: GlassLayers, values: F32) -> F32:
-    """Add the radiance of glass to what comes through it.
+def composite_glass(glass: GlassLayers, values: Shaped[F32, " rows *channels"]) -> Shaped[F32, " rays *channels"]:
+    """Add the radiance of glass to the light behind it.
 
     Args:
-        glass: before some of the rays. values: of the rays, then of the panes. (rays + g, …) float32
+        glass: in front of some rays. values: of the rays, then of the glass; overwritten.
     Returns:
-        Of the rays. (rays, …) float32
+        The values of the rays.
     """
     num = len(values) - len(glass.ray)
     out = values[:num]
@@ -75,8 +77,8 @@ def composite_glass(glass: GlassLayers, values: F32) -> F32:
     return out
 
 
-def adjust_alpha(glass: GlassLayers, coverage: F32) -> F32:
-    """How much rays hide of what is behind all, glass included. hides: of the rays, then of the panes. (rays,)"""
+def adjust_alpha(glass: GlassLayers, coverage: Shaped[F32, " rows"]) -> Shaped[F32, " rays"]:
+    """Return the coverage of rays including glass. coverage: of the rays, then of the glass."""
     out = coverage[: len(coverage) - len(glass.ray)]
     out[glass.ray] = 1 - (1 - out[glass.ray]) * glass.transmittance.mean(axis=1)
     return out

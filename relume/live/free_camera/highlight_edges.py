@@ -1,8 +1,8 @@
-"""Rims of highlights a pixel thin: where brightness jumps from pixel to pixel, many rays find what a pixel sees of it.
+"""Antialiasing of highlight edges: pixels with a large luminance step get many rays.
 
-Rays through the middles of pixels meet a thin rim or miss it, and it is hundreds of times as bright as what lies beside
-it. Of all pixels a few make most of the error (docs/free-camera.md#highlights). They take more time than a moving eye
-has: fine frames alone have them.
+Rays through pixel centers hit a thin highlight or miss it, and it is hundreds of times as bright as its surroundings. A
+few pixels make most of the error (docs/free-camera.md#highlights). This takes more time than a moving camera allows, so
+only fine frames do it.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import LUMINANCE
@@ -21,22 +22,24 @@ from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]
 
-_MAX_EDGE_FRACTION = 0.02  # of all pixels, those across which it jumps most
-_MIN_JUMP = 1.0  # of the picture's mean: the least jump
+_MAX_EDGE_FRACTION = 0.02  # of all pixels, those with the largest steps
+_MIN_JUMP = 1.0  # of the image's mean luminance: smallest step
 _RAYS_PER_PIXEL = 16
-_STEP = 7  # from row to row: no two rays share a row or a column, none are close
+_STEP = 7  # from row to row: no two rays share a row or column, and none are close
 RAY_POSITIONS = (
     (np.stack([np.arange(_RAYS_PER_PIXEL), np.arange(_RAYS_PER_PIXEL) * _STEP % _RAYS_PER_PIXEL], axis=1) + 0.5)
     / _RAYS_PER_PIXEL
 ).astype(np.float32)
 
 
-def find_highlight_edges(image: F32, is_candidate: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Find the pixels whose luminance differs most from one beside them, row after row. (n,) int32
+def find_highlight_edges(
+    image: Shaped[F32, "height width 3"], is_candidate: Shaped[NDArray[np.bool_], " pixels"]
+) -> Shaped[NDArray[np.int32], " n"]:
+    """Return the pixels whose luminance differs most from an adjacent one, in row-major order.
 
     Args:
-        image: linear radiance. (height, width, 3) float32
-        is_candidate: pixels that may be chosen. (height · width,) bool
+        image: linear radiance.
+        is_candidate: pixels that may be returned, one per pixel.
     """
     luminance = image @ np.array(LUMINANCE, np.float32)
     jump = np.zeros_like(luminance)
@@ -53,7 +56,7 @@ def find_highlight_edges(image: F32, is_candidate: NDArray[np.bool_]) -> NDArray
 
 
 def _adjacent_views(values: F32, axis: int) -> tuple[F32, F32]:
-    """Views of all but the last and of all but the first along an axis."""
+    """Views without the last and without the first element along an axis."""
     axis_first = np.moveaxis(values, axis, 0)
     return np.moveaxis(axis_first[:-1], 0, axis), np.moveaxis(axis_first[1:], 0, axis)
 
@@ -66,13 +69,12 @@ def add_samples(
     frame: Frame,
     shadow_visibility: Sequence[F32] = (),
 ) -> Frame:
-    """Find anew what pixels across rims show.
+    """Return the frame with pixels on highlight edges rendered anew.
 
     Args:
-        transfer, state, gbuffer, camera, shadow_visibility: as of `relume.live.free_camera.frame.render_frame`, which
-        made the frame. Of beams,
-            all rays of a pixel see what the one through its middle does.
-        frame: left as it is.
+        transfer, state, gbuffer, camera, shadow_visibility: as in `relume.live.free_camera.frame.render_frame`, which
+            rendered the frame. All rays of a pixel take the hard shadows of its center.
+        frame: unchanged.
     """
     height, width, _ = frame.image.shape
     face = gbuffer.hits.face[: width * height]

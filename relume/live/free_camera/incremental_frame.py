@@ -1,7 +1,7 @@
-"""A frame after an edit of materials, its eye and its light as they were: only what shows them is found anew.
+"""Incremental frames after material edits with the same camera and light: only affected pixels are rendered.
 
-What an eye meets, the light at points and all other materials stay. Of points those are evaluated whose own material
-was edited, of vertices those that take from such points, of rays those that show either.
+The G-buffer, incident light and all other materials stay. Probes with an edited material are shaded, then the lattice
+nodes that interpolate them, then the rays that show either.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -22,29 +23,29 @@ F32 = NDArray[np.float32]
 
 
 class DirtyRegion(NamedTuple):
-    """What of a picture shows some materials.
+    """The part of an image that shows some materials.
 
     Attributes:
-        probe_mask: that send by them. (points,) uint8. node_mask: that take from those. (vertices,) uint8
-        rays: that show them; None: all. (n,) int32
+        probe_mask: probes with these materials. node_mask: lattice nodes that interpolate such probes.
+        rays: rays that show them; None: all.
     """
 
-    probe_mask: NDArray[np.uint8]
-    node_mask: NDArray[np.uint8]
-    rays: NDArray[np.int32] | None
+    probe_mask: Shaped[NDArray[np.uint8], " probes"]
+    node_mask: Shaped[NDArray[np.uint8], " nodes"]
+    rays: Shaped[NDArray[np.int32], " n"] | None
 
 
 class DirtyPixels(NamedTuple):
-    """A part of a picture, and its pixels.
+    """A region of an image, and its pixels.
 
     Attributes:
-        pixels: that have any of its rays. (m,) int32
-        first_extra_ray: of each, where its other rays begin among those that go through no middle. (m,) int64
+        pixels: pixels with any of its rays.
+        first_extra_ray: of each, index of its first extra ray.
     """
 
     region: DirtyRegion
-    pixels: NDArray[np.int32]
-    first_extra_ray: NDArray[np.intp]
+    pixels: Shaped[NDArray[np.int32], " m"]
+    first_extra_ray: Shaped[NDArray[np.intp], " m"]
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
@@ -71,13 +72,13 @@ def _mark_rays(material, is_changed, node_mask, face, lattice_node, weight, owne
 
 
 def find_dirty_pixels(
-    stored_scene: StoredScene, gbuffer: GBuffer, is_changed: NDArray[np.bool_], num_pixels: int
+    stored_scene: StoredScene, gbuffer: GBuffer, is_changed: Shaped[NDArray[np.bool_], " materials"], num_pixels: int
 ) -> DirtyPixels:
-    """Find what of a picture shows some materials.
+    """Return the pixels that show some materials.
 
     Args:
-        stored_scene: that is seen. gbuffer: by the rays of the picture, no glass among it.
-        is_changed: whether a material is one of them. (materials,) bool. num_pixels: of the picture.
+        stored_scene: the scene. gbuffer: of the image's rays, without glass.
+        is_changed: the materials. num_pixels: of the image.
     """
     probe_mask = (gbuffer.is_needed & is_changed[stored_scene.material]).astype(np.uint8)
     node_mask, ray_mask = np.zeros_like(gbuffer.is_visible), np.zeros(len(gbuffer.directions), np.bool_)
@@ -94,7 +95,7 @@ def find_dirty_pixels(
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _resolve_subset(radiance, owner, first_extra_ray, pixels, start, stop, out, rgb9e5):  # type: ignore[no-untyped-def]
-    """Resolve the pixels that are [start, stop) of pixels."""
+    """Resolve pixels[start:stop]."""
     num_pixels = out.shape[0]
     for i in range(start, stop):
         p, r, num = pixels[i], first_extra_ray[i], np.float32(1)
@@ -110,14 +111,18 @@ def _resolve_subset(radiance, owner, first_extra_ray, pixels, start, stop, out, 
 
 
 def resolve_subset(
-    radiance: F32, owner: NDArray[np.int32], dirty: DirtyPixels, out: F32, rgb9e5: NDArray[np.uint32]
+    radiance: Shaped[F32, "rays 3"],
+    owner: Shaped[NDArray[np.int32], " m"],
+    dirty: DirtyPixels,
+    out: Shaped[F32, "pixels 3"],
+    rgb9e5: Shaped[NDArray[np.uint32], " pixels"],
 ) -> None:
-    """Take the mean of all rays of some pixels; see `relume.views.resolve`, which does so of all.
+    """Average all rays of some pixels; see `relume.live.free_camera.antialiasing.resolve` for all pixels.
 
     Args:
-        radiance: of the rays through the middles of all pixels, then of the others. (rays, 3) float32
-        owner: pixels of the others, rising. (m,) int32. dirty: with the pixels that are asked.
-        out: written there. (num_pixels, 3) float32. rgb9e5: the same, packed. (num_pixels,) uint32
+        radiance: of the rays through all pixel centers, then of the extra rays.
+        owner: pixels of the extra rays, ascending. dirty: the pixels to resolve.
+        out: radiance, float32, written there. rgb9e5: the same, packed.
     """
     args = radiance, owner, dirty.first_extra_ray, dirty.pixels
     parallel_for_chunks(lambda start, stop: _resolve_subset(*args, start, stop, out, rgb9e5), len(dirty.pixels))

@@ -1,12 +1,12 @@
-"""Normal maps where the eye moves: how what points send changes as the normal of a pixel leans away from theirs.
+"""Normal mapping for the free camera: outgoing radiance changes as pixel normals deviate from those of probes.
 
-A surface that leans by little sees the same lights under other cosines,
+A surface with a slightly perturbed normal receives the same lights with other cosines,
 
     E(n') = Σ_s w_s n'·ω_s = n' · D,   D = Σ_s w_s ω_s
 
-exact where no light lies between the two horizons. The tangential parts of D are integrals of the light times x and y;
-against light vectors, which hold the cosine already, those of x / z and y / z, expanded in the in-basis. What is
-broad is multiplied by n'·D / n·D, of D's luminance; what is narrow looks along the leaning normal itself.
+exact if no light lies between the two horizons. The tangential components of D are integrals of incident light times x
+and y; incident coefficients include the cosine, so x / z and y / z are projected onto the basis. Broad terms are
+multiplied by n'·D / n·D, with D of luminance; narrow lobes are evaluated for the perturbed normal.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Any
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import LUMINANCE
@@ -29,27 +30,27 @@ from relume.math.zernike import project
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_NUM_QUADRATURE_NODES = 64  # of quadrature along each of θ and φ: exact for what is expanded
-_MAX_RATIO = np.float32(4)  # times: a slope that the light grazes is not blown up
+_NUM_QUADRATURE_NODES = 64  # of quadrature along each of θ and φ; exact for these integrands
+_MAX_RATIO = np.float32(4)  # limits the ratio at grazing light
 _EPSILON = np.float32(1e-12)
 
 
 @lru_cache(maxsize=1)
-def basis_gradients() -> F32:
-    """Expand x / z, y / z and 1: their inner products with light vectors are D in the local frame. (3, K) float32"""
+def basis_gradients() -> Shaped[F32, "3 K"]:
+    """Project x / z, y / z and 1: their inner products with incident coefficients are D in the local frame."""
     node, weight = np.polynomial.legendre.leggauss(_NUM_QUADRATURE_NODES)
     theta, phi = (node + 1) * np.pi / 4, np.arange(_NUM_QUADRATURE_NODES) * 2 * np.pi / _NUM_QUADRATURE_NODES
     azimuth_vectors = np.stack([np.cos(phi), np.sin(phi), np.ones(_NUM_QUADRATURE_NODES)])
     wi = np.sin(theta)[:, None, None] * azimuth_vectors.T
     wi[..., 2] = np.cos(theta)[:, None]
-    # h is expanded under dx dy = cos θ dω, so that x / z leaves x dω
+    # the basis is orthonormal in dx dy = cos θ dω, so x / z leaves x dω
     solid_angle = np.sin(theta) * weight * np.pi / 4 * (2 * np.pi / _NUM_QUADRATURE_NODES)
     return np.asarray(np.einsum("tpi,tpk,t->ik", wi, project(wi), solid_angle), np.float32)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _light_gradient(gradients, luminance, normal, tangent, vectors, is_needed, start, stop, out):  # type: ignore[no-untyped-def]
-    """Find D of points [start, stop)."""
+    """Compute D of probes [start, stop)."""
     for p in range(start, stop):
         if not is_needed[p]:
             continue
@@ -64,14 +65,16 @@ def _light_gradient(gradients, luminance, normal, tangent, vectors, is_needed, s
         out[p, 2] = x * t[2] + y * (n[0] * t[1] - n[1] * t[0]) + z * n[2]
 
 
-def light_gradient(stored_scene: StoredScene, vectors: F32, is_needed: NDArray[np.uint8]) -> F32:
-    """Find where light comes from at points: D, its length their irradiance where it comes from one side.
+def light_gradient(
+    stored_scene: StoredScene, vectors: Shaped[F32, "probes 3 K"], is_needed: Shaped[NDArray[np.uint8], " probes"]
+) -> Shaped[F32, "probes 3"]:
+    """Return D of probes, the mean light vector; its length is the irradiance if light comes from one side.
 
     Args:
-        stored_scene: whose points. vectors: t of each. (points, 3, K) float32
-        is_needed: points that are asked; the others get nothing. (points,) uint8
+        stored_scene: the scene. vectors: t of each probe.
+        is_needed: nonzero for probes to evaluate; the others get zero.
     Returns:
-        World space, luminance. (points, 3) float32
+        World space, luminance.
     """
     out = np.zeros((len(vectors), 3), np.float32)
     probes = stored_scene.probes
@@ -82,7 +85,7 @@ def light_gradient(stored_scene: StoredScene, vectors: F32, is_needed: NDArray[n
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def normalize(vector):  # type: ignore[no-untyped-def]
-    """Scale a vector, a tuple of three, to length one."""
+    """Normalize a vector, a tuple of three."""
     x, y, z = vector
     scale = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, _EPSILON))
     return np.float32(scale * x), np.float32(scale * y), np.float32(scale * z)
@@ -90,14 +93,14 @@ def normalize(vector):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def normal_tilt(textures, texture, texture_uv, footprint, n, t, handedness, outward, scratch):  # type: ignore[no-untyped-def]
-    """Look up a mapped normal. See `relume.raytrace.surface_interaction`, which does so for fixed views.
+    """Sample a mapped normal. See `relume.raytrace.surface_interaction` for fixed views.
 
     Args:
-        textures: all of them. texture: number of the map. texture_uv, footprint: u and v, and see `sample_texture`.
-        n: the normal, unit. t: tangent, not yet across it. handedness: of the bitangent; its sign counts.
-        outward: the face's normal on the side that is seen. scratch: (3,)
+        textures: all of them. texture: index of the map. texture_uv, footprint: u and v, and see `sample_texture`.
+        n: the normal, unit. t: tangent, not yet orthogonal to it. handedness: of the bitangent; its sign counts.
+        outward: the face normal on the visible side. scratch: (3,)
     Returns:
-        The unit normal; n itself where the map leans it below the face.
+        The unit normal; n itself if the mapped normal points below the face.
     """
     sample_texture(textures, texture, texture_uv[0], texture_uv[1], footprint, scratch)
     tangent_dot_normal: Any = t[0] * n[0] + t[1] * n[1] + t[2] * n[2]
@@ -115,10 +118,10 @@ def normal_tilt(textures, texture, texture_uv, footprint, n, t, handedness, outw
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def shading_ratio(gradient, n, perturbed):  # type: ignore[no-untyped-def]
-    """Compute n'·D / n·D, bounded.
+    """Return n'·D / n·D, clamped.
 
     Args:
-        gradient: D, a tuple of three. n: the surface's normal. perturbed: n', where it leans to.
+        gradient: D, a tuple of three. n: the surface's normal. perturbed: n', the perturbed normal.
     """
     irradiance: Any = gradient[0] * n[0] + gradient[1] * n[1] + gradient[2] * n[2]
     perturbed_irradiance: Any = gradient[0] * perturbed[0] + gradient[1] * perturbed[1] + gradient[2] * perturbed[2]

@@ -1,10 +1,10 @@
-"""Light of points that something stands before: pixels take it from those of the points about them that they see.
+"""Occlusion-aware interpolation: probes that are occluded from a pixel are excluded and the weights renormalized.
 
-A floor goes on under what stands on it and behind walls. The three nodes about a pixel may lie on both sides of a wall,
-and those beyond it know other light, or none. So nodes that do not see their neighbours in the grid of a face are found
-once; pixels about them look for each of their three nodes, from as little above the surface, and do without those that
-they do not see. Where a pixel sees none, it takes all three. Faces that have no more nodes than corners are left alone:
-what is that fine is curved, and hides a node from the next by itself.
+A floor continues under objects and behind walls. The three lattice nodes around a pixel may lie on both sides of a
+wall, with different light on each side. Nodes that are occluded from a neighbor in the grid of a face are found once.
+Pixels next to such nodes trace a ray to each of their three nodes, slightly above the surface, and exclude occluded
+ones; if all are occluded, all are used. Faces without nodes besides their corners are skipped: such fine meshes are
+curved, and occlude adjacent nodes by themselves.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -34,11 +35,11 @@ from relume.raytrace.ray_packet import (
 F32 = NDArray[np.float32]
 
 _FACES_PER_RANGE = 256
-_RAYS_PER_PACKET = LANES // 3  # whose three nodes are looked for at once
+_RAYS_PER_PACKET = LANES // 3  # camera rays per packet, three nodes each
 
 
 class _GridGeometry(NamedTuple):
-    """Grids of faces, as kernels want them; see `OcclusionMesh`."""
+    """Grids of faces, as arrays for kernels; see `OcclusionMesh`."""
 
     probe_grid: ProbeGrid
     positions: F32
@@ -50,7 +51,7 @@ class _GridGeometry(NamedTuple):
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def _point_on_face(geometry, f, side, u, v, point):  # type: ignore[no-untyped-def]
-    """Find a place in a face, off its surface and its edges, where it would lie in other faces. at: (3,)"""
+    """Write a point in a face, offset from its surface and edges, where it would lie in other faces. point: (3,)"""
     w = max(np.float32(1) - u - v, geometry.edge_offset[f, 0])
     u, v = max(np.float32(u), geometry.edge_offset[f, 1]), max(np.float32(v), geometry.edge_offset[f, 2])
     a, b, c = geometry.faces[f, 0], geometry.faces[f, 1], geometry.faces[f, 2]
@@ -62,14 +63,14 @@ def _point_on_face(geometry, f, side, u, v, point):  # type: ignore[no-untyped-d
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def _aim_between(packet, lane, start, end):  # type: ignore[no-untyped-def]
-    """Send a lane from one place to another."""
+    """Aim a lane from one point at another."""
     set_origin(packet, lane, start[0], start[1], start[2])
     set_direction(packet, lane, end[0] - start[0], end[1] - start[1], end[2] - start[2], np.float32(1))
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _flush(occluded, packet, num_pending, ends, has_occluded_neighbor):  # type: ignore[no-untyped-def]
-    """Trace the first lanes, and note both ends of what is blocked. ends: vertices. (`LANES`, 2)"""
+    """Trace the first lanes, and mark both ends of occluded ones. ends: nodes. (`LANES`, 2)"""
     enable_first_lanes(packet, num_pending)
     trace_shadows(occluded, packet)
     for lane in range(num_pending):
@@ -79,7 +80,7 @@ def _flush(occluded, packet, num_pending, ends, has_occluded_neighbor):  # type:
 
 @nb.njit(nogil=True, cache=True)
 def _mark_occluded(occluded, scene, arguments, geometry, start, stop, has_occluded_neighbor):  # type: ignore[no-untyped-def]
-    """Look along all edges of the grids of faces [start, stop)."""
+    """Trace along all edges of the grids of faces [start, stop)."""
     packet, ends, num_pending = new_packet(scene, arguments), np.empty((LANES, 2), np.uint32), 0
     origin, target = np.empty(3, np.float32), np.empty(3, np.float32)
     for f in range(start, stop):
@@ -90,7 +91,7 @@ def _mark_occluded(occluded, scene, arguments, geometry, start, stop, has_occlud
             )
             for i in range(num_rows if num_rows > 1 else 0):
                 for j in range(num_rows - i):
-                    for edge in range(3):  # of the small triangle that begins here
+                    for edge in range(3):  # of the grid triangle at (i, j)
                         i0, j0 = (i + 1, j) if edge == 2 else (i, j)
                         i1, j1 = (i + 1, j) if edge == 0 else (i, j + 1)
                         _point_on_face(geometry, f, side, i0 / num_rows, j0 / num_rows, origin)
@@ -106,12 +107,12 @@ def _mark_occluded(occluded, scene, arguments, geometry, start, stop, has_occlud
         _flush(occluded, packet, num_pending, ends, has_occluded_neighbor)
 
 
-def find_occluded_probes(mesh: OcclusionMesh) -> NDArray[np.uint8]:
-    """Find the vertices that do not see all of their neighbours in the grids of faces. (vertices,) uint8"""
+def find_occluded_probes(mesh: OcclusionMesh) -> Shaped[NDArray[np.uint8], " nodes"]:
+    """Return nonzero for lattice nodes that are occluded from a neighbor in the grid of a face."""
     stored_scene, arguments = mesh.stored_scene, packet_arguments(coherent=True)
     has_occluded_neighbor = np.zeros(len(stored_scene.lattice_nodes.normal), np.uint8)
     args = occluded, mesh.embree.handle, arguments.ctypes.data, _grid_geometry(mesh)
-    # threads may note one twice
+    # threads may mark a node twice
     for_ranges(
         lambda start, stop: _mark_occluded(*args, start, stop, has_occluded_neighbor),
         len(stored_scene.faces),
@@ -128,10 +129,10 @@ def _grid_geometry(mesh: OcclusionMesh) -> _GridGeometry:
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def _grid_triangle(num_rows, u, v):  # type: ignore[no-untyped-def]
-    """Find the small triangle that a place in a face lies in: i and j of its first node, whether it is turned round.
+    """Return the grid triangle that contains a point of a face: i and j of its first node, and whether it is inverted.
 
     Its nodes are (i, j), (i + 1, j), (i, j + 1), or (i + 1, j + 1) instead of the first: in the order of
-    `Seen.lattice_node`.
+    `GBuffer.lattice_node`.
     """
     i = min(max(np.int64(u * np.float32(num_rows)), 0), num_rows - 1)
     j = min(max(np.int64(v * np.float32(num_rows)), 0), num_rows - 1 - i)
@@ -143,7 +144,7 @@ def _grid_triangle(num_rows, u, v):  # type: ignore[no-untyped-def]
 def _reweight(  # type: ignore[no-untyped-def]
     occluded, scene, arguments, geometry, has_occluded_neighbor, face, uv, directions, lattice_node, start, stop, weight
 ):
-    """Look for the nodes of rays [start, stop) about which some are parted."""
+    """Trace to the nodes of rays [start, stop) that have a node with an occluded neighbor."""
     packet, num_pending = new_packet(scene, arguments), 0
     origin, target, normals = np.empty(3, np.float32), np.empty(3, np.float32), geometry.face_normal
     for p in range(start, stop):
@@ -180,7 +181,7 @@ def _reweight(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _reweight_traced(occluded, packet, num_pending, weight):  # type: ignore[no-untyped-def]
-    """Trace three lanes for each ray that waits; weights of nodes that are not seen become nothing."""
+    """Trace three lanes for each pending ray; weights of occluded nodes become zero."""
     enable_first_lanes(packet, 3 * num_pending)
     trace_shadows(occluded, packet)
     for r in range(num_pending):
@@ -192,13 +193,12 @@ def _reweight_traced(occluded, packet, num_pending, weight):  # type: ignore[no-
                 weight[p, k] = weight[p, k] / total if is_unoccluded(packet, 3 * r + k) else np.float32(0)
 
 
-def reweight(gbuffer: GBuffer, has_occluded_neighbor: NDArray[np.uint8], mesh: OcclusionMesh) -> None:
-    """Let rays do without the nodes that what they hit does not see.
+def reweight(gbuffer: GBuffer, has_occluded_neighbor: Shaped[NDArray[np.uint8], " nodes"], mesh: OcclusionMesh) -> None:
+    """Exclude nodes that are occluded from the hits of rays.
 
     Args:
-        gbuffer: by an eye; its weights are changed. has_occluded_neighbor: from `find_occluded_probes`. (vertices,)
-            uint8
-        mesh: that is seen.
+        gbuffer: its weights are overwritten. has_occluded_neighbor: from `find_occluded_probes`.
+        mesh: the scene.
     """
     if not has_occluded_neighbor.any():
         return

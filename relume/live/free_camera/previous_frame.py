@@ -1,4 +1,4 @@
-"""What a moving picture has drawn last, and what the next frame may go on from."""
+"""The last frame of a free camera, which the next one may update."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.live.free_camera.frame import Frame, FrameRequestState
@@ -17,12 +18,13 @@ F32 = NDArray[np.float32]
 
 @dataclass
 class PreviousImage:
-    """What a picture has drawn last.
+    """The last rendered image.
 
     Attributes:
-        state: what it shows. gbuffer: by the rays of its eye. frame: the finished one.
-        shadow_visibility: of beams, along its rays. has_highlight_edges: it is fine, and all of its rims are found.
-        rgb9e5: its pixels, packed as RGB9_E5; None where nobody has asked for them. (pixels,) uint32
+        state: its target. gbuffer: of its rays. frame: the finished frame.
+        shadow_visibility: of hard-shadow lights along its rays. has_highlight_edges: its highlight edges are
+            antialiased.
+        rgb9e5: its pixels, encoded as RGB9_E5; None until requested.
     """
 
     state: FrameRequestState
@@ -30,10 +32,10 @@ class PreviousImage:
     frame: Frame
     shadow_visibility: Sequence[F32]
     has_highlight_edges: bool
-    rgb9e5: NDArray[np.uint32] | None = None
+    rgb9e5: Shaped[NDArray[np.uint32], " pixels"] | None = None
 
-    def to_rgb9e5(self) -> NDArray[np.uint32]:
-        """Its pixels, packed, from when somebody asks for them first."""
+    def to_rgb9e5(self) -> Shaped[NDArray[np.uint32], " pixels"]:
+        """Return its pixels encoded as RGB9_E5; cached."""
         if self.rgb9e5 is None:
             self.rgb9e5 = pack_pixels(self.frame.image.reshape(-1, 3))
         return self.rgb9e5

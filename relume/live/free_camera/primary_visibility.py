@@ -1,4 +1,4 @@
-"""From what an eye sees to the points about it: which three, with which weights."""
+"""Primary visibility of a free camera: hits of camera rays, and the three lattice nodes around each with weights."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -27,29 +28,28 @@ _PIXEL_CENTER = np.array([[0.5, 0.5]], np.float32)
 
 
 class GBuffer(NamedTuple):
-    """What the eye's rays see: one through the middle of each pixel, row after row, then more across edges.
+    """Surfaces along camera rays: one ray per pixel center in row-major order, then extra rays on edges, then glass.
 
     Attributes:
-        hits: of the rays. directions: of these, unit. (n, 3) float32
-        owner: pixels that those beyond one for each belong to. (m,) int32
-        lattice_node: the three about each hit. (n, 3) uint32. weight: of each; all zero where there are none. (n, 3)
-            float32
-        glass: glass before rays, whose own hits come after those of all others.
-        is_visible: whether any ray meets the surface about a vertex. (vertices,) uint8
-        is_needed: whether one that is shown follows from a point. (points,) uint8
+        hits: of the rays. directions: of the rays, unit.
+        owner: pixel of each extra ray.
+        lattice_node: the three nodes around each hit. weight: of each; zero if the hit has none.
+        glass: in front of rays; its own hits come after all others.
+        is_visible: nonzero for lattice nodes around any hit.
+        is_needed: nonzero for probes that visible nodes interpolate.
     """
 
     hits: Hits
-    directions: F32
-    owner: NDArray[np.int32]
-    lattice_node: NDArray[np.uint32]
-    weight: F32
+    directions: Shaped[F32, "n 3"]
+    owner: Shaped[NDArray[np.int32], " m"]
+    lattice_node: Shaped[NDArray[np.uint32], "n 3"]
+    weight: Shaped[F32, "n 3"]
     glass: GlassLayers
-    is_visible: NDArray[np.uint8]
-    is_needed: NDArray[np.uint8]
+    is_visible: Shaped[NDArray[np.uint8], " nodes"]
+    is_needed: Shaped[NDArray[np.uint8], " probes"]
 
     def pixel_centers(self, num_pixels: int) -> GBuffer:
-        """Those through the middles of pixels alone, of what is behind glass. num_pixels: of the picture"""
+        """Return only the rays through pixel centers, behind glass. num_pixels: of the image"""
         rows = slice(0, num_pixels)
         return self._replace(
             hits=self.hits.rows(rows), directions=self.directions[rows], owner=self.owner[:0],
@@ -58,7 +58,7 @@ class GBuffer(NamedTuple):
         )  # fmt: skip
 
     def first_hit_row(self, pixel: int) -> int:
-        """Which row tells what is met first through the middle of a pixel, glass included."""
+        """Return the row of the first hit at a pixel center, glass included."""
         glass_rays = self.glass.ray
         glass_index = int(np.searchsorted(glass_rays, pixel))
         has_glass = glass_index < len(glass_rays) and glass_rays[glass_index] == pixel
@@ -67,7 +67,7 @@ class GBuffer(NamedTuple):
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _aim(rotation, half_width, half_height, width, height, pixels, offsets, start, stop, out):  # type: ignore[no-untyped-def]
-    """Direct rays through places in pixels [start, stop), those of one pixel in a row."""
+    """Compute directions through points of pixels [start, stop), those of one pixel in succession."""
     for i in range(start, stop):
         y = pixels[i] // width
         x = pixels[i] - y * width
@@ -82,7 +82,7 @@ def _aim(rotation, half_width, half_height, width, height, pixels, offsets, star
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _find_nodes(probe_grid, face_normal, face, uv, directions, start, stop, lattice_node, weight, is_visible):  # type: ignore[no-untyped-def]
-    """Find the vertices about hits [start, stop); of a side without any, those of the other."""
+    """Find the lattice nodes around hits [start, stop); a side without nodes uses those of the other side."""
     for p in range(start, stop):
         f = face[p]
         weight[p, 0] = weight[p, 1] = weight[p, 2] = 0
@@ -110,10 +110,10 @@ def _find_nodes(probe_grid, face_normal, face, uv, directions, start, stop, latt
 
 
 def trace_primary(stored_scene: StoredScene, embree: EmbreeScene, camera: Camera, size: tuple[int, int]) -> GBuffer:
-    """Find what every pixel of a picture sees.
+    """Trace the camera rays of an image.
 
     Args:
-        stored_scene: that is seen. embree: its triangles. camera: the eye. size: width and height in pixels.
+        stored_scene: the scene. embree: its triangles. camera: of the image. size: width and height in pixels.
     """
     num_pixels, camera_position = size[0] * size[1], camera.to_world[:3, 3].astype(np.float32)
     directions = _directions(camera, size, np.arange(num_pixels, dtype=np.int32), _PIXEL_CENTER)
@@ -142,16 +142,16 @@ def trace_through_glass(
     embree: EmbreeScene,
     camera: Camera,
     size: tuple[int, int],
-    pixels: NDArray[np.int32],
-    offsets: F32,
+    pixels: Shaped[NDArray[np.int32], " n"],
+    offsets: Shaped[F32, "k 2"],
 ) -> GBuffer:
-    """Find what more rays through some pixels see, and none through the middles of others.
+    """Trace more rays through some pixels only.
 
     Args:
-        stored_scene, embree, camera, size: as of `look`.
-        pixels: that are looked through. (n,) int32. offsets: in each of them, pixel units. (k, 2) float32
+        stored_scene, embree, camera, size: as in `trace_primary`.
+        pixels: the pixels. offsets: of rays in each pixel, pixel units.
     Returns:
-        Of k rays for each pixel in a row, as if each were a pixel by itself.
+        k rays for each pixel in succession, as if each ray were a pixel.
     """
     camera_position, directions = camera.to_world[:3, 3].astype(np.float32), _directions(camera, size, pixels, offsets)
     hits, glass_hits = (
@@ -169,7 +169,7 @@ def _make_gbuffer(
     glass_hits: Hits | None,
     owner: NDArray[np.int32],
 ) -> GBuffer:
-    """Find what is about the hits of rays, and of the glass before them. first: hits of that, None: there is none."""
+    """Make the G-buffer of rays and glass. glass_hits: first hits including glass, None without glass."""
     glass = GlassLayers(np.empty(0, np.int64), _NO_VECTORS)
     if glass_hits is not None:
         glass = find_glass_layers(embree, stored_scene, glass_hits, directions)
@@ -186,7 +186,7 @@ def _make_gbuffer(
 
 
 def _directions(camera: Camera, size: tuple[int, int], pixels: NDArray[np.int32], offsets: F32) -> F32:
-    """Aim rays through places in pixels, those of one pixel in a row. places: pixel units. (k, 2) float32"""
+    """Directions through points of pixels, those of one pixel in succession. offsets: pixel units. (k, 2) float32"""
     width, height = size
     half_height = np.float32(math.tan(camera.yfov / 2))
     rotation = np.ascontiguousarray(camera.to_world[:3, :3], np.float32)
@@ -198,11 +198,10 @@ def _directions(camera: Camera, size: tuple[int, int], pixels: NDArray[np.int32]
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def mark_needed_probes(lattice_nodes, is_visible, is_needed):  # type: ignore[no-untyped-def]
-    """Note the points that vertices follow from.
+    """Mark the probes that lattice nodes interpolate.
 
     Args:
-        lattice_nodes: all. is_visible: those that are asked about. (vertices,) uint8. is_needed: written. (points,)
-            uint8
+        lattice_nodes: all. is_visible: the nodes. (nodes,) uint8. is_needed: written. (probes,) uint8
     """
     for v in range(is_visible.shape[0]):
         if is_visible[v]:
@@ -213,7 +212,7 @@ def mark_needed_probes(lattice_nodes, is_visible, is_needed):  # type: ignore[no
 
 @nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
 def _interpolate_to_nodes(lattice_nodes, rows, values, start, stop, out):  # type: ignore[no-untyped-def]
-    """Find what the vertices that are [start, stop) of rows take from points."""
+    """Interpolate probe values to the lattice nodes rows[start:stop]."""
     for v in rows[start:stop]:
         out[v] = 0
         for k in range(lattice_nodes.probe.shape[1]):
@@ -224,15 +223,16 @@ def _interpolate_to_nodes(lattice_nodes, rows, values, start, stop, out):  # typ
 
 
 def interpolate_to_nodes(
-    stored_scene: StoredScene, is_visible: NDArray[np.uint8], values: F32, out: F32 | None = None
-) -> F32:
-    """Find what vertices take from the points that they follow from.
+    stored_scene: StoredScene,
+    is_visible: Shaped[NDArray[np.uint8], " nodes"],
+    values: Shaped[F32, " probes *channels"],
+    out: Shaped[F32, " nodes *channels"] | None = None,
+) -> Shaped[F32, " nodes *channels"]:
+    """Interpolate probe values to lattice nodes.
 
     Args:
-        stored_scene: with both. is_visible: vertices that are asked about. (vertices,) uint8
-        values: of points. (points, …) float32. out: written where asked; None: the others get nothing.
-    Returns:
-        (vertices, …) float32
+        stored_scene: the scene. is_visible: nonzero for nodes to evaluate.
+        values: of probes. out: overwritten there; None: new, zero elsewhere.
     """
     flat = values.reshape(len(values), -1)
     node_values = np.zeros((len(is_visible), *values.shape[1:]), np.float32) if out is None else out

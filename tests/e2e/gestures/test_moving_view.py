@@ -139,7 +139,7 @@ def test_a_material_is_chosen_by_a_click_and_edited_while_the_eye_is_elsewhere(m
     differs(moving, edited)
     moving.canvas.focus()
     page.keyboard.press("ArrowRight")
-    expect(page.locator("footer.status")).to_contain_text(re.compile("approximate|the exact picture from here"))
+    expect(page.locator("footer.status")).to_contain_text(re.compile("approximate|the exact image of this camera"))
     differs(moving, edited)
 
 

@@ -123,7 +123,7 @@ def test_highlighting_equals_the_probe(transfer):
 
 
 def test_highlighting_needs_a_prepared_curve(transfer):
-    with pytest.raises(NotPrecomputedError, match="take it in hand"):
+    with pytest.raises(NotPrecomputedError, match="select it"):
         open_exact_picture(transfer).highlight_pixels(BALL + "theta_h", 0, 10)
 
 

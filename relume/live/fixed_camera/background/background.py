@@ -1,8 +1,8 @@
-"""What the eye sees behind the surfaces of a view, and on a ground that only catches shadows.
+"""Background compositing, behind the surfaces of a view and on shadow catchers.
 
-A catcher shows, sample by sample, what lies behind it times what arrives there over what would arrive if nothing but
-the ground were there; where nothing would, nothing is hidden. What arrives is the image of a white diffuse term, so
-that all that keeps images near their look holds for it too; the rest is a factor on it.
+A shadow catcher shows, per sample, the background times the ratio of incident light with and without the objects. If
+no light would arrive, nothing is occluded. The incident light is the image of a white diffuse term, so the update
+strategies apply to it; the rest is a factor on that image.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Hashable
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import luminance, srgb_encode
@@ -27,16 +28,16 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 _MAP = BackgroundLook(kind="map", color=(0, 0, 0), blur=0)
-MAX_CATCHER_RATIO = 8.0  # times what is behind: where next to nothing but reflected light arrives there is no measure
-_MIN_GAIN = 1e-12  # what is not the environment's is divided by its gain, which multiplies the finished picture
+MAX_CATCHER_RATIO = 8.0  # times the background; the ratio is unbounded if nearly all light is indirect
+_MIN_GAIN = 1e-12  # a background color is divided by the gain, which multiplies the finished image
 
 
 class _BackgroundState(NamedTuple):
-    """All that what is behind depends on.
+    """Everything that the background depends on.
 
     Attributes:
-        factor: multiplies the map, or the colour, for the gain of the finished picture is yet to.
-        mirror_emitters: that shine before it in mirrors.
+        factor: multiplies the map or the color, before the gain of the finished image.
+        mirror_emitters: rectangles that emit in front of the background in mirrors.
     """
 
     background: BackgroundLook
@@ -47,7 +48,7 @@ class _BackgroundState(NamedTuple):
 
 
 class Background:
-    """Of one picture; what it was last is kept, for most edits leave it as it is."""
+    """The background of one image; it is recomputed only if its state changes, since most edits do not affect it."""
 
     def __init__(self, images: ViewImages) -> None:
         self._images, self._view = images, images.view
@@ -58,18 +59,20 @@ class Background:
         self.is_transparent = False
 
     @staticmethod
-    def clamped_gain(gain: Rgb, background: BackgroundLook) -> F64:
-        """What multiplies the finished picture: never nothing before a colour, which is seen where no light is."""
+    def clamped_gain(gain: Rgb, background: BackgroundLook) -> Shaped[F64, " 3"]:
+        """Return the gain of the finished image; positive for a background color, which is visible without light."""
         return np.asarray(np.maximum(np.array(gain), _MIN_GAIN if background.kind == "color" else 0.0))
 
-    def update(self, look: Look, light: Illumination, gain: F64, radiance: F32) -> bool:
-        """Bring the samples of the background and the factors of catchers to a look.
+    def update(
+        self, look: Look, light: Illumination, gain: Shaped[F64, " 3"], radiance: Shaped[F32, "3 samples"]
+    ) -> bool:
+        """Update the background samples and the factors of shadow catchers to a look.
 
         Args:
-            light: that the picture shows. gain: from `clamped_gain`.
-            radiance: of every view sample, before the gain. (3, samples) float32, written
+            light: the illumination of the image. gain: from `clamped_gain`.
+            radiance: radiance of every view sample before the gain, float32. Background samples are written.
         Returns:
-            Whether samples of the background are new.
+            True if background samples have changed.
         """
         background = look.background
         factor = tuple(1 / gain) if background.kind == "color" else light.environment_gain
@@ -85,7 +88,7 @@ class Background:
         self._state, self.is_transparent = state, background.kind == "transparent"
         first, mirrored = self._view.num_surface_samples, self._view.mirrored
         radiance[:, first:] = self._background_radiance(state, None).T if state.is_direct else 0
-        if mirrored is not None and state.is_direct:  # mirrors show the light, whatever is put behind
+        if mirrored is not None and state.is_direct:  # mirrors reflect the light, not the background of the look
             selection = mirrored.restrict_to(slice(first, self._view.num_view_samples))
             samples, unblurred_state = (
                 mirrored.sample[selection],
@@ -96,12 +99,13 @@ class Background:
                 radiance[:, samples] += emitter_radiance[:, selection]
         return True
 
-    def alpha(self, *, for_display: bool) -> F32:
-        """How much every pixel hides of what is put behind the picture. (height, width) float32
+    def alpha(self, *, for_display: bool) -> Shaped[F32, "height width"]:
+        """Return the alpha of every pixel over a background that is composited later, float32.
 
         Args:
-            for_display: the picture will be laid over display values (sRGB), where a shadow that leaves half of the
-                light leaves three quarters of the value; else over linear ones.
+            for_display: the image will be composited with display values (sRGB), where a shadow that transmits half of
+                the
+                light keeps three quarters of the value; otherwise with linear values.
         """
         if for_display not in self._coverage:
             catcher_opacity = self._display_shadow_opacity if for_display else self._shadow_opacity
@@ -112,7 +116,7 @@ class Background:
         return np.asarray(1 - srgb_encode(1 - self._shadow_opacity(material)), np.float32)
 
     def _shadow_opacity(self, material: MaterialImage) -> F32:
-        """The share of light that does not arrive at samples of a catcher. (n,) float32"""
+        """Fraction of light that is occluded at the samples of a shadow catcher. (n,) float32"""
         is_direct = self._state is None or self._state.is_direct
         incident = material.terms[0].displayed.image.transpose(1, 0, 2).reshape(3, -1)[:, : material.num_samples]
         unoccluded = self._unoccluded_images[material.index][1].T
@@ -134,8 +138,10 @@ class Background:
             material.set_factor((state, light_key), np.ascontiguousarray(factor.T), max_radiance, unlit)
 
     def _unoccluded_image(self, material: MaterialImage, light: Illumination) -> tuple[Hashable, F32]:
-        """What tells a light from others here, and the image in it if nothing stood on the catcher, (n, 3): as rough as
-        what is displayed, which is left as it was where another light is being made."""
+        """Return the cache key of a light and the unoccluded image of a shadow catcher in it, (n, 3).
+
+        It is as coarse as the displayed image, and remains unchanged while an image in another light is computed.
+        """
         live, cached = material.terms[0], self._unoccluded_images.get(material.index)
         is_preview, is_light_changing = not live.displayed.is_converged, live.displayed.light not in (None, light)
         key = light.environment, light.environment_gain, light.local, is_preview
@@ -145,7 +151,7 @@ class Background:
         return cached
 
     def _background_radiance(self, state: _BackgroundState, material: int | None) -> F32:
-        """Radiance behind samples of a material, of the background where None, over the gain. (n, 3) float32"""
+        """Radiance behind the samples of a material (None: of the background), divided by the gain. (n, 3) float32"""
         background, factor = state.background, np.array(state.factor)
         first, stop = self._view.num_surface_samples, self._view.num_view_samples
         rows = slice(first, stop) if material is None else self._view.rows(material)

@@ -1,10 +1,11 @@
-"""How much every pixel of a view hides of what is put behind the picture: kept, and made anew where a shadow is."""
+"""Coverage (alpha) of every pixel, cached and updated where shadows change."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
@@ -15,9 +16,9 @@ F32 = NDArray[np.float32]
 
 
 class Coverage:
-    """Of surfaces one, of the background nothing, of catchers what `shadow_opacity` says of their samples, (n,).
+    """Coverage is 1 on surfaces, 0 on the background, and `shadow_opacity` per sample, (n,), on shadow catchers.
 
-    Catchers are asked about again once their radiance has been written anew.
+    A shadow catcher is evaluated again after its radiance has been written.
     """
 
     def __init__(self, view: View, shadow_opacity: Callable[[MaterialImage], F32]) -> None:
@@ -29,14 +30,14 @@ class Coverage:
         self._num_composed: dict[int, int] = {}
         self._pixels: F32 | None = None
 
-    def pixels(self, materials: Iterable[MaterialImage]) -> F32:
-        """As the materials are shown now. (height, width) float32"""
+    def pixels(self, materials: Iterable[MaterialImage]) -> Shaped[F32, "height width"]:
+        """Return the coverage of the displayed materials, float32."""
         for material in materials:
             if self._num_composed.get(material.index, 0) != material.num_composed:
                 self._num_composed[material.index] = material.num_composed
                 self._update(material)
         if self._pixels is None:
-            # glass hides nothing, but dims what is behind
+            # glass covers nothing, but attenuates the background
             coverage = np.clip(1 - self._pixel_weights @ (1 - self._samples), 0, 1)
             self._pixels = coverage.reshape(self._view.height, self._view.width)
         return self._pixels

@@ -1,8 +1,9 @@
-"""What would arrive at the samples of a material if nothing else were there: nothing hidden, nothing reflected."""
+"""Incident light at the samples of a material without other geometry: no occlusion, no indirect light."""
 
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.live.fixed_camera.illumination import Illumination
@@ -15,10 +16,10 @@ F32 = NDArray[np.float32]
 
 
 class UnoccludedLight:
-    """Of a material whose samples face few ways, as those of a level ground do.
+    """Unoccluded light on a material whose samples have few distinct normals, such as a level ground.
 
     Attributes:
-        directions: unit, in which the camera sees its samples. (n, 3)
+        directions: unit directions in which the camera sees its samples. (n, 3)
     """
 
     def __init__(self, images: ViewImages, material: MaterialImage) -> None:
@@ -29,15 +30,13 @@ class UnoccludedLight:
         self._distinct_normals = self._points.rows(first)
         self._normal_index = normal_index.ravel()
 
-    def image(self, light: Illumination, *, is_preview: bool) -> F32:
-        """The image of the material's first term, which is diffuse, under a light whose way is free.
+    def image(self, light: Illumination, *, is_preview: bool) -> Shaped[F32, "n 3"]:
+        """Return the image of the material's first term, which is diffuse, under unoccluded light, float32.
 
-        Surfaces that shine are among what is not there.
+        Emissive surfaces are left out with all other geometry.
 
         Args:
-            is_preview: from a small map where another environment than the baked one must be weighed.
-        Returns:
-            (n, 3) float32
+            is_preview: use a small map if the environment is not the baked one.
         """
         is_coarse = is_preview and light.environment != BAKED_ENVIRONMENT
         image = self._from_triangles(light, is_preview=is_coarse)[self._normal_index]
@@ -52,7 +51,7 @@ class UnoccludedLight:
         return self._images.cache.transient.get_value(key, lambda: transfer.local.unoccluded(geometry, self._points))
 
     def _from_triangles(self, light: Illumination, *, is_preview: bool) -> F32:
-        """Of the environment, for each of the normals. (normals, 3) float32"""
+        """Light from the environment for each distinct normal. (normals, 3) float32"""
         term = self._material.terms[0]
         incident = self._transfer.unoccluded_environment(light, self._distinct_normals, is_preview=is_preview)
         return shade(term.term, term.target_bands, *incident, lambda share: None, lambda: False).rows(

@@ -1,4 +1,4 @@
-"""A route: one way in which the image of a term comes from what it shows to what is wanted."""
+"""Update strategies: each is a way to bring the image of a term to its target."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from relume.live.fixed_camera.jobs import Job, TermTarget
 
 
 class LightStrategy(Protocol):
-    """From the anchor of a term, an exact image, to the same curves in another light.
+    """Updates a term's reference image, which is exact, to the same curves in another light.
 
     Attributes:
-        fidelity: of the images it leads to.
+        fidelity: of the resulting images.
     """
 
     fidelity: Fidelity
 
     def applicable(self, target: TermTarget, light: Illumination) -> bool:
-        """Whether it leads from the term's anchor to this light, once all that it needs has been made."""
+        """Return whether it can update the reference image to this light, after its jobs have run."""
         ...
 
     def prepare(self, target: TermTarget, light: Illumination) -> Sequence[Job]:
-        """What must be made before it does; nothing where it does at once."""
+        """Return the jobs that it needs first; empty if it can update at once."""
         ...
 
     def evaluate(self, target: TermTarget, light: Illumination) -> None:
-        """Put the image in this light; the route must reach it and need nothing."""
+        """Update the image to this light; it must be applicable and need no jobs."""
         ...

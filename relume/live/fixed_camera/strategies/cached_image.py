@@ -1,4 +1,4 @@
-"""What the memory knows already: the image of the same curves in the wanted light, shaded some time ago."""
+"""The cached image of the same curves in the target light."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from relume.live.fixed_camera.jobs import Job, TermTarget
 
 
 class CachedImage:
-    """A `LightStrategy` back to where the picture has been; bit for bit what it showed there at rest."""
+    """A `LightStrategy` that returns to an earlier state; bit for bit the converged image of that state."""
 
     fidelity = Fidelity.EXACT
 
@@ -21,7 +21,7 @@ class CachedImage:
         return images.image_in(material, live, light) is not None
 
     def prepare(self, target: TermTarget, light: Illumination) -> Sequence[Job]:
-        """See `LightStrategy`; it is there or it is not."""
+        """See `LightStrategy`; it needs no jobs."""
         return ()
 
     def evaluate(self, target: TermTarget, light: Illumination) -> None:

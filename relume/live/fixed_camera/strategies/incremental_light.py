@@ -1,9 +1,9 @@
-"""Changed light, followed at once: anchor + rows · ΔL, and what moved lights give straight, for each term of a picture.
+"""Incremental light updates: reference image + transport rows · ΔL + direct light of moved lights, per term.
 
-Where a hand drags a diffuse colour or the number of bounces, all that changes of light is what gather cells send out;
-where it moves a local light, what comes straight from that light as well. The rows of all terms are made when such a
-thing is touched, once the picture is exact, or first edited; from then on each frame shows the image that was exact
-last and what has changed. It is never called exact: at rest all is shaded that has changed.
+An edit of a diffuse color or of the number of bounces changes only the outgoing radiance of patches; an edit of a local
+light also changes its direct light. The rows of all terms are precomputed when such a control is prepared (after the
+image has converged) or first edited. From then on each frame shows the last exact image plus the change. It is never
+labeled exact: when the drag ends, everything that has changed is shaded.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ F32 = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class PrecomputeRows:
-    """The operator from what gather cells send out to the image of a term; found in the memory from then on.
+    """Operator from the outgoing radiance of patches to the image of a term; cached.
 
     Attributes:
-        material: index into the scene's. bands: of the term's curves, (3, J) each. light: like which it is to serve.
+        material: index into the scene's. bands: of the term's curves, (3, J) each. light: for expected light values.
     """
 
     label: str
@@ -67,11 +67,11 @@ class PrecomputeRows:
         return precompute_rows(self.term, self.bands, receivers, rays, expected, progress, is_canceled)
 
     def install(self, result: IndirectOperator) -> None:
-        """See `Job`; the memory has it, which is enough."""
+        """See `Job`; the result is in the cache, so nothing is left to do."""
 
 
 class IncrementalLight:
-    """A `LightStrategy` for what a hand moves: a local light, a diffuse colour, the number of bounces."""
+    """A `LightStrategy` for edits of a local light, a diffuse color, or the number of bounces."""
 
     fidelity = Fidelity.INCREMENTAL
 
@@ -81,7 +81,7 @@ class IncrementalLight:
         self._change: tuple[Illumination, Illumination, F32, MirrorLightsDelta | None] | None = None
 
     def fits_budget(self) -> bool:
-        """Whether the memory has room for all rows, where any are needed, beside other things."""
+        """Return whether all needed rows fit half of the memory budget."""
         if self._reflected is None:
             return True
         needed = sum(row_bytes(m.num_samples, num_channels(t.term, t.target_bands)) for m, t in self._images.terms())
@@ -93,7 +93,7 @@ class IncrementalLight:
         return reference is not None and reference.light is not None and is_same_environment(reference.light, light)
 
     def prepare(self, target: TermTarget, light: Illumination) -> Sequence[Job]:
-        """See `LightStrategy`. The rows serve any light like this one, so that they can be made before it changes."""
+        """See `LightStrategy`. The rows serve any similar light, so they can be precomputed before it changes."""
         if self._reflected is None or self._rows(target) is not None:
             return []
         images, material, live = target
@@ -107,7 +107,7 @@ class IncrementalLight:
         reference, rows = live.ready.reference, self._rows(target)
         if reference is None or reference.light is None:
             return
-        image = live.ready.image  # nothing else refers to it but the picture's own state
+        image = live.ready.image  # only the picture's own state refers to it
         np.copyto(image, reference.image)
         self._moved_lights.add_change(target, reference.light, light, image)
         if rows is not None:
@@ -121,8 +121,10 @@ class IncrementalLight:
         live.set_ready(replace(live.ready, image=image, fidelity=self.fidelity, bands=reference.bands, light=light))
 
     def _outgoing_change(self, before: Illumination, after: Illumination) -> tuple[F32, MirrorLightsDelta | None]:
-        """Haar coefficients of what cells send out more, (padded cells, 3) float32, and what flat mirrors throw more;
-        the same for all terms."""
+        """Return the Haar coefficients of the change of patch radiance, (padded patches, 3) float32, and the change of
+        mirror
+        lights; equal for all terms.
+        """
         reflected = self._reflected
         assert reflected is not None
         if self._change is None or self._change[:2] != (before, after):

@@ -1,10 +1,10 @@
-"""Brighter, dimmer, tinted, switched: transport is linear in sources, so a picture is mixed from one image of each.
+"""Linear light mixing: transport is linear in light sources, so an image is a weighted sum of one image per source.
 
     R' = R + Σ_e (g'_e − g_e) R_e,   or   R' = Σ_e g'_e R_e
 
-with e the elements of light (`element_gains`) and R_e what one gives alone under the same curves, shaded once and found
-in the memory from then on. That is exact, and a frame costs the sum of a few images. Whichever formula lacks fewer
-sources is taken: a soloed light needs no other's.
+e are the elements of light (`element_gains`), and R_e the image of one element under the same curves, shaded once and
+cached. The sum is exact, and a frame costs the sum of a few images. The formula with fewer missing sources is used: a
+soloed light needs no other source.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from relume.look.model import Rgb
 
 F32 = NDArray[np.float32]
 
-_MAX_MISSING_SOURCES = 1  # sources; where there are more, shading all light at once is no slower
+_MAX_MISSING_SOURCES = 1  # sources; with more, shading all light at once is no slower
 
 
 @dataclass(frozen=True)
 class _Recipe:
-    """How much of which elements to add, and to what.
+    """The elements to add, their gains, and the base image.
 
     Attributes:
-        from_reference: to what the term showed before, else to nothing.
-        missing: elements whose image is not there yet.
+        from_reference: add to the reference image, else to zero.
+        missing: elements without a cached image.
     """
 
     from_reference: bool
@@ -41,12 +41,12 @@ class _Recipe:
 
     @property
     def num_missing_sources(self) -> int:
-        """Sources that the lacking elements are of."""
+        """Number of sources of the missing elements."""
         return len({(element.environment_gain, element.local) for element in self.missing})
 
 
 class LinearMix:
-    """A `LightStrategy` for gains; nothing has moved."""
+    """A `LightStrategy` for changes of gains without moved lights."""
 
     fidelity = Fidelity.EXACT
 
@@ -80,8 +80,7 @@ class LinearMix:
         )
 
     def resum_job(self, target: TermTarget) -> Resum | None:
-        """What sums an image of all its sources once that was mixed from step to step; None where too few of the
-        sources' own images are there."""
+        """Return the job that sums a mixed image once from all its sources; None if images of sources are missing."""
         live, gains = target.live, element_gains(target.live.light)
         if self._make_recipe(target, False, gains).missing:
             return None
@@ -90,7 +89,7 @@ class LinearMix:
         return Resum(target, key, live.ready, lambda image: weighted_sum(image, weighted_images))
 
     def _recipe(self, target: TermTarget, light: Illumination) -> _Recipe | None:
-        """How the term's image is mixed; None where other things than gains have changed, or too much is lacking."""
+        """Return how the term's image is mixed; None if more than gains has changed, or too many images are missing."""
         reference = target.live.ready.reference
         if reference is None or reference.light is None or not equal_up_to_gains(reference.light, light):
             return None
@@ -103,7 +102,7 @@ class LinearMix:
 
     @staticmethod
     def _is_affordable(target: TermTarget, recipe: _Recipe) -> bool:
-        """Whether making what is lacking is worth its while, and the memory has room for it beside other things."""
+        """Return whether the missing images are worth their cost and fit half of the memory budget."""
         needed = 2 * len(recipe.gains) * target.images.image_bytes()
         return recipe.num_missing_sources <= _MAX_MISSING_SOURCES and needed <= target.images.cache.budget_bytes
 
@@ -114,7 +113,7 @@ class LinearMix:
 
 
 def _weighted_images(target: TermTarget, gains: Mapping[Illumination, Rgb]) -> list[tuple[F32, Rgb]]:
-    """Images of elements of light that the memory has, each with its gain."""
+    """Cached images of elements of light, each with its gain."""
     images, material, live = target
     candidates = ((images.image_in(material, live, element), gain) for element, gain in gains.items())
     return [(shaded.image, gain) for shaded, gain in candidates if shaded is not None]

@@ -1,7 +1,7 @@
-"""Local lights that were moved: what they give straight to a picture, evaluated anew each frame.
+"""Direct light of local lights that were moved, evaluated each frame.
 
-Shadows are traced for the place where a light is now, for the whole view at once, and kept in passing. Terms that
-scatter evenly need no more of a light than what arrives; others list its rays.
+Shadows are traced for the current position of a light, for the whole view at once, and held in the transient cache.
+Diffuse terms need only irradiance; other terms need rays.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.thread_pools import parallel_for_chunks
@@ -32,19 +33,20 @@ F32 = NDArray[np.float32]
 
 
 class MovedLights:
-    """Of the terms of one view."""
+    """Moved lights for the terms of one view."""
 
     def __init__(self, images: ViewImages) -> None:
         self._images = images
         self._view_key = images.transfer.key, images.view.name, images.view.maps
 
-    def add_change(self, target: TermTarget, before: Illumination, after: Illumination, out: F32) -> None:
-        """Add what comes straight to a term's samples from lights that were not there before, and take off what came
-        from those that are not there any more.
+    def add_change(
+        self, target: TermTarget, before: Illumination, after: Illumination, out: Shaped[F32, "tiles 3 lanes"]
+    ) -> None:
+        """Add the direct light of new local lights to a term's samples, and subtract that of removed ones.
 
         Args:
-            target: of the term. before: light of `out`. after: light that it is brought to.
-            out: shaped like the term's image. (tiles, 3, samples) float32, written
+            target: the term. before: light of `out`. after: target light.
+            out: image of the term, float32, overwritten.
         """
         if not after.paths.direct:
             return
@@ -58,11 +60,11 @@ class MovedLights:
         if added:
             self._add_moved(material, live, added, out)
 
-    def add_mirror_lights(self, target: TermTarget, rays: MirrorRays, out: F32) -> None:
-        """Add what flat mirrors throw to a term's samples, the few that see any of it.
+    def add_mirror_lights(self, target: TermTarget, rays: MirrorRays, out: Shaped[F32, "tiles 3 lanes"]) -> None:
+        """Add light of planar mirrors to the few samples of a term that receive any.
 
         Args:
-            target, out: as of `add_change`. rays: to all samples of its material.
+            target, out: as in `add_change`. rays: to all samples of its material.
         """
         _, material, live = target
         lit = np.flatnonzero(rays.visible.any(axis=1))
@@ -72,8 +74,11 @@ class MovedLights:
             out[tile, :, offset] += self._rows(live, subset, len(lit), None)
 
     def _static_image(self, material: MaterialImage, live: LiveTerm, light: Illumination) -> F32:
-        """What comes straight from a light that stood still, as exact as in the picture that was shaded; the same in
-        every frame, and so kept. Where a hand took its time it was made before (`StrategyScheduler`)."""
+        """Direct light from a light before it moved, as exact as in the converged image; cached, since every frame uses
+        it.
+
+        Usually the scheduler has prefetched it (`StrategyScheduler`).
+        """
         images = self._images
         key = images.image_key(material, live, light)
 
@@ -90,7 +95,7 @@ class MovedLights:
         return images.cache.get(key, ShadedTerm, shaded_bytes(material.num_samples), shaded).image
 
     def _exact_rays(self, material: MaterialImage, light: Illumination) -> list[LocalRays]:
-        """Of a light that has local lights alone, as pictures at rest have them."""
+        """Rays of a light that has only local lights, as in converged images."""
         images = self._images
         _, points = images.transfer.incident_light(images.view, material.index, light, images.cache)
         return [rays for rays in points.rays if isinstance(rays, LocalRays)]
@@ -114,7 +119,7 @@ class MovedLights:
     def _shaded(
         self, material: MaterialImage, live: LiveTerm, rays: list[LocalRays], base_radiance: F32 | None = None
     ) -> ShadedTerm:
-        """What rays bring a term, in the threads of frames. beside: what is shown already, see `Shader`"""
+        """Shade a term from rays, in the threads of frames. base_radiance: the current image, see `Shader`"""
         receivers = replace(self._images.unlit_samples(material), rays=rays)
         return ShadedTerm.from_rows(self._rows(live, receivers, material.num_samples, base_radiance))
 
@@ -130,7 +135,7 @@ class MovedLights:
         return rows
 
     def _points(self) -> SurfacePoints:
-        """Those of the view; of samples that are seen from behind the normals are nothing, and no light arrives."""
+        """Surface points of the view; normals of back-facing samples are zero, so that no light arrives."""
         view = self._images.view
 
         def read() -> SurfacePoints:
@@ -141,7 +146,7 @@ class MovedLights:
 
 
 def _diffuse_factor(live: LiveTerm) -> NDArray[np.float64] | None:
-    """What a term makes of all light that arrives; None where it asks where that comes from. (3,)"""
+    """Factor of a diffuse term on irradiance; None if the term depends on the incident direction. (3,)"""
     if not live.term.is_lambertian:
         return None
     contraction = contract(live.term, live.target_bands, None)

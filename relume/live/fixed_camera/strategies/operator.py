@@ -1,9 +1,9 @@
-"""The routes of a curve or a parameter that is in hand: the term's frozen operator, R += T · Δc or R = Σ_s c_s R_s.
+"""Updates of an active curve or parameter by the term's operator, R += T · Δc or R = Σ_s c_s R_s.
 
-A step adds the most important coefficients first where there is no time for all (eqs. 29 to 31, Ben-Artzi 2006). Along
-a parameter, whose few coefficients say curves only nearly, a step sums all of them, and the image is near its look.
-An operator of some samples (`relume.operators.subsampled`) adds the change of either kind to an image of all. What that
-and packed columns (`relume.operators.quantized`) make is shaded when the hand rests.
+A step adds the most important coefficients first if time is short (eqs. 29 to 31, Ben-Artzi 2006). Along a parameter,
+whose few coefficients only approximate curves, a step sums all of them, and the image is nearly exact. A subsampled
+operator (`relume.operators.subsampled`) adds the change to an image of all samples. The results of subsampled and
+quantized operators (`relume.operators.quantized`) are shaded exactly when the drag ends.
 """
 
 from __future__ import annotations
@@ -21,17 +21,16 @@ from relume.operators.operator import Operator
 
 F64 = NDArray[np.float64]
 
-# Share of an image's length that float32 sums may have left in it before it is summed anew instead of gone on with; a
-# frame's pixels have nine bits.
+# Greatest rounding error, as a fraction of the image's norm, before an image is resummed; a frame's pixels have 9 bits.
 MAX_ROUNDING = 2.0**-11
-_RESUM_RATIO = 4.0  # times what that sum itself would leave
+_RESUM_RATIO = 4.0  # times the rounding error of the resummed image
 
 
 def step(target: TermTarget, max_coefficients: int | None) -> None:
-    """Bring the curves that a term's operator leaves free to their target, as far as the operator is there.
+    """Update the free curves of a term's operator toward their target.
 
     Args:
-        max_coefficients: of each channel, at most; None for all.
+        max_coefficients: limit per channel; None for all.
     """
     images, material, live = target
     operator = images.operator(material, live)
@@ -44,11 +43,11 @@ def step(target: TermTarget, max_coefficients: int | None) -> None:
 def advance(
     ready: DisplayedImage, target_bands: Mapping[str, F64], operator: Operator, max_coefficients: int | None
 ) -> DisplayedImage:
-    """What an image shows after one step along its basis; the same where that leaves nothing free that differs.
+    """Return an image after one step along its basis; the same if no free curve differs.
 
     Args:
         ready: with basis and coefficients. target_bands: bands of each of the term's curves. (3, J) each
-        operator: the operator that the coefficients are of. max_coefficients: of each channel, at most; None for all.
+        operator: the operator of the coefficients. max_coefficients: limit per channel; None for all.
     """
     basis, light = ready.basis, ready.light
     if basis is None or light is None or set(ready.changed_curves(target_bands)).isdisjoint(basis.affected_curves):
@@ -64,10 +63,10 @@ def advance(
 
 
 def resum_job(target: TermTarget) -> Resum | None:
-    """What makes of an image that was summed from steps one that was summed once from all coefficients.
+    """Return the job that sums an image once from all coefficients, after steps.
 
-    None where the operator is gone or not exact, where there is no need: a few small steps leave less than a sum of all
-    coefficients, whose columns cancel; and where they cancel so that no such sum is exact.
+    None if the operator is missing or not exact, if a few small steps leave less rounding error than a sum of all
+    coefficients, or if the columns cancel so that no such sum is exact.
     """
     images, material, live = target
     ready, operator = live.ready, images.operator(material, live)
@@ -86,7 +85,7 @@ def resum_job(target: TermTarget) -> Resum | None:
 def _add_change(
     ready: DisplayedImage, new_bands: Mapping[str, F64], operator: Operator, max_coefficients: int | None
 ) -> DisplayedImage:
-    """Add T · Δc; where float32 sums have left too much in the image, sum all of it anew."""
+    """Add T · Δc; resum if the rounding error is too large."""
     assert ready.basis is not None
     assert ready.coefficients is not None
     current, exact = ready.coefficients, ready.basis.coefficients(new_bands)
@@ -95,15 +94,15 @@ def _add_change(
     if np.count_nonzero(change) > budget:
         weight = np.abs(change) * operator.importance
         change[weight < np.partition(weight.ravel(), -budget)[-budget]] = 0.0
-        exact = np.where(change == 0, current, exact)  # a sum would leave a rest to move again
-        # shows no curve exactly
+        exact = np.where(change == 0, current, exact)  # a sum would leave a remainder
+        # no curve is shown exactly
         undefined = {name: np.full_like(new_bands[name], np.nan) for name in ready.basis.affected_curves}
         new_bands = {**new_bands, **undefined}
     norm = norm_of(ready.image)
     operator.add(change, ready.image)
     rounding = float(np.hypot(ready.rounding, accumulated_error(norm, change, operator)))
     after = replace(ready, bands=new_bands, coefficients=exact, rounding=rounding)
-    if not operator.is_exact:  # at rest it is shaded
+    if not operator.is_exact:  # shaded when the drag ends
         return replace(
             after, fidelity=min(ready.fidelity, Fidelity.NEARLY_EXACT if operator.is_whole else Fidelity.COARSE)
         )

@@ -1,11 +1,11 @@
-"""A preview of other light: one sample of each small square of pixels is shaded, those between are interpolated.
+"""A sparse preview in another light: one sample per pixel block is shaded, and the others are interpolated.
 
-When the environment is turned or exchanged, or surfaces reflect other light onto each other, every image of a picture
-counts for nothing at once, and shading all samples takes seconds; so it does where a view is opened for the first time,
-and for one term where a parameter changes that its operators are frozen with.
-A preview costs a few thousand samples whatever the picture's size, holds no operator, and lets the hand see where the
-light goes; colours and textures multiply it at full size. It is never called exact: at rest all is shaded. Where that
-takes long, as of a large picture, finer previews come before, each of eight times as many samples.
+If the environment is rotated or replaced, or reflectances for indirect light change, all images of a picture become
+invalid at once, and shading all samples takes seconds. The same holds for a newly opened view, and for a term whose
+fixed parameter changes. A preview costs a few thousand samples at any image size, needs no operator, and shows
+where the light moves; colors and textures multiply it at full resolution. It is never labeled exact: when the drag
+ends,
+all samples are shaded. In large images finer previews come first, each with eight times as many samples.
 """
 
 from __future__ import annotations
@@ -34,20 +34,20 @@ from relume.views.view import View
 
 F32 = NDArray[np.float32]
 
-_MAX_SHADED = 6000  # samples of a view, about
-_MAX_SHADED_AT_ONCE = 8 * _MAX_SHADED  # samples of terms of a view; they take about as long as choosing some of them
-_DETAIL_FACTOR = 8  # times as many samples
-_MIN_FINER_RATIO = 16  # times as many as a finer preview shades; where fewer are left, all are shaded
+_MAX_SHADED = 6000  # approximate number of samples in a view
+_MAX_SHADED_AT_ONCE = 8 * _MAX_SHADED  # samples of terms in a view that take as long as selecting a subset
+_DETAIL_FACTOR = 8  # ratio of samples between levels of detail
+_MIN_FINER_RATIO = 16  # times the samples of a finer preview; with fewer, all are shaded
 _NUM_NEIGHBORS = 3
-_SOFTENING = 0.5  # pixels²; a sample's own neighbours share it where they are as near as this
+_SOFTENING = 0.5  # pixels²; smooths the interpolation weights near a shaded sample
 
 
 @dataclass(frozen=True)
 class SampleSubset:
-    """The samples of a material that are shaded, and how all others are made from them.
+    """The shaded samples of a material, and the weights that interpolate all others.
 
     Attributes:
-        samples: the samples. weights: rows sum to one. (samples, few samples) sparse float32
+        samples: the shaded samples. weights: sparse float32, rows sum to 1. (samples, shaded samples)
     """
 
     samples: SampledShading
@@ -55,7 +55,7 @@ class SampleSubset:
 
     @property
     def num_bytes(self) -> int:
-        """Memory it holds."""
+        """Memory that it takes."""
         weights = self.weights
         return int(self.samples.num_bytes + weights.data.nbytes + weights.indices.nbytes + weights.indptr.nbytes)
 
@@ -63,13 +63,13 @@ class SampleSubset:
 def choose_samples(
     transfer: FixedViewTransfer, view: View, material: int, detail: int, *, has_indirect: bool
 ) -> SampleSubset:
-    """One sample of each square of pixels that a material is seen in; reads the store.
+    """Select one sample per pixel block of a material; reads the store.
 
-    Those between take the mean of the nearest, by place in the picture and by normal.
+    The others are averages of the nearest selected samples, by image position and normal.
 
     Args:
-        transfer: an opened bake. view: one of its views. material: index of the material.
-        detail: how often the samples are made more. has_indirect: they are shaded with light between surfaces.
+        transfer: an open bake. view: one of its views. material: index of the material.
+        detail: number of refinements. has_indirect: they are shaded with indirect light.
     """
     step = max(1, int(np.ceil(np.sqrt(view.num_surface_samples / _num_shaded(detail)))))
     sample_indices = one_per_block(view, material, step)
@@ -85,7 +85,7 @@ def _num_shaded(detail: int) -> int:
 
 
 def _sample_subset(images: ViewImages, material: int, light: Illumination, detail: int) -> SampleSubset:
-    """Of a material of a view, kept in the cache with the operators; of finer previews for a while."""
+    """Cached sample subset of a material; subsets of finer previews are held in the transient cache."""
     has_indirect = light.paths.has_indirect
 
     def choose() -> SampleSubset:
@@ -100,29 +100,29 @@ def _key(images: ViewImages, material: int, light: Illumination, detail: int = 0
 
 
 def _subset_bytes(images: ViewImages, material: int) -> int:
-    """Memory that `Sparse` takes at most, but for the few samples themselves."""
+    """Upper limit of the memory of a `SampleSubset` without the shaded samples."""
     rows = images.view.rows(material)
     return int(rows.stop - rows.start) * (_NUM_NEIGHBORS * 12 + 8)
 
 
 def can_preview(images: ViewImages) -> bool:
-    """Whether the cache has room for it beside other things."""
+    """Return whether the subsets fit half of the memory budget."""
     return 2 * sum(_subset_bytes(images, k) for k in range(len(images.by_name))) <= images.cache.budget_bytes
 
 
 def is_needed_for_first_frame(images: ViewImages) -> bool:
-    """Whether a picture that shows nothing yet is seen much sooner so than by making the images that it lacks."""
+    """Return whether a preview of a new picture is much faster than its missing images."""
     num_missing = sum(m.num_samples for m, image in images.terms() if not images.is_cached(m, image))
     return num_missing > _MAX_SHADED_AT_ONCE and can_preview(images)
 
 
 def should_refine(num_samples: int, detail: int) -> bool:
-    """Whether shading so many samples takes so long that a preview of one more detail than this is worth its while."""
+    """Return whether shading takes so long that a preview of the next detail is worthwhile."""
     return num_samples > _MIN_FINER_RATIO * _num_shaded(detail + 1)
 
 
 def is_prepared(images: ViewImages) -> bool:
-    """Whether the samples have been chosen: the first preview of a view takes a second more."""
+    """Return whether the samples are selected; otherwise the first preview of a view takes a second more."""
     materials = {material.index for material, _ in images.terms()}
     return all(
         images.cache.get_cached(_key(images, index, images.light), SampleSubset) is not None for index in materials
@@ -131,7 +131,7 @@ def is_prepared(images: ViewImages) -> bool:
 
 @dataclass(frozen=True)
 class _TermSnapshot:
-    """One term, as it was when the preview was asked for."""
+    """State of a term when the preview was requested."""
 
     target: TermTarget
     term: Term
@@ -140,11 +140,11 @@ class _TermSnapshot:
 
 @dataclass(frozen=True, eq=False)
 class SparsePreview:
-    """Rough images of terms in one light; the only route that reaches any light, from nothing.
+    """Previews of terms in one light; the only strategy that reaches any light without a reference image.
 
     Attributes:
-        gain: what multiplies the finished picture in that light.
-        detail: how often it is made finer.
+        gain: of the finished image in that light.
+        detail: number of refinements.
     """
 
     key: tuple[Hashable, ...]
@@ -161,7 +161,7 @@ class SparsePreview:
 
     @classmethod
     def for_targets(cls, images: ViewImages, targets: Iterable[TermTarget], label: str) -> SparsePreview:
-        """Preview the terms of these targets of a picture's images in the current look. label: in messages."""
+        """Return the preview of some terms in the current look. label: text for the user."""
         targets = list(targets)
         snapshots = [_TermSnapshot(target, target.live.term, target.live.target_bands) for target in targets]
         image_keys = (images.image_key(target.material, target.live, images.light) for target in targets)
@@ -169,15 +169,15 @@ class SparsePreview:
         return cls(key, images, images.light, images.gain, snapshots, label)
 
     def with_detail(self, detail: int, *, is_refinement: bool) -> SparsePreview:
-        """The same of more samples. refines: it can wait for hands."""
+        """Return the same preview with more samples. is_refinement: it can wait for edits."""
         return replace(self, key=(*self.key, detail), detail=detail, is_refinement=is_refinement)
 
     def direct_only_first(self) -> SparsePreview:
-        """The same of what light comes straight: that between surfaces takes some seconds where it is not known."""
+        """Return the same preview without indirect light, which takes seconds if it is not cached."""
         return replace(self, key=(*self.key, "direct"), light=direct_only(self.light))
 
     def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> list[F32]:
-        """See `Job`. Returns images of all parts, (tiles, 3, samples) float32 each."""
+        """See `Job`. Returns the images of all terms, (tiles, 3, samples) float32 each."""
         previews = []
         for k, snapshot in enumerate(self.snapshots):
             subset = _sample_subset(self.images, snapshot.target.material.index, self.light, self.detail)
@@ -186,7 +186,7 @@ class SparsePreview:
         return previews
 
     def _preview_image(self, snapshot: _TermSnapshot, subset: SampleSubset, is_canceled: CancelCheck) -> F32:
-        """One term's image, (tiles, 3, samples) float32; a texture's samples have texels of their own, if quick."""
+        """Return one term's image, (tiles, 3, samples) float32; BTFs evaluate a texel per sample if that is fast."""
         incident, btf_ref = subset.samples.incident_light(self.light), snapshot.term.texels
         if btf_ref is None or not fits_budget(btf_ref, snapshot.target.material.num_samples):
             return _interpolate(
@@ -198,17 +198,17 @@ class SparsePreview:
         ).image
 
     def install(self, result: Sequence[F32]) -> None:
-        """See `Job`; also where the hand has turned the light further meanwhile."""
+        """See `Job`; used even if the light has changed further meanwhile."""
         for snapshot, image in zip(self.snapshots, result, strict=True):
             live = snapshot.target.live
             is_incremental = live.ready.fidelity == Fidelity.INCREMENTAL and live.ready.light == live.light
-            # with other fixed parameters it is a glimpse of it as well
+            # with other fixed parameters it is still a preview
             is_same = live.term.model == snapshot.term.model
             if is_same and not (live.is_converged or is_incremental) and snapshot.target.exists():
                 live.set_ready(self._merge(snapshot, image))
 
     def _merge(self, snapshot: _TermSnapshot, image: F32) -> DisplayedImage:
-        """The image in the place of what is ready; a part of that which is exact already stays."""
+        """Return the preview that replaces the newest image; its exact region is retained."""
         ready, material = snapshot.target.live.ready, snapshot.target.material
         preview = replace(ready, image=image, fidelity=Fidelity.PREVIEW, bands=snapshot.bands, light=self.light)
         if ready.exact_region is None or ready.light != self.light:
@@ -219,9 +219,9 @@ class SparsePreview:
 
 
 def _ignore_progress(fraction: float) -> None:
-    """Say nothing: a part of a preview takes some milliseconds."""
+    """Ignore progress: a term of a preview takes milliseconds."""
 
 
 def _interpolate(shaded: ShadedTerm, weights: Any) -> F32:
-    """An image of all samples from that of the few. (tiles, 3, samples) float32"""
+    """Interpolate an image of all samples from the shaded ones. (tiles, 3, samples) float32"""
     return ShadedTerm.from_rows(weights @ shaded.rows(weights.shape[1])).image

@@ -1,7 +1,7 @@
-"""A texture that looks different from every side, in hand: its texels are summed anew in light that is kept.
+"""Edits of a BTF: its texels are summed again in cached incident light.
 
-How often it repeats and how many components are summed change no light: such images are exact. One that was turned is
-lit nearly, and shaded when the hand rests.
+Repetition and the number of components do not change incident light: such images are exact. A rotated BTF is lit
+approximately and shaded when the drag ends.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from relume.operators.texel_light import BtfIncidentLight, fits_budget
 
 
 def step(target: TermTarget) -> None:
-    """Show a term's texture as it is wanted, where it shows nothing and what arrives at it is known."""
+    """Update a term's BTF image if it has none and its incident light is cached."""
     images, material, live = target
     btf_ref = live.term.texels
     if btf_ref is None or live.is_converged:
@@ -34,7 +34,7 @@ def step(target: TermTarget) -> None:
 
 @dataclass(frozen=True, eq=False)
 class SumTexels:
-    """What arrives at a texture that a hand has taken hold of; found in the memory from then on."""
+    """Incident light of a BTF that is edited; cached."""
 
     target: TermTarget
     btf_ref: BtfRef
@@ -46,7 +46,7 @@ class SumTexels:
 
     @property
     def label(self) -> str:
-        """In words."""
+        """Text for the user."""
         return f"{self.target.name}, {self.target.live.term.label}"
 
     def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> BtfIncidentLight:
@@ -56,11 +56,11 @@ class SumTexels:
         )
 
     def install(self, result: BtfIncidentLight) -> None:
-        """See `Job`; the memory has it, which is enough."""
+        """See `Job`; the result is in the cache, so nothing is left to do."""
 
 
 def job_for(target: TermTarget) -> SumTexels | None:
-    """What a hand on a term's texture must wait for before it is followed; None where there is no need."""
+    """Return the job that an edit of a term's BTF needs first; None if it needs none."""
     images, material, live = target
     btf_ref = live.term.texels
     if btf_ref is None or not material.num_samples or not is_cacheable(images, material, btf_ref):

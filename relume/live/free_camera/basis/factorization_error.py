@@ -1,4 +1,4 @@
-"""What the in-basis makes of a term, in numbers that people can be told (Mahajan 2008, section 3.3)."""
+"""Factorization error of a term in the hemispherical basis, for users (Mahajan 2008, section 3.3)."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ BOUND = 0.05
 
 
 class FactorizationError(NamedTuple):
-    """How a term is sent in moving views.
+    """Representation of a term for the free camera.
 
     Attributes:
-        functions: K, of the in-basis. residual: what these miss of the term, cosine-weighted RMS over its own.
-        required_functions: how many functions miss at most `BOUND`; None where K do not.
-        is_mirror: it is sent as a blurred mirror instead, since K functions miss too much.
+        functions: K, size of the basis. residual: cosine-weighted RMS error of the basis, relative to the term's RMS.
+        required_functions: number of functions with a residual of at most `BOUND`; None if K are not enough.
+        is_mirror: the term is rendered as a lobe instead, since the residual of K functions is too large.
     """
 
     functions: int
@@ -28,7 +28,7 @@ class FactorizationError(NamedTuple):
 
 
 def factorization_error(term_document: Mapping[str, Any]) -> FactorizationError:
-    """Of one term of a complete look."""
+    """Return the factorization error of one term of a complete look."""
     coefficients = white_coefficients(term_document)
     residuals = coefficients.residual_by_degree
     needed = next((num_functions(degree) for degree, residual in enumerate(residuals) if residual <= BOUND), None)

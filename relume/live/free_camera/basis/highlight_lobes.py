@@ -1,19 +1,19 @@
-"""Lobes: highlights as light of a mirror that is blurred, or of two (after Sun 2007).
+"""Highlight lobes: the blurred reflection of the environment, in one or two lobes (after Sun 2007).
 
     L(ωo) = a(θo) · L̄(ωm, √(1 − R)),   a = ∫ ρ cos θi dωi,   R ωm = ∫ ωi ρ cos θi dωi / a
 
-L̄ is the sky about a direction, blurred by a width; it is found for each pixel, where Σ_k p_k t_k is found for points.
-Points find more: most highlights have a core and a wide skirt, and seen from aslant they are longer in the plane of the
-eye and the normal than across it, and lean. Two round lobes stand for one there
+L̄ is the environment around a direction, blurred by a width; it is evaluated per pixel, and Σ_k p_k t_k per probe.
+Probes evaluate more: most highlights have a core and a wide tail, and at grazing angles they are asymmetric and longer
+in the plane of the view direction and the normal. Two isotropic lobes approximate this
 (`relume.live.free_camera.basis.two_lobes`, docs/free-camera.md#highlights),
 
     L_2(ωo) = a(θo) · Σ_n s_n L̄(ω_n, σ_n),   s_1 + s_2 = 1 ,
 
-and for each pixel, too, where both are not alike. What the in-basis cannot tell is summed over lights, by the shape of
-the terms (`relume.live.free_camera.basis.lobe_shapes`), and where these are narrower than lights it is L_2. L is what
-changes fastest from point to point, and what is sent less L is interpolated: B(pixel) = L(pixel) + Σ_points w (B − L)
-(docs/free-camera.md#highlights). All stand in tables over θo, as out-factors do; of terms that depend on
-φo as well, the mean over it, and one lobe.
+and pixels use them too if both lobes differ. Terms that the basis does not represent are summed over lights by the
+terms' shape (`relume.live.free_camera.basis.lobe_shapes`), or by L_2 if they are narrower than lights. L varies fastest
+between probes, so outgoing radiance minus L is interpolated: B(pixel) = L(pixel) + Σ_probes w (B − L)
+(docs/free-camera.md#highlights). All tables are over θo, like outgoing coefficients; terms that depend on φo are
+averaged over it and get one lobe.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from itertools import compress
 from typing import Any, NamedTuple, Self
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
@@ -49,59 +50,57 @@ from relume.live.free_camera.basis.two_lobes import NUM_PARAMETERS, fit_two_lobe
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-NARROW_RESIDUAL = 0.1  # what the in-basis misses of a term that it cannot tell, see `OutFactors.missed`
+NARROW_RESIDUAL = 0.1  # residual above which the basis does not represent a term; see `OutgoingCoefficients`
 _REPRESENTABLE_RESIDUAL = (
-    0.03  # the same, up to which it tells the sky in a highlight as well as lights do, in less time
+    0.03  # residual up to which the basis represents environment highlights as well as lights do, in less time
 )
-_NARROW_ANISOTROPIC = 0.2  # the same of terms that are not isotropic, which one round lobe tells less of
-_HIGHLIGHT_CRITERION = 3, 0.15  # a degree, and what its functions miss of a term that has a highlight
+_NARROW_ANISOTROPIC = 0.2  # `NARROW_RESIDUAL` of anisotropic terms, which one isotropic lobe fits worse
+_HIGHLIGHT_CRITERION = 3, 0.15  # a degree, and its residual above which a term has a highlight
 NUM_GROUPS = 1 + len(TEXTURES)
 _NUM_RINGS, _NUM_AZIMUTHS = 64, 24  # of the quadrature about the mirror direction
 _INNERMOST_ANGLE = 3e-4  # radians
-_NUM_VIEW_AZIMUTHS = 8  # φo over which a term that is not isotropic is averaged
+_NUM_VIEW_AZIMUTHS = 8  # φo over which anisotropic terms are averaged
 _MAX_CACHED = 256
 _MIN_RESIDUAL = 1e-3
 _NUM_SHAPE_PARAMETERS = NUM_PARAMETERS + 2
-_MAX_WIDTH_RATIO = 1.5  # times as wide as the other is a lobe, at most, where one stands for both
-_MIN_VIEW_COSINE = 0.3  # cos θo above which that counts: farther aslant all lobes are unlike
+_MAX_WIDTH_RATIO = 1.5  # greatest ratio of widths at which one lobe replaces two
+_MIN_VIEW_COSINE = 0.3  # cos θo above which that is checked; at grazing angles all lobes differ
 
 
 class Lobes(NamedTuple):
-    """The lobes of all materials, one each.
+    """The lobes of all materials, at most one pair each.
 
     Attributes:
-        albedo: a, by groups of terms as in `relume.live.free_camera.shade_probes`. (lobes, `NUM_ROWS`, groups, 3)
-            float32
-        cosine: cos θ of ω_1 and ω_2, on the side that the mirror direction is. (lobes, `NUM_ROWS`, 2) float32
-        first: s_1. (lobes, `NUM_ROWS`) float32
-        sigma: of both, radians. (lobes, `NUM_ROWS`, 2) float32
-        mean: cos θm. (lobes, `NUM_ROWS`) float32. single_sigma: √(1 − R), σ of one lobe for both. (lobes, `NUM_ROWS`)
-            float32
-        max_ratio: what the in-basis says of the sky is believed up to so many times of what the lobe says, and down to
-            that part of it; 1: it is not believed, since it cannot tell the terms: lights do. (lobes,) float32
-        is_two: whether one lobe for both would stand for it badly. (lobes,) bool
-        shape, flatness, lobe_confidence: of the whole, see `relume.live.free_camera.basis.lobe_shapes`: T, α², and 1 −
-        β, which is one where
-            the in-basis is believed. (lobes, `NUM_ROWS`, widths, places), (lobes,), (lobes, `NUM_ROWS`) float32
-        lobe_index: lobe of each material, −1 for none. (materials,) int32
+        albedo: a, by groups of terms as in `relume.live.free_camera.shade_probes`.
+        cosine: cos θ of ω_1 and ω_2, on the side of the mirror direction.
+        first: s_1.
+        sigma: σ_1 and σ_2, radians.
+        mean: cos θm. single_sigma: √(1 − R), σ of one lobe for both.
+        max_ratio: the basis's value for the environment is clamped to between 1/max_ratio and max_ratio times the
+            lobe's;
+            1: the basis does not represent the terms, so lights are summed instead.
+        is_two: one lobe would be a bad fit.
+        shape, flatness, lobe_confidence: T, α² and 1 − β of the whole highlight, see
+            `relume.live.free_camera.basis.lobe_shapes`; 1 − β is 1 if the basis represents it.
+        lobe_index: lobe of each material, −1 for none.
     """
 
-    albedo: F32
-    cosine: F32
-    first: F32
-    sigma: F32
-    mean: F32
-    single_sigma: F32
-    max_ratio: F32
-    is_two: NDArray[np.bool_]
-    shape: F32
-    flatness: F32
-    lobe_confidence: F32
-    lobe_index: NDArray[np.int32]
+    albedo: Shaped[F32, "lobes rows groups 3"]
+    cosine: Shaped[F32, "lobes rows 2"]
+    first: Shaped[F32, "lobes rows"]
+    sigma: Shaped[F32, "lobes rows 2"]
+    mean: Shaped[F32, "lobes rows"]
+    single_sigma: Shaped[F32, "lobes rows"]
+    max_ratio: Shaped[F32, " lobes"]
+    is_two: Shaped[NDArray[np.bool_], " lobes"]
+    shape: Shaped[F32, "lobes rows widths directions"]
+    flatness: Shaped[F32, " lobes"]
+    lobe_confidence: Shaped[F32, "lobes rows"]
+    lobe_index: Shaped[NDArray[np.int32], " materials"]
 
     @classmethod
     def joined(cls, lobe_sets: Sequence[Lobes]) -> Self:
-        """Those of some materials, then of others."""
+        """Concatenate the lobes of several sets of materials."""
         first = np.cumsum([0, *(len(lobes.albedo) for lobes in lobe_sets)])
         lobe_index = [
             lobes.lobe_index + np.where(lobes.lobe_index >= 0, row, 0)
@@ -112,15 +111,16 @@ class Lobes(NamedTuple):
 
 
 def is_narrow(coefficients: OutgoingCoefficients) -> bool:
-    """Whether the in-basis cannot tell a term. known: its factors"""
+    """Return whether the basis does not represent a term."""
     return coefficients.residual_energy > _residual_limit(coefficients)
 
 
 def is_representable(terms: Sequence[Mapping[str, Any]]) -> bool:
-    """Whether the in-basis tells the sky in a highlight: it misses nothing, or little of one that has no skirt.
+    """Return whether the basis represents environment highlights: its residual is small, or moderate without a wide
+    tail.
 
     Args:
-        terms: that the highlight consists of, of a complete look.
+        terms: the terms of the highlight, of a complete look.
     """
     return all(map(_is_term_representable, terms))
 
@@ -133,7 +133,7 @@ def _is_term_representable(term: Mapping[str, Any]) -> bool:
 
 
 def _needs_two_lobes(sigma: F64) -> bool:
-    """Whether one lobe would stand for both badly. sigma: of both. (rows, 2)"""
+    """Return whether one lobe would be a bad fit. sigma: of both. (rows, 2)"""
     return bool((sigma.max(axis=1) > _MAX_WIDTH_RATIO * sigma.min(axis=1))[cosines() > _MIN_VIEW_COSINE].any())
 
 
@@ -147,17 +147,19 @@ def _has_highlight(coefficients: OutgoingCoefficients) -> bool:
 
 
 def terms_in_lobe(coefficients: Sequence[OutgoingCoefficients]) -> list[bool]:
-    """Tell which terms of a material its lobe stands for: narrow ones; if there are none, those with a highlight.
+    """Select the terms of a material in its lobe: narrow ones; if there are none, those with a highlight.
 
     Args:
-        coefficients: the factors of each.
+        coefficients: of each term.
     """
     narrow = [is_narrow(term) for term in coefficients]
     return narrow if any(narrow) else [_has_highlight(term) for term in coefficients]
 
 
 def _max_ratio(terms: Sequence[Mapping[str, Any]]) -> float:
-    """What the in-basis is believed: any multiple where it misses nothing, none where it does not tell the sky."""
+    """Greatest ratio of basis to lobe: larger for a smaller residual, 1 if the basis does not represent the
+    environment.
+    """
     if not is_representable(terms):
         return 1.0
     return max(
@@ -171,7 +173,7 @@ def _max_ratio(terms: Sequence[Mapping[str, Any]]) -> float:
 
 
 def build_lobes(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
-    """Sum the narrow terms of each material to one lobe; where it has none, those with a highlight.
+    """Sum the narrow terms of each material into one lobe; if there are none, those with a highlight.
 
     Args:
         materials: the terms of each, of a complete look.
@@ -193,7 +195,7 @@ def build_lobes(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
             np.zeros((NUM_ROWS, _NUM_SHAPE_PARAMETERS)),
         )
         grid_values = np.zeros((NUM_ROWS, NUM_GRID_DIRECTIONS))
-        needs_grid = max_ratio[-1] == 1  # else the in-basis tells it
+        needs_grid = max_ratio[-1] == 1  # else the basis represents it
         for term in compress(terms, is_in_lobe):
             lobe_parameters = _fit_lobe(white_term_key(term))
             term_albedo = lobe_parameters[:, :3] * np.asarray(term["color"], np.float64)
@@ -222,7 +224,7 @@ def build_lobes(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
 
 @lru_cache(maxsize=2)
 def _polar_grid(num_azimuths: int) -> tuple[F64, F64]:
-    """Spread directions about a pole, over the half where y > 0 for what is the same on the other.
+    """Distribute directions around a pole, for half as many azimuths only over y > 0.
 
     Returns:
         Unit directions (n, 3) and solid angles (n,).
@@ -236,12 +238,12 @@ def _polar_grid(num_azimuths: int) -> tuple[F64, F64]:
 
 
 class _IsotropicGrid(NamedTuple):
-    """Where isotropic terms are evaluated.
+    """Quadrature for isotropic terms.
 
     Attributes:
-        quadrature: for φo = 0. moment_weights: about it, see `_lobe_quadrature`.
-        grid_quadrature, cosine: of the places of shapes, and cos θi there. (rows, places) float32
-        x, z: of ωi there. (rows, n) float32. area: solid angles. (n,) float32
+        quadrature: for φo = 0. moment_weights: for it, see `_lobe_quadrature`.
+        grid_quadrature, cosine: at grid directions of shapes, and cos θi there. (rows, directions) float32
+        x, z: of ωi. (rows, n) float32. area: solid angles. (n,) float32
     """
 
     quadrature: Quadrature
@@ -264,13 +266,13 @@ def _isotropic_grid() -> _IsotropicGrid:
 
 
 def _lobe_quadrature(phi: float, num_azimuths: int) -> tuple[F64, F64, F64]:
-    """Spread directions about the mirror directions of eyes in all rows.
+    """Distribute directions around the mirror directions of view directions in all rows.
 
     Args:
-        phi: φo of the eyes. num_azimuths: of the directions about each.
+        phi: φo of the view directions. num_azimuths: of the directions around each.
     Returns:
-        ωi (rows, n, 3); ωo (rows, 1, 3); weights of cos θi dωi, and times x and z, with x what ωi goes away from the
-        eye along the surface, and z = cos θi (rows, n, 3).
+        ωi (rows, n, 3); ωo (rows, 1, 3); weights of cos θi dωi, and times x and z (rows, n, 3). x points along the
+        surface, away from the view direction; z = cos θi.
     """
     directions, area = _polar_grid(num_azimuths)
     wi, wo = rotate_to_mirror(directions, phi)
@@ -280,8 +282,8 @@ def _lobe_quadrature(phi: float, num_azimuths: int) -> tuple[F64, F64, F64]:
 
 
 def _view_azimuths(document: Mapping[str, Any]) -> list[tuple[float, float]]:
-    """φo of the eyes over which a term that is not isotropic is averaged, and the share of each."""
-    # how many eyes each stands for
+    """φo over which an anisotropic term is averaged, and the weight of each."""
+    # number of equivalent view azimuths
     phi, multiplicity = np.arange(_NUM_VIEW_AZIMUTHS) * (2 * np.pi / _NUM_VIEW_AZIMUTHS), np.ones(_NUM_VIEW_AZIMUTHS)
     if has_reflection_symmetry(document):
         phi, multiplicity = (
@@ -292,7 +294,7 @@ def _view_azimuths(document: Mapping[str, Any]) -> list[tuple[float, float]]:
 
 
 def _anisotropic_moments(document: Mapping[str, Any]) -> F64:
-    """∫ ρ (1, x, z) cos θi dωi, the mean over φo. (channels, rows, 3)"""
+    """∫ ρ (1, x, z) cos θi dωi, mean over φo. (channels, rows, 3)"""
     total = np.zeros((3, NUM_ROWS, 3))
     for phi, view_weight in _view_azimuths(document):
         wi, wo, moment_weights = _lobe_quadrature(phi, _NUM_AZIMUTHS)
@@ -301,7 +303,7 @@ def _anisotropic_moments(document: Mapping[str, Any]) -> F64:
 
 
 def _anisotropic_grid_values(document: Mapping[str, Any]) -> F64:
-    """ρ cos θi at the places of shapes, the mean over channels, φo and both sides of it. (rows, places)"""
+    """ρ cos θi at grid directions, mean over channels, φo and both sides. (rows, directions)"""
     total = np.zeros((NUM_ROWS, NUM_GRID_DIRECTIONS))
     for phi, view_weight in _view_azimuths(document):
         for directions in (grid_directions(), grid_directions() * [1, -1, 1]):
@@ -330,7 +332,7 @@ def _fit_lobe(term_text: str) -> F64:
 
 @lru_cache(maxsize=_MAX_CACHED)
 def _grid_values(term_text: str) -> F64:
-    """ρ cos θi at the places of shapes, the mean over channels. (`NUM_ROWS`, `NUM_GRID_DIRECTIONS`)"""
+    """ρ cos θi at grid directions, mean over channels. (`NUM_ROWS`, `NUM_GRID_DIRECTIONS`)"""
     document, grid = json.loads(term_text), _isotropic_grid()
     if not white_coefficients(document).is_isotropic:
         return _anisotropic_grid_values(document)
@@ -338,7 +340,7 @@ def _grid_values(term_text: str) -> F64:
 
 
 def _single_lobe(moments: F64) -> tuple[F64, F64]:
-    """Find cos θm and √(1 − R) from moments, (channels, rows, 3). (rows,) each"""
+    """Return cos θm and √(1 − R) from moments, (channels, rows, 3). (rows,) each"""
     albedo, x, z = moments.mean(axis=0).T
     length = np.hypot(x, z)
     return z / np.maximum(length, 1e-30), np.sqrt(np.maximum(1 - length / np.maximum(albedo, 1e-30), 1e-8))

@@ -1,7 +1,8 @@
-"""The out-factors of a look: those of terms that the same texture multiplies summed, highlights apart.
+"""Outgoing coefficients of a look: summed over terms with the same texture, highlights separate.
 
-Functions cut off at a degree ring: beside what is bright they say less than black. Of what highlights send of other
-light than the sky, in Σ_k w_k p_k t_k, w takes that away for a little blur (docs/free-camera.md#highlights).
+Truncation at a degree causes ringing: next to bright light the sum is negative. For highlights of light other than the
+environment, Σ_k w_k p_k t_k, the window w removes ringing at the cost of a little blur
+(docs/free-camera.md#highlights).
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from itertools import compress
 from typing import Any, NamedTuple, Self
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.texture_slots import texture_slot
@@ -20,28 +22,28 @@ from relume.math.zernike import DEGREES, NUM_FUNCTIONS, WINDOW_DECAY, recurrence
 
 F32 = NDArray[np.float32]
 
-_FULL_WINDOW_RESIDUAL = 0.6  # what functions miss of a highlight, RMS, from which on all of the window is asked for
+_FULL_WINDOW_RESIDUAL = 0.6  # RMS residual of a highlight from which the full window is used
 
 
 class Tables(NamedTuple):
-    """The out-factors of all materials.
+    """The outgoing coefficients of all materials.
 
     Attributes:
-        isotropic: of isotropic terms summed, for φo = 0, by rungs of the ladder. (tables, `NUM_ROWS`, 3, rungs) float32
-        anisotropic: of the others summed. (tables, `NUM_ROWS`, `NUM_COLUMNS`, 3, K) float32
-        table_index: table of each material and group in both, −1 for none: of terms without a highlight; of what those
-            with one send of the sky, where the in-basis tells it; of what these send of other light. Groups are terms
-            without a texture, and those that each of `relume.brdf.texture_slots.TEXTURES` multiplies. (materials,
-            groups, 6) int32
+        isotropic: sums of isotropic terms for φo = 0, per entry of the recurrence table.
+        anisotropic: sums of other terms.
+        table_index: table of each material and group, −1 for none, an isotropic and an anisotropic one each: for terms
+            without a highlight; for the environment in highlights, if the basis represents it; for other light in
+            highlights. Groups are terms without a texture, and those with each of
+            `relume.brdf.texture_slots.TEXTURES`.
     """
 
-    isotropic: F32
-    anisotropic: F32
-    table_index: NDArray[np.int32]
+    isotropic: Shaped[F32, "tables rows 3 entries"]
+    anisotropic: Shaped[F32, "anisotropic_tables rows columns 3 K"]
+    table_index: Shaped[NDArray[np.int32], "materials groups 6"]
 
     @classmethod
     def joined(cls, table_sets: Sequence[Tables]) -> Self:
-        """Those of some materials, then of others."""
+        """Concatenate the tables of several sets of materials."""
         isotropic, anisotropic = (np.concatenate([tables[kind] for tables in table_sets]) for kind in (0, 1))
         num = np.array([[len(tables.isotropic), len(tables.anisotropic)] for tables in table_sets], np.int32)
         first = np.repeat(
@@ -53,18 +55,18 @@ class Tables(NamedTuple):
         )
 
 
-def window(residual: float) -> F32:
-    """Find w of each function, e^(−n (n + 2) f). (K,) float32
+def window(residual: float) -> Shaped[F32, " K"]:
+    """Return w of each function, e^(−n (n + 2) f), float32.
 
     Args:
-        residual: by all functions of a highlight, RMS: little rings where they miss little, and blurs for nothing.
+        residual: RMS residual of a highlight; a smaller one causes less ringing and needs less blur.
     """
     fall = WINDOW_DECAY * min(residual / _FULL_WINDOW_RESIDUAL, 1.0)
     return np.asarray(np.exp(-fall * DEGREES * (DEGREES + 2)), np.float32)
 
 
 def build_tables(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Tables:
-    """Sum the out-factors of the terms of each material that the same texture multiplies, highlights apart.
+    """Sum the outgoing coefficients of each material's terms with the same texture, highlights separate.
 
     Args:
         materials: the terms of each, of a complete look.

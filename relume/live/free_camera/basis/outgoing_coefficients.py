@@ -1,9 +1,9 @@
-"""Out-factors: what materials send to the eye of each function of the in-basis (Mahajan 2008; Sun 2007).
+"""Outgoing BRDF coefficients ("out-going factors") of the hemispherical basis (Mahajan 2008; Sun 2007).
 
     p_k(ωo) = ∫ ρ(ωi, ωo) cos θi h_k(ωi) dωi,   B(ωo) = Σ_k p_k(ωo) t_k
 
-Light that comes from a direction φ further round is seen a φ further round, so that the factors of an isotropic term
-are tables over θo alone, times cos mφ and sin mφ. Those of other terms are tables over θo and φo.
+For an isotropic term, rotating incident light by φ rotates outgoing light by φ, so its coefficients are tables over θo
+alone, times cos mφ and sin mφ. Other terms have tables over θo and φo.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
@@ -27,7 +28,7 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 NUM_ROWS = 32  # of tables, over sqrt(1 − cos θo) from 0 to 1
-NUM_COLUMNS = 32  # over φo, where a term is not isotropic
+NUM_COLUMNS = 32  # over φo, for anisotropic terms
 _NUM_RADII, _NUM_AZIMUTHS = 40, 96  # of the quadrature over the disc
 _MIN_COSINE = 1e-3
 _MAX_CACHED = 256
@@ -39,36 +40,37 @@ class OutgoingCoefficients:
     """The table of one term.
 
     Attributes:
-        table: (`NUM_ROWS`, columns, 3, K) float32; of one column, for φo = 0, where the term is isotropic.
-        residual_by_degree: what the functions up to each degree miss of the term, cosine-weighted RMS over its own, the
+        table: one column, for φo = 0, if the term is isotropic.
+        residual_by_degree: cosine-weighted RMS residual of the functions up to each degree, relative to the term's RMS,
             mean over θo; in [0, 1].
     """
 
-    table: F32
+    table: Shaped[F32, "rows columns 3 K"]
     residual_by_degree: tuple[float, ...]
 
     @property
     def is_isotropic(self) -> bool:
-        """Whether the term looks the same when both directions turn about the normal, or are mirrored."""
+        """True if the term is invariant under rotation and reflection about the normal."""
         return bool(self.table.shape[1] == 1)
 
     @property
     def residual_energy(self) -> float:
-        """What all K functions miss."""
+        """Residual of all K functions."""
         return self.residual_by_degree[-1]
 
 
-def cosines() -> F64:
-    """Of θo, in the rows of a table. (`NUM_ROWS`,)"""
+def cosines() -> Shaped[F64, " rows"]:
+    """Return cos θo of the rows of a table."""
     return np.maximum(1 - np.linspace(0, 1, NUM_ROWS) ** 2, _MIN_COSINE)
 
 
 @lru_cache(maxsize=2)
 def _disk_quadrature(is_half: bool) -> tuple[F64, F64, F64]:
-    """Spread directions over the disc, or over half of it for what is the same on the other.
+    """Distribute directions over the disk, or over half of it for symmetric terms.
 
     Returns:
-        Unit directions (n, 3), weights of cos θ dω (n,), functions (n, K); those that the halves cancel are nothing.
+        Unit directions (n, 3), weights of cos θ dω (n,), functions (n, K); functions that cancel over both halves are
+        0.
     """
     nodes, weights = np.polynomial.legendre.leggauss(_NUM_RADII)
     num_azimuths = _NUM_AZIMUTHS // 2 if is_half else _NUM_AZIMUTHS
@@ -84,7 +86,7 @@ def _disk_quadrature(is_half: bool) -> tuple[F64, F64, F64]:
 
 
 def outgoing_coefficients(term_document: Mapping[str, Any]) -> OutgoingCoefficients:
-    """Project a term, its colour included, its texture not.
+    """Project a term with its color, without its texture.
 
     Args:
         term_document: one term of a complete look.
@@ -95,12 +97,12 @@ def outgoing_coefficients(term_document: Mapping[str, Any]) -> OutgoingCoefficie
 
 
 def white_coefficients(term_document: Mapping[str, Any]) -> OutgoingCoefficients:
-    """Project a term, its colour and texture left out."""
+    """Project a term without its color and texture."""
     return _white_coefficients(white_term_key(term_document))
 
 
 def white_term_key(term_document: Mapping[str, Any]) -> str:
-    """What tells a term from others, its colour and texture left out."""
+    """Return a cache key of a term without its color and texture."""
     return json.dumps({**term_document, "color": _WHITE, "texture": None}, sort_keys=True)
 
 
@@ -125,7 +127,7 @@ def _white_coefficients(term_text: str) -> OutgoingCoefficients:
 
 
 def _view_directions(phi: F64) -> F64:
-    """ωo of all rows, from some φo. (`NUM_ROWS`, columns, 3)"""
+    """ωo of all rows for some φo. (`NUM_ROWS`, columns, 3)"""
     cosine = np.broadcast_to(cosines()[:, None], (NUM_ROWS, len(phi)))
     sine = np.sqrt(1 - cosine**2)
     return np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], axis=-1)
@@ -133,7 +135,7 @@ def _view_directions(phi: F64) -> F64:
 
 @lru_cache(maxsize=1)
 def _isotropic_quadrature() -> tuple[Quadrature, F32, F32]:
-    """Where isotropic terms are evaluated; weights (n,); weighed functions of the ladder's cosine parts, (n, rungs)."""
+    """Quadrature for isotropic terms; weights (n,); weighted functions of the cosine entries, (n, entries)."""
     wi, weight, functions = _disk_quadrature(is_half=True)
     weighted_functions = weight[:, None] * functions[:, recurrence().cosine]
     return (
@@ -144,7 +146,7 @@ def _isotropic_quadrature() -> tuple[Quadrature, F32, F32]:
 
 
 def _project_isotropic(document: Mapping[str, Any]) -> tuple[F64, F64]:
-    """Project an isotropic term seen from all rows and φo = 0: factors (rows, 1, 3, K), energies (rows, 1)."""
+    """Project an isotropic term for all rows and φo = 0: coefficients (rows, 1, 3, K), energies (rows, 1)."""
     quadrature, weight, weighted_functions = _isotropic_quadrature()
     value = quadrature.values(document).astype(np.float32)  # (channels, rows, n)
     table = np.zeros((NUM_ROWS, 1, 3, NUM_FUNCTIONS))
@@ -153,11 +155,11 @@ def _project_isotropic(document: Mapping[str, Any]) -> tuple[F64, F64]:
 
 
 def _project_anisotropic(document: Mapping[str, Any], phi: F64) -> tuple[F64, F64]:
-    """Project a term seen from all rows and some φo: factors (rows, columns, 3, K), energies (rows, columns)."""
+    """Project a term for all rows and some φo: coefficients (rows, columns, 3, K), energies (rows, columns)."""
     wo, (wi, weight, functions) = _view_directions(phi), _disk_quadrature(is_half=False)
     table, energy = np.empty((NUM_ROWS, len(phi), 3, NUM_FUNCTIONS)), np.empty((NUM_ROWS, len(phi)))
     weighted_functions = weight[:, None] * functions
-    for row in range(NUM_ROWS):  # so many at once that arrays are of some megabytes
+    for row in range(NUM_ROWS):  # one row at a time, so that arrays take a few megabytes
         value = np.moveaxis(eval_brdf(document, wi, wo[row, :, None]), -1, -2)  # (columns, 3, directions)
         table[row] = value @ weighted_functions
         energy[row] = (value**2 @ weight).sum(axis=-1)

@@ -1,4 +1,4 @@
-"""Where what an eye sees lies in tables over θo and φo."""
+"""Indices of view directions in tables over θo and φo."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import numpy as np
 from relume.core.numba_options import UNCOUNTED
 from relume.live.free_camera.basis.outgoing_coefficients import NUM_ROWS
 
-MIN_COSINE = np.float32(0.01)  # of θo: what is interpolated between points may be seen from a little below them
+MIN_COSINE = np.float32(0.01)  # of θo; a visible pixel may interpolate probes that face away slightly
 
 
 @nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
 def table_row(cosine):  # type: ignore[no-untyped-def]
-    """Find where cos θo lies in tables: a row, and the share of the next."""
+    """Return the row of cos θo in tables, and the fraction toward the next row."""
     row_coordinate = math.sqrt(max(np.float32(1) - cosine, np.float32(0))) * np.float32(NUM_ROWS - 1)
     row: Any = min(np.int64(row_coordinate), NUM_ROWS - 2)
     return row, np.float32(row_coordinate - row)
@@ -24,10 +24,10 @@ def table_row(cosine):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def view_direction_local(position, normal, tangent, camera_position):  # type: ignore[no-untyped-def]
-    """Find where a point's wo lies in tables: a row, the share of the next, and cos φo, sin φo.
+    """Return table coordinates of a point's ωo: a row, the fraction toward the next, and cos φo, sin φo.
 
     Args:
-        position, normal, tangent: of the point. camera_position: where it is.
+        position, normal, tangent: of the point. camera_position: of the camera.
     """
     x, y, z = camera_position[0] - position[0], camera_position[1] - position[1], camera_position[2] - position[2]
     scale = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-20)))

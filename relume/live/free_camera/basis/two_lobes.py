@@ -1,11 +1,11 @@
-"""Two round lobes of a highlight: a mixture of two distributions of von Mises and Fisher, fitted by their likelihood.
+"""Two-lobe mixture of a highlight: two von Mises–Fisher distributions, fitted by maximum likelihood.
 
     f(ωi) = Σ_n s_n κ_n e^(−κ_n (1 − ω_n · ωi)) / (2π (1 − e^(−2 κ_n))),   σ_n² = 1 / κ_n
 
-Microfacets have a core and a wide skirt, and seen from aslant a highlight is longer in the plane of the eye than across
-it: two lobes of a width of their own tell either. They are found by expectation and maximisation (Banerjee et al. 2005,
-*Clustering on the Unit Hypersphere using von Mises-Fisher Distributions*), from the same start for all: tables over θo
-are interpolated, and an edit shall change them little by little.
+Microfacet highlights have a core and a wide tail, and at grazing angles they are longer in the plane of incidence than
+across it: two lobes of different widths represent both. They are fitted by expectation maximization (Banerjee et al.
+2005, *Clustering on the Unit Hypersphere using von Mises-Fisher Distributions*), always from the same start: tables
+over θo are interpolated, and should change continuously with edits.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -25,13 +26,13 @@ F64 = NDArray[np.float64]
 
 NUM_PARAMETERS = 5  # cos θ of both, s_1, both σ
 _NUM_ITERATIONS = 12
-_INITIAL_OFFSET = 0.5  # of σ, that each begins off the middle
+_INITIAL_OFFSET = 0.5  # of σ, initial distance of each lobe from the center
 _NARROWEST, _WIDEST = np.float32(1e-8), np.float32(1.0)  # σ²
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _responsibility(x):  # type: ignore[no-untyped-def]
-    """Find 1 / (1 + e^x), to 1e-4, by Lambert's continued fraction of the hyperbolic tangent: eight at once."""
+    """Return 1 / (1 + e^x), to 1e-4, by Lambert's continued fraction of the hyperbolic tangent, which vectorizes."""
     h = min(max(np.float32(-0.5) * x, np.float32(-4.9)), np.float32(4.9))
     q = h * h
     numerator = h * (np.float32(135135) + q * (np.float32(17325) + q * (np.float32(378) + q)))
@@ -41,7 +42,7 @@ def _responsibility(x):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _squared_width(length):  # type: ignore[no-untyped-def]
-    """Find σ² = 1 / κ from the length of the mean direction, R: κ ≈ R (3 − R²) / (1 − R²)."""
+    """Return σ² = 1 / κ from the length of the mean direction, R: κ ≈ R (3 − R²) / (1 − R²)."""
     r = min(max(length, np.float32(1e-3)), np.float32(1 - 1e-7))
     return min(max((np.float32(1) - r * r) / (r * (np.float32(3) - r * r)), _NARROWEST), _WIDEST)
 
@@ -69,7 +70,7 @@ def _fit(x, z, area, brdf_cosine, start, stop, out):  # type: ignore[no-untyped-
             continue
         inverse_total = np.float32(1) / total
         along_x, along_z = along_x * inverse_total, along_z * inverse_total
-        # squares of a density are as wide as √½ of it, wherever it is bright
+        # the square of a density is narrower by √½
         variance = max(
             np.float32(2) - np.float32(2) * math.sqrt(squared_x * squared_x + squared_z * squared_z) / squared_total,
             _NARROWEST,
@@ -110,15 +111,16 @@ def _fit(x, z, area, brdf_cosine, start, stop, out):  # type: ignore[no-untyped-
         out[row, 3], out[row, 4] = math.sqrt(variance_1), math.sqrt(variance_2)
 
 
-def fit_two_lobes(x: F32, z: F32, area: F32, brdf_cosine: F32) -> F32:
-    """Fit two lobes to each of some highlights, the same on both sides of a plane.
+def fit_two_lobes(
+    x: Shaped[F32, "rows n"], z: Shaped[F32, "rows n"], area: Shaped[F32, " n"], brdf_cosine: Shaped[F32, "rows n"]
+) -> Shaped[F32, "rows 5"]:
+    """Fit two lobes to each of some highlights that are symmetric about a plane.
 
     Args:
-        x, z: of directions, along the surface and along the normal, in the plane. (rows, n) float32
-        area: solid angle of each. (n,) float32. brdf_cosine: f cos θi there, not negative. (rows, n) float32
+        x, z: components of directions in the plane, along the surface and along the normal.
+        area: solid angle of each. brdf_cosine: f cos θi there, not negative.
     Returns:
-        cos θ of both on the side of positive x, none beyond the normal; the share of the first, s_1; σ of both,
-        radians. (rows, 5) float32
+        cos θ of both on the side of positive x, 1 beyond the normal; the weight of the first, s_1; σ of both, radians.
     """
     out = np.empty((len(x), NUM_PARAMETERS), np.float32)
     parallel_for_chunks(lambda start, stop: _fit(x, z, area, brdf_cosine, start, stop, out), len(x))

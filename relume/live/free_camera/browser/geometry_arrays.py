@@ -1,4 +1,4 @@
-"""What a shader keeps of a bake: surfaces and points, in arrays of texels of one, two or four numbers."""
+"""Arrays of a bake for the browser's renderer: surfaces and probes, as texels with one, two or four components."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.live.free_camera.basis.lobe_shapes import NUM_AZIMUTHS, NUM_RINGS, WIDTHS
@@ -26,15 +27,16 @@ from relume.math.zernike import NUM_FUNCTIONS, recurrence
 
 Texels = NDArray[Any]
 
-MAX_TEXELS = 1 << 24  # of textures, all levels: finer ones are left out, finest first
+MAX_TEXELS = 1 << 24  # of textures, all levels; the finest levels are omitted first
 
 
 def constants(transfer: FreeCameraTransfer) -> dict[str, Any]:
-    """What shaders are written from: the recurrence of the Zernike basis, its gradients for mapped normals, sizes of
-    tables and of lists of lights.
+    """Return the constants of shaders: the recurrence of the Zernike basis, its gradients for mapped normals, and sizes
+    of
+    tables and light lists.
 
-    `first_probes`: index of the first probe of each material, and one more at the end. `has_alpha_test`: surfaces
-    have alpha masks, which shaders do not know of.
+    `first_probes`: index of the first probe of each material, and the total at the end. `has_alpha_test`: surfaces have
+    alpha masks, which shaders do not support.
     """
     recurrence_fields = {name: field.tolist() for name, field in recurrence()._asdict().items()}
     sizes = {"num_basis": NUM_FUNCTIONS, "table_rows": NUM_ROWS, "table_columns": NUM_COLUMNS}
@@ -57,22 +59,22 @@ def constants(transfer: FreeCameraTransfer) -> dict[str, Any]:
     }
 
 
-def first_probes(transfer: FreeCameraTransfer) -> NDArray[np.int64]:
-    """Find where the points of each material begin, which come one after another. (materials + 1,)"""
+def first_probes(transfer: FreeCameraTransfer) -> Shaped[NDArray[np.int64], " bounds"]:
+    """Return the index of the first probe of each material, and the total; probes are sorted by material."""
     return np.searchsorted(transfer.stored_scene.material, np.arange(len(transfer.material_names) + 1))
 
 
 def array_factories(transfer: FreeCameraTransfer) -> Mapping[str, Callable[[], Texels]]:
-    """Name the arrays of a bake; each is made when it is called.
+    """Return functions that make the arrays of a bake, by name.
 
     Returns:
         (texels, 1, 2 or 4) each, float32, float16 or uint32:
-        corners: of faces, three and the material. sides: two of each face, see `node_arrays`. facing: normals of faces,
-        `uv_scale`. positions: of corners. normals, points, weights: of slots. probe_positions, probe_normals,
+        corners: three corners of each face and its material. sides: two of each face, see `node_arrays`. facing: normals of
+        faces, `uv_scale`. positions: of corners. normals, points, weights: of slots. probe_positions, probe_normals,
         tangents: of probes. visible_lights: visibility bits of each probe's lights, 128 a texel, needed only for lobes.
-        Of scenes with textures besides: texels; levels: of each texture (first level's row, how many, both wraps),
-        then of each level (first texel, height, width, 0); uvs: two of each corner, (u, v, sign of the bitangent, 0)
-        and its tangent.
+        For scenes with textures also: texels; levels: of each texture (row of its first level, number of levels, both
+        wrap modes), then of each level (first texel, height, width, 0); uvs: two of each corner, (u, v, sign of the
+        bitangent, 0) and its tangent.
     """
     stored_scene, probes = transfer.stored_scene, transfer.stored_scene.probes
     shader_nodes = node_arrays(stored_scene.probe_grid)
@@ -96,28 +98,30 @@ def array_factories(transfer: FreeCameraTransfer) -> Mapping[str, Callable[[], T
 
 
 class NodeArrays(NamedTuple):
-    """Where a shader keeps what vertices send.
+    """Slots of lattice nodes in shader arrays.
 
-    Nodes of a grid have a slot each, one after another, so that they are found without being looked up. Faces with one
-    row, which are many where a mesh is fine, share those of their corners.
+    The nodes of a grid have consecutive slots, so that no lookup is needed. Faces with one row, frequent in fine
+    meshes,
+    share the slots of their corners.
 
     Attributes:
-        sides: of each side of a face, the numbers of its rows last. Of one row: the slots of its corners. Of more: its
-            first slot, 0, 0. A side without any has what the other has. (faces, 2, 4) uint32
-        lattice_node: that each slot is. (slots,) uint32
+        sides: of each side of a face; the last entry is the number of its rows. One row: the slots of its corners.
+            More:
+            its first slot, 0, 0. A side without nodes has those of the other side.
+        lattice_node: lattice node of each slot.
     """
 
-    sides: NDArray[np.uint32]
-    lattice_node: NDArray[np.uint32]
+    sides: Shaped[NDArray[np.uint32], "faces 2 4"]
+    lattice_node: Shaped[NDArray[np.uint32], " slots"]
 
 
 def node_arrays(probe_grid: ProbeGrid) -> NodeArrays:
-    """Number the slots of a lattice."""
+    """Assign slots to the nodes of a lattice."""
     rows, first = probe_grid.num_rows.ravel().astype(np.int64), probe_grid.first.ravel().astype(np.int64)
     counts = num_nodes(rows)
     is_wide = rows > 1
     is_wide_node = np.repeat(is_wide, counts)  # nodes are in the order of sides
-    narrow = first[rows == 1, None] + np.array([0, 2, 1])  # i towards the second corner, j towards the third
+    narrow = first[rows == 1, None] + np.array([0, 2, 1])  # i toward the second corner, j toward the third
     corners, corner_index = np.unique(probe_grid.node_index[narrow], return_inverse=True)
     num_wide = int(is_wide_node.sum())
     side_table = np.zeros((len(rows), 4), np.uint32)
@@ -151,10 +155,10 @@ def _texture_factories(stored_scene: StoredScene, textures: Textures) -> dict[st
 
 
 def overridden_texture_arrays(baked: StoredScene, stored_scene: StoredScene) -> dict[str, Texels]:
-    """Find what takes the place of a bake's arrays of textures where a look names images: textures keep their numbers.
+    """Return the texture arrays that replace those of a bake for map overrides; texture indices stay.
 
     Args:
-        baked: what is seen. stored_scene: it with the images.
+        baked: the scene without overrides. stored_scene: the scene with them.
     """
     factories = _texture_factories(stored_scene, stored_scene.textures)
     has_frames = len(baked.textures.wraps) and stored_scene.tangents is baked.tangents
@@ -164,13 +168,15 @@ def overridden_texture_arrays(baked: StoredScene, stored_scene: StoredScene) -> 
 def _corner_frames(stored_scene: StoredScene) -> Texels:
     out = np.zeros((len(stored_scene.uvs), 2, 4), np.float32)
     out[:, 0, :2] = stored_scene.uvs
-    num = len(stored_scene.tangents)  # corners whose places are projected have none of their own
+    num = len(stored_scene.tangents)  # tri-planar corners have no tangents
     out[:num, 0, 2], out[:num, 1, :3] = stored_scene.tangents[:, 3], stored_scene.tangents[:, :3]
     return out.reshape(-1, 4)
 
 
 def _select_levels(textures: Textures) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Levels of all textures that fit, and where those of each begin: the finest of the largest goes first."""
+    """Select the levels of all textures that fit, and the first of each; the finest level of the largest is omitted
+    first.
+    """
     ranges = [list(range(a, b)) for a, b in zip(textures.first[:-1], textures.first[1:], strict=True)]
     area = textures.levels[:, 1] * textures.levels[:, 2]
     while sum(int(area[k].sum()) for k in ranges) > MAX_TEXELS:
@@ -182,7 +188,7 @@ def _select_levels(textures: Textures) -> tuple[NDArray[np.int64], NDArray[np.in
 
 
 def _bits(visible: NDArray[np.uint8]) -> Texels:
-    """Put bits of points, low ones first, into whole texels."""
+    """Pack visibility bits of probes, low bits first, into whole texels."""
     num = -(-visible.shape[1] // 16)
     out = np.zeros((len(visible), 16 * num), np.uint8)
     out[:, : visible.shape[1]] = visible
@@ -190,7 +196,7 @@ def _bits(visible: NDArray[np.uint8]) -> Texels:
 
 
 def _to_vec4(vectors: NDArray[Any], fourth: Any) -> Texels:
-    """Add a fourth number to each row."""
+    """Append a fourth component to each row."""
     out = np.empty((len(vectors), 4), np.float32)
     out[:, :3] = vectors
     out[:, 3] = fourth

@@ -1,10 +1,11 @@
-"""What a shader sums highlights from: lights of a sky, shapes of terms (docs/free-camera.md#highlights)."""
+"""Environment lights and highlight shapes, as arrays for shaders (docs/free-camera.md#highlights)."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.live.free_camera.basis.highlight_lobes import Lobes
@@ -20,28 +21,29 @@ _MAX_HALF = 65504.0
 
 
 def environment_light_array(lights: EnvironmentLights) -> dict[str, Texels]:
-    """Of each light where it is and the number of the tables that are as wide as it is; then what it brings.
+    """Return the direction and width index of each light, then its irradiance.
 
     Args:
-        lights: of the sky.
+        lights: of the environment.
     Returns:
         (2 lights, 4) float32
     """
     width = (lights.table // NUM_GRID_DIRECTIONS).astype(np.float32)
-    towards, irradiance = np.split(lights.lights, 2, axis=1)
-    rows = np.column_stack([towards, width, irradiance, np.zeros_like(width)])
+    directions, irradiance = np.split(lights.lights, 2, axis=1)
+    rows = np.column_stack([directions, width, irradiance, np.zeros_like(width)])
     return {"environment_lights": np.ascontiguousarray(rows.reshape(-1, 4))}
 
 
-def lobe_shape_array(lobes: Lobes, material: int, normal_variation: F32) -> dict[str, Texels]:
-    """The table of a material's highlight.
+def lobe_shape_array(lobes: Lobes, material: int, normal_variation: Shaped[F32, " materials"]) -> dict[str, Texels]:
+    """Return the table of a material's highlight.
 
     Args:
-        lobes: of all materials. material: one with a lobe. normal_variation: of all, see `Surface.bumpiness`.
-            (materials,)
+        lobes: of all materials. material: one with a lobe. normal_variation: of all, see
+            `relume.live.free_camera.probes.stored_scene.StoredScene`.
     Returns:
-        Of each row 1 − β, α², and how far the table is believed where normals bend; then, for each width, of each ring
-        the numbers of its first four spokes, and of its last four. (rows · (1 + widths · rings · 2), 4) float16
+        Of each row 1 − β, α², and the weight of the table for varying normals; then, for each width and ring, the
+        values
+        at its first four azimuths, and at its last four. (rows · (1 + widths · rings · 2), 4) float16
     """
     lobe = int(lobes.lobe_index[material])
     ring_values = lobes.shape[lobe].reshape(NUM_ROWS, -1, NUM_AZIMUTHS)

@@ -1,4 +1,4 @@
-"""What a look makes for a shader: tables of materials, light vectors, the sky; each known by what it follows from."""
+"""Arrays of a look for the browser's renderer: material tables, incident coefficients, environment; each with a key."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.texture_slots import TEXTURES
@@ -26,18 +27,18 @@ from relume.views.resolve import encode_pixels
 F32 = NDArray[np.float32]
 Texels = NDArray[Any]
 
-_NUM_COARSE_FUNCTIONS = num_functions(FAST_DEGREE)  # that are not nothing in what is found quickly
-# how many are sent: a shader is written for each number
+_NUM_COARSE_FUNCTIONS = num_functions(FAST_DEGREE)  # nonzero functions of approximate coefficients
+# possible numbers of functions; a shader is generated for each
 _FUNCTION_COUNTS = np.array([1, _NUM_COARSE_FUNCTIONS, NUM_FUNCTIONS])
-_MAX_RESIDUAL = 1e-3  # of a table's size, by the functions that a shader leaves out
-_MAX_SCALED = 2.0**14  # of light vectors: well inside half precision
+_MAX_RESIDUAL = 1e-3  # RMS of omitted functions, relative to the table's
+_MAX_SCALED = 2.0**14  # of coefficients: well inside half precision
 
 
 class ArrayBlock(NamedTuple):
-    """Some arrays that change together.
+    """Arrays that change together.
 
     Attributes:
-        key: of what they follow from. make: finds them, by name; (texels, 1, 2 or 4) each.
+        key: identifies their content. make: returns them by name; (texels, 1, 2 or 4) each.
     """
 
     key: Hashable
@@ -45,7 +46,7 @@ class ArrayBlock(NamedTuple):
 
 
 class ShaderConstants(NamedTuple):
-    """What a frame needs besides: as `SceneUpdate` of the wire says."""
+    """Other data of a frame: the fields of the message `SceneUpdate`."""
 
     gain: list[float]
     environment_gain: list[float]
@@ -62,10 +63,10 @@ class ShaderConstants(NamedTuple):
 def array_blocks(
     transfer: FreeCameraTransfer, state: FrameRequestState, versions: tuple[Hashable, Hashable]
 ) -> dict[str, ArrayBlock]:
-    """Name what a shader must have to show a look.
+    """Return the array blocks that a shader needs to show a look, by name.
 
     Args:
-        transfer: of the bake. state: what is shown. versions: of its materials, and of its light vectors.
+        transfer: of the bake. state: of the frame. versions: of its materials, and of its incident coefficients.
     """
     look, light = state.look, state.light
     lobes, background = state.materials.lobes, look.background
@@ -112,7 +113,7 @@ def array_blocks(
 
 
 def shader_constants(transfer: FreeCameraTransfer, state: FrameRequestState) -> ShaderConstants:
-    """Find what a shader needs besides its arrays; see `relume.live.free_camera.frame`."""
+    """Return the data that a shader needs besides arrays; see `relume.live.free_camera.frame`."""
     look, light = state.look, state.light
     environment_gain = light.environment_gain if light.has_direct_environment else (0.0, 0.0, 0.0)
     radiance, blur = look.background, look.background.blur if look.background.kind == "blurred" else 0.0
@@ -141,7 +142,7 @@ def _materials(transfer: FreeCameraTransfer, state: FrameRequestState) -> dict[s
 
 
 def _highlight_blocks(transfer: FreeCameraTransfer, state: FrameRequestState) -> dict[str, ArrayBlock]:
-    """The lights of the sky, and the shape of the highlight of each material that they are summed for."""
+    """The environment lights, and the shape of each material's highlight that is summed over them."""
     environment, lobes, is_coarse = state.light.environment, state.materials.lobes, state.is_coarse
     normal_variation, projected = (
         transfer.stored_scene_with(state.materials.overrides).normal_variation,
@@ -165,8 +166,10 @@ def _highlight_blocks(transfer: FreeCameraTransfer, state: FrameRequestState) ->
 
 
 def _lobes(lobes: Lobes) -> F32:
-    """Of each row of each lobe the albedos by groups, with `most`, σ_2, √(1 − R); then both cosines, s_1 and σ_1.
-    (lobes · rows · (groups + 1), 4)"""
+    """Per row of each lobe: albedos by groups, with `max_ratio`, σ_2, √(1 − R) as fourth components; then both cosines,
+    s_1
+    and σ_1. (lobes · rows · (groups + 1), 4)
+    """
     num, rows = lobes.first.shape
     out = np.zeros((num, rows, NUM_GROUPS + 1, 4), np.float32)
     out[:, :, :NUM_GROUPS, :3] = lobes.albedo
@@ -180,8 +183,10 @@ def _lobes(lobes: Lobes) -> F32:
 
 
 def _lobe_light_arrays(lobe_lights: LobeLightLists) -> dict[str, Texels]:
-    """Lights that lobes look for, two texels each; lists of four a texel, −1 after the last; the first
-    list of each width; of each lamp its lights and their shares."""
+    """Lights in lobes, two texels each; lists with four lights per texel, −1 after the last; the first list of each
+    width;
+    lights and weights of each bright light.
+    """
     lights = np.zeros((len(lobe_lights.lights), 8), np.float32)
     lights[:, :5] = lobe_lights.lights
     bright_lights = np.stack([lobe_lights.bright_lights.astype(np.float32), lobe_lights.bright_light_weights], axis=-1)
@@ -198,10 +203,13 @@ def _lobe_light_arrays(lobe_lights: LobeLightLists) -> dict[str, Texels]:
 def _material_rows(
     transfer: FreeCameraTransfer, state: FrameRequestState, materials: MaterialState
 ) -> NDArray[np.int32]:
-    """What each material has: of each group its even and its uneven table, whether it sends, its texture; then its
-    lobe, its normal map, whether it is a catcher, −1; then the bits of its emission, and the image of that; then of
-    each group both tables of the sky in its highlights, and both of other light. −1 for none.
-    (materials · (2 groups + 2), 4) int32"""
+    """Rows of each material; −1 for none. (materials · (2 groups + 2), 4) int32
+
+    Per group: its isotropic and anisotropic table, 1 if it reflects, its texture. Then its lobe, its normal map, 1 for
+    a
+    shadow catcher, −1. Then the bits of its emission, and its emission texture. Then per group both tables of the
+    environment in highlights, and both of other light.
+    """
     tables, lobes, is_reflective = materials.tables, materials.lobes, materials.is_reflective
     material_textures = transfer.stored_scene_with(materials.overrides).textures.material_textures
     out = np.full((len(is_reflective), 2 * NUM_GROUPS + 2, 4), -1, np.int32)
@@ -218,15 +226,16 @@ def _material_rows(
 
 
 def needed_function_counts(
-    materials: MaterialState, has_map: NDArray[np.bool_]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Find how many functions of light vectors materials get: at least up to the degree that their tables know, all
-    where a normal map asks where light comes from.
+    materials: MaterialState, has_map: Shaped[NDArray[np.bool_], " materials"]
+) -> tuple[Shaped[NDArray[np.int64], " materials"], Shaped[NDArray[np.int64], " materials"]]:
+    """Return the number of functions of incident coefficients per material: at least up to the degree of its tables,
+    all with
+    a normal map.
 
     Args:
-        materials: what they send. has_map: whether each has a normal map. (materials,)
+        materials: of the look. has_map: materials with a normal map.
     Returns:
-        Of vectors of all light, and of those of others than the sky, which highlights send apart. (materials,) each
+        For all light, and for light other than the environment, which highlights add separately.
     """
     tables = materials.tables
     isotropic_degrees, anisotropic_degrees = (
@@ -251,19 +260,21 @@ def needed_function_counts(
 
 
 def _degrees(tables: F32, function_degrees: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The degree up to which functions matter, of each table (tables, …, functions), whose degrees are given."""
+    """Greatest significant degree of each table (tables, …, functions), given the degrees of functions."""
     size = np.square(tables, dtype=np.float64).sum(axis=tuple(range(1, tables.ndim - 1)))
     energy_by_degree = np.stack(
         [size[:, function_degrees == degree].sum(axis=1) for degree in range(DEGREE + 1)], axis=1
     )
-    tail_energy = energy_by_degree[:, ::-1].cumsum(axis=1)[:, ::-1]  # from a degree on
+    tail_energy = energy_by_degree[:, ::-1].cumsum(axis=1)[:, ::-1]  # of this degree and all higher ones
     is_significant = tail_energy > _MAX_RESIDUAL**2 * np.maximum(tail_energy[:, :1], 1e-30)
     return np.asarray(is_significant.sum(axis=1) - 1, np.int64).clip(0)
 
 
 def _vector_arrays(name: str, vectors: F32, num: int) -> dict[str, Texels]:
-    """So many functions of light vectors of points in half precision, channel by channel, each point in whole texels;
-    and by how much they were divided, and how many functions there are."""
+    """Pack coefficients of probes in half precision, channel by channel, each probe in whole texels; and their scale
+    and
+    number of functions.
+    """
     largest = float(max(vectors.max(initial=0), -vectors.min(initial=0), 1e-30))
     scale = 2.0 ** np.ceil(np.log2(largest / _MAX_SCALED))
     out = np.zeros((len(vectors), -(-3 * num // 4) * 4), np.float16)
@@ -279,5 +290,5 @@ def _unoccluded(transfer: FreeCameraTransfer, state: FrameRequestState, catchers
 
 
 def _encode_rgb9e5(pixels: F32) -> NDArray[np.uint32]:
-    """Radiance in words of RGB9_E5. (n, 1) uint32"""
+    """Radiance encoded as RGB9_E5. (n, 1) uint32"""
     return np.frombuffer(encode_pixels(np.ascontiguousarray(pixels), "rgb9e5"), np.uint32)[:, None]

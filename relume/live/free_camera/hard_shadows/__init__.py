@@ -1,1 +1,1 @@
-"""Hard-shadow lights: suns and small lights whose shadows each pixel traces itself."""
+"""Hard-shadow lights: sun disks and small lights whose shadows are traced per pixel."""

@@ -1,10 +1,10 @@
-"""Which share of a beam each ray's surface sees, with few shadow rays: every fourth pixel is asked, others predicted.
+"""Adaptive hard shadows: the visible fraction of a light per ray, from few shadow rays.
 
-Every second pixel of every second row asks for one of its targets, neighbours for different ones. Where all that are
-asked about a pixel, on its surface, say the same, so does it. Others ask for all targets, from places spread over
-what the pixel covers: so edges of shadows are smooth, and as wide as the light is. Where one of those finds else than
-what was predicted beside it, its neighbours ask too, in a few rounds. Where a whole neighbourhood is partly in
-shadow, each pixel takes the mean of nine, whose targets together are `NUM_TARGET_SETS` times as many.
+Every second pixel in every second row traces one target of the light, adjacent pixels different ones. If all traced
+neighbors of a pixel on its surface agree, the pixel takes their value. Other pixels trace all targets, from points
+distributed over the pixel's footprint, so that shadow edges are antialiased and penumbras correct. Where such a pixel
+contradicts the prediction next to it, its neighbors are traced too, in a few rounds. In wide penumbras each pixel takes
+the mean of nine pixels, whose targets together are `NUM_TARGET_SETS` times as many.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import math
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.thread_pools import parallel_for_chunks
@@ -34,21 +35,19 @@ from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]
 U8 = NDArray[np.uint8]
-_TraceArguments = tuple[Any, int, int, ShadowRays, ShadowTargets]  # what kernels that trace are called with first
+_TraceArguments = tuple[Any, int, int, ShadowRays, ShadowTargets]  # first arguments of tracing kernels
 
-_MAX_ROUNDS = 32  # a shadow is followed that many times two pixels beyond where it was seen first
+_MAX_ROUNDS = 32  # each follows a shadow edge by two more pixels
 
 
 def visible_fractions(
     solid: OcclusionMesh, gbuffer: GBuffer, camera: Camera, size: tuple[int, int], targets: ShadowTargets
-) -> F32:
-    """Find the share of a beam that is seen where each ray of an eye ends.
+) -> Shaped[F32, " rays"]:
+    """Return the visible fraction of a light at each ray's hit, float32.
 
     Args:
-        solid: what is seen, and may be in the way. gbuffer: by the rays. camera: the eye.
-        size: width and height of its picture, pixels. targets: what shadow rays are sent to.
-    Returns:
-        (rays,) float32
+        solid: the scene. gbuffer: of the rays. camera: of the rays.
+        size: width and height of the image, pixels. targets: of shadow rays.
     """
     width, height = size
     num_pixels, num_visible = width * height, np.zeros(len(gbuffer.hits.face), np.uint8)
@@ -80,7 +79,7 @@ def _shadow_rays(solid: OcclusionMesh, gbuffer: GBuffer, camera: Camera, height:
 
 
 def _trace_pixels(trace_arguments: _TraceArguments, gbuffer: GBuffer, size: tuple[int, int], num_visible: U8) -> None:
-    """Ask every fourth pixel, and all that are in doubt. num: targets that rays see, written for pixels. (rays,)"""
+    """Trace every fourth pixel, and all uncertain ones. num_visible: visible targets, written for pixels. (rays,)"""
     (width, height), rays, face = size, trace_arguments[3], gbuffer.hits.face
     is_uncertain, is_refined, is_edge = (np.zeros(width * height, np.bool_) for _ in range(3))
     is_edge[gbuffer.owner] = True
@@ -129,7 +128,7 @@ def _spread_uncertainty(
 def _trace_edge_rays(
     trace_arguments: _TraceArguments, gbuffer: GBuffer, num_pixels: int, width: int, num_visible: U8
 ) -> None:
-    """Ask the rays beyond one for each pixel, for all targets where those of one pixel do not agree."""
+    """Trace the extra rays of edge pixels; all targets if the rays of a pixel disagree."""
     rays, face = trace_arguments[3], gbuffer.hits.face
     edge_rays = np.flatnonzero(face[num_pixels:] >= 0) + num_pixels
     parallel_for_chunks(

@@ -1,4 +1,4 @@
-"""What beams are: where their light comes from, and what points would get of it if nothing were in the way."""
+"""Hard-shadow lights: their targets, and their unoccluded incident light at probes."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Hashable
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.environments.equirect import rotate_about_y
@@ -18,51 +19,52 @@ from relume.transport.incident_coefficients import incident_coefficients
 
 F32 = NDArray[np.float32]
 
-_DELTA_LIGHT_KINDS = "point", "spot", "directional"  # of lamps that have no extent
+_DELTA_LIGHT_KINDS = "point", "spot", "directional"  # of lights without extent
 _MAX_LOCAL_LIGHTS = 4
 
 
 class ShadowTargets(NamedTuple):
-    """What shadow rays are sent to.
+    """Targets of shadow rays.
 
     Attributes:
-        towards: unit directions, or places in metres; each has an equal share of the light. One of `NUM_TARGET_SETS`
-            sets is a pixel's own. (`NUM_TARGET_SETS`, `NUM_TARGETS`, 3) float32
+        towards: unit directions, or positions in meters, with an equal fraction of the light each. Each pixel uses one
+            of
+            `NUM_TARGET_SETS` sets.
         is_far: they are directions.
     """
 
-    towards: F32
+    towards: Shaped[F32, "sets targets 3"]
     is_far: bool
 
 
 class HardShadowLight(NamedTuple):
-    """One source.
+    """One hard-shadow light.
 
     Attributes:
-        key: of its targets: equal ones cast equal shadows. Of a lamp it is the geometry.
-        vectors: of its light at points, nothing in its way, gain 1. (points, 3, K) float32
-        gain: of it, in each channel. (3,) float32
+        key: equal keys cast equal shadows. For a local light it is the geometry.
+        vectors: its unoccluded incident coefficients at probes, gain 1.
+        gain: per channel.
     """
 
     key: Hashable
     targets: ShadowTargets
-    vectors: F32
-    gain: F32
+    vectors: Shaped[F32, "probes 3 K"]
+    gain: Shaped[F32, " 3"]
 
-    def scatter(self, rows: NDArray[np.intp], shape: tuple[int, int, int]) -> HardShadowLight:
-        """The same of as many points as vectors of this shape have, whose light is that of some. chosen: these. (n,)"""
+    def scatter(self, rows: Shaped[NDArray[np.intp], " n"], shape: tuple[int, int, int]) -> HardShadowLight:
+        """Return the same light with coefficients of all probes, zero except in `rows`. shape: of all coefficients."""
         vectors = np.zeros(shape, np.float32)
         vectors[rows] = self.vectors
         return self._replace(vectors=vectors)
 
     @property
-    def center(self) -> F32:
-        """Where its light comes from: a direction, not quite unit, or a place. (3,) float32"""
+    def center(self) -> Shaped[F32, " 3"]:
+        """Mean target: a direction, not quite unit, or a position."""
         return np.asarray(self.targets.towards.mean(axis=(0, 1)), np.float32)
 
 
 def hard_shadow_lights(light: Illumination) -> tuple[LightSource, ...]:
-    """Find the lamps of a light that are beams: all of those without an extent, unless they are many."""
+    """Return the local lights with hard shadows: all lights without extent, unless there are too many."""
     sources = tuple(
         source for source in light.local if source.geometry.kind in _DELTA_LIGHT_KINDS and light.paths.direct
     )
@@ -70,13 +72,13 @@ def hard_shadow_lights(light: Illumination) -> tuple[LightSource, ...]:
 
 
 def sun_shadow_targets(sun_disk: SunDisk, rotation: float) -> ShadowTargets:
-    """Aim at a sun of a map that is turned by `rotation` degrees."""
+    """Return the targets of a sun disk in a map rotated by `rotation` degrees."""
     towards = rotate_about_y(sun_disk.directions.reshape(-1, 3), rotation).reshape(sun_disk.directions.shape)
     return ShadowTargets(np.ascontiguousarray(towards, np.float32), True)
 
 
 def local_shadow_targets(geometry: LightGeometry) -> ShadowTargets:
-    """Aim at a lamp without an extent."""
+    """Return the targets of a local light without extent."""
     is_far = geometry.kind == "directional"
     location = np.array(geometry.position, np.float64)
     if is_far:
@@ -85,13 +87,11 @@ def local_shadow_targets(geometry: LightGeometry) -> ShadowTargets:
     return ShadowTargets(np.tile(location, (NUM_TARGET_SETS, NUM_TARGETS, 1)).astype(np.float32), is_far)
 
 
-def unoccluded_sun_vectors(sun_disk: SunDisk, rotation: float, probes: SurfacePoints) -> F32:
-    """Find what points get of a sun if nothing hides it.
+def unoccluded_sun_vectors(sun_disk: SunDisk, rotation: float, probes: SurfacePoints) -> Shaped[F32, "probes 3 K"]:
+    """Return the unoccluded incident coefficients of a sun disk at probes.
 
     Args:
-        sun_disk: of a map. rotation: of the map, degrees. probes: that are asked about.
-    Returns:
-        Light vectors. (points, 3, K) float32
+        sun_disk: of a map. rotation: of the map, degrees. probes: the probes.
     """
     mean = rotate_about_y(sun_disk.mean[None], rotation)
     length = np.linalg.norm(mean)

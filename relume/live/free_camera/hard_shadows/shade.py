@@ -1,10 +1,10 @@
-"""What surfaces send of beams, as far as rays see them: unhidden light is interpolated between points, shadows are not.
+"""Shading with hard-shadow lights: unoccluded light is interpolated between probes, visibility is traced per pixel.
 
-    B(pixel) = Σ_points w (B − S) + V(pixel) Σ_points w U
+    B(pixel) = Σ_probes w (B − S) + V(pixel) Σ_probes w U
 
-S is what a point knows of the beam, with the shadows that points know; U what it would get if nothing were in the
-way. Light vectors that are shown beside beams lack S; V is the share that
-`relume.live.free_camera.hard_shadow_lights.shadows` finds.
+S is a probe's light from the source with the probe's own visibility; U is the unoccluded light. Incident coefficients
+used with hard-shadow lights exclude S; V is the visible fraction from
+`relume.live.free_camera.hard_shadows.adaptive_shadows`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.live.free_camera.basis.highlight_lobes import build_lobes
@@ -29,7 +30,7 @@ F32 = NDArray[np.float32]
 
 
 class BeamMaterials(Protocol):
-    """What is asked of `relume.live.free_camera.frame.MaterialState`."""
+    """Interface of `relume.live.free_camera.frame.MaterialState`."""
 
     @property
     def tables(self) -> Tables: ...
@@ -46,17 +47,17 @@ def add_direct_sharp(
     pixel_angle: float,
     materials: BeamMaterials,
     unused_environment: PrefilteredEnvironment,
-    rays: NDArray[np.int32] | None,
-    out: F32,
+    rays: Shaped[NDArray[np.int32], " n"] | None,
+    out: Shaped[F32, "rays 3"],
 ) -> None:
-    """Add what surfaces send of beams, by the terms that the in-basis tells.
+    """Add the reflected light of hard-shadow lights, for terms that the basis represents.
 
     Args:
-        hard_shadow_lights: of the light. shadow_visibility: that rays see of each. (rays,) float32 each
-        stored_scene: that is seen. gbuffer: by the rays. camera: the eye. pixel_angle: that a pixel spans, radians.
-        materials: of the surface. unused_environment: any; nothing of it is shown.
-        rays: that are asked; None: all. (n,) int32
-        out: added to there. (rays, 3) float32
+        hard_shadow_lights: of the illumination. shadow_visibility: of each along the rays. (rays,) float32 each
+        stored_scene: the scene. gbuffer: of the rays. camera: of the rays. pixel_angle: of a pixel, radians.
+        materials: of the surfaces. unused_environment: any; it is not shown.
+        rays: the rays to shade; None: all.
+        out: radiance, float32, added to.
     """
     num_materials, camera_position = len(materials.is_reflective), camera.to_world[:3, 3].astype(np.float32)
     dark = np.zeros((num_materials, 3), np.float32)
@@ -79,7 +80,7 @@ def add_direct_sharp(
 
 
 def _light_directions(stored_scene: StoredScene, light: HardShadowLight) -> F32:
-    """Where a beam comes from, for normal maps: seen from each vertex. (vertices or 0, 3) float32"""
+    """Direction to a hard-shadow light from each lattice node, for normal maps. (nodes or 0, 3) float32"""
     if not len(stored_scene.tangents):
         return np.empty((0, 3), np.float32)
     if light.targets.is_far:

@@ -1,6 +1,6 @@
-"""Kernels of hard shadows: rays ask for targets, and pixels are predicted, doubted, evened out.
+"""Kernels of adaptive hard shadows: trace targets, predict pixels, mark uncertain ones, smooth penumbras.
 
-A target is one of `Targets.towards`. What a ray has seen is counted in targets, from 0 to `NUM_TARGETS`.
+A target is one of `ShadowTargets.towards`. Visibility is counted in targets, from 0 to `NUM_TARGETS`.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from relume.raytrace.ray_packet import (
 
 F32 = NDArray[np.float32]
 
-_REFINEMENT_RADIUS = 2  # pixels that a contradiction is believed for
-_MIN_SLANT = np.float32(0.05)  # cosine, below which what a pixel covers is taken for less than it is
-_LIFT = np.float32(0.15)  # of the way aside, over which a hollow surface of small faces rises less
-# the order in which pixels that follow each other ask for targets: far apart on the light
+_REFINEMENT_RADIUS = 2  # pixels around a contradiction that are traced
+_MIN_SLANT = np.float32(0.05)  # cosine, below which the pixel footprint is limited
+_LIFT = np.float32(0.15)  # of the lateral offset; concave tessellated surfaces rise less
+# order of targets in adjacent pixels: far apart on the light
 _ORDER = np.array([0, 8, 4, 12, 2, 10, 6, 14, 1, 9, 5, 13, 3, 11, 7, 15], np.int64)
 
 
 class ShadowRays(NamedTuple):
-    """What rays hit, as kernels want it."""
+    """Hits of camera rays, as arrays for kernels."""
 
     positions: F32
     edge_offset: F32
@@ -54,7 +54,9 @@ class ShadowRays(NamedTuple):
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _shadow_origin(rays, p, at):  # type: ignore[no-untyped-def]
-    """Write where a ray hits, off its surface, and the face's normal on its side. at: (3, 3), the last scratch"""
+    """Write the hit point, offset from its surface, and the face normal on its side. at: (3, 3), the last row is
+    scratch
+    """
     f, along, barycentric = rays.face[p], np.float32(0), at[2]
     a, b, c = rays.faces[f, 0], rays.faces[f, 1], rays.faces[f, 2]
     barycentric[0], barycentric[1], barycentric[2] = (
@@ -64,7 +66,7 @@ def _shadow_origin(rays, p, at):  # type: ignore[no-untyped-def]
     )
     for axis in range(3):
         along += rays.face_normal[f, axis] * rays.directions[p, axis]
-    # where two walls meet, a place on the one would lie in the other's plane, and see what is behind it
+    # at the edge of two walls, a point on one would lie in the plane of the other and look behind it
     total = np.float32(0)
     for k in range(3):
         barycentric[k] = max(barycentric[k], rays.edge_offset[f, k])
@@ -82,7 +84,7 @@ def _shadow_origin(rays, p, at):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _aim_at_target(packet, lane, targets, target_set, target_index, x, y, z, normal):  # type: ignore[no-untyped-def]
-    """Send a lane from a place to one of the targets; returns whether that lies above the face."""
+    """Aim a lane from a point at a target; returns whether the target lies above the face."""
     dx, dy, dz = (
         targets.towards[target_set, target_index, 0],
         targets.towards[target_set, target_index, 1],
@@ -99,12 +101,11 @@ def _aim_at_target(packet, lane, targets, target_set, target_index, x, y, z, nor
 
 @nb.njit(nogil=True, cache=True)
 def trace_single_target(occluded, scene, arguments, rays, targets, ray_indices, width, start, stop, num_visible):  # type: ignore[no-untyped-def]
-    """Ask for one target from each of rays chosen[start:stop].
+    """Trace one target from each of the rays ray_indices[start:stop].
 
     Args:
-        occluded, scene, arguments: of Embree. rays: of the eye. targets: on the beam. ray_indices: numbers of rays.
-        (m,)
-        width: of the picture, pixels. start, stop: the range. num_visible: written, 0 or `NUM_TARGETS`. (rays,) uint8
+        occluded, scene, arguments: of Embree. rays: of the camera. targets: of the light. ray_indices: the rays. (m,)
+        width: of the image, pixels. start, stop: the range. num_visible: written, 0 or `NUM_TARGETS`. (rays,) uint8
     """
     packet, at = new_packet(scene, arguments), np.empty((3, 3), np.float32)
     is_above = np.zeros(LANES, np.bool_)
@@ -128,11 +129,11 @@ def trace_single_target(occluded, scene, arguments, rays, targets, ray_indices, 
 
 @nb.njit(nogil=True, cache=True)
 def trace_all_targets(occluded, scene, arguments, rays, targets, ray_indices, is_edge, width, start, stop, num_visible):  # type: ignore[no-untyped-def]
-    """Ask for all targets of rays chosen[start:stop], over what their pixels cover.
+    """Trace all targets of the rays ray_indices[start:stop], from points in their pixel footprints.
 
     Args:
-        occluded, scene, arguments, rays, targets, ray_indices, width, start, stop: as of `trace_single_target`.
-        is_edge: whether a pixel lies on one. (pixels,) num_visible: written, targets that are seen. (rays,) uint8
+        occluded, scene, arguments, rays, targets, ray_indices, width, start, stop: as in `trace_single_target`.
+        is_edge: pixels on an edge. (pixels,) num_visible: written, number of visible targets. (rays,) uint8
     """
     packet, at = new_packet(scene, arguments), np.empty((3, 3), np.float32)
     is_above, step = np.zeros(LANES, np.bool_), np.empty((2, 3), np.float32)
@@ -142,7 +143,7 @@ def trace_all_targets(occluded, scene, arguments, rays, targets, ray_indices, is
         reach = np.float32(0)
         if p < len(is_edge) and not is_edge[p]:
             reach = np.float32(0.25) * rays.distance[p] * min(-slant / _MIN_SLANT, np.float32(1))
-        for side in range(2):  # what the pixel covers of the plane through its middle
+        for side in range(2):  # footprint of the pixel in the plane through its center
             across = rays.right if side == 0 else rays.up
             normal_component: Any = across[0] * at[1, 0] + across[1] * at[1, 1] + across[2] * at[1, 2]
             for axis in range(3):
@@ -168,7 +169,7 @@ def trace_all_targets(occluded, scene, arguments, rays, targets, ray_indices, is
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def _is_same_surface(rays, p, q):  # type: ignore[no-untyped-def]
-    """Whether two pixels see one surface."""
+    """Return whether two pixels show one surface."""
     return rays.face[q] >= 0 and not is_edge(
         rays.material, rays.face_normal, rays.face, rays.distance, rays.directions, p, q
     )
@@ -176,11 +177,11 @@ def _is_same_surface(rays, p, q):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def predict(rays, width, height, start, stop, num_visible, is_uncertain):  # type: ignore[no-untyped-def]
-    """Predict what was not asked in squares of 2 × 2 pixels [start, stop); doubt it where others disagree.
+    """Predict untraced pixels in blocks of 2 × 2 pixels [start, stop); mark them uncertain if neighbors disagree.
 
     Args:
-        rays: of the eye. width, height: of the picture, pixels. start, stop: the range.
-        num_visible: targets that are seen, written where nobody asked. (rays,) uint8. is_uncertain: written. (rays,)
+        rays: of the camera. width, height: of the image, pixels. start, stop: the range.
+        num_visible: visible targets, written for untraced pixels. (rays,) uint8. is_uncertain: written. (rays,)
     """
     across, down = (width + 1) // 2, (height + 1) // 2
     for block in range(start, stop):
@@ -200,7 +201,7 @@ def predict(rays, width, height, start, stop, num_visible, is_uncertain):  # typ
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _predict_pixel(rays, width, height, x, y, num_visible, is_uncertain):  # type: ignore[no-untyped-def]
-    """Predict a pixel from those of its surface about it that were asked."""
+    """Predict a pixel from traced neighbors on its surface."""
     p, num_neighbors, agree, value = y * width + x, 0, True, np.uint8(0)
     for row in range(max(y - 2 + y % 2, 0), min(y + 3, height), 2):
         for column in range(max(x - 2 + x % 2, 0), min(x + 3, width), 2):
@@ -216,11 +217,11 @@ def _predict_pixel(rays, width, height, x, y, num_visible, is_uncertain):  # typ
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def needs_refinement(rays, width, height, refined_pixels, is_refined, num_visible, start, stop, is_uncertain):  # type: ignore[no-untyped-def]
-    """Doubt what was predicted near found[start:stop], on their surface, and differs from them.
+    """Mark predicted pixels near refined_pixels[start:stop], on their surface, that differ from them.
 
     Args:
-        rays, width, height, num_visible: as of `predict`. refined_pixels: pixels that were asked for all targets. (m,)
-        is_refined: whether a pixel was. (pixels,) start, stop: the range. is_uncertain: written. (rays,)
+        rays, width, height, num_visible: as in `predict`. refined_pixels: pixels that traced all targets. (m,)
+        is_refined: pixels that did. (pixels,) start, stop: the range. is_uncertain: written. (rays,)
     """
     for k in range(start, stop):
         p = refined_pixels[k]
@@ -234,11 +235,11 @@ def needs_refinement(rays, width, height, refined_pixels, is_refined, num_visibl
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def needs_refinement_at_edges(rays, owner, num_pixels, rays_per_pixel, num_visible, start, stop, is_uncertain):  # type: ignore[no-untyped-def]
-    """Doubt rays across edges of pixels owner[more · (start:stop)] that differ from others on a surface.
+    """Mark extra rays of edge pixels owner[rays_per_pixel · (start:stop)] that differ from others on a surface.
 
     Args:
-        rays, num_visible: as of `predict`. owner: pixels of the rays that go through no middle, rising. (k,)
-        num_pixels: of the picture. rays_per_pixel: such rays a pixel has. start, stop: the range. is_uncertain:
+        rays, num_visible: as in `predict`. owner: pixels of the extra rays, ascending. (k,)
+        num_pixels: of the image. rays_per_pixel: extra rays per edge pixel. start, stop: the range. is_uncertain:
             written. (k,)
     """
     for first in range(start * rays_per_pixel, stop * rays_per_pixel, rays_per_pixel):
@@ -256,10 +257,10 @@ def needs_refinement_at_edges(rays, owner, num_pixels, rays_per_pixel, num_visib
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def smooth_visibility(rays, width, height, num_visible, start, stop, out):  # type: ignore[no-untyped-def]
-    """Write the shares of pixels [start, stop): the mean of nine where all of them are partly in shadow.
+    """Write visible fractions of pixels [start, stop): the mean of nine if all are in penumbra.
 
     Args:
-        rays, width, height, num_visible: as of `predict`. start, stop: the range. out: written, 0…1. (rays,) float32
+        rays, width, height, num_visible: as in `predict`. start, stop: the range. out: written, 0…1. (rays,) float32
     """
     for p in range(start, stop):
         x, y, total = p % width, p // width, np.int64(num_visible[p])

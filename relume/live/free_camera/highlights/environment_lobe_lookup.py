@@ -1,4 +1,4 @@
-"""Where lobes look, and the sky that they show there."""
+"""Directions of lobes, and the prefiltered environment in them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -19,29 +20,30 @@ _MAX_EXPONENT = np.float32(16)  # e^−x is less than 2e-7
 
 
 class PrefilteredEnvironment(NamedTuple):
-    """The sky that lobes show.
+    """The environment as lobes show it.
 
     Attributes:
-        environment: its levels, lamps left out of all that are blurred.
-        bright_lights: what of it is small and strong: of each the direction, world space, ∫ L dω, and 1 − |Σ ω L / Σ
-            L|, the variance of its own width; `MAX_BRIGHT_LIGHTS` at most. (lamps, 7) float32
-        rotation: of the levels, from `rotation_of`. gain: of its light, in each channel. (3,) float32
+        environment: its levels; blurred ones exclude bright lights.
+        bright_lights: small bright regions: direction, world space, ∫ L dω, and 1 − |Σ ω L / Σ L|, the variance of
+            their
+            own width; at most `MAX_BRIGHT_LIGHTS`.
+        rotation: of the levels, from `rotation_of`. gain: per channel.
     """
 
     environment: EnvironmentLookup
-    bright_lights: F32
+    bright_lights: Shaped[F32, "bright_lights 7"]
     rotation: np.float32
-    gain: F32
+    gain: Shaped[F32, " 3"]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def evaluate_lobe(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
-    """Find where a lobe looks.
+    """Evaluate the direction and width of a lobe.
 
     Args:
-        lobes, lobe: which. n: the normal, d: from the eye, unit, tuples.
+        lobes, lobe: all lobes, and an index. n: the normal, d: from the camera, unit, tuples.
     Returns:
-        A row of its table and the share of the next; its direction, a tuple; its width.
+        A row of its table and the fraction toward the next; its direction, a tuple; its width.
     """
     row, fraction, tangential = _lobe_frame(n, d)
     cosine = lobes.mean[lobe, row] + fraction * (lobes.mean[lobe, row + 1] - lobes.mean[lobe, row])
@@ -53,13 +55,14 @@ def evaluate_lobe(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def evaluate_two_lobes(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
-    """Find where the two lobes that a point has for one look.
+    """Evaluate the directions and widths of the two lobes of a highlight.
 
     Args:
-        lobes, lobe, n, d: as of `evaluate_lobe`.
+        lobes, lobe, n, d: as in `evaluate_lobe`.
     Returns:
-        A row of the table and the share of the next; both directions, tuples; the share of the first, s_1; σ of the
-        first and of the other.
+        A row of the table and the fraction toward the next; both directions, tuples; the weight of the first, s_1; σ_1
+        and
+        σ_2.
     """
     row, fraction, tangential = _lobe_frame(n, d)
     weight_1 = lobes.first[lobe, row] + fraction * (lobes.first[lobe, row + 1] - lobes.first[lobe, row])
@@ -80,7 +83,7 @@ def evaluate_two_lobes(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _lobe_frame(n, d):  # type: ignore[no-untyped-def]
-    """Find where θo lies in tables, and the unit direction along the surface in which d goes on."""
+    """Return the table row of θo, and the unit projection of d onto the surface."""
     facing = -(n[0] * d[0] + n[1] * d[1] + n[2] * d[2])
     cosine: Any = min(max(facing, MIN_COSINE), np.float32(1))
     row, fraction = table_row(cosine)
@@ -91,7 +94,7 @@ def _lobe_frame(n, d):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _direction_at_cosine(cosine, tangential, n):  # type: ignore[no-untyped-def]
-    """The direction between n and `tangential`, by the cosine of its angle from n."""
+    """Return the direction in the plane of n and `tangential` with a given cosine to n."""
     sine = math.sqrt(max(np.float32(1) - cosine * cosine, np.float32(0)))
     return (
         sine * tangential[0] + cosine * n[0],
@@ -102,17 +105,18 @@ def _direction_at_cosine(cosine, tangential, n):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def add_environment_in_lobe(environment, visibility, direction, sigma, gain, out):  # type: ignore[no-untyped-def]
-    """Add what a lobe shows of the sky, without the sky's gain.
+    """Add the environment in a lobe, without the environment's gain.
 
     Args:
-        environment: a `PrefilteredEnvironment`. visibility: how much of it is seen, lamps left out, and of each lamp, a
-            tuple.
-        direction: of the lobe, a tuple. sigma: of the blur, radians. gain: that it is multiplied by.
+        environment: a `PrefilteredEnvironment`. visibility: of the environment without bright lights, and of each
+            bright
+            light, a tuple.
+        direction: of the lobe, a tuple. sigma: of the blur, radians. gain: a factor.
         out: added to, radiance. (3,)
     """
     level = blur_level(sigma)
     add_environment(environment.environment, environment.rotation, direction, level, visibility[0] * gain, out)
-    blurred = min(level, np.float32(1))  # the sharp level has its lamps
+    blurred = min(level, np.float32(1))  # the sharp level includes bright lights
     for bright_light in range(environment.bright_lights.shape[0]):
         concentration = np.float32(1) / (sigma * sigma + environment.bright_lights[bright_light, 6])
         x, y, z = (
@@ -132,5 +136,5 @@ def add_environment_in_lobe(environment, visibility, direction, sigma, gain, out
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _decay(x):  # type: ignore[no-untyped-def]
-    """e^−x, without a call where nothing is left."""
+    """Return e^−x, without a call if it is negligible."""
     return np.float32(math.exp(-x)) if x < _MAX_EXPONENT else np.float32(0)

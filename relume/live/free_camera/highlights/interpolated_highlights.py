@@ -1,15 +1,14 @@
-"""What is interpolated between points of the sky in highlights: all but the lobe that each pixel has anew.
+"""Environment highlights between probes: each pixel evaluates a lobe, and probes interpolate the rest.
 
-    B(pixel) = L(pixel) + Σ_points w (B − L),   L(ωo) = a(θo) (V L̄(ωm, σ) + Σ_lamps V_j L̄_j(ωm, σ))
+    B(pixel) = L(pixel) + Σ_probes w (B − L),   L(ωo) = a(θo) (V L̄(ωm, σ) + Σ_lights V_j L̄_j(ωm, σ))
 
-L is the sky in a lobe (`relume.live.free_camera.basis.highlight_lobes`), times what a point sees of it: a control
-variate; in fine frames, and where one lobe would stand for the highlight badly, L_2,
-the sky in two. It is what turns fastest where surfaces are
-curved, twice as fast as their normals. B is summed over lights (`relume.live.free_camera.highlights.sum_over_lights`),
-or it is what the in-basis says, Σ_k p_k t_k of the sky, where that tells as much. Beside what is bright this rings,
-and says what
-cannot be: it is held within a multiple of L_2; the more the in-basis misses, the smaller is the multiple. Lights are
-summed for the normal of a point: where a normal map bends it by more than a lobe is wide, L_2 alone is believed.
+L is the environment in a lobe (`relume.live.free_camera.basis.highlight_lobes`) times its visibility from a probe: a
+control variate. In fine frames, and if one lobe would fit the highlight badly, it is L_2, the environment in two lobes.
+It is the part that varies fastest on curved surfaces, twice as fast as normals. B is summed over lights
+(`relume.live.free_camera.highlights.light_sum_kernel`), or it is Σ_k p_k t_k of the environment, if the basis
+represents that. Next to bright regions the basis rings, so its value is clamped to multiples of L_2; the larger the
+residual of the basis, the smaller the multiple. Lights are summed for the normal of a probe: if a normal map perturbs
+normals by more than the width of a lobe, only L_2 is used.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ import math
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.thread_pools import parallel_for_chunks
@@ -33,7 +33,7 @@ from relume.live.free_camera.shade_probes import ProbeRadiance
 
 F32 = NDArray[np.float32]
 
-NORMAL_VARIANCE_FACTOR = np.float32(4)  # σ² of normals over that of a lobe, which turns twice as far
+NORMAL_VARIANCE_FACTOR = np.float32(4)  # a reflected direction turns twice as far as the normal
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
@@ -53,7 +53,7 @@ def _add_highlights(  # type: ignore[no-untyped-def]
     outgoing,
     basis_radiance,
 ):
-    """Add B − L to what the points that are [start, stop) of rows send. sent, sky: (points, groups, 3)"""
+    """Add B − L to the radiance of probes rows[start:stop]. outgoing, basis_radiance: (probes, groups, 3)"""
     position, normal, _, _, _ = probes
     lobe_radiance, two_lobe_radiance = np.empty(3, np.float32), np.empty(3, np.float32)
     for p in rows[start:stop]:
@@ -108,24 +108,22 @@ def add_environment_highlights(
     stored_scene: StoredScene,
     lobes: Lobes,
     environment: PrefilteredEnvironment,
-    camera_position: F32,
-    lobe_visibility: F32,
-    light_sums: F32,
-    is_needed: NDArray[np.uint8],
+    camera_position: Shaped[F32, " 3"],
+    lobe_visibility: Shaped[F32, "probes 3"],
+    light_sums: Shaped[F32, "probes 3"],
+    is_needed: Shaped[NDArray[np.uint8], " probes"],
     outgoing: ProbeRadiance,
     *,
     is_fine: bool,
 ) -> None:
-    """Add what points know of the sky in highlights, less what pixels find.
+    """Add the probes' environment highlights, minus the lobes that pixels evaluate.
 
     Args:
-        stored_scene: whose points. lobes: of all materials. environment: that they show. camera_position: where it is.
-            (3,) float32
-        lobe_visibility: of the points along their lobes, from `relume.live.free_camera.highlights.lobe_visibility`.
-            (points, 3)
-        light_sums: by lights, from `relume.live.free_camera.highlights.sum_over_lights`. (points, 3)
-        is_needed: points that are asked. (points,) uint8
-        outgoing: by them; its radiance is added to. is_fine: pixels find two lobes for a highlight, not one.
+        stored_scene: the scene. lobes: of all materials. environment: prefiltered. camera_position: of the camera.
+        lobe_visibility: of the probes along their lobes, from `relume.live.free_camera.highlights.lobe_visibility`.
+        light_sums: from `relume.live.free_camera.highlights.light_sum_kernel`.
+        is_needed: nonzero for probes to evaluate.
+        outgoing: its radiance is added to. is_fine: pixels evaluate two lobes, not one.
     """
     rows = np.flatnonzero(is_needed.view(np.bool_))
     probe_args = (

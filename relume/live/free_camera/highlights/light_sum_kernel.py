@@ -1,11 +1,10 @@
-"""What points send of the sky in highlights: summed over the light triangles that each of them sees.
+"""Environment highlights of probes, summed over visible environment triangles.
 
     B / a = (1 − β) (L_2 / a) + Σ_l V_l E_l T(x_l, ψ_l) / (x_h + α²)²
 
-T is a table of the highlight (`relume.live.free_camera.basis.lobe_shapes`), V_l a bit. Nothing is approximated but the
-shape of the table, and that light comes from where triangles are,
-as wide as they are: four that lie beside each other are one light
-where they are seen together, in the middle of those that are seen, and as wide as these are apart.
+T is a table of the highlight (`relume.live.free_camera.basis.lobe_shapes`), V_l a visibility bit. The approximations
+are the shape of the table and that of lights: each has the direction and width of its triangle, and four adjacent
+triangles count as one light if several are visible, with the mean direction and the spread of the visible ones.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.thread_pools import parallel_for_chunks
@@ -32,33 +32,35 @@ from relume.live.free_camera.probes.stored_scene import StoredScene
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-LIGHTS_PER_GROUP = 4  # lights beside each other that are one where a point sees several of them
+LIGHTS_PER_GROUP = 4  # adjacent lights that are merged if several are visible
 _MIN_SQUARED_DISTANCE = np.float32(2.0**MIN_EXPONENT)
 LEAST_BITS = np.int32(np.float32(_MIN_SQUARED_DISTANCE).view(np.int32))
-_HALF_OCTAVE = np.float32(2.0**-22)  # of bits of a float: a ring
-_LAST_RING, _LAST_SPOKE = np.float32(NUM_RINGS - 1.001), np.float32(NUM_AZIMUTHS - 1.001)
+_HALF_OCTAVE = np.float32(2.0**-22)  # of bits of a float: one ring
+_LAST_RING, _LAST_AZIMUTH = np.float32(NUM_RINGS - 1.001), np.float32(NUM_AZIMUTHS - 1.001)
 _RADIUS_TO_VARIANCE = 8.0  # a triangle's r² over that of the circle about it: of an equilateral one, along an axis
-_SPOKES_PER_RADIAN = np.float32(NUM_AZIMUTHS / math.pi)
+_AZIMUTHS_PER_RADIAN = np.float32(NUM_AZIMUTHS / math.pi)
 
 
 class EnvironmentLights(NamedTuple):
-    """The light triangles of a sky, in groups: of each group one light for every combination that is seen.
+    """The environment triangles, in groups: one light for each combination of visible triangles in a group.
 
     Attributes:
-        lights: of each combination the mean direction, unit, then Σ E in each channel. (16 groups, 6) float32
-        table: where the table of its width begins. (16 groups,) int32
+        lights: of each combination the mean direction, unit, then Σ E per channel.
+        table: start of the table of its width.
     """
 
-    lights: F32
-    table: NDArray[np.int32]
+    lights: Shaped[F32, "combinations 6"]
+    table: Shaped[NDArray[np.int32], " combinations"]
 
     @classmethod
-    def from_lights(cls, directions: F32, irradiance: F32, radius: F32) -> EnvironmentLights:
-        """Put lights together that follow each other.
+    def from_lights(
+        cls, directions: Shaped[F32, "lights 3"], irradiance: Shaped[F32, "lights 3"], radius: Shaped[F32, " lights"]
+    ) -> EnvironmentLights:
+        """Group successive lights.
 
         Args:
-            directions, irradiance: of each light, those beside each other one after another. (lights, 3) float32
-            radius: of a circle about each, radians. (lights,) float32
+            directions, irradiance: of each light, adjacent lights in succession.
+            radius: of a circle about each, radians.
         """
         num_rows = -(-len(directions) // LIGHTS_PER_GROUP) * LIGHTS_PER_GROUP
         rows = np.zeros((num_rows, 7))
@@ -76,16 +78,16 @@ class EnvironmentLights(NamedTuple):
         return cls(lights.reshape(-1, 6).astype(np.float32), table.ravel().astype(np.int32))
 
 
-# In one piece: arrays that are handed to functions, even to inlined ones, are counted as references, at every point.
+# One function: arrays passed to functions, even inlined ones, are reference-counted, for every probe.
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _sum_lights(probes, material, visibility_bits, environment_lights, lobes, camera_position, rows, start, stop, out):  # type: ignore[no-untyped-def]
-    """Sum the lights of the points that are [start, stop) of rows. out: (points, 3), written there"""
+    """Sum the lights of probes rows[start:stop]. out: (probes, 3), written there"""
     position, normal, _, _, _ = probes
     lights, table_start = environment_lights
     shape = lobes.shape.reshape(lobes.shape.shape[0], lobes.shape.shape[1], lobes.shape.shape[2] * NUM_GRID_DIRECTIONS)
     num_groups = lights.shape[0] >> LIGHTS_PER_GROUP
     visible_lights, ring = np.empty(num_groups, np.int32), np.empty(num_groups, np.float32)
-    spoke, scale = np.empty(num_groups, np.float32), np.empty(num_groups, np.float32)
+    azimuth, scale = np.empty(num_groups, np.float32), np.empty(num_groups, np.float32)
     ring_bits = ring.view(np.int32)
     for p in rows[start:stop]:
         out[p, 0] = out[p, 1] = out[p, 2] = 0
@@ -104,7 +106,7 @@ def _sum_lights(probes, material, visibility_bits, environment_lights, lobes, ca
         row, fraction = table_row(facing)
         flatness, double = lobes.flatness[lobe], np.float32(2) * facing
         mx, my, mz = double * nx - ox, double * ny - oy, double * nz - oz
-        # across the mirror direction, in the plane of n and o
+        # perpendicular to the mirror direction, in the plane of n and o
         ex, ey, ez = nx - facing * mx, ny - facing * my, nz - facing * mz
         inverse_length = np.float32(1) / math.sqrt(max(ex * ex + ey * ey + ez * ez, np.float32(1e-12)))
         ex, ey, ez = inverse_length * ex, inverse_length * ey, inverse_length * ez
@@ -117,11 +119,11 @@ def _sum_lights(probes, material, visibility_bits, environment_lights, lobes, ca
             if byte_value >> 4:
                 visible_lights[num] = 32 * byte + 16 + (byte_value >> 4)
                 num += 1
-        for k in range(num):  # put side by side: the loop after this one does sixteen at once
+        for k in range(num):  # contiguous, so that the next loop vectorizes
             light = visible_lights[k]
-            ring[k], spoke[k], scale[k] = lights[light, 0], lights[light, 1], lights[light, 2]
+            ring[k], azimuth[k], scale[k] = lights[light, 0], lights[light, 1], lights[light, 2]
         for k in range(num):
-            lx, ly, lz = ring[k], spoke[k], scale[k]
+            lx, ly, lz = ring[k], azimuth[k], scale[k]
             mirror_cosine, cross_component = mx * lx + my * ly + mz * lz, ex * lx + ey * ly + ez * lz
             squared_distance: Any = min(
                 max(np.float32(2) - np.float32(2) * mirror_cosine, _MIN_SQUARED_DISTANCE), np.float32(4)
@@ -139,14 +141,14 @@ def _sum_lights(probes, material, visibility_bits, environment_lights, lobes, ca
             half = (nx * lx + ny * ly + nz * lz + facing) / math.sqrt(half_squared)
             denominator = max(np.float32(2) - np.float32(2) * half, np.float32(0)) + flatness
             ring[k] = squared_distance
-            spoke[k] = min(max(psi * _SPOKES_PER_RADIAN - np.float32(0.5), np.float32(0)), _LAST_SPOKE)
+            azimuth[k] = min(max(psi * _AZIMUTHS_PER_RADIAN - np.float32(0.5), np.float32(0)), _LAST_AZIMUTH)
             scale[k] = np.float32(1) / (denominator * denominator)
         red = green = blue = np.float32(0)
         for k in range(num):
             light = visible_lights[k]
             ring_coordinate: Any = min(np.float32(ring_bits[k] - LEAST_BITS) * _HALF_OCTAVE, _LAST_RING)
-            r, s = np.int32(ring_coordinate), np.int32(spoke[k])
-            fr, fs = ring_coordinate - np.float32(r), spoke[k] - np.float32(s)
+            r, s = np.int32(ring_coordinate), np.int32(azimuth[k])
+            fr, fs = ring_coordinate - np.float32(r), azimuth[k] - np.float32(s)
             at = table_start[light] + r * NUM_AZIMUTHS + s
             wa, wb = (np.float32(1) - fr) * (np.float32(1) - fs), (np.float32(1) - fr) * fs
             wc, wd = fr * (np.float32(1) - fs), fr * fs
@@ -164,21 +166,20 @@ def _sum_lights(probes, material, visibility_bits, environment_lights, lobes, ca
 
 def sum_lights(
     stored_scene: StoredScene,
-    visibility_bits: NDArray[np.uint8],
+    visibility_bits: Shaped[NDArray[np.uint8], "probes bytes"],
     lights: EnvironmentLights,
     lobes: Lobes,
-    camera_position: F32,
-    is_needed: NDArray[np.uint8],
-) -> F32:
-    """Sum the lights that points see in their highlights.
+    camera_position: Shaped[F32, " 3"],
+    is_needed: Shaped[NDArray[np.uint8], " probes"],
+) -> Shaped[F32, "probes 3"]:
+    """Sum the visible lights in highlights of probes.
 
     Args:
-        stored_scene: whose points. visibility_bits: light l of a point in bit l & 7 of byte l >> 3. (points, bytes)
-            uint8
-        lights: of the sky. lobes: of all materials. camera_position: where it is. (3,) float32
-        is_needed: points that are asked; the others get nothing. (points,) uint8
+        stored_scene: the scene. visibility_bits: light l of a probe in bit l & 7 of byte l >> 3.
+        lights: of the environment. lobes: of all materials. camera_position: of the camera.
+        is_needed: nonzero for probes to evaluate; the others get zero.
     Returns:
-        Σ, of unit albedo, of what neither lobes nor the in-basis are believed. (points, 3) float32
+        Σ for unit albedo, without the fractions of lobes; zero if the basis represents the highlight.
     """
     sums = np.zeros((len(visibility_bits), 3), np.float32)
     rows = np.flatnonzero(is_needed.view(np.bool_))

@@ -1,14 +1,13 @@
-"""How other light than the sky's changes in highlights as they look elsewhere: gradients, and halves of them.
+"""Gradients of non-environment highlights with respect to the mirror direction.
 
-    Y(pixel) = Σ_points w (Y_p + ½ G_p · (ωr − ω_p)),   G = ∂Y / ∂ωr
+    Y(pixel) = Σ_probes w (Y_p + ½ G_p · (ωr − ω_p)),   G = ∂Y / ∂ωr
 
-Y is the luminance of Σ_k w_k p_k t_k (`relume.live.free_camera.shade_probes`) for an albedo of one, ωr the mirror
-direction of what is seen. Where weights w give ωr back from those of points, ω_p,
-this is exact for what is square in ωr: the second
-order that the whole gradient adds too much of is what is missing without it (docs/free-camera.md#highlights). ωr turns
-twice as fast as normals do, and reflections with it.
+Y is the luminance of Σ_k w_k p_k t_k (`relume.live.free_camera.shade_probes`) for unit albedo, ωr the mirror direction
+at the pixel. If the weights w reproduce ωr from those of probes, ω_p, this is exact for functions quadratic in ωr: the
+full gradient adds twice the missing second order (docs/free-camera.md#highlights). ωr turns twice as fast as normals,
+and so do reflections.
 
-What pixels add is linear in their own ωr: points tell G, and G · ω_p.
+The contribution of a pixel is linear in its own ωr: probes provide G and G · ω_p.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ from typing import Any
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import LUMINANCE
@@ -34,7 +34,7 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 _LUMINANCE = np.array(LUMINANCE, np.float32)
-_NON_ENVIRONMENT_COLUMN = 4  # the column of `Tables.table_index` for other light in highlights
+_NON_ENVIRONMENT_COLUMN = 4  # column of `Tables.table_index` for other light in highlights
 _MIN_SINE = np.float32(1e-3)
 
 
@@ -43,10 +43,10 @@ def _sum_factors(tables, lobes, material, row, channel, factors, step):  # type:
     """Sum the tables and albedos of a material's terms with a highlight.
 
     Args:
-        tables, lobes: of all materials. material, row, channel: which one, and where.
-        factors, step: written, w_k p_k in the row and what the next has more. (rungs,)
+        tables, lobes: of all materials. material, row, channel: indices.
+        factors, step: written, w_k p_k in the row and the difference to the next. (entries,)
     Returns:
-        The albedo in the row, and what the next has more.
+        The albedo in the row, and the difference to the next.
     """
     albedo = albedo_step = np.float32(0)
     lobe, num_basis = lobes.lobe_index[material], factors.shape[0]
@@ -69,13 +69,13 @@ def _sum_factors(tables, lobes, material, row, channel, factors, step):  # type:
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _outgoing_with_derivatives(recurrence_table, incident, channel, factors, step, view_coordinates):  # type: ignore[no-untyped-def]
-    """Sum the light of a point with factors, and how that changes.
+    """Sum the incident light of a probe with coefficients, and its derivatives.
 
     Args:
-        recurrence_table: of the ladder. incident: t of the point. (3, K). channel, factors, step: see `_sum_factors`.
-        view_coordinates: from `seen_from`.
+        recurrence_table: of the basis. incident: t of the probe. (3, K). channel, factors, step: see `_sum_factors`.
+        view_coordinates: from `view_direction_local`.
     Returns:
-        Σ_k w_k p_k t_k; what it changes by in a row; and in a radian of φo.
+        Σ_k w_k p_k t_k; its derivative per row; and per radian of φo.
     """
     _, fraction, cosine_phi, sine_phi = view_coordinates
     outgoing = row_derivative = azimuth_derivative = np.float32(0)
@@ -97,17 +97,18 @@ def _outgoing_with_derivatives(recurrence_table, incident, channel, factors, ste
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _gradient(recurrence_table, n, t, o, view_coordinates, non_environment, tables, lobes, material, factors, step):  # type: ignore[no-untyped-def]
-    """Find G of a point, in world space.
+    """Return G of a probe, in world space.
 
     Args:
-        n, t, o: its normal, its tangent and where the eye is, unit, tuples. view_coordinates: from `seen_from`.
-        non_environment: t of it. (3, K). factors, step: room. (rungs,)
+        n, t, o: its normal, tangent and direction to the camera, unit, tuples. view_coordinates: from
+            `view_direction_local`.
+        non_environment: t of it. (3, K). factors, step: scratch. (entries,)
     """
     row, fraction, cosine_phi, sine_phi = view_coordinates
     facing = n[0] * o[0] + n[1] * o[1] + n[2] * o[2]
     cosine: Any = min(max(facing, MIN_COSINE), np.float32(1))
     sine: Any = max(math.sqrt(max(np.float32(1) - facing * facing, np.float32(0))), _MIN_SINE)
-    # rows of tables for a radian of θo; none where tables end
+    # table rows per radian of θo; 0 beyond the end of the table
     rows_per_radian = np.float32(0.5 * (NUM_ROWS - 1)) * math.sqrt(np.float32(1) + cosine)
     if facing < MIN_COSINE:
         rows_per_radian = np.float32(0)
@@ -122,7 +123,7 @@ def _gradient(recurrence_table, n, t, o, view_coordinates, non_environment, tabl
             weight = _LUMINANCE[channel] / albedo
             by_theta += weight * rows_per_radian * (row_derivative - outgoing * albedo_step / albedo)
             by_phi += weight * azimuth_derivative / sine
-    # ωr goes down where θo grows, away from the eye, and turns against φ̂
+    # as θo grows, ωr turns down and away from the camera; as φo grows, against φ̂
     tangent_component = sine_phi * by_phi - facing * cosine_phi * by_theta
     bitangent_component, normal_component = -cosine_phi * by_phi - facing * sine_phi * by_theta, -sine * by_theta
     bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
@@ -149,7 +150,7 @@ def _gradient_rows(  # type: ignore[no-untyped-def]
     step,
     out,
 ):
-    """Find G and G · ω_p of the points that are [start, stop) of rows. out: (points, 4), written there"""
+    """Compute G and G · ω_p of probes rows[start:stop]. out: (probes, 4), written there"""
     position, normal, tangent, _, _ = probes
     for row_index in range(start, stop):
         p = rows[row_index]
@@ -180,7 +181,7 @@ def _gradient_rows(  # type: ignore[no-untyped-def]
 def _gradient_kernel(  # type: ignore[no-untyped-def]
     recurrence_table, probes, material, non_environment, tables, lobes, camera_position, rows, start, stop, out
 ):
-    """Make room, and do as `_gradient_rows`."""
+    """Allocate scratch arrays and call `_gradient_rows`."""
     factors, step = (
         np.empty(recurrence_table.order.shape[0], np.float32),
         np.empty(recurrence_table.order.shape[0], np.float32),
@@ -204,23 +205,23 @@ def _gradient_kernel(  # type: ignore[no-untyped-def]
 
 def gradients_along_lobe(
     stored_scene: StoredScene,
-    non_environment: F32,
+    non_environment: Shaped[F32, "probes 3 K"],
     tables: Tables,
     lobes: Lobes,
-    camera_position: F32,
-    is_needed: NDArray[np.uint8],
-    out: F32 | None = None,
-) -> F32:
-    """Find how points send other light otherwise in their highlights as these look elsewhere.
+    camera_position: Shaped[F32, " 3"],
+    is_needed: Shaped[NDArray[np.uint8], " probes"],
+    out: Shaped[F32, "probes 4"] | None = None,
+) -> Shaped[F32, "probes 4"]:
+    """Return the gradients of other light in highlights with respect to the mirror direction.
 
     Args:
-        stored_scene: whose points. non_environment: t of all light but the sky's own. (points, 3, K) float32
-        tables: of all materials; those over φo too tell nothing of it. lobes: of all materials.
-        camera_position: where it is. (3,) float32
-        is_needed: points that are asked. (points,) uint8
-        out: written where needed; None: the others are nothing.
+        stored_scene: the scene. non_environment: t of all light except the environment's own.
+        tables: of all materials; anisotropic ones are ignored. lobes: of all materials.
+        camera_position: of the camera.
+        is_needed: nonzero for probes to evaluate.
+        out: overwritten there; None: new, zero elsewhere.
     Returns:
-        G, world space, and G · ω_p, radiance. (points, 4) float32
+        G in world space, and G · ω_p, radiance.
     """
     gradients = np.zeros((len(non_environment), 4), np.float32) if out is None else out
     rows = np.flatnonzero(is_needed.view(np.bool_))

@@ -1,12 +1,13 @@
-"""The lights that a lobe may see, listed by where it looks and how wide it is.
+"""Lists of the lights in a lobe, by its direction and width.
 
-A point knows of each light triangle whether it sees it. What it sees of the sky in a lobe about ω, σ wide, is
+A probe has a visibility bit for each environment triangle. The visible fraction of the environment in a lobe around ω
+of width σ is
 
     V = Σ_l V_l w_l / Σ_l w_l,   w_l = E_l / (σ² + r_l²) · (1 − (1 − ω · ω_l) / (8 (σ² + r_l²)))₊⁸,
 
-weighed by light, with r_l what a triangle is wide: (1 − x / 8)⁸ is e^−x nearly, without a call, and nothing beyond
-twenty degrees of a lobe of seven. Of a thousand lights few count, and those that do are listed for each of 576 squares
-of an octahedral map of directions and each of some widths.
+weighted by light, with r_l the width of a triangle. (1 − x / 8)⁸ approximates e^−x without a call, and vanishes beyond
+twenty degrees for a lobe of seven. Few of a thousand lights matter; they are listed for each of 576 direction bins of
+an octahedral map and each of some widths.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -28,8 +30,8 @@ from relume.live.free_camera.basis.highlight_lobes import Lobes
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-SIDE = 24  # of the map, in squares
-NUM_LISTED = 32  # lights in a list, at most
+SIDE = 24  # of the map, in direction bins
+NUM_LISTED = 32  # greatest number of lights in a list
 MAX_BRIGHT_LIGHTS, LIGHTS_PER_BRIGHT_LIGHT = MAX_SUN_DISKS, 16
 MIN_SIGMA = 0.05  # σ of the first width, radians; each is √2 times the one before
 NUM_WIDTHS = 10
@@ -38,33 +40,33 @@ _RADIUS_TO_VARIANCE = 8.0  # a triangle's r² over that of the circle about it: 
 
 
 class LobeLightLists(NamedTuple):
-    """Lights of a sky, and lists of them.
+    """Environment lights, and lists of them per direction bin.
 
     Attributes:
-        lights: of each light the direction, r², and E, luminous, without lamps. (lights, 5) float32
-        lists: lights of every width and square; after the last of a list −1. (lists, `NUM_LISTED`) int32
-        first: list of the first square of each width, or of the nearest that has lists. (`NUM_WIDTHS`,) int32
-        bright_lights: the lights that most of each lamp comes by, then −1. (lamps, `LIGHTS_PER_BRIGHT_LIGHT`) int32
-        bright_light_weights: how much of it comes by each, one in all. (lamps, `LIGHTS_PER_BRIGHT_LIGHT`) float32
+        lights: of each the direction, r², and E, luminance, without bright lights.
+        lists: lights of every width and bin; −1 after the last.
+        first: list of the first bin of each width, or of the nearest width with lists.
+        bright_lights: the lights that contribute most to each bright light, then −1.
+        bright_light_weights: contribution of each, 1 in sum.
     """
 
-    lights: F32
-    lists: NDArray[np.int32]
-    first: NDArray[np.int32]
-    bright_lights: NDArray[np.int32]
-    bright_light_weights: F32
+    lights: Shaped[F32, "lights 5"]
+    lists: Shaped[NDArray[np.int32], "lists listed"]
+    first: Shaped[NDArray[np.int32], " widths"]
+    bright_lights: Shaped[NDArray[np.int32], "bright_lights contributors"]
+    bright_light_weights: Shaped[F32, "bright_lights contributors"]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def width_index(sigma):  # type: ignore[no-untyped-def]
-    """Find which width's lists a lobe of σ takes: the nearest."""
+    """Return the index of the width nearest to σ."""
     step = np.float32(2) * math.log2(max(sigma, np.float32(1e-6)) * np.float32(1 / MIN_SIGMA))
     return min(max(np.int64(step + np.float32(0.5)), 0), NUM_WIDTHS - 1)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def bin_of(x, y, z):  # type: ignore[no-untyped-def]
-    """Find the square of a direction, whose parts are x, y, z."""
+    """Return the direction bin of the direction x, y, z."""
     per = np.float32(1) / (abs(x) + abs(y) + abs(z))
     u, v = x * per, z * per
     if y < 0:
@@ -78,7 +80,7 @@ def bin_of(x, y, z):  # type: ignore[no-untyped-def]
 
 
 def _direction_bins() -> tuple[F64, F64]:
-    """Directions of the squares' middles (squares, 3), and the angle from each to its farthest corner (squares,)."""
+    """Center directions of bins (bins, 3), and the angle from each to its farthest corner (bins,)."""
     edge = np.linspace(-1, 1, SIDE + 1)
     middle = 0.5 * (edge[1:] + edge[:-1])
 
@@ -102,10 +104,11 @@ _DIRECTION_BINS = _direction_bins()
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def light_weight(lights, light, x, y, z, variance):  # type: ignore[no-untyped-def]
-    """Find w of a light.
+    """Return w of a light.
 
     Args:
-        lights, light: of `LobeLightLists`, and which. x, y, z: about what a lobe is, unit. variance: of the lobe, σ².
+        lights, light: of `LobeLightLists`, and an index. x, y, z: direction of the lobe, unit. variance: of the lobe,
+            σ².
     """
     one_minus_cosine = np.float32(1) - (x * lights[light, 0] + y * lights[light, 1] + z * lights[light, 2])
     return _weight(one_minus_cosine, lights[light, 3], lights[light, 4], variance)
@@ -113,7 +116,7 @@ def light_weight(lights, light, x, y, z, variance):  # type: ignore[no-untyped-d
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _weight(one_minus_cosine, spread, luminance, variance):  # type: ignore[no-untyped-def]
-    """Find w from 1 − ω · ω_l, r² and E."""
+    """Return w from 1 − ω · ω_l, r² and E."""
     inverse_variance = np.float32(1) / (variance + spread)
     remainder = max(np.float32(1) - one_minus_cosine * inverse_variance * np.float32(1 / _SHARPNESS), np.float32(0))
     remainder *= remainder
@@ -123,17 +126,17 @@ def _weight(one_minus_cosine, spread, luminance, variance):  # type: ignore[no-u
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _list_lights(columns, centers, radius, variance, start, stop, out):  # type: ignore[no-untyped-def]
-    """List the lights that weigh most anywhere in squares [start, stop). columns: of the lights. (5, lights)"""
+    """List the lights with the largest weight anywhere in bins [start, stop). columns: of the lights. (5, lights)"""
     num, max_listed = columns.shape[1], out.shape[1]
     weight = np.empty(num, np.float32)
-    bits = weight.view(np.int32)  # of numbers that are not negative these are in the same order
+    bits = weight.view(np.int32)  # the same order as nonnegative floats
     for bin_index in range(start, stop):
         x, y, z = centers[bin_index, 0], centers[bin_index, 1], centers[bin_index, 2]
         cosine, sine = np.float32(math.cos(radius[bin_index])), np.float32(math.sin(radius[bin_index]))
-        for k in range(num):  # without a branch: eight at once
+        for k in range(num):  # no branches, so that it vectorizes
             along = x * columns[0, k] + y * columns[1, k] + z * columns[2, k]
             across = math.sqrt(max(np.float32(1) - along * along, np.float32(0)))
-            nearest = along * cosine + across * sine  # at the place in the square that is nearest to the light
+            nearest = along * cosine + across * sine  # cosine at the point in the bin nearest to the light
             one_minus_cosine = np.float32(1) - (nearest if along < cosine else np.float32(1))
             weight[k] = _weight(one_minus_cosine, columns[3, k], columns[4, k], variance)
         threshold, num_equal = _selection_threshold(bits, max_listed)
@@ -148,14 +151,14 @@ def _list_lights(columns, centers, radius, variance, start, stop, out):  # type:
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _selection_threshold(bits, max_count):  # type: ignore[no-untyped-def]
-    """Find the least of the largest `max_count` numbers, none of them 0.
+    """Return the smallest of the largest `max_count` numbers, ignoring zeros.
 
-    By halving the range that it is in: counting is vector code, sorting is not.
+    Bisects its range: counting vectorizes, sorting does not.
 
     Args:
-        bits: of n numbers, not negative. (n,) int32
+        bits: of n nonnegative numbers. (n,) int32
     Returns:
-        Its bits, and how many like it may be among these.
+        Its bits, and how many equal numbers may be selected.
     """
     num_lit, high = np.int32(0), np.int32(0)
     for k in range(bits.shape[0]):
@@ -163,7 +166,7 @@ def _selection_threshold(bits, max_count):  # type: ignore[no-untyped-def]
         high = max(high, bits[k])
     if num_lit <= max_count:
         return np.int32(1), np.int32(max_count)
-    # more than `most` are at least `low`, fewer at least `high`
+    # more than `max_count` are at least `low`, fewer at least `high`
     low, high, above = np.int32(1), high + np.int32(1), np.int32(0)
     while high - low > 1:
         middle = low + (high - low) // np.int32(2)
@@ -180,16 +183,20 @@ def _selection_threshold(bits, max_count):  # type: ignore[no-untyped-def]
 
 
 def build_light_lists(
-    directions: F32, radius: F32, luminance: F32, bright_light_fractions: F32, widths: Sequence[int]
+    directions: Shaped[F32, "lights 3"],
+    radius: Shaped[F32, " lights"],
+    luminance: Shaped[F32, " lights"],
+    bright_light_fractions: Shaped[F32, "bright_lights lights"],
+    widths: Sequence[int],
 ) -> LobeLightLists:
-    """List the lights of a sky.
+    """List the lights of an environment.
 
     Args:
-        directions: unit, that points see them in or not. (lights, 3) float32
-        radius: of a circle about each, radians. (lights,) float32
-        luminance: E of each without lamps, luminance. (lights,) float32
-        bright_light_fractions: how much of each lamp comes by each light. (lamps, lights) float32
-        widths: that lobes have, from `lobe_widths`; ascending, one at least.
+        directions: unit, those of visibility bits.
+        radius: of a circle about each, radians.
+        luminance: E of each without bright lights, luminance.
+        bright_light_fractions: contribution of each light to each bright light.
+        widths: of lobes, from `lobe_widths`; ascending, at least one.
     """
     lights = np.column_stack([directions, radius**2 / _RADIUS_TO_VARIANCE, luminance]).astype(np.float32)
     columns, (centers, farthest) = np.ascontiguousarray(lights.T), _DIRECTION_BINS
@@ -203,7 +210,7 @@ def build_light_lists(
 
 
 def _bright_light_lists(bright_light_fractions: F32) -> tuple[NDArray[np.int32], F32]:
-    """Find the fields `lamps` and `share`."""
+    """Return the fields `bright_lights` and `bright_light_weights`."""
     num_lights = min(LIGHTS_PER_BRIGHT_LIGHT, bright_light_fractions.shape[1])
     lights = np.full((len(bright_light_fractions), LIGHTS_PER_BRIGHT_LIGHT), -1, np.int32)
     weights = np.zeros(lights.shape, np.float32)
@@ -218,12 +225,12 @@ def _list_lights_into(args: tuple[Any, ...], lists: NDArray[np.int32], start: in
 
 
 def sigma_at_width(width: int) -> float:
-    """Find the σ that lists of a width are made for, radians."""
+    """Return the σ of lists of a width, radians."""
     return float(MIN_SIGMA * 2 ** (width / 2))
 
 
 def lobe_widths(lobes: Lobes) -> tuple[int, ...]:
-    """Find the widths of lobes, as `relume.live.free_camera.highlights.lobe_visibility` takes them: two a lobe."""
+    """Return the widths of lobes for `relume.live.free_camera.highlights.lobe_visibility`, merged from two each."""
     if not len(lobes.sigma):
         return ()
     angle = np.arccos(np.clip(lobes.cosine.astype(np.float64), -1, 1))

@@ -1,7 +1,7 @@
-"""What points see of the sky in their lobes: bits of light triangles, weighed by light.
+"""Visibility of the environment in lobes of probes, from visibility bits weighted by light.
 
-What is weighed with what, `relume.live.free_camera.highlights.lobe_light_lists` says. A lamp is seen as much as the
-lights by which it comes, wherever a lobe looks.
+`relume.live.free_camera.highlights.lobe_light_lists` defines the weights. A bright light is visible as far as the
+triangles that contribute to it, for any direction of a lobe.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import math
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -31,7 +32,7 @@ F64 = NDArray[np.float64]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def _mean_lobe(direction_1, direction_2, weight_1, sigma_1, sigma_2):  # type: ignore[no-untyped-def]
-    """Find the mean direction of two lobes, three numbers, and how wide both are together, σ²."""
+    """Return the mean direction of two lobes, three numbers, and their joint variance, σ²."""
     x = weight_1 * direction_1[0] + (np.float32(1) - weight_1) * direction_2[0]
     y = weight_1 * direction_1[1] + (np.float32(1) - weight_1) * direction_2[1]
     z = weight_1 * direction_1[2] + (np.float32(1) - weight_1) * direction_2[2]
@@ -50,7 +51,7 @@ def _mean_lobe(direction_1, direction_2, weight_1, sigma_1, sigma_2):  # type: i
 def _trace_lobe_visibility(  # type: ignore[no-untyped-def]
     probes, material, visibility_bits, lobe_lights, lobes, camera_position, rows, start, stop, out
 ):
-    """Look along lobes from the points that are [start, stop) of rows."""
+    """Evaluate lobe visibility of probes rows[start:stop]."""
     position, normal, _, _, _ = probes
     for p in rows[start:stop]:
         lobe = lobes.lobe_index[material[p]]
@@ -92,24 +93,22 @@ def _trace_lobe_visibility(  # type: ignore[no-untyped-def]
 
 def trace_lobe_visibility(
     stored_scene: StoredScene,
-    visibility_bits: NDArray[np.uint8],
+    visibility_bits: Shaped[NDArray[np.uint8], "probes bytes"],
     lobe_lights: LobeLightLists,
     lobes: Lobes,
-    camera_position: F32,
-    is_needed: NDArray[np.uint8],
-    out: F32 | None = None,
-) -> F32:
-    """Look from points along their lobes.
+    camera_position: Shaped[F32, " 3"],
+    is_needed: Shaped[NDArray[np.uint8], " probes"],
+    out: Shaped[F32, "probes 3"] | None = None,
+) -> Shaped[F32, "probes 3"]:
+    """Return the visibility of the environment in lobes of probes.
 
     Args:
-        stored_scene: whose points. visibility_bits: light l of a point in bit l & 7 of byte l >> 3. (points, bytes)
-            uint8
-        lobe_lights: lights of the sky. lobes: of all materials. camera_position: where it is. (3,) float32
-        is_needed: points that are asked. (points,) uint8
-        out: written where needed; None: the others see nothing.
+        stored_scene: the scene. visibility_bits: light l of a probe in bit l & 7 of byte l >> 3.
+        lobe_lights: of the environment. lobes: of all materials. camera_position: of the camera.
+        is_needed: nonzero for probes to evaluate.
+        out: overwritten there; None: new, zero elsewhere.
     Returns:
-        V, the share of the sky's light that is seen there; then that of each lamp.
-        (points, 3) float32
+        V, the visible fraction of environment light in the lobe; then that of each bright light.
     """
     lobe_visibility = np.zeros((len(visibility_bits), 1 + MAX_BRIGHT_LIGHTS), np.float32) if out is None else out
     rows = np.flatnonzero(is_needed.view(np.bool_))

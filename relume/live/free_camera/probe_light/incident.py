@@ -1,4 +1,4 @@
-"""What arrives at the points of a moving picture: summed over sources."""
+"""Incident radiance coefficients at probes, summed over light sources."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.live.fixed_camera.illumination import Illumination, element_gains
@@ -18,32 +19,32 @@ F32 = NDArray[np.float32]
 
 
 class IncidentCoefficients(NamedTuple):
-    """What arrives at points.
+    """Incident radiance coefficients of all probes.
 
     Attributes:
-        total: light vectors of all light but that of beams. (points, 3, K) float32
-        non_environment: of that which is not the sky's own, lamps that are beams included. (points, 3, K) float32
-        hard_shadow_lights: whose shadows pixels find by themselves.
+        total: of all light except that of hard-shadow lights.
+        non_environment: of light other than the environment's own, including local hard-shadow lights.
+        hard_shadow_lights: their visibility is traced per pixel.
     """
 
-    total: F32
-    non_environment: F32
+    total: Shaped[F32, "probes 3 K"]
+    non_environment: Shaped[F32, "probes 3 K"]
     hard_shadow_lights: tuple[HardShadowLight, ...] = ()
 
     def copy(self) -> IncidentCoefficients:
-        """One that may be added to."""
+        """Return a copy that may be modified."""
         return self._replace(total=self.total.copy(), non_environment=self.non_environment.copy())
 
 
 class PartialCoefficients(NamedTuple):
-    """Light vectors of some points.
+    """Incident radiance coefficients of some probes.
 
     Attributes:
-        vectors: of fewer functions, maybe. (m, 3, ≤ K) float32. rows: the points. (m,); None: all.
+        vectors: possibly truncated to fewer functions. rows: the probes; None: all.
     """
 
-    vectors: F32
-    rows: NDArray[np.intp] | None = None
+    vectors: Shaped[F32, "m 3 functions"]
+    rows: Shaped[NDArray[np.intp], " m"] | None = None
 
 
 def combine(
@@ -52,16 +53,16 @@ def combine(
     get_vectors: Callable[[Illumination], PartialCoefficients],
     hard_shadow_lights: tuple[HardShadowLight, ...] = (),
     indirect: Sequence[tuple[PartialCoefficients, Rgb]] | None = None,
-    rows: NDArray[np.intp] | None = None,
+    rows: Shaped[NDArray[np.intp], " n"] | None = None,
 ) -> IncidentCoefficients:
-    """Sum over sources: transport is linear in them.
+    """Sum coefficients over sources; transport is linear in them.
 
     Args:
-        transfer: of the points. light: that arrives.
-        get_vectors: finds those of one source and one kind of way, suns that are beams left out.
+        transfer: of the probes. light: the illumination.
+        get_vectors: returns those of one light element, without sun disks that are hard-shadow lights.
         hard_shadow_lights: of the light.
-        indirect: what surfaces send, with its gains, in place of what `get_vectors` finds of it.
-        rows: points that are asked about, the others have anything; None: all.
+        indirect: indirect light with its gains, instead of that from `get_vectors`.
+        rows: probes to evaluate, the others are undefined; None: all.
     """
     total, non_environment = (np.zeros(transfer.vectors_shape, np.float32) for _ in range(2))
     hard_shadow_keys = {hard_shadow_light.key for hard_shadow_light in hard_shadow_lights}
@@ -88,10 +89,10 @@ def _add(total: F32, contribution: PartialCoefficients, gain: Rgb, default_rows:
 def combine_all(
     transfer: FreeCameraTransfer, light: Illumination, *, has_hard_shadows: bool = False
 ) -> IncidentCoefficients:
-    """Find what arrives at all points, where it is not known too.
+    """Return the coefficients of all probes, computed if they are not cached.
 
     Args:
-        transfer: of the points. light: that arrives. has_hard_shadows: pixels find the shadows of beams.
+        transfer: of the probes. light: the illumination. has_hard_shadows: pixels trace hard-shadow lights.
     """
     hard_shadow_lights = transfer.hard_shadow_lights(light, None) if has_hard_shadows else ()
     return combine(

@@ -1,4 +1,4 @@
-"""What surfaces send each other while a hand moves: of the light as it was some frames ago, and of a change."""
+"""Indirect illumination of probes during an edit: that of the light some frames ago, and its change."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.live.fixed_camera.illumination import Illumination, element_gains
@@ -18,27 +19,26 @@ F32 = NDArray[np.float32]
 
 
 class IndirectCoefficients(NamedTuple):
-    """What surfaces send to points under a light.
+    """Indirect illumination of probes.
 
     Attributes:
-        light: that they send. is_complete: points that all of it has been found for. (points,) uint8
-        exact: what is known of some sources, with their gains. approximate: of the others, of points that were asked
-            about.
+        light: the illumination. is_complete: nonzero for evaluated probes.
+        exact: cached coefficients of some elements, with their gains. approximate: of the others, for evaluated probes.
     """
 
     light: Illumination
-    is_complete: NDArray[np.uint8]
+    is_complete: Shaped[NDArray[np.uint8], " probes"]
     exact: Mapping[Illumination, tuple[PartialCoefficients, Rgb]]
     approximate: Sequence[tuple[PartialCoefficients, Rgb]]
 
     @property
     def contributions(self) -> Sequence[tuple[PartialCoefficients, Rgb]]:
-        """All of it."""
+        """All coefficients, with their gains."""
         return [*self.exact.values(), *self.approximate]
 
 
 def same_indirect(first: Illumination, second: Illumination) -> bool:
-    """Whether surfaces send each other the same under two lights."""
+    """Return whether two lights have the same indirect illumination."""
     return _indirect_only(first) == _indirect_only(second)
 
 
@@ -47,22 +47,22 @@ def _indirect_only(light: Illumination) -> Illumination:
 
 
 def _indirect_elements(light: Illumination) -> dict[Illumination, Rgb]:
-    """What surfaces send of the light of each source, gain 1, and its gain."""
+    """Indirect elements of a light, with their gains."""
     return {element: gain for element, gain in element_gains(light).items() if element.paths.has_indirect}
 
 
 def is_cached(transfer: FreeCameraTransfer, light: Illumination) -> bool:
-    """Whether all that surfaces send under a light is there at once."""
+    """Return whether all indirect illumination of a light is cached."""
     return all(transfer.has_vectors(element, without_sun_disks=False) for element in _indirect_elements(light))
 
 
 def indirect_of(
-    transfer: FreeCameraTransfer, light: Illumination, is_needed: NDArray[np.uint8]
+    transfer: FreeCameraTransfer, light: Illumination, is_needed: Shaped[NDArray[np.uint8], " probes"]
 ) -> IndirectCoefficients:
-    """Find what surfaces send to some points, exactly where that is known, else quickly.
+    """Return the indirect illumination of some probes, exact if cached, else approximate.
 
     Args:
-        transfer: of the points. light: that surfaces send. is_needed: points that are asked about. (points,) uint8
+        transfer: of the probes. light: the illumination. is_needed: nonzero for probes to evaluate.
     """
     exact = {
         element: (PartialCoefficients(transfer.vectors(element, without_sun_disks=False)), gain)
@@ -73,12 +73,12 @@ def indirect_of(
 
 
 def extend(
-    transfer: FreeCameraTransfer, indirect: IndirectCoefficients, is_needed: NDArray[np.uint8]
+    transfer: FreeCameraTransfer, indirect: IndirectCoefficients, is_needed: Shaped[NDArray[np.uint8], " probes"]
 ) -> IndirectCoefficients:
-    """Find the same for points that it has not been found for: those that an eye sees since.
+    """Evaluate indirect illumination for probes that became visible.
 
     Args:
-        transfer, is_needed: as of `indirect_of`. indirect: what has been found.
+        transfer, is_needed: as in `indirect_of`. indirect: the current result.
     """
     new = np.flatnonzero(is_needed & ~indirect.is_complete)
     if not len(new):
@@ -98,13 +98,13 @@ def update_reflectances(
     before: Illumination,
     previous: IncidentCoefficients,
     light: Illumination,
-    rows: NDArray[np.intp],
+    rows: Shaped[NDArray[np.intp], " n"],
 ) -> IncidentCoefficients:
-    """Find what arrives at some points where surfaces reflect otherwise than before, quickly: what arrived, changed.
+    """Return approximate coefficients of some probes after a change of reflectances: the previous ones plus the change.
 
     Args:
-        transfer: of the points. before: a light of the same sources. previous: what arrives of it, exactly.
-        light: that arrives. rows: points that are asked about. (n,)
+        transfer: of the probes. before: a light of the same sources. previous: its exact coefficients.
+        light: the illumination. rows: the probes.
     """
     delta, incident = transfer.indirect_delta(before, light, rows), previous.copy()
     for into in (incident.total, incident.non_environment):

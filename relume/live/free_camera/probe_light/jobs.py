@@ -1,4 +1,4 @@
-"""Light vectors made beside the frames; both are a `relume.live.fixed_camera.jobs.Job`."""
+"""Jobs that compute incident coefficients in the background; each is a `relume.live.fixed_camera.jobs.Job`."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from relume.live.free_camera.protocol import FreeCameraTransfer
 
 @dataclass(frozen=True)
 class ProbeLightJob:
-    """What arrives, exactly, when a hand rests.
+    """Computes exact coefficients when the drag ends.
 
     Attributes:
-        has_hard_shadows: pixels find the shadows of beams. on_done: gets it when it is there.
+        has_hard_shadows: pixels trace hard-shadow lights. on_done: receives the result.
     """
 
     transfer: FreeCameraTransfer
@@ -27,24 +27,24 @@ class ProbeLightJob:
     has_hard_shadows: bool
     on_done: Callable[[Illumination, bool, IncidentCoefficients], None]
 
-    label = "light on the points"
+    label = "light at the probes"
     state: ClassVar[Literal["shading"]] = "shading"
     is_refinement = True
     is_resumable = False
 
     @property
     def key(self) -> tuple[Hashable, ...]:
-        """Jobs of one light are one."""
+        """Equal for jobs of one light."""
         return self.transfer.key, "incident coefficients", self.light, self.has_hard_shadows
 
     def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> IncidentCoefficients:
-        """Find it, source by source. Raises CancelledError where `is_canceled`, asked before each, said so."""
+        """Compute it source by source. Raises CancelledError if `is_canceled`, polled before each, returned true."""
         num, done = len(element_gains(self.light)), 0
 
         def get_vectors(element: Illumination) -> PartialCoefficients:
             nonlocal done
             if is_canceled():
-                raise CancelledError("light on the points was cancelled")
+                raise CancelledError("the light at the probes was canceled")
             vectors, done = self.transfer.vectors(element, self.has_hard_shadows), done + 1
             progress(done / num)
             return PartialCoefficients(vectors)
@@ -53,37 +53,37 @@ class ProbeLightJob:
         return combine(self.transfer, self.light, get_vectors, hard_shadow_lights)
 
     def install(self, result: IncidentCoefficients) -> None:
-        """Hand it over."""
+        """Pass the result on."""
         self.on_done(self.light, self.has_hard_shadows, result)
 
 
 @dataclass(frozen=True)
 class IncrementalProbeLightJob:
-    """What surfaces send each other under a hand, quickly: some frames behind it, and never given up for a newer look.
+    """Computes approximate indirect light during a drag: some frames late, and not canceled by newer looks.
 
     Attributes:
-        light: of the look when it was begun. compute: finds it. on_done: gets it when it is there.
+        light: of the look when the job was created. compute: computes it. on_done: receives the result.
     """
 
     light: Illumination
     compute: Callable[[], Any]
     on_done: Callable[[Any], None]
 
-    label = "light between surfaces"
+    label = "indirect light"
     state: ClassVar[Literal["updating"]] = "updating"
     is_refinement = False
     is_resumable = False
 
     @property
     def key(self) -> tuple[Hashable, ...]:
-        """Jobs of one light are one."""
+        """Equal for jobs of one light."""
         return "light that follows", self.light
 
     def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> Any:
-        """Find it, by threads that let frames go first."""
+        """Compute it in threads with lower priority than frames."""
         with low_priority():
             return self.compute()
 
     def install(self, result: Any) -> None:
-        """Hand it over."""
+        """Pass the result on."""
         self.on_done(result)

@@ -1,8 +1,8 @@
-"""The light vectors of one session's moving picture, under a light that changes.
+"""Incident coefficients of one session's free-camera image, under changing light.
 
-What is exact is found when a hand rests. While it moves, light that comes straight is found at once for the points that
-an eye sees, in every frame. What surfaces send each other takes longer than a frame: it is found beside the frames,
-which show what was found last (`relume.live.free_camera.probe_light.jobs.IncrementalProbeLightJob`).
+Exact coefficients are computed when a drag ends. During a drag, direct light is computed in every frame for visible
+probes. Indirect light takes longer than a frame: it is computed in the background, and frames use the latest result
+(`relume.live.free_camera.probe_light.jobs.IncrementalProbeLightJob`).
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.live.fixed_camera.illumination import Illumination, element_gains, equal_up_to_reflectances
@@ -27,10 +28,10 @@ from relume.live.free_camera.protocol import FreeCameraTransfer
 
 
 class LightRequest(NamedTuple):
-    """What is to arrive.
+    """The requested light.
 
     Attributes:
-        light: of the look. has_hard_shadows: pixels find the shadows of beams.
+        light: of the look. has_hard_shadows: pixels trace hard-shadow lights.
     """
 
     light: Illumination
@@ -38,10 +39,10 @@ class LightRequest(NamedTuple):
 
 
 class _UpdatedIncident(NamedTuple):
-    """What is exact, with what surfaces send otherwise.
+    """Exact coefficients plus a change of indirect light.
 
     Attributes:
-        base: that it was made from. light: that arrives. is_complete: points that know it. (points,) uint8
+        base: the exact coefficients. light: the illumination. is_complete: nonzero for updated probes. (probes,) uint8
     """
 
     base: IncidentCoefficients
@@ -51,7 +52,7 @@ class _UpdatedIncident(NamedTuple):
 
 
 class _CoarseIncident(NamedTuple):
-    """What was found in a frame, and of what."""
+    """Coefficients of a frame, and their inputs."""
 
     direct: LightRequest
     is_needed: NDArray[np.uint8]
@@ -60,10 +61,10 @@ class _CoarseIncident(NamedTuple):
 
 
 class ProbeLightState:
-    """State of one picture; used from one thread at a time.
+    """State of one image; used from one thread at a time.
 
     Attributes:
-        version: another one where what follows a hand has gone on.
+        version: increases with each update during an edit.
     """
 
     def __init__(self, transfer: FreeCameraTransfer) -> None:
@@ -75,21 +76,21 @@ class ProbeLightState:
         self.version = 0
 
     def is_available(self, request: LightRequest) -> bool:
-        """Whether nobody has to wait for what is exact."""
+        """Return whether exact coefficients need no computation."""
         is_exact = self._exact is not None and self._exact[0] == request
         return is_exact or all(
             self._transfer.has_vectors(element, request.has_hard_shadows) for element in element_gains(request.light)
         )
 
     def only_indirect_pending(self, request: LightRequest) -> bool:
-        """Whether all that somebody would wait for is what surfaces send each other."""
+        """Return whether only indirect light differs from the last exact coefficients."""
         if self._exact is None:
             return False
         before, has_hard_shadows = self._exact[0]
         return has_hard_shadows == request.has_hard_shadows and equal_up_to_reflectances(before, request.light)
 
     def exact(self, request: LightRequest) -> IncidentCoefficients:
-        """All of it, at all points."""
+        """Return exact coefficients of all probes."""
         if self._exact is None or self._exact[0] != request:
             self.restart_from(
                 *request, combine_all(self._transfer, request.light, has_hard_shadows=request.has_hard_shadows)
@@ -98,19 +99,19 @@ class ProbeLightState:
         return self._exact[1]
 
     def restart_from(self, light: Illumination, has_hard_shadows: bool, incident: IncidentCoefficients) -> None:
-        """Go on from what is exact.
+        """Set exact coefficients.
 
         Args:
-            light, has_hard_shadows: under which, see `LightRequest`. incident: at all points.
+            light, has_hard_shadows: see `LightRequest`. incident: the coefficients.
         """
         self._exact = LightRequest(light, has_hard_shadows), incident
         self._updated = self._indirect = self._coarse = None
 
-    def fast(self, request: LightRequest, is_needed: NDArray[np.uint8]) -> IncidentCoefficients:
-        """What is there at once for some points; what surfaces send, as of some frames ago.
+    def fast(self, request: LightRequest, is_needed: Shaped[NDArray[np.uint8], " probes"]) -> IncidentCoefficients:
+        """Return approximate coefficients of some probes; indirect light may be some frames old.
 
         Args:
-            request: what is to arrive. is_needed: points that are asked about. (points,) uint8
+            request: the requested light. is_needed: nonzero for probes to evaluate.
         """
         if self.only_indirect_pending(request):
             assert self._exact is not None
@@ -128,7 +129,7 @@ class ProbeLightState:
     def _solve_direct(
         self, request: LightRequest, is_needed: NDArray[np.uint8], indirect: IndirectCoefficients
     ) -> IncidentCoefficients:
-        """Find what comes straight, and add the rest."""
+        """Compute direct light, and add indirect light."""
         transfer, (light, has_hard_shadows), rows = self._transfer, request, np.flatnonzero(is_needed)
 
         def get_vectors(element: Illumination) -> PartialCoefficients:
@@ -140,7 +141,7 @@ class ProbeLightState:
         return combine(transfer, light, get_vectors, hard_shadow_lights, indirect.contributions, rows)
 
     def _latest_indirect(self, light: Illumination, is_needed: NDArray[np.uint8]) -> IndirectCoefficients:
-        """What surfaces sent when that was found last, or now where it never was."""
+        """Return the latest indirect light, or compute it if there is none."""
         transfer, last = self._transfer, self._indirect
         if last is None or last.light.paths.has_indirect != light.paths.has_indirect:
             before = light if self._exact is None else self._exact[0].light
@@ -148,11 +149,13 @@ class ProbeLightState:
             last = indirect_of(transfer, before if is_reusable else light, is_needed)
         return extend(transfer, last, is_needed)
 
-    def next_job(self, request: LightRequest, is_needed: NDArray[np.uint8]) -> IncrementalProbeLightJob | ProbeLightJob:
-        """What brings light that is not there: first what surfaces send some points, then all there is.
+    def next_job(
+        self, request: LightRequest, is_needed: Shaped[NDArray[np.uint8], " probes"]
+    ) -> IncrementalProbeLightJob | ProbeLightJob:
+        """Return the job for missing light: indirect light of some probes first, then all exact coefficients.
 
         Args:
-            request, is_needed: as of `fast`, after it.
+            request, is_needed: as in `fast`, which must have been called.
         """
         transfer, (light, has_hard_shadows) = self._transfer, request
         if self.only_indirect_pending(request):

@@ -1,4 +1,4 @@
-"""Jobs that refine the image when the camera stops: sparse exact samples that correct it, then the static view."""
+"""Jobs when the camera stops: a few exact samples that correct the image, then the exact image."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, Protocol
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.cache import Cache
@@ -25,12 +26,12 @@ F32 = NDArray[np.float32]
 SizedCamera = tuple[Camera, tuple[int, int]]
 
 TRACING_FRACTION = 0.5  # of the progress of a static view; the rest is shading
-SAMPLE_SPACING = 8  # pixels between sparse samples
-_MIN_SPARSE_SAMPLES = 1000  # with fewer the exact image is ready as early
+SAMPLE_SPACING = 8  # pixels from one sparse sample to the next
+_MIN_SPARSE_SAMPLES = 1000  # with fewer samples, the exact image takes no longer
 
 
 class StaticViewFactory(Protocol):
-    """Traces the view of a camera: an opened bake with this one fixed view."""
+    """Traces a fixed view on demand, as an open bake."""
 
     def __call__(
         self,
@@ -48,11 +49,11 @@ class StaticViewFactory(Protocol):
 
 @dataclass(frozen=True)
 class StaticViewState:
-    """Camera and look of an exact image.
+    """The target of an exact image.
 
     Attributes:
-        make_static_view: traces the view; slow. cache: of the picture.
-        sized_camera: camera and image size. look, solo: to display.
+        make_static_view: traces the view; expensive. cache: for its results.
+        sized_camera: camera and image size. look, solo: of the image.
     """
 
     make_static_view: StaticViewFactory
@@ -63,7 +64,7 @@ class StaticViewState:
 
     @property
     def is_indirect(self) -> bool:
-        """True if the look shows indirect light."""
+        """True if indirect light is shown."""
         return self.look.transport.paths.has_indirect
 
     def static_picture(
@@ -72,8 +73,8 @@ class StaticViewState:
         """Trace and shade the view.
 
         Args:
-            progress: called with the approximate fraction done. is_canceled: polled.
-            smooths_edges: take several samples in edge pixels.
+            progress: called with the approximate fraction done. is_canceled: polled regularly.
+            smooths_edges: pixels on edges have several samples.
         Raises:
             CancelledError: `is_canceled` returned true.
         """
@@ -96,13 +97,11 @@ class StaticViewState:
 
 @dataclass(frozen=True)
 class SparseExactJob:
-    """Estimate the error of direct light in a free-camera image from sparse exact samples; a
-    `relume.live.fixed_camera.jobs.Job`.
+    """Computes the residual of direct light from few exact samples; a `relume.live.fixed_camera.jobs.Job`.
 
     Attributes:
-        view_state: camera and look. free_camera_picture: a copy of the picture for this job alone.
-        key: equal for jobs of one camera and look. on_done: receives the residual image; None if nothing is to be
-            corrected.
+        view_state: the exact target. free_camera_picture: the image to correct, a copy for this job alone.
+        key: equal for jobs of one camera and look. on_done: receives the residual; None if there is nothing to correct.
     """
 
     view_state: StaticViewState
@@ -110,28 +109,28 @@ class SparseExactJob:
     key: tuple[Hashable, ...]
     on_done: Callable[[F32 | None], None]
 
-    label = "the first exact samples"
+    label = "exact samples of this camera"
     state: ClassVar[Literal["shading"]] = "shading"
     is_refinement = True
     is_resumable = False
 
     @staticmethod
     def should_refine(view_state: StaticViewState) -> bool:
-        """True if direct light is shown in an image that is large enough."""
+        """Return whether direct light is shown and the image is large enough."""
         width, height = view_state.sized_camera[1]
         return (
             view_state.look.transport.paths.direct
             and (width // SAMPLE_SPACING) * (height // SAMPLE_SPACING) >= _MIN_SPARSE_SAMPLES
         )
 
-    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> F32 | None:
-        """Trace, shade and compare. (height, width, 3). Raises CancelledError if `is_canceled`."""
+    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> Shaped[F32, "height width 3"] | None:
+        """Trace, shade and compare; None for no residual. Raises CancelledError if `is_canceled` returned true."""
         picture, (camera, size), gbuffer = (
             self.free_camera_picture,
             self.view_state.sized_camera,
             self.free_camera_picture.gbuffer,
         )
-        if len(gbuffer.glass.ray):  # the errors of a glass surface and of what is behind it differ
+        if len(gbuffer.glass.ray):  # reflections and the background of glass have different residuals
             return None
         transport = self.view_state.look.transport.model_copy(update={"show": "direct"})
         look = self.view_state.look.model_copy(update={"transport": transport})
@@ -141,7 +140,7 @@ class SparseExactJob:
             exact = direct_view.static_picture(progress, is_canceled, smooths_edges=False).image()
         except CancelledError:
             raise
-        except RelumeError:  # the scene was deleted, or needs more memory than is free
+        except RelumeError:  # the scene is gone, or it needs more memory than there is
             return None
         picture.set_look(look, solo=direct_view.solo)
         radiance, sample_gbuffer = picture.render_pixel_centers(coarse_size)
@@ -154,39 +153,39 @@ class SparseExactJob:
         residual_image = residual(radiance, exact, samples, pixels)
         return residual_image if residual_image.any() else None
 
-    def install(self, result: F32 | None) -> None:
-        """Deliver the result."""
+    def install(self, result: Shaped[F32, "height width 3"] | None) -> None:
+        """Pass the result on."""
         self.on_done(result)
 
 
 @dataclass(frozen=True)
 class StaticViewJob:
-    """Render the exact static view in the background; a `relume.live.fixed_camera.jobs.Job`.
+    """Renders the exact image of a stopped camera in the background; a `relume.live.fixed_camera.jobs.Job`.
 
     Attributes:
-        view_state: camera and look; the picture follows later looks from there.
-        key: equal for jobs of one camera and look, so that edits do not start further jobs.
-        on_done: receives whether indirect light can be shown, and the picture; None if it is unavailable.
+        view_state: the target; the result continues with looks that were set meanwhile.
+        key: equal for jobs of one camera and look, so that edits replace it.
+        on_done: receives whether indirect light was traced, and the picture, or None if it is not available.
     """
 
     view_state: StaticViewState
     key: tuple[Hashable, ...]
     on_done: Callable[[bool, Picture | None], None]
 
-    label = "the exact image from this camera"
+    label = "the exact image of this camera"
     state: ClassVar[Literal["shading"]] = "shading"
     is_refinement = True
     is_resumable = False
 
     def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> Picture | ResultUnavailableError:
-        """Trace and shade, or return why that failed. Raises CancelledError if `is_canceled`."""
+        """Trace and shade it; an error if that fails. Raises CancelledError if `is_canceled` returned true."""
         try:
             return self.view_state.static_picture(progress, is_canceled)
         except CancelledError:
             raise
-        except RelumeError as error:  # the scene was deleted, or needs more memory than is free
-            return ResultUnavailableError(f"the approximate image stays; {self.label} cannot be rendered: {error}")
+        except RelumeError as error:  # the scene is gone, or it needs more memory than there is
+            return ResultUnavailableError(f"{self.label} is not available: {error}")
 
     def install(self, result: Picture | ResultUnavailableError) -> None:
-        """Deliver the result."""
+        """Pass the result on."""
         self.on_done(self.view_state.is_indirect, None if isinstance(result, ResultUnavailableError) else result)
