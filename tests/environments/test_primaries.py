@@ -74,7 +74,7 @@ def test_a_colour_outside_of_ours_is_held_to_it_and_said(tmp_path):
     ],
 )
 def test_primaries_that_tell_no_colours_are_refused_in_words(tmp_path, primaries):
-    with pytest.raises(SceneError, match=r"odd primaries .* Rec\. 709"):
+    with pytest.raises(SceneError, match=r"invalid primaries .* Rec\. 709"):
         read_environment(write_map(tmp_path / "a.exr", dusk(), primaries), "dusk")
 
 

@@ -152,7 +152,7 @@ def test_what_a_method_leaves_out_is_what_the_two_truths_differ_by() -> None:
     few = truth_of(True, bounces=1)
     np.testing.assert_allclose(few.all_paths_image, shown["all"], rtol=1e-5)
     assert shown["direct"].mean() < few.method_image.mean() < few.all_paths_image.mean()
-    assert few.omitted_paths == ("Light that more than 1 surfaces have reflected.",)
+    assert few.omitted_paths == ("Light after more than 1 bounces.",)
     asked = truth_of(False, show="direct")  # of what is shown nothing is left out
     np.testing.assert_array_equal(asked.all_paths_image, asked.method_image)
     assert asked.omitted_paths == asked.unsupported_paths == ()

@@ -159,7 +159,7 @@ def test_a_picture_in_aces_is_read_as_the_light_that_it_was(tmp_path):
 
 @pytest.mark.parametrize("name", ["ACEScct", "Raw", "sRGB - Display", "../../etc/passwd", ""])
 def test_no_picture_is_exported_in_what_is_not_linear_light(name):
-    with using_config(STUDIO), pytest.raises(ParameterError, match="linear colour space"):
+    with using_config(STUDIO), pytest.raises(ParameterError, match="linear color space"):
         find_space(name)
 
 
