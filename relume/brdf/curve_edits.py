@@ -41,14 +41,12 @@ def curve_edit(drawn: Mapping[str, Any], before: Shaped[F64, "3 J"]) -> tuple[Sh
     return gain * factor, gain * offset + lift
 
 
-def evaluate_edit(
-    rows: Shaped[F64, "3 J"], gamma: Shaped[F64, "*batch"], max_angle: float, *, smooth: bool
-) -> Shaped[F64, "3 ..."]:
+def evaluate_edit(rows: Shaped[F64, "3 J"], gamma: F64, max_angle: float, *, smooth: bool) -> Shaped[F64, "3 ..."]:
     """Evaluate band values at exact angles.
 
     Args:
         rows: a value for each channel and band.
-        gamma: radians in [0, max_angle].
+        gamma: radians in [0, max_angle]. (...)
         max_angle: end of the last band, radians.
         smooth: interpolate linearly between band centers; otherwise values are constant in each band and keep averages.
     """

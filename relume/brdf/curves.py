@@ -137,13 +137,13 @@ def curve_bands(term_document: Mapping[str, Any], curve: Curve) -> Shaped[F64, "
     return bands
 
 
-def curve_values(term_document: Mapping[str, Any], curve: Curve, gamma: Shaped[F64, "*batch"]) -> Shaped[F64, "3 ..."]:
+def curve_values(term_document: Mapping[str, Any], curve: Curve, gamma: F64) -> Shaped[F64, "3 ..."]:
     """Evaluate the displayed curve, not negative, at exact angles; a curve given as bands is constant in each band.
 
     Args:
         term_document: one term of a complete look: model, params, curves.
         curve: one of the term's curves.
-        gamma: radians in [0, π/2].
+        gamma: radians in [0, π/2]. (...)
     """
     if curve.factor is not None:
         values = np.array(curve.factor(gamma))

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Shaped
 
 from relume.brdf.term import F64
 
 
-def fresnel(cos_theta_d: Shaped[F64, "*batch"], ior: float | F64, extinction: float) -> Shaped[F64, "*batch"]:
+def fresnel(cos_theta_d: F64, ior: float | F64, extinction: float) -> F64:
     """Mean Fresnel reflectance, in [0, 1], of both polarizations for light from vacuum.
 
     The exact equations for a conductor as collected by Lagarde 2013 (Memo on Fresnel equations); they
     reduce to those of a dielectric for zero extinction.
 
     Args:
-        cos_theta_d: cosine between light and half vector, in [0, 1].
+        cos_theta_d: cosine between light and half vector, in [0, 1]. (...)
         ior: index of refraction η; one, or one per angle. extinction: k; both relative to the outside.
     """
     cos2 = np.square(cos_theta_d)
@@ -33,6 +32,6 @@ def fresnel(cos_theta_d: Shaped[F64, "*batch"], ior: float | F64, extinction: fl
     return np.asarray(np.clip(0.5 * (r_perpendicular + r_parallel), 0.0, 1.0))
 
 
-def schlick(cos_theta_d: Shaped[F64, "*batch"], f0: float | F64) -> Shaped[F64, "*batch"]:
+def schlick(cos_theta_d: F64, f0: float | F64) -> F64:
     """Schlick's reflectance f0 + (1 - f0)(1 - cos θd)^5 (eq. 15, Schlick 1994); f0: at normal incidence, in [0, 1]."""
     return f0 + (1.0 - f0) * (1.0 - cos_theta_d) ** 5

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import IO, Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 _ROWS_PER_BLOCK = 1 << 16
@@ -57,8 +58,8 @@ class Column:
         data = self._file.read(out.nbytes)
         out.reshape(-1).view(np.uint8)[:] = np.frombuffer(data, np.uint8)
 
-    def take(self, rows: NDArray[np.integer]) -> NDArray[Any]:
-        """Read rows in any order, quickly if most are consecutive. (n, …)"""
+    def take(self, rows: Shaped[NDArray[np.integer], " n"]) -> Shaped[NDArray[Any], "n ..."]:
+        """Read rows in any order, quickly if most are consecutive."""
         out = np.empty((len(rows), *self.shape[1:]), self.dtype)
         order = np.argsort(rows, kind="stable")
         bounds = np.searchsorted(rows[order], np.arange(0, self.shape[0] + _ROWS_PER_BLOCK, _ROWS_PER_BLOCK))
@@ -86,11 +87,11 @@ class ExternalSort:
     _keys: list[NDArray[np.int32]] = field(default_factory=list)
     _run_starts: list[NDArray[np.int64]] = field(default_factory=list)
 
-    def add(self, key: NDArray[np.int32], columns: Mapping[str, NDArray[Any]]) -> None:
+    def add(self, key: Shaped[NDArray[np.int32], " n"], columns: Mapping[str, NDArray[Any]]) -> None:
         """Append a chunk.
 
         Args:
-            key: of its rows, ascending. (n,) columns: the same names for all chunks. (n, …)
+            key: of its rows, ascending. columns: the same names for all chunks. (n, …)
         """
         first = np.flatnonzero(np.diff(key, prepend=np.int32(-1)))
         self._keys.append(key[first])

@@ -196,7 +196,7 @@ class ReflectedLight(NamedTuple):
 def lights_visible_in_mirrors(
     geometry: SceneBuffers, mirrors: FlatMirrors, points: SurfacePoints, directions: Shaped[F32, "T 3"]
 ) -> ReflectedLight:
-    """Find the lights that points see in planar mirrors. directions: to the lights, unit"""
+    """Find the lights that points see in planar mirrors. geometry: the scene's. directions: to the lights, unit"""
     mirrored_directions = mirrored_lights(mirrors.normal, directions)
     is_candidate = np.zeros((points.num_points, mirrors.num_planes * len(directions)), np.bool_)
     mirror_arrays = mirrors.normal, mirrors.offset, mirrors.axes, mirrors.low, mirrors.high

@@ -59,15 +59,15 @@ def glass_surfaces(materials: Sequence[Material]) -> GlassSurfaces:
 
 
 def refract(
-    geometry: SceneBuffers, glass: GlassSurfaces, paths: RayPaths, hits: Hits, rows: NDArray[np.intp]
-) -> tuple[NDArray[np.bool_], RayPaths]:
+    geometry: SceneBuffers, glass: GlassSurfaces, paths: RayPaths, hits: Hits, rows: Shaped[NDArray[np.intp], " k"]
+) -> tuple[Shaped[NDArray[np.bool_], " k"], RayPaths]:
     """Continue the paths of rays that hit glass.
 
     Args:
         geometry: the triangles. glass: glass parameters of materials.
-        paths: of the rays. hits: of all paths. rows: paths that hit glass. (k,)
+        paths: of the rays. hits: of all paths. rows: paths that hit glass.
     Returns:
-        True for hits on thin glass or the outside of a solid, (k,), and the continued paths.
+        True for hits on thin glass or the outside of a solid, and the continued paths.
     """
     glass_hits = hits.rows(rows)
     material, directions = geometry.face_material[glass_hits.face], paths.directions[rows].astype(np.float64)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.specular import is_mirror
@@ -18,8 +19,8 @@ from relume.scene.model import Material
 MAX_MIRROR_BOUNCES = 2  # per camera ray; further reflections are as blurred as lobes
 
 
-def is_mirror_material(materials: Sequence[Material]) -> NDArray[np.bool_]:
-    """True for each material that is a mirror in the scene's own look. (materials,)"""
+def is_mirror_material(materials: Sequence[Material]) -> Shaped[NDArray[np.bool_], " materials"]:
+    """True for each material that is a mirror in the scene's own look."""
     return np.array([is_mirror(material.terms) for material in materials], np.bool_)
 
 
@@ -28,7 +29,7 @@ def reflect_rays(
     materials: Sequence[Material],
     paths: RayPaths,
     hits: Hits,
-    rows: NDArray[np.intp],
+    rows: Shaped[NDArray[np.intp], " k"],
     pixel_angle: float,
     num_keys: int,
 ) -> RayPaths:
@@ -36,7 +37,7 @@ def reflect_rays(
 
     Args:
         geometry: the triangles. materials: of the scene.
-        paths: of the rays. hits: of all paths. rows: paths that hit mirrors. (k,)
+        paths: of the rays. hits: of all paths. rows: paths that hit mirrors.
         pixel_angle: angle of a pixel, radians. num_keys: larger than any mesh index.
     Returns:
         The continued paths.

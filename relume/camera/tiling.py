@@ -28,7 +28,7 @@ class ImageTile(NamedTuple):
     width: int
     height: int
 
-    def pixels(self, size: tuple[int, int]) -> NDArray[np.int64]:
+    def pixels(self, size: tuple[int, int]) -> Shaped[NDArray[np.int64], " pixels"]:
         """Row-major indices of the tile's pixels in an image of `size`. (width · height,)"""
         rows = np.arange(self.y, self.y + self.height)[:, None] * size[0]
         return (rows + np.arange(self.x, self.x + self.width)).ravel()
@@ -39,8 +39,10 @@ class ImageTile(NamedTuple):
         right, bottom = min(size[0], self.x + self.width + 1), min(size[1], self.y + self.height + 1)
         return ImageTile(x, y, right - x, bottom - y)
 
-    def crop_from(self, padded: ImageTile, values: NDArray[np.generic]) -> NDArray[np.generic]:
-        """Crop values of a padded tile to this tile. values: (pixels of the padded tile,)"""
+    def crop_from(
+        self, padded: ImageTile, values: Shaped[NDArray[np.generic], " padded_pixels"]
+    ) -> Shaped[NDArray[np.generic], " pixels"]:
+        """Crop values of a padded tile to this tile."""
         x, y = self.x - padded.x, self.y - padded.y
         padded_image = values.reshape(padded.height, padded.width)
         return padded_image[y : y + self.height, x : x + self.width].ravel()

@@ -112,7 +112,7 @@ def distances(rows: Shaped[F32, "n R"], clusters: Clusters) -> Shaped[F32, "n K"
     return np.asarray(out, np.float32)
 
 
-def residual_energy(rows: Shaped[F32, "n R"], clusters: Clusters) -> F64:
+def residual_energy(rows: Shaped[F32, "n R"], clusters: Clusters) -> Shaped[F64, " errors"]:
     """Squared reconstruction error of all rows with 0, 1, … C components. (C + 1,)"""
     residual = np.zeros(1 + clusters.components.shape[1])
     for k, (mean, components) in enumerate(zip(clusters.mean, clusters.components, strict=True)):

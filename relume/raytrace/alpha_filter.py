@@ -104,7 +104,7 @@ class AlphaTest(NamedTuple):
 def _number_sheets(positions: F32, faces: U32, image: NDArray[np.int32], alpha_masks: AlphaMasks) -> NDArray[np.int32]:
     """Sheet of each triangle: the row of its image, or a separate number per connected piece of glass. (faces,)
 
-    Separate numbers let two panes in a row absorb independently.
+    Separate numbers let two glass surfaces in a row absorb independently.
     """
     sheet, (first, num) = image.copy(), (len(alpha_masks.rules), 0)
     for row in np.flatnonzero(alpha_masks.rules[:, 0] == GLASS_RULE):

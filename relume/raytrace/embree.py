@@ -94,8 +94,8 @@ occluded = _ByAddress(f"rtcOccluded{PACKET_WIDTH}")
 intersect = _ByAddress(f"rtcIntersect{PACKET_WIDTH}")
 
 
-def packet_arguments(coherent: bool) -> NDArray[np.uint64]:
-    """Make RTCOccludedArguments or RTCIntersectArguments: flags, feature mask, and three null pointers. (5,) uint64"""
+def packet_arguments(coherent: bool) -> Shaped[NDArray[np.uint64], " 5"]:
+    """Make RTCOccludedArguments or RTCIntersectArguments: flags, feature mask, and three null pointers."""
     arguments = np.zeros(5, np.uint64)
     halves = arguments.view(np.uint32)
     halves[0] = _COHERENT if coherent else 0

@@ -67,7 +67,7 @@ def new_packet(scene, arguments):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def set_origin(packet, lane, x, y, z):  # type: ignore[no-untyped-def]
-    """Set the origin of the ray of a `lane` to (x, y, z)."""
+    """Set the origin of the ray of a `lane` of a `packet` to (x, y, z)."""
     packet.rays[_ORIGIN * LANES + lane] = x
     packet.rays[(_ORIGIN + 1) * LANES + lane] = y
     packet.rays[(_ORIGIN + 2) * LANES + lane] = z
@@ -75,7 +75,7 @@ def set_origin(packet, lane, x, y, z):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def set_direction(packet, lane, x, y, z, far):  # type: ignore[no-untyped-def]
-    """Set the direction of the ray of a `lane`, of any length; the ray ends after `far` lengths."""
+    """Set the direction (x, y, z) of a `lane` of a `packet`, of any length; the ray ends after `far` lengths."""
     packet.rays[_DIRECTION * LANES + lane] = x
     packet.rays[(_DIRECTION + 1) * LANES + lane] = y
     packet.rays[(_DIRECTION + 2) * LANES + lane] = z
@@ -90,7 +90,7 @@ def enable_stochastic_alpha(packet, lane, alpha_sample):  # type: ignore[no-unty
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def enable_lane(packet, lane, is_active):  # type: ignore[no-untyped-def]
-    """Enable or disable the ray of a `lane`."""
+    """Enable the ray of a `lane` of a `packet` if `is_active`, else disable it."""
     packet.is_active[lane] = -1 if is_active else 0
 
 
@@ -142,12 +142,12 @@ def get_uv(packet, lane):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def get_position(packet, lane, axis):  # type: ignore[no-untyped-def]
-    """Compute a component (`axis`) of the hit position of the ray of a `lane`, or of its end."""
+    """Compute a component (`axis`) of the hit position of a `lane` of a `packet`, or of the ray's end."""
     far = packet.rays[_FAR * LANES + lane]
     return packet.rays[(_ORIGIN + axis) * LANES + lane] + far * packet.rays[(_DIRECTION + axis) * LANES + lane]
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def get_direction(packet, lane, axis):  # type: ignore[no-untyped-def]
-    """Read a component (`axis`) of the direction of the ray of a `lane`."""
+    """Read a component (`axis`) of the direction of a `lane` of a `packet`."""
     return packet.rays[(_DIRECTION + axis) * LANES + lane]

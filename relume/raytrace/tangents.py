@@ -32,6 +32,6 @@ def project_to_tangent(vector: Shaped[F32, "#n 3"], normal: Shaped[F32, "n 3"]) 
 def rotation_between(
     normal: Shaped[F32, "n 3"], start: Shaped[F32, "n 3"], end: Shaped[F32, "n 3"]
 ) -> Shaped[F32, " n"]:
-    """Angles about normals from `start` to `end`, both approximately orthogonal to the normals, radians in [−π, π]."""
+    """Angles about each `normal` from `start` to `end`, both approximately orthogonal to it, radians in [−π, π]."""
     y, x = np.einsum("nc,nc->n", np.cross(normal, start), end), np.einsum("nc,nc->n", start, end)
     return np.asarray(np.arctan2(y, x), np.float32)

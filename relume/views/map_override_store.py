@@ -59,7 +59,7 @@ class RayTracer(Protocol):
     def gather_hits(
         self, points: SurfacePoints, wo: Shaped[F32, "n 3"], pattern: RayPattern
     ) -> Shaped[NDArray[np.uint16], "n rays"]:
-        """Find the patches that gather rays of points hit. wo: toward the viewer"""
+        """Find the patches that gather rays of points hit. wo: toward the viewer. pattern: of the rays"""
         ...
 
     def mirror_lights(self, points: SurfacePoints) -> Shaped[NDArray[np.uint8], "n bytes"]:

@@ -207,11 +207,13 @@ class View:
 
         return self.cache.transient.get_value((self.key, "visibility", *self.sample_key(material)), read)
 
-    def read_rows(self, name: str, material: int, sample_indices: NDArray[np.integer]) -> NDArray[Any]:
+    def read_rows(
+        self, name: str, material: int, sample_indices: Shaped[NDArray[np.integer], " k"]
+    ) -> Shaped[NDArray[Any], "k ..."]:
         """Read an array of the view at some of a material's samples; if rays must be traced, only for those.
 
         Args:
-            name: of the array. material: its index. sample_indices: counted from the material's first. (k,)
+            name: of the array. material: its index. sample_indices: counted from the material's first.
         """
         rows, path = self.rows(material), f"views/{self.index}/{name}"
         if isinstance(self.store, TransferReader):
@@ -220,7 +222,9 @@ class View:
             return np.asarray(self._read_visibility(material)[sample_indices])
         return np.asarray(self.store.read(path, rows.start, rows.stop)[sample_indices])
 
-    def subset_rays(self, material: int, sample_indices: NDArray[np.integer], outgoing: OutgoingLight) -> GatherRays:
+    def subset_rays(
+        self, material: int, sample_indices: Shaped[NDArray[np.integer], " k"], outgoing: OutgoingLight
+    ) -> GatherRays:
         """Read gather rays of some of a material's samples, unfiltered. See `read_rows`, `gather_rays`."""
         gather_hits = np.asarray(self.read_rows("gather_hits", material, sample_indices), np.uint16)
         return GatherRays(gather_hits, make_material_pattern(self.store, self.index, material), outgoing)
@@ -310,7 +314,7 @@ def open_view(
     cache: Cache,
     key: str,
     maps: tuple[Hashable | None, ...] = (),
-    rows: NDArray[np.int64] | None = None,
+    rows: Shaped[NDArray[np.int64], " surface_samples"] | None = None,
 ) -> View:
     """Read the data of a view that every frame needs; visibility stays in the store until an operator needs it.
 
