@@ -1,13 +1,12 @@
-"""Compiles every kernel once, so that nothing compiles while somebody waits: `python -m relume.precompile`.
+"""Compile every kernel once, so that no user waits for compilation: `python -m relume.precompile`.
 
-Most of that is Numba's own work, in Python. What is inlined by `inline="always"` is typed anew at each place: the
-kernel of moving pixels took 27 s so. `forceinline=True` leaves it to LLVM, which takes a tenth of that, and code is as
-fast; `inline` is for helpers that are handed what holds arrays, whose references would be counted.
+Most of the time is Numba's own work in Python. `inline="always"` makes Numba type the helper again at every call: the
+kernel of free-camera pixels took 27 s that way. `forceinline=True` leaves inlining to LLVM, which takes a tenth of that
+for equally fast code; use `inline` only for helpers that take objects with arrays, whose references would be counted.
 
-Bakes a thumbnail of the built-in scene, shows each term with each of its curves, and along each parameter that moves
-several, moves local lights and eyes, covers surfaces with a BTF, compares with the truth, looks measured materials up.
-The compiled kernels lie in the cache that `relume.core.numba_cache` has chosen; every later process loads them from
-there.
+Bakes a thumbnail of the built-in scene, edits each term by each of its curves and by each parameter that changes
+several curves, moves local lights and cameras, applies a BTF, renders the reference, and evaluates measured materials.
+`relume.core.numba_cache` chooses the cache for the compiled kernels; every later process loads them from there.
 """
 
 from __future__ import annotations
@@ -50,10 +49,10 @@ from relume.scene.scene_folder import load_scene, save_scene
 from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
 
-SIZE, NUM_LIGHTS, NUM_PROBES = (64, 48), 256, 4000  # as many lights as are grouped
+SIZE, NUM_LIGHTS, NUM_PROBES = (64, 48), 256, 4000  # enough lights to be grouped
 CACHE_BYTES = 1 << 28
 ANALYTIC = tuple(model for model, term in TERMS.items() if not term.needs_data)
-# has no angle; has one that listens to a parameter with another: rays know no more cases
+# the first has no angle, the second has an angle with a parameter: rays distinguish no more cases
 RAY_MODELS = (
     "lambert",
     "ggx",
@@ -61,7 +60,7 @@ RAY_MODELS = (
 
 
 def precompile() -> None:
-    """Bake with every method, edit each analytic term by each curve and along parameters, add and move local lights.
+    """Bake with every method, edit each analytic term by each curve and parameter, add and move local lights.
 
     Cost: a minute and a half of two cores, 20 s when everything is compiled.
     """
@@ -72,7 +71,7 @@ def precompile() -> None:
 
 
 def _compile_pictures() -> None:
-    """Compile what pictures of light triangles are made by, half of all there is."""
+    """Compile the kernels of the method `direct`, half of all there are."""
     with _temporary_scene() as (scene, folder):
         _exercise(METHODS["direct"], scene, folder, ANALYTIC)
         _compare(scene)
@@ -80,7 +79,7 @@ def _compile_pictures() -> None:
 
 
 def _compile_rays() -> None:
-    """Compile what gather rays need more; `gather` last, by when what it shares with `direct` is there."""
+    """Compile the kernels of gather rays; `gather` comes last, when the kernels it shares with `direct` exist."""
     with _temporary_scene() as (scene, folder):
         for method in (METHODS["probes"], METHODS["gather"]):
             _exercise(method, scene, folder, RAY_MODELS)
@@ -88,14 +87,14 @@ def _compile_rays() -> None:
 
 @contextmanager
 def _temporary_scene() -> Iterator[tuple[Scene, Path]]:
-    """The built-in scene, as the worker has it, and a folder for its bakes."""
+    """The built-in scene, loaded as in the worker, and a folder for its bakes."""
     with tempfile.TemporaryDirectory(prefix="relume-warm-") as name:
         save_scene(demo_scene(), Path(name) / "scene")
         yield load_scene(Path(name) / "scene"), Path(name)
 
 
 def _exercise(method: TransferMethod, scene: Scene, folder: Path, models: Iterable[str]) -> None:
-    """Bake, open, edit terms of some models, and move what can be moved."""
+    """Bake, open, edit terms of some models, and move everything that can move."""
     recipe = Recipe(method.name, (scene.cameras[0].name,), SIZE, NUM_LIGHTS, num_probes=NUM_PROBES)
     transfer: Any = open_bake(
         bake_in_process(method, scene, recipe, folder / f"{method.name}.zarr"), Cache(CACHE_BYTES)
@@ -110,7 +109,7 @@ def _exercise(method: TransferMethod, scene: Scene, folder: Path, models: Iterab
 
 
 def _edit(transfer: FixedViewTransfer, picture: Picture, models: Iterable[str]) -> None:
-    """Edit each curve of a term, and along parameters that move several."""
+    """Edit each curve of a term, and each parameter that changes several curves."""
     material = transfer.material_names[0]
     for term in map(TERMS.__getitem__, models):
         partial = {"materials": {material: {"terms": [{"model": term.model}]}}}
@@ -129,7 +128,7 @@ def _edit(transfer: FixedViewTransfer, picture: Picture, models: Iterable[str]) 
 
 
 def _move_lights(transfer: FixedViewTransfer, picture: Picture) -> None:
-    """Add a light of each kind, one after another, and move each twice while it is in hand; one material is enough."""
+    """Add a light of each kind in sequence and move each twice while it is prepared; one material is enough."""
     dark: dict[str, Any] = {name: {"terms": []} for name in transfer.material_names[1:]}
     for kind in ("point", "spot", "directional", "rectangle"):
         picture.prepare("/lights/Lamp")
@@ -141,9 +140,9 @@ def _move_lights(transfer: FixedViewTransfer, picture: Picture) -> None:
 
 
 def _move_cameras(transfer: BakedFreeCamera, picture: FreeCameraPicture) -> None:
-    """See what a moving eye sees, in a picture that is not all edges: kernels are the same whatever terms and lights.
+    """Render free-camera images that are not all edges: kernels are the same for all terms and lights.
 
-    Normal maps are asked for apart, for the scene has none.
+    The light gradient for normal maps is computed explicitly, because the scene has no normal maps.
     """
     partial = {"lights": {"Lamp": {"kind": "point", "position": [0.0, 1.0, 0.5]}}}
     picture.set_look(validate(complete(partial, transfer.default_look), transfer.default_look))
@@ -161,7 +160,7 @@ def _move_cameras(transfer: BakedFreeCamera, picture: FreeCameraPicture) -> None
 
 
 def _apply_btf(transfer: Any, picture: Picture | FreeCameraPicture, folder: Path) -> None:
-    """Show all surfaces covered with a BTF of two texels by two."""
+    """Apply a BTF of 2 × 2 texels to all surfaces."""
     source, grid = folder / "btf.txt", make_direction_grid([(0.0, 1), (45.0, 4)])
     source.write_text("grey")
     gray = LocalPcaBtf(
@@ -182,7 +181,7 @@ def _apply_btf(transfer: Any, picture: Picture | FreeCameraPicture, folder: Path
 
 
 def _sample_btf(term: dict[str, Any]) -> None:
-    """Find what places of a BTF send, as brute force does."""
+    """Sample BTF texels as the reference does."""
     texels, up = TERMS[term["model"]].normalized(term).texels, np.array([[0.0, 0.0, 1.0]])
     assert texels is not None
     sample_btf_surface(texels, np.ones((1, 5), np.float32), up, np.random.default_rng(0)).evaluate(
@@ -191,7 +190,7 @@ def _sample_btf(term: dict[str, Any]) -> None:
 
 
 def _compare(scene: Scene) -> None:
-    """Find the true radiance of a point, of every texel and of a few."""
+    """Render the reference radiance of a point, with all environment texels and with a few samples."""
     up, tangent = np.array([[0, 1, 0]], np.float32), np.array([[1, 0, 0]], np.float32)
     points = ReferencePoints(
         position=9 * up, normal=up, tangent=tangent, wo=up, textures={"diffuse": up}, roughness=up[:, 1]
@@ -202,14 +201,14 @@ def _compare(scene: Scene) -> None:
 
 
 def _evaluate_measured() -> None:
-    """Divide a measured material's curves out, in both precisions that quotients are asked in."""
+    """Divide a measured material by its curves, in both precisions that quotients use."""
     table, curves = np.ones((90, 90, 180, 3), np.float32), np.ones((4, 3, NUM_KNOTS))
     for kind in (np.float32, np.float64):
         measured_over_model(QuotientKind.DIFFUSE, table, curves, *np.array([[0], [0], [1], [0], [0], [1]], kind))
 
 
 def _render(picture: Picture) -> None:
-    """Freeze what waits, take a short and a full step, encode."""
+    """Precompute pending operators, take a short and a full step, encode."""
     while picture.next_job():
         picture.run_next_job(lambda _: None, lambda: False)
     picture.advance(1)

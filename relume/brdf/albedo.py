@@ -1,10 +1,10 @@
-"""What share of light a material sends on, by where it comes from and where it goes.
+"""Reflectance of materials in the hemispherical basis, for light between surfaces.
 
     L_j = Σ_k F_jk t_k,   F_jk = ∫∫ f(ωi, ωo) h_j(ωo) h_k(ωi) cos θi cos θo dωi dωo
 
-with one basis h for both sides (`relume.math.zernike`; Mahajan 2008, section 3, whose out-factors it projects again).
-F_00 is the reflectance ρ, whatever the directions. Where a term looks the same from all around, only functions of one
-order m are mixed, their cosine and sine parts alike; of other terms F is the mean over turns about the normal.
+with one basis h for both sides (`relume.math.zernike`; Mahajan 2008, section 3, projects its out-going factors again).
+F_00 is the reflectance ρ for diffuse light. An isotropic term mixes only functions of one order m, with equal weights
+for their cosine and sine parts; for other terms F is the mean over rotations about the normal.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
@@ -29,7 +30,7 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 Reflectances = tuple[bytes, ...]
-"""Of each material, from `pack_reflectance`; as bytes, which are compared and hashed at every frame."""
+"""One per material, from `pack_reflectance`; bytes, because every frame compares and hashes them."""
 
 
 def _pairs() -> tuple[tuple[int, int], ...]:
@@ -38,31 +39,30 @@ def _pairs() -> tuple[tuple[int, int], ...]:
 
 
 PAIRS = _pairs()
-"""Rungs j ≤ k of equal order: F is known by their numbers; the first is F_00."""
+"""Rows j ≤ k of the recurrence table with equal order: the entries of F that are stored; the first is F_00."""
 
 _REFLECTANCE_BYTES = 4 * (1 + len(TEXTURES)) * 3 * len(PAIRS)
 _NUM_COSINES, _NUM_AZIMUTHS = 24, 24
 _NUM_OUT, _NUM_RADII, _NUM_AROUND = 10, 32, 12
-_STEPS = 128  # of a highlight's numbers, from none to all
-_STEPS_PER_OCTAVE = 64  # steps of a sharp highlight's numbers
-# F_00 of a highlight that counts; F_66 of F_00 where functions miss some of it
+_STEPS = 128  # quantization steps of a highlight's F, from 0 to 1
+_STEPS_PER_OCTAVE = 64  # quantization steps of a sharp highlight's parameters
+# least F_00 of a highlight that matters; least F_66 / F_00 of a highlight that the basis does not represent
 _MIN_REFLECTANCE, _MIN_RESIDUAL_RATIO = 0.15, 0.03
 _LAST_PAIR = PAIRS.index((OUTGOING_DEGREE // 2, OUTGOING_DEGREE // 2))  # both of the highest degree, of order 0
 
 
 def scatters_diffusely(term_document: Mapping[str, Any]) -> bool:
-    """Whether a term scatters light about evenly; see `Term.scatters_diffusely`."""
+    """True if a term is nearly diffuse; see `Term.scatters_diffusely`."""
     return TERMS[term_document["model"]].scatters_diffusely
 
 
 def pack_reflectance(terms: Sequence[Mapping[str, Any]], normals: NormalMap | None = None) -> bytes:
-    """What a material sends on: the sum of its terms without a texture, and of those with each of `TEXTURES`; the
-    images that its look names in their place; its mirrors; what few functions do not tell of it; and how it leans.
+    """Pack a material's F, summed over terms per texture slot, its image names, mirrors, narrow lobes and normal map.
 
     Args:
-        terms: of a complete look. normals: the image that it names in the place of the material's normal map.
+        terms: of a complete look. normals: the image that the look uses instead of the material's normal map.
     Returns:
-        What `unpack_reflectance`, `unpack_images`, `unpack_mirrors`, `unpack_lobes` and `unpack_normal_map` read.
+        Bytes for `unpack_reflectance`, `unpack_images`, `unpack_mirrors`, `unpack_lobes` and `unpack_normal_map`.
     """
     return _reflectances(json.dumps([{**term} for term in terms], sort_keys=True), normals)
 
@@ -83,25 +83,25 @@ def _reflectances(terms_text: str, normals: NormalMap | None) -> bytes:
 
 
 def _pack_text(*sections: Sequence[Any]) -> bytes:
-    """What is known beside numbers: names of images, then all else, where there is anything."""
+    """Encode image names, then all other sections as JSON if any is not empty."""
     image_names, *extras = sections
     return " ".join([*image_names, json.dumps(extras, sort_keys=True)] if any(extras) else image_names).encode()
 
 
-def quantized_reflectance(term: Mapping[str, Any]) -> F64:
-    """F of a highlight as it counts: else all light would be made anew with each step of a hand. (3, pairs)"""
+def quantized_reflectance(term: Mapping[str, Any]) -> Shaped[F64, "3 pairs"]:
+    """F of a highlight in coarse steps, so that not every small edit of a slider recomputes all indirect light."""
     return np.asarray(np.round(reflectance_matrix(term) * _STEPS) / _STEPS)
 
 
 def narrow_lobes(highlights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """All highlights of a material, where few functions do not tell one of them that sends much.
+    """All highlights of a material, if the basis does not represent a significant one.
 
-    Their numbers have steps of 1 %; curves that are drawn are as they are.
+    Their parameters are quantized in steps of 1 %; drawn curves are not.
 
     Args:
         highlights: terms of a complete look.
     Returns:
-        Their documents, for `relume.brdf.highlight_tables`; none where functions are enough.
+        Their documents, for `relume.brdf.highlight_tables`; empty if the basis suffices.
     """
     if any(map(_is_textured, highlights)) or not any(map(_is_narrow, highlights)):
         return []
@@ -109,18 +109,18 @@ def narrow_lobes(highlights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]
 
 
 def _is_textured(term: Mapping[str, Any]) -> bool:
-    """Whether texels cover a term: what it sends is their mean, which few functions tell."""
+    """True if the term is a BTF: its mean over texels is represented well by the basis."""
     return TERMS[term["model"]].normalized(term).texels is not None
 
 
 def _is_narrow(term: Mapping[str, Any]) -> bool:
-    """Whether a highlight sends much, and not as few functions do."""
+    """True if a highlight is significant and not represented by the basis."""
     matrix = reflectance_matrix(term).max(axis=0)
     return bool(matrix[0] > _MIN_REFLECTANCE and matrix[_LAST_PAIR] > _MIN_RESIDUAL_RATIO * matrix[0])
 
 
 def _quantize_parameters(term: Mapping[str, Any]) -> dict[str, Any]:
-    """A term whose numbers are whole powers of 2^(1/64): a hand that hardly moves makes no light anew."""
+    """Round a term's numbers to powers of 2^(1/64), so that tiny edits recompute no light."""
 
     def rounded(value: Any) -> Any:
         if isinstance(value, list):
@@ -131,36 +131,36 @@ def _quantize_parameters(term: Mapping[str, Any]) -> dict[str, Any]:
     return {**term, "color": rounded(list(term["color"])), "params": params}
 
 
-def unpack_reflectance(packed_material: bytes) -> F32:
-    """F of a material's terms without a texture, then of those with each of `TEXTURES`. (3, channels, pairs) float32"""
+def unpack_reflectance(packed_material: bytes) -> Shaped[F32, "slots 3 pairs"]:
+    """F of a material's terms without a texture, then of the terms with each of `TEXTURES`."""
     return np.frombuffer(packed_material[:_REFLECTANCE_BYTES], np.float32).reshape(1 + len(TEXTURES), 3, len(PAIRS))
 
 
 def unpack_images(packed_material: bytes) -> Images:
-    """What a look names in the place of each of a material's `TEXTURES`. of_material: from `pack_reflectance`"""
+    """Images that a look uses instead of each of a material's `TEXTURES`. packed_material: from `pack_reflectance`"""
     (diffuse, specular), *_ = _unpack_text(packed_material)
     return diffuse or None, specular or None
 
 
 def unpack_mirrors(packed_material: bytes) -> list[dict[str, Any]]:
-    """The terms of a material that are mirrors, in part at least, and flat. of_material: from `pack_reflectance`"""
+    """Planar mirror terms of a material; empty with a normal map. packed_material: from `pack_reflectance`"""
     _, mirrors, _, normals = _unpack_text(packed_material)
     return [] if normals else mirrors
 
 
 def unpack_lobes(packed_material: bytes) -> list[dict[str, Any]]:
-    """The highlights of a material that few functions do not tell; see `narrow_lobes`. of_material: likewise"""
+    """Highlights that the basis does not represent; see `narrow_lobes`. packed_material: from `pack_reflectance`"""
     return _unpack_text(packed_material)[2]
 
 
 def unpack_normal_map(packed_material: bytes) -> NormalMap | None:
-    """What a look names in the place of a material's normal map. of_material: likewise"""
+    """Image that a look uses instead of a material's normal map. packed_material: from `pack_reflectance`"""
     normal_map = _unpack_text(packed_material)[3]
     return NormalMap(*normal_map) if normal_map else None
 
 
 def drop_normal_map(packed_material: bytes) -> bytes:
-    """The same of a material that leans as it was baked. of_material: likewise"""
+    """Remove the look's normal map, so that the material uses the baked one. packed_material: likewise"""
     image_names, mirrors, lobes, normals = _unpack_text(packed_material)
     return (
         packed_material[:_REFLECTANCE_BYTES] + _pack_text(image_names, mirrors, lobes, [])
@@ -170,25 +170,19 @@ def drop_normal_map(packed_material: bytes) -> bytes:
 
 
 def _unpack_text(packed_material: bytes) -> tuple[list[str], list[dict[str, Any]], list[dict[str, Any]], list[Any]]:
-    """What `_text` wrote."""
+    """Decode the output of `_pack_text`."""
     diffuse, specular, *extras = packed_material[_REFLECTANCE_BYTES:].decode().split(" ", 2)
     mirrors, lobes, normals = json.loads(extras[0]) if extras else ([], [], [])
     return [diffuse, specular], mirrors, lobes, normals
 
 
-def reflectance(term_document: Mapping[str, Any]) -> F64:
-    """ρ = F_00 of a term, its colour included, its texture not. (3,), not negative"""
+def reflectance(term_document: Mapping[str, Any]) -> Shaped[F64, " 3"]:
+    """Reflectance ρ = F_00 ≥ 0 of a term, with its color but without its texture."""
     return reflectance_matrix(term_document)[:, 0]
 
 
-def reflectance_matrix(term_document: Mapping[str, Any]) -> F64:
-    """F of a term, its colour included, its texture not; of a diffuse term F_00 alone.
-
-    Args:
-        term_document: one term of a complete look.
-    Returns:
-        (channels, pairs)
-    """
+def reflectance_matrix(term_document: Mapping[str, Any]) -> Shaped[F64, "3 pairs"]:
+    """F of a term of a complete look, with its color but without its texture; F_00 alone for a diffuse term."""
     white_matrix = (_diffuse_matrix if scatters_diffusely(term_document) else _lobe_matrix)(
         white_material_key(term_document)
     )
@@ -196,22 +190,22 @@ def reflectance_matrix(term_document: Mapping[str, Any]) -> F64:
 
 
 def white_material_key(term_document: Mapping[str, Any]) -> str:
-    """The text of a term whose colour is white: the colour multiplies what is found of it."""
+    """JSON of a term with a white color, because cached results are scaled by the color later."""
     return json.dumps({**term_document, "color": [1.0, 1.0, 1.0]}, sort_keys=True)
 
 
 @lru_cache(maxsize=1024)
 def _lobe_matrix(term_text: str) -> F64:
-    """As `_diffuse_matrix`, of a term with a lobe about the mirror direction, where ωi are dense too. (3, pairs)"""
+    """F of a term with a lobe: like `_diffuse_matrix`, with ωi concentrated around the mirror direction. (3, pairs)"""
     points, projected = _mirror_quadrature(), _project_incident(term_text)
-    products = np.tensordot(points.h_o, projected, axes=(0, 0))  # (rungs, 3, rungs)
+    products = np.tensordot(points.h_o, projected, axes=(0, 0))  # (rows, 3, rows)
     rows, columns = np.array(PAIRS).T
     return np.asarray(products[rows, :, columns].T)
 
 
 @lru_cache(maxsize=256)
 def _project_incident(term_text: str) -> F64:
-    """What each function of ωi sends towards each ωo, weighed as `_QuadraturePoints`. (o, 3, rungs)"""
+    """Radiance toward each ωo for light in each basis function, weighted as `_QuadraturePoints`. (o, 3, rows)"""
     document, points = json.loads(term_text), _mirror_quadrature()
     if is_isotropic(document):
         value = _quadrature().values(document)
@@ -227,15 +221,15 @@ def _quadrature() -> Quadrature:
     return Quadrature(_mirror_quadrature().wi, _mirror_quadrature().wo)
 
 
-def directional_albedo(terms: Sequence[Mapping[str, Any]]) -> tuple[F64, F64]:
-    """What share of even light a material sends towards each θo, its textures white, the mean over turns:
+def directional_albedo(terms: Sequence[Mapping[str, Any]]) -> tuple[Shaped[F64, " n"], Shaped[F64, "n 3"]]:
+    """Directional albedo of a material with white textures, the mean over rotations about the normal:
 
         a(θo) = ∫ f(ωi, ωo) cos θi dωi
 
     Args:
         terms: of a complete look.
     Returns:
-        θo in radians, rising, (o,), and a there, (o, 3).
+        θo in radians, ascending, and a(θo).
     """
     points, total = _mirror_quadrature(), np.zeros((_NUM_OUT, 3))
     for term in terms:
@@ -246,12 +240,12 @@ def directional_albedo(terms: Sequence[Mapping[str, Any]]) -> tuple[F64, F64]:
 
 
 class _QuadraturePoints(NamedTuple):
-    """Where terms are evaluated, which no term changes.
+    """Quadrature points and weights, the same for all terms.
 
     Attributes:
         wi, wo: local directions. (o, n, 3), (o, 1, 3)
-        h_i: functions of ωi, weighed. (o, n, rungs). h_o: of ωo, times ∫ cos² mφ dφ. (o, rungs)
-        weight_o: of each ωo, its cosine included, which is in h_i. (o,)
+        h_i: basis functions of ωi, weighted. (o, n, rows). h_o: of ωo, times ∫ cos² mφ dφ. (o, rows)
+        weight_o: weights of ωo with the cosine; h_i contains them. (o,)
     """
 
     wi: F64
@@ -263,9 +257,10 @@ class _QuadraturePoints(NamedTuple):
 
 @lru_cache(maxsize=1)
 def _mirror_quadrature() -> _QuadraturePoints:
-    """Spread ωi about the mirror directions of a few ωo.
+    """Distribute ωi around the mirror directions of a few ωo.
 
-    With θr the angle from there, θr = π u³ and dωi = 3π u² sin θr du dφr; below the horizon there is nothing.
+    With θr the angle from the mirror direction, θr = π u³ and dωi = 3π u² sin θr du dφr; the weight is zero below the
+    horizon.
     """
     cos_o, weight_o = _gauss(_NUM_OUT)
     u, weight_u = _gauss(_NUM_RADII)
@@ -285,17 +280,17 @@ def _mirror_quadrature() -> _QuadraturePoints:
 
 
 def _gauss(num: int) -> tuple[F64, F64]:
-    """Find the places and weights of Gauss and Legendre over [0, 1]. (num,) each"""
+    """Nodes and weights of Gauss-Legendre quadrature over [0, 1]. (num,) each"""
     nodes, weights = np.polynomial.legendre.leggauss(num)
     return (nodes + 1) / 2, weights / 2
 
 
-_ROTATIONS = [rotational_symmetry(np.pi * (k + 0.5) / 4) for k in range(4)]  # of a term that looks different from there
+_ROTATIONS = [rotational_symmetry(np.pi * (k + 0.5) / 4) for k in range(4)]  # for anisotropic terms
 
 
 @lru_cache(maxsize=1024)
 def _diffuse_matrix(term_text: str) -> F64:
-    """By Gauss–Legendre quadrature over cosines; diffuse terms are smooth, or steps of hand-drawn bands. (3, pairs)"""
+    """F by Gauss-Legendre quadrature over cosines; diffuse terms are smooth, or steps of drawn bands. (3, pairs)"""
     cosine, weight = _gauss(_NUM_COSINES)
     cosine_weight = weight * cosine
     sine = np.sqrt(1 - cosine**2)
@@ -305,6 +300,6 @@ def _diffuse_matrix(term_text: str) -> F64:
     wo = np.stack([sine, 0 * sine, cosine], axis=-1)[:, None, None]
     over_azimuths = eval_brdf(json.loads(term_text), wi, wo).mean(axis=2)
     out = np.zeros((3, len(PAIRS)))
-    # 2π for the azimuths of each direction, over π
+    # 2π for the azimuths of each direction, divided by π
     out[:, 0] = 4 * np.pi * np.einsum("o,i,oic->c", cosine_weight, cosine_weight, over_azimuths)
     return out

@@ -1,7 +1,7 @@
-"""The angles that curves are functions of, as Numba kernels over local-frame directions (z = normal, x = tangent).
+"""Angles of curves, as Numba kernels over local-frame directions (z = normal, x = tangent).
 
-Each is γ(wi, wo) in radians, clamped to [0, π/2]; see docs/direct-light.md#angles. The NumPy twin that tests compare
-with is `relume.brdf.evaluate.angles_numpy`.
+Each is γ(wi, wo) in radians, clamped to [0, π/2]; see docs/direct-light.md#angles. `relume.brdf.evaluate.angles_numpy`
+is the NumPy reference for tests.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _HALF_PI = np.float32(math.pi / 2)
 _ONE = np.float32(1)
 _LN2, _PER_LN2 = np.float32(math.log(2)), np.float32(1 / math.log(2))
 
-# of NumPy: for each int of Python a kernel that is called with it would be compiled anew
+# NumPy integers: Numba compiles a kernel anew for each Python int literal
 THETA_I = np.int64(Angle.THETA_I)
 THETA_H = np.int64(Angle.THETA_H)
 THETA_D = np.int64(Angle.THETA_D)
@@ -36,9 +36,9 @@ TILT_Y = np.int64(Angle.TILT_Y)
 def fast_pow(x, exponent):  # type: ignore[no-untyped-def]
     """x ** exponent for x in (0, 1] and exponent in [0, 1], relative error below 2e-6.
 
-    Written with arithmetic only: calls of exp and log would keep the compiler from vectorising the loops around them.
+    Uses arithmetic only: calls of exp and log would prevent vectorization of the surrounding loops.
     """
-    # x = m · 2^e with m in [0.75, 1.5); ln m = 2 artanh((m − 1)/(m + 1)), whose series is exact where x is near one
+    # x = m · 2^e with m in [0.75, 1.5); ln m = 2 artanh((m − 1)/(m + 1)), a series that is exact near m = 1
     bits = np.float32(x).view(np.int32)
     halves = (bits - np.int32(0x3F400000)) >> np.int32(23)
     m = np.int32(bits - (halves << np.int32(23))).view(np.float32)
@@ -80,13 +80,13 @@ def angle_at(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     if kind == LOBE:
         return acos_clamped(ix * ox + iy * oy + iz * oz)
     hx, hy, hz = ix + ox, iy + oy, iz + oz
-    # opposite directions have no half vector; the tiny constant keeps the length from vanishing
+    # opposite directions have no half vector; the tiny constant prevents division by zero
     inverse = _ONE / math.sqrt(hx * hx + hy * hy + hz * hz + np.float32(1e-12))
     if kind == THETA_H:
         return acos_clamped(hz * inverse)
     if kind == THETA_D:
         return acos_clamped((hx * ix + hy * iy + hz * iz) * inverse)
-    # tan γ = |h along the axis| / n·h, written without the tangent, which has a pole
+    # tan γ = |h along the axis| / n·h, without the tangent, which has a pole
     if kind == TILT_X:
         return acos_clamped(hz / math.sqrt(hz * hz + hx * hx + np.float32(1e-12)))
     if kind == TILT_Y:
@@ -101,15 +101,15 @@ def angle_at(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def compute_angles(kind, scale, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-untyped-def]
-    """γ · scale of many directions wi and one wo.
+    """γ · scale for many directions wi and one wo.
 
     Args:
         kind: an `Angle`. scale: e.g. bands per radian. float32
         ix, iy, iz: local wi. (n,) float32
         ox, oy, oz: local wo, scalars.
-        out: (n,) float32, written.
+        out: output. (n,) float32
     """
-    # one loop for each angle: only then does the compiler vectorise it
+    # one loop for each angle: otherwise the compiler does not vectorize it
     if kind == THETA_I:
         for k in range(ix.shape[0]):
             out[k] = scale * angle_at(THETA_I, ix[k], iy[k], iz[k], ox, oy, oz)
@@ -144,11 +144,11 @@ def compute_angles(kind, scale, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def compute_alpha_beta(scale, ix, iy, iz, ox, oy, oz, alpha, beta):  # type: ignore[no-untyped-def]
-    """γα and γβ times scales, of many directions wi and one wo, by one power: cos γα · cos γβ = cos θh.
+    """γα and γβ times scales, for many directions wi and one wo, with one power: cos γα · cos γβ = cos θh.
 
     Args:
-        scale: of each. (2,) float32. ix, iy, iz: local wi. (n,) float32
-        ox, oy, oz: local wo, scalars. alpha, beta: (n,) float32, written.
+        scale: of each angle. (2,) float32. ix, iy, iz: local wi. (n,) float32
+        ox, oy, oz: local wo, scalars. alpha, beta: output. (n,) float32
     """
     along, across = scale[0], scale[1]
     for k in range(ix.shape[0]):

@@ -1,9 +1,9 @@
-"""Edits of a curve relative to what it was: of each band a factor and an offset, so that a band nobody touched stays.
+"""Relative edits of a curve: a factor and an offset for each band, so that unedited bands keep their values.
 
     edited = factor · before + offset
 
-`factors` and `offsets` give them band by band. `handles`, [degrees, was, becomes], pull the result: between two of them
-the pulls of both are blended, so that one handle moves the curve as far as its neighbours and no farther
+`factors` and `offsets` give them per band. `handles`, [degrees, value before, value after], drag the curve: between two
+handles their edits are blended, so that one handle changes the curve as far as its neighbors
 (docs/direct-light.md#curves-as-bands).
 """
 
@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 F64 = NDArray[np.float64]
@@ -21,17 +22,17 @@ RELATIVE = ("factors", "offsets", "handles")
 
 
 def is_relative(drawn: Mapping[str, Any]) -> bool:
-    """Whether a freehand object says anything relative to what the curve was."""
+    """True if a freehand object has relative edits."""
     return any(name in drawn for name in RELATIVE)
 
 
-def curve_edit(drawn: Mapping[str, Any], before: F64) -> tuple[F64, F64]:
-    """What multiplies each band of a curve, and what is then added.
+def curve_edit(drawn: Mapping[str, Any], before: Shaped[F64, "3 J"]) -> tuple[Shaped[F64, "3 J"], Shaped[F64, "3 J"]]:
+    """Factor and offset of each band of a curve.
 
     Args:
-        before: band averages of what is edited, not negative. (3, J)
+        drawn: the freehand object. before: band averages of the edited curve, not negative.
     Returns:
-        factor, offset: (3, J) each, not negative; exactly one and zero in bands that are not edited
+        factor, offset: not negative; exactly one and zero in unedited bands
     """
     factor, offset = (_rows(drawn, name, before, neutral) for name, neutral in (("factors", 1.0), ("offsets", 0.0)))
     if "handles" not in drawn:
@@ -40,16 +41,14 @@ def curve_edit(drawn: Mapping[str, Any], before: F64) -> tuple[F64, F64]:
     return gain * factor, gain * offset + lift
 
 
-def evaluate_edit(rows: F64, gamma: F64, max_angle: float, *, smooth: bool) -> F64:
-    """Numbers of bands at exact angles: those of the band, so that averages hold; `smooth`, linear between middles.
+def evaluate_edit(rows: Shaped[F64, "3 J"], gamma: F64, max_angle: float, *, smooth: bool) -> Shaped[F64, "3 ..."]:
+    """Evaluate band values at exact angles.
 
     Args:
-        rows: a number for each band and channel. (3, J)
+        rows: a value for each channel and band.
         gamma: radians in [0, max_angle]. (...)
-        max_angle: where the last band ends, radians.
-        smooth: whether to go linearly from one band's middle to the next one's, instead of in steps.
-    Returns:
-        (3, ...) float64
+        max_angle: end of the last band, radians.
+        smooth: interpolate linearly between band centers; otherwise values are constant in each band and keep averages.
     """
     num_bands = rows.shape[1]
     band_position = gamma * (num_bands / max_angle)
@@ -59,16 +58,16 @@ def evaluate_edit(rows: F64, gamma: F64, max_angle: float, *, smooth: bool) -> F
 
 
 def _rows(drawn: Mapping[str, Any], name: str, like: F64, neutral: float) -> F64:
-    """(3, J), from one J for all channels, three lists of J, or 3·J flat."""
+    """Broadcast one list for all channels, three lists of J, or 3·J flat values to (3, J)."""
     if name not in drawn:
         return np.full(like.shape, neutral)
     return np.broadcast_to(np.asarray(drawn[name], np.float64).reshape(-1, like.shape[1]), like.shape)
 
 
 def _handle_edits(handles: F64, before: F64) -> tuple[F64, F64]:
-    """Factor and offset of each band by its two neighbouring handles. (3, J) each"""
+    """Factor and offset of each band from its two neighboring handles. (3, J) each"""
     num_bands = before.shape[1]
-    # the outer half of the first and the last band belongs to its middle: there is nothing finer
+    # the outer half of the first and last band belongs to its center: bands have no finer resolution
     handle_position = np.clip(handles[:, 0] * (num_bands / 90.0) - 0.5, 0.0, num_bands - 1.0)
     band = np.arange(num_bands)
     left = np.clip(np.searchsorted(handle_position, band, side="right") - 1, 0, len(handle_position) - 2)
@@ -84,11 +83,11 @@ def _handle_edits(handles: F64, before: F64) -> tuple[F64, F64]:
 
 
 def _handle_edit(from_value: F64, to_value: F64, before: F64) -> tuple[F64, F64]:
-    """How one handle moves values: change = gain · before + lift. (3, J) each
+    """Edit of values by one handle: change = gain · before + lift. (3, J) each
 
-    What is lower than the handle moves in proportion, what is higher as far as the handle, so that nothing moves
-    farther than the hand, neither in amount nor in proportion. A handle that more than doubles what was there adds the
-    rest to the low ones too: nothing can be multiplied out of a curve that is zero.
+    Values below the handle change in proportion, values above it by the same amount, so that nothing changes more than
+    the handle, neither in amount nor in proportion. A handle that more than doubles its value adds the rest to the low
+    values too, because no factor changes a curve that is zero.
     """
     change = to_value - from_value
     rise = np.maximum(change, 0.0)

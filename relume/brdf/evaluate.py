@@ -1,4 +1,4 @@
-"""The whole BRDF of a term in plain NumPy, float64, its curves at exact angles: what frames are compared with."""
+"""NumPy reference for the BRDF of a term, in float64, with curves at exact angles."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 
 from relume.brdf.curves import curve_values
 from relume.brdf.registry import TERMS
@@ -14,23 +15,26 @@ from relume.brdf.term import F64, Angle
 
 def _normalize(v: F64) -> F64:
     length = np.linalg.norm(v, axis=-1, keepdims=True)
-    # opposite directions have no half vector; the value does not matter, such pairs lie on the horizon
+    # opposite directions have no half vector; the value does not matter, because such pairs lie on the horizon
     return np.asarray(v / np.where(length > 0, length, 1.0))
 
 
-def angles_numpy(angle: Angle, wi: F64, wo: F64, axes: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> F64:
-    """γ(wi, wo) in radians, clamped to [0, π/2].
+def angles_numpy(
+    angle: Angle,
+    wi: Shaped[F64, "*#batch 3"],
+    wo: Shaped[F64, "*#batch 3"],
+    axes: tuple[float, float, float] = (1.0, 1.0, 1.0),
+) -> F64:
+    """Evaluate the angle γ(wi, wo) of a curve, in radians, clamped to [0, π/2].
 
     Definitions: `THETA_R` between wi and the reflection of wo about the normal; `ALPHA` and `BETA` by eqs. 15 and 16,
     Ben-Artzi 2006: cos γα = (cos θh)^(cos² φh), cos γβ = (cos θh)^(sin² φh), φh from the tangent x; `TILT_X` and
     `TILT_Y`: tan γ = tan θh |cos φh|, tan θh |sin φh|; `LOBE`: cos γ = Σ axes · wi · wo, axis by axis.
 
     Args:
-        angle: which of them.
-        wi, wo: local frame, unit, z = normal. (..., 3)
+        angle: kind of angle.
+        wi, wo: local frame, unit, z = normal; they broadcast.
         axes: of the curve, see `Curve.axes`.
-    Returns:
-        (...) float64
     """
     wi, wo = np.broadcast_arrays(np.asarray(wi, np.float64), np.asarray(wo, np.float64))
     half = _normalize(wi + wo)
@@ -57,14 +61,16 @@ def angles_numpy(angle: Angle, wi: F64, wo: F64, axes: tuple[float, float, float
     return np.arccos(np.clip(cosine, 0.0, 1.0))
 
 
-def eval_brdf(term_document: Mapping[str, Any], wi: F64, wo: F64) -> F64:
-    """BRDF of one term: colour · quotient · Π curves.
+def eval_brdf(
+    term_document: Mapping[str, Any], wi: Shaped[F64, "*#batch 3"], wo: Shaped[F64, "*#batch 3"]
+) -> Shaped[F64, "*batch 3"]:
+    """Evaluate the BRDF of one term: color · quotient · Π curves, in 1/sr, without the cosine and without textures.
 
     Args:
         term_document: one term of a complete look: model, color, params, curves.
-        wi, wo: directions to light and viewer, local frame, unit, z = normal, x = tangent; they broadcast. (..., 3)
+        wi, wo: directions to light and viewer, local frame, unit, z = normal, x = tangent; they broadcast.
     Returns:
-        1/sr, no cosine. (..., 3) float64; zero below the horizon. Textures are not part of it.
+        BRDF per channel; zero below the horizon
     """
     term = TERMS[term_document["model"]].normalized(term_document)
     wi, wo = np.broadcast_arrays(np.asarray(wi, np.float64), np.asarray(wo, np.float64))

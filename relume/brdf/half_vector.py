@@ -1,4 +1,4 @@
-"""What quotients share: cosines of the half vector, and how ufuncs are made. Local frame, z = normal."""
+"""Helpers for quotients: cosines of the half vector, and lazily compiled ufuncs. Local frame, z = normal."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ import numpy as np
 
 from relume.core.numba_options import UNCOUNTED
 
-# Cosines below this are within 2e-4 degrees of the horizon. Quotients divide by them, and one over their square must
-# stay finite in float32; it is, at 1e12.
+# Cosines below this are within 2e-4 degrees of the horizon. Quotients divide by them; the inverse square, 1e12, stays
+# finite in float32.
 MIN_COSINE = np.float32(1e-6)
-# Float constants of Numba are float64 and would drag the float32 loops along; these are exact in both.
+# Float literals in Numba are float64 and would promote the float32 loops; these constants are exact in both.
 ZERO, ONE, TWO, HALF = np.float32(0), np.float32(1), np.float32(2), np.float32(0.5)
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def half_vector_cosines(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def]
-    """cos θh = n·h and cos θd = wo·h = |wi + wo| / 2, of unit directions above the horizon.
+    """Cosines cos θh = n·h and cos θd = wo·h = |wi + wo| / 2 of unit directions above the horizon.
 
     Args:
         wi_x, wi_y, wi_z: light direction, local frame, unit. (...) each
@@ -31,12 +31,12 @@ def half_vector_cosines(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-
     """
     h_x, h_y, h_z = wi_x + wo_x, wi_y + wo_y, wi_z + wo_z
     cos_theta_d = max(HALF * math.sqrt(h_x * h_x + h_y * h_y + h_z * h_z), MIN_COSINE)
-    cos_theta_h = min(HALF * h_z / cos_theta_d, ONE)  # rounding may carry it past one
+    cos_theta_h = min(HALF * h_z / cos_theta_d, ONE)  # rounding may exceed one
     return cos_theta_h, cos_theta_d
 
 
 class LazyUfunc:
-    """A ufunc that is compiled, or loaded from the cache, when it is first called: few processes need every term."""
+    """A ufunc that is compiled, or loaded from the cache, on its first call: few processes need every term."""
 
     def __init__(self, function: Callable[..., Any], signatures: Sequence[Any]) -> None:
         self._function, self._signatures = function, signatures
@@ -45,7 +45,7 @@ class LazyUfunc:
         self.__doc__ = function.__doc__
 
     def __call__(self, *args: Any) -> Any:
-        """Apply the ufunc, which the first call compiles or loads."""
+        """Apply the ufunc; the first call compiles or loads it."""
         return (self._ufunc or self._compile())(*args)
 
     def _compile(self) -> Callable[..., Any]:
@@ -57,7 +57,7 @@ class LazyUfunc:
 
 
 def quotient_ufunc_with(num_fixed: int) -> Callable[[Callable[..., Any]], LazyUfunc]:
-    """Decorator for a quotient that has fixed parameters before the six components of wi and wo.
+    """Make a decorator for a quotient with fixed parameters before the six components of wi and wo.
 
     float32 directions give float32.
     """
@@ -71,7 +71,7 @@ quotient_ufunc = quotient_ufunc_with(0)
 
 @quotient_ufunc
 def hemisphere_indicator(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def]
-    """One above the horizon: the quotient where the curves say it all.
+    """One above the horizon, else zero: the quotient of terms that consist of curves alone.
 
     Args:
         wi_x, wi_y, wi_z: light direction, local frame, unit. (...) each

@@ -1,10 +1,10 @@
-"""What a highlight sends of light that comes straight to a surface, tabulated: few functions make it 30° wide.
+"""Tables of a highlight's reflection of direct light between patches; the basis blurs a highlight to 30°.
 
     T(b, s) = ∫_s f(ω_b, ωo) cos θo dωo / ∫_s cos θo dωo
 
-over squares s of the grid by which gather cells send (`relume.math.direction_grid`), for light from the middles ω_b of
-finer bins; all squares together send what the term does. A term that looks the same from all around and in a mirror is
-known from one eighth of all bins.
+over the outgoing direction bins s of patches (`relume.math.direction_grid`), for light from the centers ω_b of finer
+bins; the sum over all s has the exact energy of the term. By isotropy and reflection symmetry, one eighth of the fine
+bins suffices.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
@@ -26,18 +27,16 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 _NUM_RADII, _NUM_AROUND = 48, 48
-_CENTER_WEIGHT = 1e-6  # weight of the middle of a square, which counts where nothing else lies in it
-_ROTATIONS = [rotational_symmetry(np.pi * (k + 0.5) / 4) for k in range(4)]  # of a term that looks different from there
+_CENTER_WEIGHT = 1e-6  # weight of a bin's center, which matters only if the bin has no other sample
+_ROTATIONS = [rotational_symmetry(np.pi * (k + 0.5) / 4) for k in range(4)]  # for anisotropic terms
 
 
 @lru_cache(maxsize=64)
-def lobe_table(term_text: str) -> F32:
-    """T of a term: the mean over turns about the normal where it looks different from there.
+def lobe_table(term_text: str) -> Shaped[F32, "fine_bins 3 bins"]:
+    """Table T of a term, in 1/sr; for an anisotropic term the mean over rotations about the normal.
 
     Args:
-        term_text: one term of a complete look, as JSON, its colour white (`relume.brdf.albedo.white_material_key`).
-    Returns:
-        1/sr. (bins, 3 channels, `NUM_DIRECTION_BINS`) float32
+        term_text: one term of a complete look, as JSON, with a white color (`relume.brdf.albedo.white_material_key`).
     """
     document, pairs = json.loads(term_text), _pairs()
     value = _values(document, pairs.quadrature)
@@ -59,13 +58,13 @@ def _values(document: Mapping[str, Any], pairs: Quadrature) -> F64:
 
 
 class _DirectionPairs:
-    """Directions ωo about where light from each bin is mirrored to, and the middles of all squares.
+    """Directions ωo around the mirror direction of each fine bin, and the centers of all bins.
 
-    With θr the angle from the mirror direction, θr = π u³ and dωo = 3π u² sin θr du dφr, as narrow highlights want it.
+    With θr the angle from the mirror direction, θr = π u³ and dωo = 3π u² sin θr du dφr, dense for narrow highlights.
 
     Attributes:
-        weight: cos θo dωo. (bins, n). bin_indices: that each ωo is in. (bins, n)
-        total: Σ cos θo dωo of each square. (bins, squares). area: ∫ cos θo dωo over it. (squares,)
+        weight: cos θo dωo. (fine bins, n). bin_indices: bin of each ωo. (fine bins, n)
+        total: Σ cos θo dωo of each bin. (fine bins, bins). area: ∫ cos θo dωo over each bin. (bins,)
     """
 
     def __init__(self) -> None:
@@ -101,7 +100,7 @@ def _pairs() -> _DirectionPairs:
 
 
 def _frames(axis: F64) -> F64:
-    """Frames whose z axes are given directions, their rows the axes. axis: (b, 3). (b, 3, 3)"""
+    """Frames with given z axes; rows are axes. axis: (b, 3). (b, 3, 3)"""
     helper = np.where(np.abs(axis[:, 2:]) < 0.9, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])
     x = np.cross(helper, axis)
     x /= np.linalg.norm(x, axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""Terms of a look sampled on the MERL grid: an edited material as a file that other renderers read."""
+"""Sample terms of a look on the MERL grid, to export an edited material for other renderers."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 
 from relume.assets.measured.measured_store import source_path
 from relume.assets.measured.merl import (
@@ -21,20 +22,22 @@ from relume.assets.measured.merl import (
 from relume.brdf.evaluate import eval_brdf
 from relume.core.errors import MaterialError
 
-_STRIDE = 61  # every so manyth node is looked at for anisotropy
+_STRIDE = 61  # every 61st node is tested for anisotropy
 _TOLERANCE = 1e-6
 
 
-def sample_terms(terms: Sequence[Mapping[str, Any]]) -> F64:
-    """The sum of terms at all nodes; not measured below the horizon, and where a material that they name was not.
+def sample_terms(terms: Sequence[Mapping[str, Any]]) -> Shaped[F64, "3 90 90 180"]:
+    """Evaluate the sum of terms, without textures, at all nodes of the MERL grid.
+
+    Nodes below the horizon and unmeasured nodes of the terms' own data are marked as not measured.
 
     Args:
-        terms: of a complete look. Textures are not part of it.
+        terms: of a complete look.
     Returns:
-        (3, 90, 90, 180) float64, as `relume.assets.measured.merl.write_merl` takes them.
+        Input of `relume.assets.measured.merl.write_merl`.
     Raises:
-        MaterialError: the terms change as the surface turns about its normal, or are above 10⁶ per steradian.
-        NotFoundError: a measured material is not here.
+        MaterialError: the terms are anisotropic, or exceed 10⁶ per steradian.
+        NotFoundError: a measured material does not exist.
     """
     wi, wo = grid_directions()
     is_valid = (wi[..., 2] > 0) & (wo[..., 2] > 0)
@@ -42,10 +45,10 @@ def sample_terms(terms: Sequence[Mapping[str, Any]]) -> F64:
         is_valid &= is_measured(read_merl(source_path(data)))
     _check_isotropic(terms, wi[is_valid][::_STRIDE], wo[is_valid][::_STRIDE])
     planes = np.full((3, *SHAPE), NOT_MEASURED)
-    for h in range(SHAPE[0]):  # slab by slab: each term makes a dozen arrays of this size
+    for h in range(SHAPE[0]):  # one slab at a time: each term makes a dozen arrays of this size
         values = _total(terms, wi[h], wo[h])
         if float(values.max(initial=0.0)) > MAX_VALUE:
-            raise MaterialError(f"the material is above {MAX_VALUE:g} per steradian somewhere; lower its curves")
+            raise MaterialError(f"the material exceeds {MAX_VALUE:g} per steradian somewhere; lower its curves")
         planes[:, h] = np.where(is_valid[h], np.moveaxis(values / CHANNEL_SCALE, -1, 0), NOT_MEASURED)
     return planes
 
@@ -61,4 +64,4 @@ def _check_isotropic(terms: Sequence[Mapping[str, Any]], wi: F64, wo: F64) -> No
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     original, rotated = _total(terms, wi, wo), _total(terms, wi @ quarter, wo @ quarter)
     if np.abs(rotated - original).max(initial=0.0) > _TOLERANCE * np.abs(original).max(initial=0.0):
-        raise MaterialError("the material is anisotropic, a MERL file is not; make it the same along and across")
+        raise MaterialError("the material is anisotropic, but a MERL file is not; make it the same along and across")

@@ -1,10 +1,9 @@
-"""Terms at pairs of directions that stay the same while their parameters change: what an edit leaves is kept.
+"""Evaluation of terms at fixed pairs of directions, with cached factors that an edit does not change.
 
     f(ωi, ωo) = q(ωi, ωo) Π_c f_c(γ_c(ωi, ωo))
 
-The angles γ belong to the pairs, whatever the term. The quotient q knows only what a term fixes. An edit of a parameter
-or a curve changes functions of one angle alone; each is evaluated at a few thousand angles, once for all that ask, and
-read between them.
+The angles γ depend only on the pairs. The quotient q depends only on a term's fixed parameters. An edit of a parameter
+or a curve changes functions of one angle; each is evaluated once at a few thousand angles, cached, and interpolated.
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ from typing import Any
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.curves import curve_values
@@ -27,27 +27,27 @@ from relume.core.numba_options import UNCOUNTED
 F32 = NDArray[np.float32]
 Fixed = tuple[tuple[str, float | str], ...]  # from `Term.fixed_values`
 
-_STEPS = 4096  # of a curve, closest at both ends: highlights are narrow at 0, masking falls off at π/2
+_STEPS = 4096  # of a curve, densest at both ends: highlights are narrow at 0, masking falls off at π/2
 
 
 class Quadrature:
-    """Pairs of directions.
+    """Fixed pairs of directions.
 
     Args:
-        wi, wo: local frame, unit, z = normal; they broadcast. (..., 3)
+        wi, wo: local frame, unit, z = normal; they broadcast.
     """
 
-    def __init__(self, wi: F64, wo: F64) -> None:
+    def __init__(self, wi: Shaped[F64, "*#batch 3"], wo: Shaped[F64, "*#batch 3"]) -> None:
         self.wi, self.wo = np.broadcast_arrays(np.asarray(wi, np.float64), np.asarray(wo, np.float64))
         self.shape = self.wi.shape[:-1]
 
-    def values(self, term_document: Mapping[str, Any]) -> F64:
-        """Evaluate a term, its colour left out; `relume.brdf.evaluate.eval_brdf` is its oracle.
+    def values(self, term_document: Mapping[str, Any]) -> Shaped[F64, "channels ..."]:
+        """Evaluate a term without its color, in 1/sr, without the cosine; the reference is `eval_brdf`.
 
         Args:
             term_document: one term of a complete look.
         Returns:
-            1/sr, no cosine. (channels, ...) float64, one channel where all three are alike.
+            One channel if all three are equal, else three.
         """
         declared = TERMS[term_document["model"]]
         term, fixed = declared.normalized(term_document), declared.fixed_values(term_document)
@@ -67,13 +67,13 @@ class Quadrature:
 
 @lru_cache(maxsize=1)
 def _angles() -> F64:
-    """γ at which curves are evaluated, radians. (`_STEPS` + 1,)"""
+    """Angles γ at which curves are evaluated, in radians. (`_STEPS` + 1,)"""
     return (np.pi / 4) * (1 - np.cos(np.linspace(0, np.pi, _STEPS + 1)))
 
 
 @lru_cache(maxsize=32)
 def _curve(model: str, fixed: Fixed, name: str, given: str) -> F64:
-    """A curve of a term at `_angles`: what is asked at one pair of directions after another. (3, `_STEPS` + 1)"""
+    """Values of a term's curve at `_angles`. (3, `_STEPS` + 1)"""
     term, (params, drawn) = TERMS[model].normalized_by(fixed), json.loads(given)
     document = {"model": model, **dict(fixed), "params": params, "curves": drawn}
     return np.ascontiguousarray(curve_values(document, term.curve(name), _angles()))
@@ -81,7 +81,7 @@ def _curve(model: str, fixed: Fixed, name: str, given: str) -> F64:
 
 @lru_cache(maxsize=32)
 def _angle_positions(pairs: Quadrature, angle: Angle, axes: tuple[float, float, float]) -> F32:
-    """Where the angles of pairs lie among `_angles`. (pairs,)"""
+    """Fractional indices into `_angles` of the angles of pairs. (pairs,)"""
     gamma = angles_numpy(angle, pairs.wi, pairs.wo, axes).ravel()
     return np.interp(gamma, _angles(), np.arange(_STEPS + 1)).astype(np.float32)
 
@@ -95,7 +95,7 @@ def _quotient(pairs: Quadrature, model: str, fixed: Fixed) -> F64:
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _multiply(positions, values, out):  # type: ignore[no-untyped-def]
-    """Multiply each pair by a curve, linear between its values."""
+    """Multiply each pair by a curve, with linear interpolation."""
     for n in range(out.shape[0]):
         x = positions[n]
         first = min(np.int64(x), values.shape[0] - 2)

@@ -1,4 +1,4 @@
-"""The list of BRDF terms. To add one: write its file beside this one and add it here; tests/brdf then run over it."""
+"""Registry of BRDF terms. To add one, write its file in `terms` and add it here; tests/brdf then test it."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def _describe_curve(curve: Curve) -> dict[str, Any]:
 
 
 def describe() -> list[dict[str, Any]]:
-    """Every term as JSON for `GET /api/models`; the editor builds its sliders and curves from it."""
+    """All terms as JSON for `GET /api/models`; the editor builds its sliders and curves from it."""
     return [
         {
             "model": term.model,

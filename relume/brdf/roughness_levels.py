@@ -1,8 +1,8 @@
-"""Terms whose width a map scales: the same document at several levels of roughness.
+"""Terms with a roughness map: the same document at several roughness levels.
 
-    width(x) = width · ratio(x)^power,   ratio = roughness of the texel over the material's
+    width(x) = width · ratio(x)^power,   ratio = roughness of the texel / roughness of the material
 
-A curve that the width generates differs from level to level; a drawn one stands at all levels alike.
+A curve generated from the width differs between levels; a drawn curve is the same at all levels.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.curves import curve_bands, curve_values
@@ -21,28 +22,30 @@ F64 = NDArray[np.float64]
 
 
 class RoughnessLevels(NamedTuple):
-    """How rough a material's samples are, as its map says.
+    """Roughness levels of a material's samples from its roughness map.
 
     Attributes:
-        ratios: roughness of each level over the material's; none where it has no map. (L,)
-        level: of each sample, rising. (n,) uint8
+        ratios: roughness of each level divided by the material's; empty without a map.
+        level: of each sample, ascending.
     """
 
     ratios: tuple[float, ...]
-    level: NDArray[np.uint8]
+    level: Shaped[NDArray[np.uint8], " n"]
 
 
 NO_LEVELS = RoughnessLevels((), np.empty(0, np.uint8))
 
 
 def uses_roughness_map(document: Mapping[str, Any]) -> bool:
-    """Whether a term's width is scaled where its material has a map of roughness."""
+    """True if a term's width is scaled by its material's roughness map."""
     return bool(document.get("roughness_map")) and TERMS[document["model"]].width is not None
 
 
 def scaled_roughness(document: Mapping[str, Any], ratio: float) -> dict[str, Any]:
-    """The document of a term where its material is `ratio` times as rough, within the range of its parameter; the same
-    where it follows no map."""
+    """Scale the width of a term document by the roughness `ratio`, within the parameter's range.
+
+    Returns an unchanged copy if the term uses no roughness map.
+    """
     term = TERMS[document["model"]]
     if term.width is None or not uses_roughness_map(document):
         return dict(document)
@@ -54,25 +57,25 @@ def scaled_roughness(document: Mapping[str, Any], ratio: float) -> dict[str, Any
 
 
 def level_bands(document: Mapping[str, Any], curve: Curve, levels: RoughnessLevels) -> F64:
-    """Bands of a curve at levels of roughness.
+    """Bands of a curve at all roughness levels.
 
     Args:
-        document: a term of a complete look. curve: one of its model's. levels: of the samples.
+        document: a term of a complete look. curve: one of its model's curves. levels: of the samples.
     Returns:
-        (L, 3, J) where the curve differs with the width, else (3, J)
+        (L, 3, J) if the curve depends on the width, else (3, J)
     """
     if not _depends_on_roughness(document, curve, levels):
         return curve_bands(document, curve)
     return np.stack([curve_bands(scaled_roughness(document, ratio), curve) for ratio in levels.ratios])
 
 
-def level_values(document: Mapping[str, Any], curve: Curve, gamma: F64, levels: RoughnessLevels) -> F64:
-    """A curve at exact angles, each at a level of roughness; see `relume.brdf.curves.curve_values`.
+def level_values(
+    document: Mapping[str, Any], curve: Curve, gamma: Shaped[F64, " n"], levels: RoughnessLevels
+) -> Shaped[F64, "3 n"]:
+    """Evaluate a curve at the angle and the roughness level of each sample; see `relume.brdf.curves.curve_values`.
 
     Args:
-        document, curve, levels: as in `level_bands`. gamma: of each sample, radians. (n,)
-    Returns:
-        (3, n) float64
+        document, curve, levels: as in `level_bands`. gamma: of each sample, radians.
     """
     if not _depends_on_roughness(document, curve, levels):
         return curve_values(document, curve, gamma)

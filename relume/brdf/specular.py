@@ -1,6 +1,6 @@
-"""Highlights that are sharp enough to be a mirror's: what is seen in them is a picture, not a patch of light.
+"""Highlights that are sharp enough to be treated as mirrors: they reflect an image instead of a blurred highlight.
 
-Of a lobe that is narrower than what it reflects all light comes from where the eye is mirrored to, r:
+A lobe much narrower than the detail of its surroundings reflects only the radiance from the mirror direction r:
 
     ∫ f(wi, wo) L(wi) cos θi dwi  →  L(r) Π_c f_c(θ),   θ = θi = θd = θo,
 
@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.curves import curve_values, drawn_curves
@@ -22,21 +23,17 @@ from relume.brdf.term import Angle
 
 F64 = NDArray[np.float64]
 
-MODEL, TEXTURE = "ggx", "specular"  # its facets are normalised; terms of other models stay lobes
-SHARP, SOFT = 0.04, 0.06  # roughness up to which all is mirrored, and from which nothing is
+MODEL, TEXTURE = "ggx", "specular"  # its facet distribution is normalized; terms of other models stay lobes
+SHARP, SOFT = 0.04, 0.06  # roughness up to which a term is entirely a mirror, and from which it is none
 
 
 def specular_threshold(model: str) -> float | None:
-    """The roughness below which terms of a model are mirrors, in part at least; None where none is."""
+    """Roughness below which terms of a model are at least partly mirrors; None if they never are."""
     return SOFT if model == MODEL else None
 
 
-def specular_albedo(document: Mapping[str, Any]) -> F64:
-    """How much of a term is a mirror: the rest is its lobe. (3,) within [0, 1]
-
-    Args:
-        document: a term, complete or not.
-    """
+def specular_albedo(document: Mapping[str, Any]) -> Shaped[F64, " 3"]:
+    """Fraction of a term, complete or not, that is a mirror, per channel in [0, 1]; the rest is its lobe."""
     if document["model"] != MODEL or document.get("texture") not in (TEXTURE, None) or uses_roughness_map(document):
         return np.zeros(3)
     ndf_curve = next(curve for curve in TERMS[MODEL].curves if curve.angle is Angle.THETA_H)
@@ -48,20 +45,20 @@ def specular_albedo(document: Mapping[str, Any]) -> F64:
 
 
 def is_mirror(documents: Sequence[Mapping[str, Any]]) -> bool:
-    """Whether any term of a material is a mirror."""
+    """True if any term of a material is at least partly a mirror."""
     return any(specular_albedo(document).any() for document in documents)
 
 
 def specular_terms(
-    documents: Sequence[Mapping[str, Any]], cos_theta_i: NDArray[np.floating], tint: NDArray[Any]
-) -> F64:
-    """What a material's mirrors send on of what comes from where the eye is mirrored to.
+    documents: Sequence[Mapping[str, Any]],
+    cos_theta_i: Shaped[NDArray[np.floating], " n"],
+    tint: Shaped[NDArray[Any], "n 3"],
+) -> Shaped[F64, "n 3"]:
+    """Specular reflectance of a material's mirror terms: reflected radiance per radiance from the mirror direction.
 
     Args:
-        documents: terms of a complete look. cos_theta_i: at which rays meet it. (n,)
-        tint: its texture of highlights there. (n, 3)
-    Returns:
-        (n, 3)
+        documents: terms of a complete look. cos_theta_i: at the hit points.
+        tint: specular texture at the hit points.
     """
     theta, total = np.arccos(np.clip(cos_theta_i, 0, 1).astype(np.float64)), np.zeros((len(cos_theta_i), 3))
     for document in documents:
@@ -76,6 +73,6 @@ def specular_terms(
 
 
 def split_specular(document: Mapping[str, Any]) -> dict[str, Any]:
-    """A term as far as it is a mirror: what is left of it is its lobe. document: a term of a complete look"""
+    """Scale a term of a complete look to its mirror fraction; the rest is its lobe."""
     color = specular_albedo(document) * np.asarray(document["color"], np.float64)
     return {**document, "color": color.tolist()}

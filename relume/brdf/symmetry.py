@@ -1,4 +1,4 @@
-"""Which turns and mirrorings leave a term as it is."""
+"""Symmetries of terms: rotations about the normal and reflections that leave a term unchanged."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
@@ -15,18 +16,18 @@ from relume.brdf.term import Angle, Curve
 
 F64 = NDArray[np.float64]
 
-_TOLERANCE = 1e-6  # relative difference that rounding may make
+_TOLERANCE = 1e-6  # relative difference due to rounding
 _REFLECTIONS = {"x": np.diag([-1.0, 1.0, 1.0]), "y": np.diag([1.0, -1.0, 1.0])}
 
 
-def rotational_symmetry(phi: float) -> F64:
-    """Find the matrix that turns local directions about their normal, radians. (3, 3)"""
+def rotational_symmetry(phi: float) -> Shaped[F64, "3 3"]:
+    """Rotation matrix of local directions about the normal by `phi` radians."""
     cosine, sine = np.cos(phi), np.sin(phi)
     return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
 
 def is_isotropic(term_document: Mapping[str, Any]) -> bool:
-    """Tell whether a term looks the same when both directions turn about the normal, or are mirrored."""
+    """True if a term is invariant under rotation about the normal and reflection of both directions."""
     declared = TERMS[term_document["model"]]
     if all(map(_is_isotropic_curve, declared.normalized(term_document).curves)):
         return _has_isotropic_quotient(declared.model, declared.fixed_values(term_document))
@@ -34,7 +35,7 @@ def is_isotropic(term_document: Mapping[str, Any]) -> bool:
 
 
 def has_reflection_symmetry(term_document: Mapping[str, Any]) -> bool:
-    """Tell whether a term looks the same on both sides of its tangent, and of what lies across that."""
+    """True if a term is invariant under reflection of both directions along the tangent and across it."""
     return _is_invariant(lambda wi, wo: eval_brdf(term_document, wi, wo), tuple(_REFLECTIONS.values()))
 
 
@@ -42,7 +43,7 @@ _ISOTROPY_MAPS = (rotational_symmetry(1.2345), _REFLECTIONS["y"])  # an angle th
 
 
 def _is_isotropic_curve(curve: Curve) -> bool:
-    """Whether a curve's angle stays the same when both directions turn about the normal, or are mirrored."""
+    """True if a curve's angle is invariant under rotation about the normal and reflection of both directions."""
     if curve.angle is Angle.LOBE:
         return curve.axes[0] == curve.axes[1]
     return curve.angle not in (Angle.ALPHA, Angle.BETA, Angle.TILT_X, Angle.TILT_Y)
@@ -50,7 +51,7 @@ def _is_isotropic_curve(curve: Curve) -> bool:
 
 @lru_cache(maxsize=256)
 def _has_isotropic_quotient(model: str, fixed: tuple[tuple[str, float | str], ...]) -> bool:
-    """Tell whether a term whose curves are round is so itself: no edit of a curve changes that."""
+    """True if the quotient of a term with isotropic curves is isotropic: edits of curves do not change that."""
     term = TERMS[model].normalized_by(fixed)
 
     def quotient(wi: F64, wo: F64) -> F64:
@@ -60,7 +61,7 @@ def _has_isotropic_quotient(model: str, fixed: tuple[tuple[str, float | str], ..
 
 
 def _is_invariant(evaluate: Callable[[F64, F64], F64], maps: Sequence[F64]) -> bool:
-    """Tell whether a function of both directions is the same after each of some maps of them, at a few of them."""
+    """True if a function of both directions is invariant under each of some maps, tested at random directions."""
     rng = np.random.default_rng(1)
     wi, wo = (np.abs(rng.normal(size=(256, 3))) for _ in range(2))
     wi[:128, 0] *= -1

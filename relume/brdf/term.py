@@ -1,4 +1,4 @@
-"""What a BRDF term is: a quotient times one-dimensional curves, and the parameters that generate the curves.
+"""Declaration of a BRDF term: a quotient times one-dimensional curves, and the parameters that generate the curves.
 
 Eqs. 7 and 9, Ben-Artzi 2006. A term's own file declares one `Term`; the registry lists them; sliders, validation and
 `GET /api/models` are generated from the declaration.
@@ -21,7 +21,7 @@ Params = Mapping[str, float]
 
 
 class Angle(IntEnum):
-    """The 1-D parameterisations γ(wi, wo), each an angle in [0, π/2]; computed by `relume.brdf.angles`."""
+    """1-D parameterizations γ(wi, wo), each an angle in [0, π/2]; computed by `relume.brdf.angles`."""
 
     THETA_I = 0
     THETA_H = 1
@@ -36,7 +36,7 @@ class Angle(IntEnum):
 
     @property
     def has_highlights(self) -> bool:
-        """Whether curves of it may be narrower than a band, about the direction where it is zero."""
+        """True if curves of this angle may have a peak at zero that is narrower than a band."""
         return self in (Angle.THETA_H, Angle.THETA_R, Angle.LOBE)
 
 
@@ -44,12 +44,12 @@ class Angle(IntEnum):
 class Parameter:
     """A number that generates curves; a look gives one value, or three for separate R, G, B.
 
-    One that is fixed at freeze (see `Term.fixed`) has one value for all channels.
+    A parameter in `Term.fixed` has one value for all channels.
 
     Attributes:
-        unit: "" where the number has none.
-        scale: how a slider moves, "linear" or "log".
-        step: values are multiples of it, where it is given.
+        unit: "" if the number has none.
+        scale: of the slider, "linear" or "log".
+        step: values are multiples of it, if given.
     """
 
     name: str
@@ -68,13 +68,13 @@ class Curve:
     """An editable factor f(γ) of a term.
 
     Attributes:
-        angle: which angle γ it is a function of; `THETA_O` curves multiply the finished pixel.
+        angle: argument γ of the curve; `THETA_O` curves multiply the finished pixel.
         generator: (γ in radians (...,) float64, params) -> f(γ) (...,) float64, finite and not negative.
-        parameters: names of the parameters the generator reads.
+        parameters: names of the parameters that the generator reads.
         num_bands: J, a power of two.
-        label: what people read, e.g. "half angle θh".
-        axes: what multiplies wo, axis by axis, before the angle is taken; other than ones for `LOBE` only.
-        factor: γ in radians (...) -> (3, ...), above zero: where data give the curve, it stands in for the generator.
+        label: text in the UI, e.g. "half angle θh".
+        axes: factors of the components of wo before the angle is computed; other than ones for `LOBE` only.
+        factor: γ in radians (...) -> (3, ...), above zero: replaces the generator if the curve is measured.
     """
 
     name: str
@@ -88,7 +88,7 @@ class Curve:
 
     @property
     def depends_on_view(self) -> bool:
-        """Whether it depends on wo alone and so multiplies the finished sample instead of entering the transport."""
+        """True if it depends on wo alone and so multiplies the finished sample instead of entering the transport."""
         return self.angle is Angle.THETA_O
 
 
@@ -97,7 +97,7 @@ def _constant(gamma: F64, params: Params) -> F64:
 
 
 VIEW = Curve("theta_o", "view angle θo", Angle.THETA_O, _constant, (), 64)
-"""What any term may depend on besides (Ben-Artzi 2006, section 4.4): one at every angle until it is drawn."""
+"""Additional factor of any term (Ben-Artzi 2006, section 4.4): one at every angle until it is drawn."""
 
 
 @dataclass(frozen=True)
@@ -105,22 +105,21 @@ class Term:
     """One BRDF term, 1/sr without the cosine: quotient(wi, wo) · Π curves.
 
     Attributes:
-        curves: those that are declared, and `VIEW` where none of them is of the outgoing angle; or none at all.
+        curves: the declared curves, plus `VIEW` if none of them has the view angle; or none at all.
         model: name in look documents.
         quotient: ufunc (wi_x, wi_y, wi_z, wo_x, wo_y, wo_z) -> value, local frame, z = normal; float32 and float64
-            loops; zero where either direction is below the horizon. With three channels, three values, channels first.
-        source: the equation it is built from.
-        texture: the texture channel it takes by default, "diffuse" or "specular".
-        fixed: parameters that shape the quotient or an angle, whatever curves read them: changing one freezes anew.
-        normalize: `fixed_values` -> the fields of this declaration that they change; as declared they hold for the
+            loops; zero if either direction is below the horizon. With three channels, three values, channels first.
+        source: the equation and its paper.
+        texture: the default texture channel, "diffuse" or "specular".
+        fixed: parameters of the quotient or an angle, whatever curves read them: a change needs a new operator.
+        normalize: `fixed_values` -> the fields of this declaration that they change; the declared fields hold for the
             defaults.
         num_channels: of the quotient, 1 or 3.
-        is_lambertian: whether the quotient is one value above the horizon.
-        is_steep: whether the quotient, times cos θi, varies with the light where no curve tells that anything does.
-        data: where documents must name something measured that is kept there; it is fixed at freeze too.
-        texels: where each place of a surface has a BRDF of its own, of which the quotient is the mean; from
-            `normalize`.
-        width: the parameter that maps of roughness scale, and the power of a roughness that it grows with.
+        is_lambertian: true if the quotient is constant above the horizon.
+        is_steep: true if the quotient times cos θi varies with the light direction although no curve does.
+        data: store of the measured data that documents must name, if any; the name is fixed too.
+        texels: for a BTF, the BRDFs per texel, whose mean is the quotient; from `normalize`.
+        width: the parameter that roughness maps scale, and its exponent in terms of roughness.
     """
 
     model: str
@@ -145,7 +144,7 @@ class Term:
             object.__setattr__(self, "curves", (*self.curves, VIEW))
 
     def active_curves(self, document: Mapping[str, Any]) -> tuple[Curve, ...]:
-        """The curves that make a difference in a term document: not `VIEW` where it is not drawn.
+        """Return the curves that affect a term document: all but an undrawn `VIEW`.
 
         Args:
             document: a term of a look, complete or not.
@@ -155,37 +154,37 @@ class Term:
 
     @property
     def needs_data(self) -> bool:
-        """Whether documents must name something measured."""
+        """True if documents must name measured data."""
         return self.data is not None
 
     @property
     def scatters_diffusely(self) -> bool:
-        """Whether it scatters light about evenly: those do whose colour is the diffuse one by default."""
+        """True if the term is nearly diffuse: those terms use the diffuse color by default."""
         return self.texture == "diffuse"
 
     def fixed_values(self, document: Mapping[str, Any]) -> tuple[tuple[str, float | str], ...]:
-        """Names and values of what a term document fixes at freeze; what it leaves out has its default."""
+        """Names and values of a document's fixed parameters; missing parameters have their defaults."""
         given = document.get("params") or {}
         values = tuple((name, float(given.get(name, self.parameter(name).default))) for name in self.fixed)
         return (*values, ("data", str(document["data"]))) if self.needs_data else values
 
     def normalized(self, document: Mapping[str, Any]) -> Term:
-        """This term with its fixed parameters put in: quotient and angles have none left."""
+        """Return this term with its fixed parameters applied to the quotient and the angles."""
         return self.normalized_by(self.fixed_values(document))
 
     def normalized_by(self, fixed: tuple[tuple[str, float | str], ...]) -> Term:
-        """The same from the `fixed_values` of a document."""
+        """Return this term with the `fixed_values` of a document applied."""
         return self if self.normalize is None else replace(self, **self.normalize(dict(fixed)))
 
     def quotients(self, *directions: NDArray[np.floating] | float) -> NDArray[Any]:
-        """The quotient with its channels first, (1, ...) or (3, ...); directions as it takes them."""
+        """Evaluate the quotient with channels first, (1, ...) or (3, ...); arguments as for `quotient`."""
         value = self.quotient(*directions)
         return np.asarray(value) if self.num_channels == 3 else np.asarray(value)[None]
 
     def parameter(self, name: str) -> Parameter:
-        """The declaration of one parameter; KeyError where there is none of that name."""
+        """The declaration of one parameter; KeyError if there is none of that name."""
         return {p.name: p for p in self.parameters}[name]
 
     def curve(self, name: str) -> Curve:
-        """The declaration of one curve; KeyError where there is none of that name."""
+        """The declaration of one curve; KeyError if there is none of that name."""
         return {c.name: c for c in self.curves}[name]

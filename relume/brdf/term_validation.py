@@ -1,4 +1,4 @@
-"""Completing and checking one term of a look against the registry of models."""
+"""Completion and validation of one term of a look against the registry of models."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ _FIELDS = ("model", "data", "color", "texture", "roughness_map", "params", "curv
 
 
 def complete_term(pointer: Pointer, given: Any, previous: Mapping[str, Any] | None) -> dict[str, Any]:
-    """The term with every field and parameter; what is left out has the model's default.
+    """Return the term with every field and parameter; missing fields have the model's defaults.
 
     Args:
-        pointer: where the term stands in its look, for the error.
-        given: the term as somebody sent it; anything.
-        previous: the valid term that stood here before, if any; its curve objects are not checked again.
+        pointer: location of the term in its look, for the error.
+        given: the received term; anything.
+        previous: the valid term at this location before, if any; its unchanged curve objects are not checked again.
     Raises:
-        ParameterError: something is wrong; it names the JSON pointer of the first such thing.
+        ParameterError: something is invalid; it names the JSON pointer of the first error.
     """
     check_object(pointer, given, _FIELDS)
     model = given.get("model")
@@ -61,8 +61,7 @@ def complete_term(pointer: Pointer, given: Any, previous: Mapping[str, Any] | No
 
 
 def _complete_map(pointer: Pointer, given: Mapping[str, Any], term: Term) -> dict[str, Any]:
-    """Whether the material's map of roughness scales the term's width, or which image does; left out of terms that do
-    not say."""
+    """The field `roughness_map`: true to scale the width by the material's map, or an image; omitted if not given."""
     if "roughness_map" not in given:
         return {}
     roughness_map = given["roughness_map"]
@@ -72,7 +71,7 @@ def _complete_map(pointer: Pointer, given: Mapping[str, Any], term: Term) -> dic
 
 
 def _complete_data(pointer: Pointer, given: Mapping[str, Any], term: Term) -> dict[str, Any]:
-    """The name of the material that a term is measured from, where it is."""
+    """The field `data`: the name of the measured material of the term, if its model needs one."""
     name = given.get("data")
     if term.data is None:
         if "data" in given:
@@ -104,7 +103,7 @@ def _complete_curves(pointer: Pointer, given: Any, term: Term, previous_curves: 
 
 
 def _check_drawn(pointer: Pointer, drawn: Any, curve: Curve) -> None:
-    """One object, or a list of objects for different channels."""
+    """Check one object, or a list of objects for different channels."""
     if not isinstance(drawn, list):
         _check_drawn_object(pointer, drawn, curve)
         return
@@ -137,8 +136,8 @@ def _check_drawn_object(pointer: Pointer, drawn: Any, curve: Curve) -> None:
 
 
 def _check_points(pointer: Pointer, points: Any, num_values: int) -> None:
-    """Points [degrees, value], or handles [degrees, was, becomes]."""
-    form = "a point [degrees, value]" if num_values == 1 else "a handle [degrees, was, becomes]"
+    """Check points [degrees, value], or handles [degrees, value before, value after]."""
+    form = "a point [degrees, value]" if num_values == 1 else "a handle [degrees, value before, value after]"
     if not isinstance(points, list | tuple) or not 2 <= len(points) <= MAX_POINTS:
         raise invalid_value(pointer, points, f"a list of 2 to {MAX_POINTS}, each {form}")
     for k, point in enumerate(points):
@@ -151,7 +150,7 @@ def _check_points(pointer: Pointer, points: Any, num_values: int) -> None:
     not_after = np.diff(np.asarray(angles, np.float64)) <= 0
     if not_after.any():
         k = int(np.argmax(not_after)) + 1
-        raise invalid_value((*pointer, k, 0), angles[k], "an angle greater than that of the point before")
+        raise invalid_value((*pointer, k, 0), angles[k], "an angle greater than that of the previous point")
 
 
 def _in_column(column: int, row: int) -> Pointer:
@@ -174,9 +173,9 @@ def _check_bands(pointer: Pointer, bands: Any, num_bands: int) -> None:
 def _check_values(
     pointer: Pointer, values: Sequence[Any], maximum: float, pointer_end: Callable[[int], Pointer]
 ) -> None:
-    """Numbers in [0, maximum], many at once; `pointer_end` turns the index of a bad one into the end of its pointer."""
+    """Check many numbers in [0, maximum]; `pointer_end` maps the index of an invalid one to the end of its pointer."""
     in_range = set(map(type, values)) <= {int, float} and min(values) >= 0.0 and max(values) <= maximum
-    if in_range and not math.isnan(sum(values)):  # min and max may pass over a NaN, a sum does not
+    if in_range and not math.isnan(sum(values)):  # min and max may miss a NaN, a sum does not
         return
     for k, value in enumerate(values):
         check_number((*pointer, *pointer_end(k)), value, 0.0, maximum)

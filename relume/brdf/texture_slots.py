@@ -1,6 +1,6 @@
-"""What multiplies a term's colour: an image of its material by channel, or one that its look names in that place.
+"""Texture slots: the image that multiplies a term's color, one of the material's textures or an image in the look.
 
-Terms of one channel share what multiplies them: finished pictures are summed by channel before textures are looked up.
+All terms of one channel share a texture, because their images are summed per channel before texture lookups.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from relume.core.validation import Pointer, invalid_value
 
 TEXTURES = ("diffuse", "specular")
 ROUGHNESS = "roughness"
-"""What a term's `roughness_map` is called where it is the material's own."""
+"""Value of a term's `roughness_map` that means the material's own map."""
 
 Images = tuple[str | None, str | None]
-"""What a look names in the place of each of a material's `TEXTURES`; None where it names nothing."""
+"""Images in a look that replace each of a material's `TEXTURES`; None: not replaced."""
 
 
 class NormalMap(NamedTuple):
-    """An image in the place of a material's normal map.
+    """An image that replaces a material's normal map.
 
     Attributes:
-        image: "image:<id>", one that was sent. scale: times the x and y of its normals, as glTF has it.
+        image: "image:<id>" of an uploaded image. scale: factor of the x and y of its normals, as in glTF.
     """
 
     image: str
@@ -33,16 +33,16 @@ class NormalMap(NamedTuple):
 
 
 IMAGES = AssetStore("image", "image:", "image.json", SceneError, max_entries=1_000)
-"""Where such images are kept, by `relume.images.image_store`."""
+"""Store of uploaded images, filled by `relume.images.image_store`."""
 
 
 def is_user_image(texture: str | None) -> TypeGuard[str]:
-    """Whether a term's `texture` or `roughness_map` names an image rather than one of the material's own."""
+    """True if a term's `texture` or `roughness_map` names an uploaded image rather than one of the material's own."""
     return isinstance(texture, str) and texture.startswith(IMAGES.prefix)
 
 
 def texture_channel(document: Mapping[str, Any]) -> str | None:
-    """The channel of a term's texture: that which it names, or that which its model takes where it names an image.
+    """Channel of a term's texture: the named channel, or the channel of its model if it names an image.
 
     Args:
         document: a term, with its `model` and `texture`.
@@ -52,13 +52,13 @@ def texture_channel(document: Mapping[str, Any]) -> str | None:
 
 
 def texture_slot(document: Mapping[str, Any]) -> int:
-    """Number of the sum that a term is part of: 0 without a texture, 1 + place in `TEXTURES` with one. document: it"""
+    """Texture slot of a term: 0 without a texture, else 1 + index in `TEXTURES`."""
     channel = texture_channel(document)
     return 0 if channel is None else 1 + TEXTURES.index(channel)
 
 
 def user_images(documents: Sequence[Mapping[str, Any]]) -> Images:
-    """What the terms of a material name in the place of each of `TEXTURES`. documents: its terms"""
+    """Images in the terms of a material that replace each of `TEXTURES`."""
     images_by_slot: dict[int, str] = {
         texture_slot(document): document["texture"] for document in documents if is_user_image(document.get("texture"))
     }
@@ -66,57 +66,51 @@ def user_images(documents: Sequence[Mapping[str, Any]]) -> Images:
 
 
 def roughness_image(documents: Sequence[Mapping[str, Any]]) -> str | None:
-    """What the terms of a material name in the place of its map of roughness; None where they name nothing.
-
-    Args:
-        documents: its terms.
-    """
+    """Image in the terms of a material that replaces its roughness map; None if there is none."""
     return next((name for document in documents if is_user_image(name := document.get("roughness_map"))), None)
 
 
 def check_map(pointer: Pointer, roughness_map: Any) -> str | None:
-    """A term's `roughness_map`. Raises ParameterError unless it is null, the material's own, or an image that is here.
+    """Return a term's `roughness_map`, or raise ParameterError unless it is null, "roughness", or an uploaded image.
 
     Args:
-        pointer: where it stands in its look. roughness_map: what stands there.
+        pointer: location in the look. roughness_map: the value there.
     """
     if roughness_map is None or (
         isinstance(roughness_map, str) and (roughness_map == ROUGHNESS or IMAGES.exists(roughness_map))
     ):
         return roughness_map
-    raise invalid_value(
-        pointer, roughness_map, f"null, {ROUGHNESS!r}, or an image that was sent to /api/images and is here"
-    )
+    raise invalid_value(pointer, roughness_map, f"null, {ROUGHNESS!r}, or an image that was uploaded to /api/images")
 
 
 def check_image(pointer: Pointer, image: Any) -> str:
-    """An image that a look names. Raises ParameterError unless it is here.
+    """Return an image name in a look, or raise ParameterError unless the image was uploaded.
 
     Args:
-        pointer: where it stands in its look. image: what stands there.
+        pointer: location in the look. image: the value there.
     """
     if isinstance(image, str) and IMAGES.exists(image):
         return image
-    raise invalid_value(pointer, image, "an image that was sent to /api/images and is here")
+    raise invalid_value(pointer, image, "an image that was uploaded to /api/images")
 
 
 def check_texture(pointer: Pointer, texture: Any) -> str | None:
-    """A term's `texture`. Raises ParameterError unless it is a channel, an image that is here, or nothing.
+    """Return a term's `texture`, or raise ParameterError unless it is null, a channel, or an uploaded image.
 
     Args:
-        pointer: where it stands in its look. texture: what stands there.
+        pointer: location in the look. texture: the value there.
     """
     if texture is None or texture in TEXTURES or (isinstance(texture, str) and IMAGES.exists(texture)):
         return cast(str | None, texture)
     channels = " or ".join(map(repr, TEXTURES))
-    raise invalid_value(pointer, texture, f"null, {channels}, or an image that was sent to /api/images and is here")
+    raise invalid_value(pointer, texture, f"null, {channels}, or an image that was uploaded to /api/images")
 
 
 def check_shared(pointer: Pointer, documents: Sequence[Mapping[str, Any]]) -> None:
-    """Raises ParameterError where terms of one channel are multiplied by different textures, or follow different maps.
+    """Raise ParameterError if terms of one channel have different textures, or terms have different roughness maps.
 
     Args:
-        pointer: where the list stands in its look. documents: complete terms of one material.
+        pointer: location of the list in the look. documents: complete terms of one material.
     """
     _check_single_map(pointer, documents)
     textures: dict[int, str | None] = {}
@@ -130,7 +124,7 @@ def check_shared(pointer: Pointer, documents: Sequence[Mapping[str, Any]]) -> No
 
 
 def _check_single_map(pointer: Pointer, documents: Sequence[Mapping[str, Any]]) -> None:
-    """Samples of a material have one level of roughness each: its terms follow one map, or none."""
+    """Require one roughness map or none per material, because each sample has one roughness level."""
     image = roughness_image(documents)
     for k, document in enumerate(documents):
         roughness_map = document.get("roughness_map")

@@ -1,4 +1,4 @@
-"""What an eye sees through the pixels of its picture: which are edges, and the rays that samples are made of."""
+"""Edge detection and camera rays for the view samples of one camera."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.camera.edge_detection import (
@@ -33,25 +34,25 @@ _PIXEL_CENTER = np.full((1, 2), 0.5)
 
 @dataclass(frozen=True)
 class EdgePixels:
-    """Of a picture.
+    """Edge pixels of an image.
 
     Attributes:
-        is_edge: whether a pixel wants more rays than the one through its middle. (pixels,)
-        num_single_samples: what the others show together. num_rays: that found it.
+        is_edge: true if a pixel needs more rays than the one through its center.
+        num_single_samples: total samples of the other pixels. num_rays: rays that were traced for this.
     """
 
-    is_edge: NDArray[np.bool_]
+    is_edge: Shaped[NDArray[np.bool_], " pixels"]
     num_single_samples: int
     num_rays: int
 
 
 @dataclass(frozen=True)
 class CameraSetup:
-    """A camera before a scene.
+    """A camera in a scene.
 
     Attributes:
-        scene: what is seen. geometry: its triangles. camera: the eye. size: width and height of its picture, pixels.
-        traces_mirrors: whether there are rays of what is seen in mirrors.
+        scene: the scene. geometry: its triangles. camera: the camera. size: image width and height in pixels.
+        traces_mirrors: trace rays that mirrors reflect.
     """
 
     scene: Scene
@@ -62,7 +63,7 @@ class CameraSetup:
 
     @property
     def pixel_angle(self) -> float:
-        """That a pixel spans, radians."""
+        """Angle of a pixel, in radians."""
         return self.camera.yfov / self.size[1]
 
     @cached_property
@@ -74,7 +75,7 @@ class CameraSetup:
         return radiance_edge_threshold(self.scene.environment.radiance)
 
     def _directions(self, pixel: NDArray[np.int64], positions: NDArray[np.float64] = _PIXEL_CENTER) -> F32:
-        """Of rays through some positions (n, 2) of pixels (p,), those of a pixel in a row. (p · n, 3)"""
+        """Directions of rays through `positions` (n, 2) in each of `pixel` (p,), grouped by pixel. (p · n, 3)"""
         y, x = np.divmod(pixel, self.size[0])
         at_x, at_y = ((a[:, None] + positions[:, k]).astype(np.float32).ravel() for k, a in enumerate((x, y)))
         return camera_directions(self.camera, self.size, at_x, at_y)
@@ -88,7 +89,7 @@ class CameraSetup:
         )  # fmt: skip
 
     def find_edges(self, *, smooths: bool) -> EdgePixels:
-        """Look at all pixels. smooths: else none is an edge."""
+        """Find the edge pixels of the image. smooths: if false, no pixel is an edge."""
         num_pixels = self.size[0] * self.size[1]
         is_edge, num_visible = np.zeros(num_pixels, np.bool_), np.zeros(num_pixels, np.uint8)
         cosine = np.ones(num_pixels, np.float32)
@@ -113,7 +114,7 @@ class CameraSetup:
     def _find_tile_edges(
         self, tile: ImageTile, layers: list[TransparencyLayer], directions: F32
     ) -> tuple[NDArray[np.bool_], F32]:
-        """Find edges but for those that turn, and the cosines of these, by rays through the middles of pixels."""
+        """Find edge pixels and the least cosine between neighboring normals, by rays through pixel centers."""
         size = tile.width, tile.height
         is_edge, cosine = np.zeros(len(directions), np.bool_), np.ones(len(directions), np.float32)
         for layer in layers:
@@ -128,14 +129,17 @@ class CameraSetup:
         return is_edge, cosine
 
     def trace_tile(
-        self, tile: ImageTile, is_edge: NDArray[np.bool_], positions: NDArray[np.float64]
+        self,
+        tile: ImageTile,
+        is_edge: Shaped[NDArray[np.bool_], " pixels"],
+        positions: Shaped[NDArray[np.float64], "n 2"],
     ) -> tuple[MergedRays, int, int]:
-        """What samples are made of in a window.
+        """Trace and merge the rays of a tile.
 
         Args:
-            tile: of the picture. is_edge: of all its pixels. positions: of the rays of one that is an edge. (n, 2)
+            tile: of the image. is_edge: for all pixels of the image. positions: of the rays within an edge pixel.
         Returns:
-            Rays; how many of them are of edges; how many were traced.
+            Merged rays; the number of merged rays in edge pixels; the number of traced rays.
         """
         pixel = tile.pixels(self.size)
         interior, edges = pixel[~is_edge[pixel]], pixel[is_edge[pixel]]
@@ -158,7 +162,7 @@ class CameraSetup:
 
 
 def _stratified_alpha_samples(pixel: NDArray[np.int64], num: int) -> F32:
-    """Chances of as many rays of each of p pixels, evenly apart: a surface that blends has its share. (p · num,)"""
-    order = np.array([0, 5, 2, 7, 4, 1, 6, 3])  # not in the order of the rows that the positions lie in
-    offset = (pixel[:, None] * _GOLDEN_RATIO_CONJUGATE) % 1  # eighths alone would be seen as steps
+    """Stratified alpha samples of the rays of p pixels, so that coverage is exact on average. (p · num,)"""
+    order = np.array([0, 5, 2, 7, 4, 1, 6, 3])  # decorrelated from the rows of the positions
+    offset = (pixel[:, None] * _GOLDEN_RATIO_CONJUGATE) % 1  # without it, eighths would be visible as steps
     return np.asarray((order[order < num] + offset) / num + 1e-6, np.float32).ravel()

@@ -1,8 +1,9 @@
-"""Pixels of a view that want more rays than one: what is seen changes across them, or is partly there."""
+"""Detection of pixels that need more than one ray: their surface changes, or covers them partly."""
 
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.environments.equirect import lookup
@@ -15,19 +16,19 @@ from relume.raytrace.scene_buffers import SceneBuffers
 
 F32 = NDArray[np.float32]
 
-COS_NORMAL_EDGE = np.cos(np.radians(4.0))  # one sample would show a sharp reflection from one side only
+COS_NORMAL_EDGE = np.cos(np.radians(4.0))  # at larger angles one sample would alias sharp reflections
 _COS_CREASE = np.cos(np.radians(20.0))  # a crease
-_DEPTH_EDGE = 0.02  # of the distance, off the plane of the surface beside
-NO_RAY_KEY = -2  # the key of pixels whose ray a layer has not
-_RADIANCE_EDGE_FACTOR = 1.0  # of the mean radiance around; darker details of a map are left to its own filter
-_MAX_NORMAL_EDGE_FRACTION = 1 / 6  # of all pixels; where more turn, as on coarse bumps, those that turn most
+_DEPTH_EDGE = 0.02  # distance off the neighbor's plane, relative to the ray length
+NO_RAY_KEY = -2  # the key of pixels without a ray in a layer
+_RADIANCE_EDGE_FACTOR = 1.0  # relative to the mean radiance; smaller steps are left to texture filtering
+_MAX_NORMAL_EDGE_FRACTION = 1 / 6  # of all pixels; if more qualify, as on coarse normal maps, the sharpest ones
 
 
 def _edges(key: NDArray[np.int64], normal: F32, distance: F32, directions: F32) -> tuple[NDArray[np.bool_], F32]:
-    """Find pixels that differ from a neighbour, and the least cosine between the normals of each and its neighbours.
+    """Find pixels that differ from a neighbor, and the least cosine between each pixel's normal and its neighbors'.
 
     Args:
-        key: what is hit, `NO_RAY_KEY` where a layer has no ray. normal, distance: of the hits. directions: of the rays.
+        key: surface that is hit, `NO_RAY_KEY` without a ray. normal, distance: of the hits. directions: of the rays.
             All are (height, width, …).
     Returns:
         (height, width) both
@@ -41,7 +42,7 @@ def _edges(key: NDArray[np.int64], normal: F32, distance: F32, directions: F32) 
             is_depth_edge(normal[base], distance[base], directions[base], distance[neighbor], directions[neighbor])
             for base, neighbor in ((first, second), (second, first))
         ]
-        # off both planes: of one alone may be a surface that is seen along itself
+        # require distance from both planes: a surface at a grazing angle is far from one of them
         has_rays = (key[first] != NO_RAY_KEY) & (key[second] != NO_RAY_KEY)
         is_different = (key[first] != key[second]) | (
             has_rays & ((cosines < _COS_CREASE) | (depth_edges[0] & depth_edges[1]))
@@ -55,11 +56,11 @@ def _edges(key: NDArray[np.int64], normal: F32, distance: F32, directions: F32) 
 def is_depth_edge(
     normal: F32, distance: F32, direction: F32, neighbor_distance: F32, neighbor_direction: F32
 ) -> NDArray[np.bool_]:
-    """Tell whether what another ray of an eye hits is off the plane of a hit by more than a small share of the way.
+    """True if a neighboring ray's hit is off the plane of a hit by more than a small fraction of the distance.
 
     Args:
         normal, distance, direction: of a hit, and of its ray. (…, 3), (…), (…, 3)
-        neighbor_distance, neighbor_direction: of the other hit, and of its ray. (…), (…, 3)
+        neighbor_distance, neighbor_direction: of the other hit, and of its ray, with the same origin. (…), (…, 3)
     """
     with np.errstate(invalid="ignore", divide="ignore"):  # background is infinitely far
         slope = np.vecdot(direction, normal) / np.vecdot(neighbor_direction, normal)
@@ -67,11 +68,11 @@ def is_depth_edge(
         return np.asarray(np.abs(neighbor_distance - distance * slope) > _DEPTH_EDGE * min_distance)
 
 
-def is_normal_edge(cosine: F32) -> NDArray[np.bool_]:
-    """Find pixels that are no edges, but whose normals turn enough for reflections to alias. (pixels,)
+def is_normal_edge(cosine: Shaped[F32, " pixels"]) -> Shaped[NDArray[np.bool_], " pixels"]:
+    """True for pixels whose normals change enough for reflections to alias, at most a sixth of all pixels.
 
     Args:
-        cosine: of all pixels of a picture, from `find_edge_pixels`. (pixels,)
+        cosine: of all pixels of an image, from `find_edge_pixels`.
     """
     is_edge = cosine < COS_NORMAL_EDGE
     max_edges = int(_MAX_NORMAL_EDGE_FRACTION * cosine.size)
@@ -82,14 +83,14 @@ def is_normal_edge(cosine: F32) -> NDArray[np.bool_]:
 
 def find_edge_pixels(
     geometry: SceneBuffers, layer: TransparencyLayer, size: tuple[int, int]
-) -> tuple[NDArray[np.bool_], F32]:
-    """Find pixels that want more rays by what a layer shows.
+) -> tuple[Shaped[NDArray[np.bool_], " pixels"], Shaped[F32, " pixels"]]:
+    """Find edge pixels in a layer.
 
     Args:
-        geometry: the triangles. layer: of one ray through the middle of each pixel. size: width and height in pixels.
+        geometry: the triangles. layer: of one ray through the center of each pixel. size: width and height in pixels.
     Returns:
-        (pixels,) both: whether it is an edge; else the least cosine between its normal and its neighbours', 1 where
-        there is nothing that turns.
+        True for edge pixels; for the others the least cosine between the normals of a pixel and its neighbors, 1 for
+        edges and the background.
     """
     width, height = size
     normals = normals_at(geometry, layer.hits, layer.directions)
@@ -97,7 +98,7 @@ def find_edge_pixels(
     distance, directions = np.full(width * height, np.inf, np.float32), np.ones((width * height, 3), np.float32)
     key[layer.ray] = layer.key
     normal[layer.ray] = normals
-    if layer.chain is None:  # a mirror's rays have no eye in common: no steps in depth are told in it
+    if layer.chain is None:  # rays of a mirror have no common origin, so depth steps are not comparable
         distance[layer.ray] = layer.hits.distance
     directions[layer.ray] = layer.directions
     shape = (height, width)
@@ -109,19 +110,19 @@ def find_edge_pixels(
     return is_edge.ravel(), cosine.ravel()
 
 
-def radiance_edge_threshold(environment: F32) -> float:
-    """By how much neighbours differ where one shows something bright, as a sun. environment: (h, w, 3) float32"""
+def radiance_edge_threshold(environment: Shaped[F32, "h w 3"]) -> float:
+    """Luminance difference of neighbors that indicates the edge of a bright region, such as a sun."""
     return _RADIANCE_EDGE_FACTOR * float(luminance(environment).mean())
 
 
 def is_radiance_edge(
-    layer: TransparencyLayer, environment: F32, threshold: float, size: tuple[int, int]
-) -> NDArray[np.bool_]:
-    """Find pixels where the background, seen in mirrors, has the rim of something bright. (pixels,)
+    layer: TransparencyLayer, environment: Shaped[F32, "h w 3"], threshold: float, size: tuple[int, int]
+) -> Shaped[NDArray[np.bool_], " pixels"]:
+    """True for pixels where the environment in a mirror has the edge of a bright region.
 
     Args:
-        layer: of one ray through the middle of each pixel. environment: its radiance. (h, w, 3) float32
-        threshold: from `radiance_edge_threshold`. size: width and height of the picture in pixels.
+        layer: of one ray through the center of each pixel. environment: its radiance.
+        threshold: from `radiance_edge_threshold`. size: width and height of the image in pixels.
     """
     width, height = size
     value, rows = np.full(width * height, np.nan), np.flatnonzero(layer.hits.face < 0)
@@ -129,19 +130,17 @@ def is_radiance_edge(
     edge = np.zeros((height, width), np.bool_)
     luminance_image = value.reshape(height, width)
     for first, second in ((np.s_[:-1], np.s_[1:]), (np.s_[:, :-1], np.s_[:, 1:])):
-        # never where a neighbour sees something else
+        # false where a neighbor shows a surface (NaN)
         is_different = np.abs(luminance_image[first] - luminance_image[second]) > threshold
         edge[first] |= is_different
         edge[second] |= is_different
     return edge.ravel()
 
 
-def is_partial_coverage(geometry: SceneBuffers, origin: F32, directions: F32) -> NDArray[np.bool_]:
-    """Find rays that meet a surface that blends. (n,)
-
-    Args:
-        geometry: the triangles. origin: of the rays. (3,) float32. directions: unit. (n, 3) float32
-    """
+def is_partial_coverage(
+    geometry: SceneBuffers, origin: Shaped[F32, " 3"], directions: Shaped[F32, "n 3"]
+) -> Shaped[NDArray[np.bool_], " n"]:
+    """True for rays that meet a blended surface first. geometry: the triangles. origin, directions: of the rays, unit"""
     any_hit, opaque_hit = (
         trace_rays(geometry.embree, origin, directions, alpha_sample).face
         for alpha_sample in (STOP_AT_PARTIAL, STOP_AT_OPAQUE)

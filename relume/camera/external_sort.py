@@ -1,7 +1,7 @@
-"""Rows that come part by part, each part sorted, put in one order without ever being in memory together.
+"""External merge sort: chunks of sorted rows, merged into one order without holding all rows in memory.
 
-Parts go to files as they come, column by column. Where a key's rows of a part begin is all that is kept of them; in
-order, each key's rows are those of the first part, of the second, and so on: a stable sort.
+Each chunk's columns are appended to files. Memory holds only the start of each key's rows in each chunk. In the merged
+order, the rows of each key are those of the first chunk, then of the second, and so on: a stable sort.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import IO, Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 _ROWS_PER_BLOCK = 1 << 16
@@ -19,10 +20,10 @@ _ROWS_PER_BLOCK = 1 << 16
 
 @dataclass
 class _Runs:
-    """Rows of one part and one key, in their final order.
+    """Runs of rows with one key in one chunk, in merged order.
 
     Attributes:
-        source_start: the first row of each, as they came. (r,) start: the same in order, and their number. (r + 1,)
+        source_start: first row of each run in the files. (r,) start: first row in merged order, and the total. (r + 1,)
     """
 
     source_start: NDArray[np.int64]
@@ -30,17 +31,17 @@ class _Runs:
 
 
 class Column:
-    """One sorted column, a `relume.store.bake_protocol.RowSource`; one thread at a time reads rows on request."""
+    """One merged column, a `relume.store.bake_protocol.RowSource`; only one thread at a time may read it."""
 
     def __init__(
         self, owner: ExternalSort, file: IO[bytes], dtype: np.dtype[Any], shape: tuple[int, ...], runs: _Runs
     ) -> None:
-        self._owner, self._file, self._runs = owner, file, runs  # files are closed with their owner
+        self._owner, self._file, self._runs = owner, file, runs  # the owner's finalizer closes the files
         self.dtype, self.shape = dtype, shape
         self._row_bytes = int(np.prod(shape[1:], dtype=np.int64)) * dtype.itemsize
 
     def __getitem__(self, rows: slice) -> NDArray[Any]:
-        """Some rows that follow each other."""
+        """Read consecutive rows."""
         start, stop, _ = rows.indices(self.shape[0])
         out = np.empty((max(0, stop - start), *self.shape[1:]), self.dtype)
         starts, source_starts = self._runs.start, self._runs.source_start
@@ -52,13 +53,13 @@ class Column:
         return out
 
     def _read(self, row: int, out: NDArray[Any]) -> None:
-        """Read rows as they came. out: written, contiguous."""
+        """Read consecutive rows in file order. out: output, contiguous."""
         self._file.seek(row * self._row_bytes)
         data = self._file.read(out.nbytes)
         out.reshape(-1).view(np.uint8)[:] = np.frombuffer(data, np.uint8)
 
-    def take(self, rows: NDArray[np.integer]) -> NDArray[Any]:
-        """Rows in any order, quickly where most follow each other. (n, …)"""
+    def take(self, rows: Shaped[NDArray[np.integer], " n"]) -> Shaped[NDArray[Any], "n ..."]:
+        """Read rows in any order, quickly if most are consecutive."""
         out = np.empty((len(rows), *self.shape[1:]), self.dtype)
         order = np.argsort(rows, kind="stable")
         bounds = np.searchsorted(rows[order], np.arange(0, self.shape[0] + _ROWS_PER_BLOCK, _ROWS_PER_BLOCK))
@@ -73,10 +74,10 @@ class Column:
 
 @dataclass
 class ExternalSort:
-    """Columns of rows that come in parts.
+    """Columns of rows that arrive in sorted chunks.
 
     Attributes:
-        scratch: opens a file that is gone when it is closed.
+        scratch: opens a temporary file that is deleted when it is closed.
     """
 
     scratch: Callable[[], IO[bytes]]
@@ -86,11 +87,11 @@ class ExternalSort:
     _keys: list[NDArray[np.int32]] = field(default_factory=list)
     _run_starts: list[NDArray[np.int64]] = field(default_factory=list)
 
-    def add(self, key: NDArray[np.int32], columns: Mapping[str, NDArray[Any]]) -> None:
-        """Take a part.
+    def add(self, key: Shaped[NDArray[np.int32], " n"], columns: Mapping[str, NDArray[Any]]) -> None:
+        """Append a chunk.
 
         Args:
-            key: of its rows, rising. (n,) columns: the same ones for all parts. (n, …)
+            key: of its rows, ascending. columns: the same names for all chunks. (n, …)
         """
         first = np.flatnonzero(np.diff(key, prepend=np.int32(-1)))
         self._keys.append(key[first])
@@ -103,7 +104,7 @@ class ExternalSort:
             self._files[name].write(np.ascontiguousarray(rows).data)
 
     def columns(self) -> dict[str, Column]:
-        """All columns, their rows in order; no part comes after that."""
+        """Return all columns in merged order; add no chunk after this."""
         key, source_starts = np.concatenate(self._keys), np.concatenate(self._run_starts)
         length = np.diff(source_starts, append=self.num_rows)
         order = np.argsort(key, kind="stable")

@@ -1,4 +1,4 @@
-"""From rays to samples: of the rays of a pixel those that see the same thing become one of them."""
+"""Merge rays into samples: similar rays of a pixel become one sample."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.camera.edge_detection import COS_NORMAL_EDGE, is_depth_edge
@@ -15,7 +16,7 @@ from relume.raytrace.scene_buffers import SceneBuffers
 
 F32 = NDArray[np.float32]
 
-# positions that no row or column shares (rook patterns), pixel units; fewer where most pixels of a picture are edges
+# rook patterns: no two positions share a row or column, pixel units; smaller ones if most pixels of an image are edges
 PATTERNS = (
     (np.array([(0, 5), (1, 2), (2, 7), (3, 0), (4, 4), (5, 1), (6, 6), (7, 3)]) + 0.5) / 8,
     (np.array([(0, 1), (1, 3), (2, 0), (3, 2)]) + 0.5) / 4,
@@ -25,31 +26,31 @@ POSITIONS_PER_PIXEL = len(PATTERNS[0])
 
 
 class MergedRays(NamedTuple):
-    """Rays that samples are made of.
+    """Rays that become samples.
 
     Attributes:
-        pixel: that each is of. (n,) int64. weight: share of it. (n,) float32
-        layer: what each meets.
+        pixel: of each ray. weight: fraction of the pixel.
+        layer: hits of the rays.
     """
 
-    pixel: NDArray[np.int64]
-    weight: F32
+    pixel: Shaped[NDArray[np.int64], " n"]
+    weight: Shaped[F32, " n"]
     layer: TransparencyLayer
 
 
 def merge_rays(
     geometry: SceneBuffers,
     layer: TransparencyLayer,
-    pixels: NDArray[np.int64],
-    positions: NDArray[np.float64] = PATTERNS[0],
+    pixels: Shaped[NDArray[np.int64], " p"],
+    positions: Shaped[NDArray[np.float64], "n 2"] = PATTERNS[0],
 ) -> MergedRays:
-    """Group the rays of a layer by what they see, of the rays of each of some pixels.
+    """Group similar rays of each pixel of a layer.
 
-    Of each group the ray next to its middle is kept, for the share of the pixel that the group has of its rays.
+    The most central ray of each group is kept, weighted by the group's fraction of the pixel's rays.
 
     Args:
-        geometry: the triangles. layer: of the rays, those of a pixel in a row. pixels: whose they are. (p,)
-        positions: of the rays in each pixel. (n, 2)
+        geometry: the triangles. layer: of the rays, grouped by pixel. pixels: pixels of the rays.
+        positions: of the rays in each pixel.
     """
     num = len(positions)
     shape, visible = (len(pixels), num), layer.visible
@@ -69,13 +70,13 @@ def merge_rays(
         out.reshape(-1, 3)[row] = values
     group = np.where(key == -2, -2, -1)
     for candidate in range(num):
-        # rays of the same mesh, turned alike and near the plane of the first that has no group yet
+        # rays on the same mesh with a similar normal, near the plane of the first ray without a group
         column = slice(candidate, candidate + 1)
         if is_direct:
             is_alike = ~is_depth_edge(
                 normal[:, column], distance[:, column], ray_directions[:, column], distance, ray_directions
             )
-        else:  # no eye in common; of the background each sees a part of its own, the rim of a sun perhaps
+        else:  # no common origin; each sees another region of the environment, perhaps the edge of a sun
             is_alike = np.einsum("pkc,pc->pk", ray_directions, ray_directions[:, candidate]) > COS_NORMAL_EDGE
             is_alike &= is_hit | (np.arange(num) == candidate)
         is_alike &= np.einsum("pkc,pc->pk", normal, normal[:, candidate]) > COS_NORMAL_EDGE
@@ -91,14 +92,14 @@ def merge_rays(
     return MergedRays(pixels[pixel], (size / num).astype(np.float32), group_layer)
 
 
-def unmerged(layer: TransparencyLayer, pixels: NDArray[np.int64]) -> MergedRays:
-    """The rays of a layer through the middles of pixels that are no edges. pixels: of all rays. (p,)"""
+def unmerged(layer: TransparencyLayer, pixels: Shaped[NDArray[np.int64], " p"]) -> MergedRays:
+    """Visible rays of a layer with one ray through the center of each pixel. pixels: pixels of the rays"""
     visible = layer.visible
     return MergedRays(pixels[visible.ray], np.ones(len(visible.ray), np.float32), visible)
 
 
 def concatenate_rays(ray_groups: Sequence[MergedRays], max_mirrors: int) -> MergedRays:
-    """All of several. most_mirrors: that any ray has met."""
+    """Concatenate groups of rays. max_mirrors: maximum number of mirrors on any ray"""
     pixel, weight, layers = zip(*ray_groups, strict=True)
     return MergedRays(np.concatenate(pixel), np.concatenate(weight), TransparencyLayer.concatenate(layers, max_mirrors))
 
@@ -106,11 +107,11 @@ def concatenate_rays(ray_groups: Sequence[MergedRays], max_mirrors: int) -> Merg
 def _central_position(
     is_member: NDArray[np.bool_], size: NDArray[np.int64], positions: NDArray[np.float64]
 ) -> NDArray[np.int64]:
-    """Choose of each group the position next to their mean: any other would shift what it shows to one side.
+    """Choose the position closest to the mean of each group, so that samples are not biased to one side.
 
     Args:
-        is_member: which positions are of a group. (groups, n). size: how many those are. (groups,)
-        positions: of all. (n, 2)
+        is_member: positions in each group. (groups, n). size: number of members. (groups,)
+        positions: of all rays of a pixel. (n, 2)
     """
     mean = is_member @ positions / size[:, None]
     squared_distance = np.sum((positions - mean[:, None]) ** 2, axis=-1)

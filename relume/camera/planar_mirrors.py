@@ -1,7 +1,7 @@
-"""Flat mirrors, and the lights that points see in them.
+"""Planar mirrors, and the lights that points see in them.
 
-By a plane with the unit normal n a light in direction d is seen in v = d − 2 (d · n) n: exactly one way leads over it,
-which no ray that leaves at random finds where the light is small.
+A plane with unit normal n mirrors a light in direction d to v = d − 2 (d · n) n. Only this one path leads over the
+plane, so random rays miss it if the light is small.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.camera.specular_hits import is_mirror_material
@@ -26,43 +27,45 @@ from relume.scene.model import Scene
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-MAX_PLANES = 4  # of a scene
+MAX_PLANES = 4  # per scene
 _MIN_FLAT_COSINE = 0.9999  # the least cosine between a face and the normals at its corners
-_MIN_RELATIVE_AREA = 1e-4  # of the square of the scene's diagonal
-_PLANE_TOLERANCE = 8  # times how far rays begin off surfaces: what is no farther from a plane lies in it
+_MIN_RELATIVE_AREA = 1e-4  # of the squared diagonal of the scene
+_PLANE_TOLERANCE = 8  # times the ray offset: points within this distance lie in a plane
 _RAYS_PER_BATCH = 1 << 18
 
 
 class FlatMirrors(NamedTuple):
-    """P planes in which mirrors lie, the largest first.
+    """Planes of mirrors, the largest first.
 
     Attributes:
-        normal: unit. (P, 3) float32. offset: n · x on them. (P,) float32. material: index into the scene's. (P,) uint16
-        axes: two directions along each. (P, 2, 3) float32. low, high: how far the mirrors reach along these. (P, 2)
+        normal: unit. offset: n · x of the plane. material: index into the scene's materials.
+        axes: two unit tangents. low, high: extent of the mirrors along the tangents.
     """
 
-    normal: F32
-    offset: F32
-    material: NDArray[np.uint16]
-    axes: F32
-    low: F32
-    high: F32
+    normal: Shaped[F32, "P 3"]
+    offset: Shaped[F32, " P"]
+    material: Shaped[NDArray[np.uint16], " P"]
+    axes: Shaped[F32, "P 2 3"]
+    low: Shaped[F32, "P 2"]
+    high: Shaped[F32, "P 2"]
 
     @property
     def num_planes(self) -> int:
-        """Their number P."""
+        """Number of planes P."""
         return len(self.offset)
 
     def distance_to_plane(self, plane: NDArray[np.integer] | int, position: NDArray[np.floating]) -> F64:
-        """How far places are off a plane. plane: one, or one each. place: (…, 3)"""
+        """Distance of positions (…, 3) from a plane, or each from its own plane."""
         normal = self.normal[plane].astype(np.float64)
         return np.asarray(np.abs((position * normal).sum(axis=-1) - self.offset[plane]), np.float64)
 
-    def containing_plane(self, position: F32, epsilon: float) -> NDArray[np.uint8]:
-        """Find the planes that points of cells lie in. (C,) uint8, 255 where in none
+    def containing_plane(
+        self, position: Shaped[F32, "patches points 3"], epsilon: float
+    ) -> Shaped[NDArray[np.uint8], " patches"]:
+        """Index of the plane that contains each patch, 255 if there is none.
 
         Args:
-            position: of the points, off the surface by about `epsilon`. (C, points, 3)
+            position: sample points of the patches, off the surface by about `epsilon`.
         """
         plane_index = np.full(len(position), 255, np.uint8)
         for p in reversed(range(self.num_planes)):
@@ -73,23 +76,19 @@ class FlatMirrors(NamedTuple):
 
 
 def has_flat_mirrors(scene: Scene) -> bool:
-    """Whether any surface is a mirror that may lie in a plane."""
+    """True if any mesh has a mirror material without a normal map."""
     return bool(_is_planar_mirror(scene)[[mesh.material for mesh in scene.meshes]].any())
 
 
 def _is_planar_mirror(scene: Scene) -> NDArray[np.bool_]:
-    """Of each material, that it is a mirror without bumps."""
+    """True for each mirror material without a normal map."""
     return is_mirror_material(scene.materials) & np.array(
         [material.normal_map is None for material in scene.materials], np.bool_
     )
 
 
 def find_flat_mirrors(scene: Scene, geometry: SceneBuffers) -> FlatMirrors:
-    """Find the planes of a scene's mirrors.
-
-    Args:
-        scene: with its materials. geometry: its triangles.
-    """
+    """Find the planes of a scene's mirrors. geometry: its triangles"""
     face = np.flatnonzero(_is_planar_mirror(scene)[geometry.face_material])
     normal, corners = geometry.face_normals[face], geometry.faces[face]
     is_curved = np.einsum("fkc,fc->fk", geometry.normals[corners], normal) < _MIN_FLAT_COSINE
@@ -103,7 +102,7 @@ def find_flat_mirrors(scene: Scene, geometry: SceneBuffers) -> FlatMirrors:
             break
         seed = group[np.argmax(area[group])]
         if not is_unassigned[seed]:
-            continue  # rounding has divided a plane that is known
+            continue  # rounding has split a plane that was found before
         plane = _plane_of_triangle(normal[seed], corner_positions[seed], face_material[seed])
         is_tilted = np.abs(normal @ plane.normal[0]) < _MIN_FLAT_COSINE
         is_coplanar = (
@@ -126,7 +125,7 @@ def find_flat_mirrors(scene: Scene, geometry: SceneBuffers) -> FlatMirrors:
 def _group_by_plane(
     normal: F32, corner_positions: F64, material: NDArray[np.integer], area: F64, min_area: float
 ) -> Iterator[NDArray[np.intp]]:
-    """Group triangles that lie in a plane, roughly, the largest first; none whose area is not above `min_area`."""
+    """Group triangles that lie roughly in one plane, the largest area first, down to `min_area`."""
     sign = np.where(normal @ np.array([1.0, 1e-2, 1e-4]) < 0, -1, 1)  # a plane has two sides
     offset = sign * np.einsum("fc,fc->f", corner_positions.mean(axis=1), normal)
     size = max(float(np.abs(corner_positions).max(initial=0)), 1e-9)
@@ -140,26 +139,22 @@ def _group_by_plane(
 
 
 def _plane_of_triangle(normal: F32, corners: F64, material: int) -> FlatMirrors:
-    """The plane of one triangle, as far as it is known. normal: (3,). corners: (3, 3)"""
+    """Make the plane of one triangle, without extent. normal: (3,). corners: (3, 3)"""
     unit_normal = normal.astype(np.float64) / np.linalg.norm(normal.astype(np.float64))
     tangent = any_tangent(unit_normal[None])[0].astype(np.float64)
     axes, offset = np.stack([tangent, np.cross(unit_normal, tangent)])[None], np.array([(corners @ unit_normal).mean()])
     return FlatMirrors(unit_normal[None], offset, np.array([material]), axes, *np.empty((2, 1, 2), np.float32))
 
 
-def mirrored_lights(normal: F32, directions: F32) -> F32:
-    """Where lights are seen in planes. (P, T, 3) float32
-
-    Args:
-        normal: of the planes, unit. (P, 3). directions: to the lights, unit. (T, 3)
-    """
+def mirrored_lights(normal: Shaped[F32, "P 3"], directions: Shaped[F32, "T 3"]) -> Shaped[F32, "P T 3"]:
+    """Mirror directions to lights at planes. normal: of the planes, unit. directions: to the lights, unit"""
     twice_cosine = 2 * normal.astype(np.float64) @ directions.T
     return np.asarray(directions[None] - twice_cosine[..., None] * normal[:, None], np.float32)
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _mark_candidates(position, normal, mirrors, mirrored_directions, start, stop, is_candidate):  # type: ignore[no-untyped-def]
-    """Mark the lights whose way over a plane from points [start, stop) meets it where mirrors are. may: (n, P T)"""
+    """Mark lights whose path from points [start, stop) crosses a plane within the mirrors. is_candidate: (n, P T)"""
     planes, offset, axes, low, high = mirrors
     num = mirrored_directions.shape[1]
     for n in range(start, stop):
@@ -187,26 +182,21 @@ def _mark_candidates(position, normal, mirrors, mirrored_directions, start, stop
 
 
 class ReflectedLight(NamedTuple):
-    """What n points see in flat mirrors.
+    """Lights that n points see in planar mirrors.
 
     Attributes:
-        visible: light t in plane p is bit k & 7 of byte k >> 3, k = p T + t. (n, bytes) uint8
-        num_rays: traced.
+        visible: light t in plane p is bit k & 7 of byte k >> 3, k = p T + t.
+        num_rays: number of traced rays.
     """
 
-    visible: NDArray[np.uint8]
+    visible: Shaped[NDArray[np.uint8], "n bytes"]
     num_rays: int
 
 
 def lights_visible_in_mirrors(
-    geometry: SceneBuffers, mirrors: FlatMirrors, points: SurfacePoints, directions: F32
+    geometry: SceneBuffers, mirrors: FlatMirrors, points: SurfacePoints, directions: Shaped[F32, "T 3"]
 ) -> ReflectedLight:
-    """Find which lights points see in flat mirrors.
-
-    Args:
-        geometry: the scene's triangles. mirrors: of the scene. points: n of them.
-        directions: to the lights, unit. (T, 3) float32
-    """
+    """Find the lights that points see in planar mirrors. geometry: the scene's. directions: to the lights, unit"""
     mirrored_directions = mirrored_lights(mirrors.normal, directions)
     is_candidate = np.zeros((points.num_points, mirrors.num_planes * len(directions)), np.bool_)
     mirror_arrays = mirrors.normal, mirrors.offset, mirrors.axes, mirrors.low, mirrors.high
@@ -232,7 +222,7 @@ def _trace_mirror_paths(
     directions: F32,
     mirrored_directions: F32,
 ) -> tuple[NDArray[np.bool_], int]:
-    """Tell whether nothing is between points and mirrors, and between these and lights; and how many rays told it."""
+    """True if a path from a point over a mirror to a light is unoccluded; and the number of traced rays."""
     plane, light_index = np.divmod(candidate, len(directions))
     to_mirror = mirrored_directions[plane, light_index]
     hits = trace_rays(geometry.embree, points.position, to_mirror, points.alpha_sample)

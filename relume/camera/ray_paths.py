@@ -1,10 +1,11 @@
-"""Ways that an eye's rays go, before it is known what they meet."""
+"""Ray paths: camera rays after glass and mirrors, before their next intersection."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 F32 = NDArray[np.float32]
@@ -13,24 +14,24 @@ NO_MIRROR = 65_535
 
 
 class SpecularChain(NamedTuple):
-    """The mirrors that sent rays on, the first one first; as many for each of them.
+    """Mirrors on the paths of rays in order from the camera, the same number for each ray.
 
     Attributes:
-        material: of each mirror, index into the scene's. (m, mirrors) uint16
-        cos_theta_i: at which it was met. (m, mirrors) float32
-        tint: its texture of highlights there. (m, mirrors, 3) float32
+        material: of each mirror, index into the scene's materials.
+        cos_theta_i: at the hit.
+        tint: specular texture at the hit.
     """
 
-    material: NDArray[np.uint16]
-    cos_theta_i: F32
-    tint: F32
+    material: Shaped[NDArray[np.uint16], "n mirrors"]
+    cos_theta_i: Shaped[F32, "n mirrors"]
+    tint: Shaped[F32, "n mirrors 3"]
 
     def rows(self, rows: NDArray[np.integer] | NDArray[np.bool_]) -> SpecularChain:
-        """Those of some rays."""
+        """Select rays."""
         return SpecularChain(self.material[rows], self.cos_theta_i[rows], self.tint[rows])
 
     def append(self, continuation: SpecularChain) -> SpecularChain:
-        """This, and the mirrors of another after it, ray by ray."""
+        """Concatenate this chain and a continuation, ray by ray."""
         return SpecularChain(
             np.concatenate([self.material, continuation.material], axis=1),
             np.concatenate([self.cos_theta_i, continuation.cos_theta_i], axis=1),
@@ -39,16 +40,15 @@ class SpecularChain(NamedTuple):
 
     @property
     def num_mirrors(self) -> int:
-        """How many each ray has met."""
+        """Number of mirrors on each path."""
         return int(self.material.shape[1])
 
     @classmethod
     def padded(cls, chain: SpecularChain | None, num_rays: int, max_mirrors: int) -> SpecularChain:
-        """One with room for `max_mirrors` mirrors a ray, `NO_MIRROR` where it has met fewer.
+        """Pad a chain to `max_mirrors` mirrors with `NO_MIRROR`.
 
         Args:
-            chain: the mirrors of `num_rays` rays; None where they have met none. max_mirrors: at least as many as there
-                are.
+            chain: of `num_rays` rays; None without mirrors. max_mirrors: at least the number of mirrors of the chain.
         """
         num_missing = max_mirrors - (0 if chain is None else chain.num_mirrors)
         ones = np.ones((num_rays, num_missing), np.float32)
@@ -61,34 +61,34 @@ class SpecularChain(NamedTuple):
 
 
 class RayPaths(NamedTuple):
-    """Rays, and what became of them so far.
+    """State of ray paths.
 
     Attributes:
-        ray: which of the eye's they are, ascending. (m,) int64
-        origins: where they begin, one for all or one each. (1 or m, 3) float32. directions: unit. (m, 3) float32
-        transmittance: share of what they meet that comes to the eye. (m, 3) float32
-        length: of the way to where they begin. (m,) float32
-        num_glass: surfaces of glass since the eye.
-        chain: mirrors on the way; None where there were none. path_key: tells ways over other mirrors apart. (m,) int64
+        ray: index of the camera ray, ascending.
+        origins: one for all or one each. directions: unit.
+        transmittance: from the origin of the ray back to the camera.
+        length: of the path up to the origin.
+        num_glass: number of glass surfaces since the camera.
+        chain: mirrors on the path; None without mirrors. path_key: distinguishes paths over different mirrors.
     """
 
-    ray: NDArray[np.int64]
-    origins: F32
-    directions: F32
-    transmittance: F32
-    length: F32
+    ray: Shaped[NDArray[np.int64], " n"]
+    origins: Shaped[F32, "#n 3"]
+    directions: Shaped[F32, "n 3"]
+    transmittance: Shaped[F32, "n 3"]
+    length: Shaped[F32, " n"]
     num_glass: int
     chain: SpecularChain | None
-    path_key: NDArray[np.int64]
+    path_key: Shaped[NDArray[np.int64], " n"]
 
     @property
     def num_mirrors(self) -> int:
-        """How many each ray has met."""
+        """Number of mirrors on each path."""
         return 0 if self.chain is None else self.chain.num_mirrors
 
     @classmethod
-    def from_camera(cls, camera_position: F32, directions: F32) -> RayPaths:
-        """Those of an eye's rays. eye: (3,) float32. directions: unit. (n, 3) float32"""
+    def from_camera(cls, camera_position: Shaped[F32, " 3"], directions: Shaped[F32, "n 3"]) -> RayPaths:
+        """Start the paths of camera rays. directions: unit"""
         num = len(directions)
         ones, zeros = np.ones((num, 3), np.float32), np.zeros(num, np.float32)
         return cls(

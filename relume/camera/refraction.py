@@ -1,11 +1,11 @@
-"""What an eye sees through glass: its rays go on behind it, straight through panes, bent by solids, tinted by both.
+"""Camera rays through glass: straight through thin glass, refracted by solids, attenuated by both.
 
-Light's rays are not bent: `relume.raytrace.alpha_filter` lets their share pass. Behind each surface of glass that an
-eye's ray meets it is dimmed by what that lets through,
+Shadow rays are not refracted: `relume.raytrace.alpha_filter` attenuates them. Behind each glass surface the
+transmittance of a camera ray is multiplied by
 
-    T = (1 - F) tint,  inside of solids also e^(-absorbed s)  along s metres,
+    T = (1 - F) tint,  inside solids also e^(-absorbed s)  along s meters,
 
-with F of a dielectric's rim. Where nothing passes, inside of a solid, the ray is reflected instead.
+with F the Fresnel reflectance of the interface. Under total internal reflection the ray is reflected instead.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.fresnel import fresnel
@@ -26,27 +27,27 @@ from relume.scene.model import Glass, Material
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-MAX_GLASS_HITS = 8  # surfaces that a ray meets; two are a pane, four a bottle
-MAX_VISIBLE_GLASS = 2  # of glass, one behind the other, that are seen themselves: each costs a sample of every pixel
+MAX_GLASS_HITS = 8  # glass surfaces on a ray; a thin pane has two, a bottle four
+MAX_VISIBLE_GLASS = 2  # successive glass surfaces that show reflections: each costs one sample per pixel
 
 
 class GlassSurfaces(NamedTuple):
-    """The glass of every material, whether it is of glass or not. (materials,) and (materials, 3)"""
+    """Glass parameters of each material; defaults if it is not glass."""
 
-    is_glass: NDArray[np.bool_]
-    ior: F64
-    is_solid: NDArray[np.bool_]
-    tint: F64
-    absorbed: F64
+    is_glass: Shaped[NDArray[np.bool_], " materials"]
+    ior: Shaped[F64, " materials"]
+    is_solid: Shaped[NDArray[np.bool_], " materials"]
+    tint: Shaped[F64, "materials 3"]
+    absorbed: Shaped[F64, "materials 3"]
 
 
 def has_glass(materials: Sequence[Material]) -> bool:
-    """Tell whether any material is of glass."""
+    """True if any material is glass."""
     return any(material.glass is not None for material in materials)
 
 
 def glass_surfaces(materials: Sequence[Material]) -> GlassSurfaces:
-    """Read the glass of materials."""
+    """Collect the glass parameters of materials."""
     glasses = [material.glass or Glass() for material in materials]
     return GlassSurfaces(
         np.array([material.glass is not None for material in materials]),
@@ -58,19 +59,19 @@ def glass_surfaces(materials: Sequence[Material]) -> GlassSurfaces:
 
 
 def refract(
-    geometry: SceneBuffers, glass: GlassSurfaces, paths: RayPaths, hits: Hits, rows: NDArray[np.intp]
-) -> tuple[NDArray[np.bool_], RayPaths]:
-    """Send rays that met glass on.
+    geometry: SceneBuffers, glass: GlassSurfaces, paths: RayPaths, hits: Hits, rows: Shaped[NDArray[np.intp], " k"]
+) -> tuple[Shaped[NDArray[np.bool_], " k"], RayPaths]:
+    """Continue the paths of rays that hit glass.
 
     Args:
-        geometry: the triangles. glass: the glass of materials.
-        paths: of the rays. hits: what they met. rows: those that met glass. (k,)
+        geometry: the triangles. glass: glass parameters of materials.
+        paths: of the rays. hits: of all paths. rows: paths that hit glass.
     Returns:
-        Whether each met the outer side of a solid, or a pane, (k,), and how they go on.
+        True for hits on thin glass or the outside of a solid, and the continued paths.
     """
     glass_hits = hits.rows(rows)
     material, directions = geometry.face_material[glass_hits.face], paths.directions[rows].astype(np.float64)
-    points = surface_at(geometry, glass_hits, paths.directions[rows]).points  # moved off to the side that is seen
+    points = surface_at(geometry, glass_hits, paths.directions[rows]).points  # offset toward the visible side
     face_normal, normal = geometry.face_normals[glass_hits.face].astype(np.float64), points.normal.astype(np.float64)
     facing = np.einsum("nc,nc->n", face_normal, directions)
     is_solid = glass.is_solid[material]
@@ -101,13 +102,11 @@ def refract(
     )
 
 
-def dielectric(cos_theta_i: F64, eta: F64) -> tuple[F64, F64]:
-    """Fresnel's reflectance, unpolarised, and the cosine behind the rim.
+def dielectric(cos_theta_i: Shaped[F64, " n"], eta: Shaped[F64, " n"]) -> tuple[Shaped[F64, " n"], Shaped[F64, " n"]]:
+    """Fresnel reflectance, unpolarized, and the cosine of refraction; 1 and 0 under total internal reflection.
 
     Args:
-        cos_theta_i: before it. (n,). eta: index of refraction before it over that behind it. (n,)
-    Returns:
-        (n,) both; 1 and 0 where nothing passes.
+        cos_theta_i: on the incident side. eta: index of refraction, incident over transmitted side.
     """
     cos_theta_t = np.sqrt(np.maximum(1 - eta**2 * (1 - cos_theta_i**2), 0))
     return fresnel(cos_theta_i, 1 / eta, 0.0), cos_theta_t

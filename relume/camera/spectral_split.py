@@ -1,15 +1,14 @@
-"""Light that comes through tinted glass: a view sample that it reaches is several, one for each tint and one besides.
+"""Split view samples that tinted glass lights: one sample per group of tints, and one for untinted light.
 
-A sample and a light have one bit, visible or not. Let P_g be the visibility where glass of the first g groups of tints
-lets all pass, and tinted glass of the others stops all. Of the light that P_g and not P_g-1 sees, each channel has the
-share T_g, the mean of what the sides of glass let pass on the way. So the visibility is
+A sample and a light have one visibility bit. Let P_g be the visibility if glass of the first g groups of tints passes
+all light, and other tinted glass blocks it. Light in P_g but not in P_g-1 has the mean transmittance T_g of the glass
+on its path, per channel. So the visibility is
 
     V = P_0 + sum_g (P_g - P_g-1) T_g  =  P_0 (1 - T_1) + P_1 (T_1 - T_2) + ... + P_G T_G
 
-in each channel, and each P is that of a sample whose share of the pixel is multiplied by what stands beside it. A lobe
-that sees one light sees its tint, and nothing that sums light knows of it
-(docs/direct-light.md#glass-mirrors-shadow-catchers). Brute force does without means: its samples are of one channel
-each, and their rays pass by the tint of that.
+in each channel, and each P is the visibility of one sample, whose pixel weight is multiplied by the factor of P. Any
+sum over lights stays correct without knowing about tints (docs/direct-light.md#glass-mirrors-shadow-catchers). The
+reference needs no means: it splits samples by channel, and their rays use the tint of that channel.
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.fresnel import schlick
@@ -38,35 +38,35 @@ from relume.scene.model import Material
 F32 = NDArray[np.float32]
 
 NUM_CHANNELS = 3
-_NUM_LIGHTS = 200  # for which visibility is traced
-_NUM_PATHS = 16  # ways through a group of tints, spread evenly over the light that comes along them
-_MAX_SIDES = 16  # of glass on that way
+_NUM_LIGHTS = 200  # lights for which visibility is traced
+_NUM_PATHS = 16  # paths through a group of tints, distributed by irradiance
+_MAX_SIDES = 16  # glass surfaces on a path
 _POINTS_PER_RANGE = 4096
 POINTS_PER_BLOCK = 16 * _POINTS_PER_RANGE
-_MIN_LIGHT_FRACTION = 0.01  # of the light that is above a sample's horizon; less through tinted glass is gray
+_MIN_LIGHT_FRACTION = 0.01  # of the light above a sample's horizon; less tinted light than this is treated as gray
 
 
 def num_tints(materials: Sequence[Material]) -> int:
-    """Bound the groups of tints, 0 where no shadow has a color."""
+    """Upper bound of the number of tint groups; 0 if no shadow is tinted."""
     return min(MAX_TINTS, sum(is_tinted(material.glass) for material in materials if material.glass is not None))
 
 
 def max_tint_rays(materials: Sequence[Material]) -> int:
-    """Bound the rays that are traced for each sample."""
+    """Upper bound of the number of rays traced per sample."""
     num = num_tints(materials)
     return (1 + num) * _NUM_LIGHTS + num * _NUM_PATHS * _MAX_SIDES if num else 0
 
 
 class TintedLight:
-    """Light of an environment, or of lights in its place, that comes through tinted glass.
+    """Light that reaches points through tinted glass, from an environment or a replacement for it.
 
     Args:
         geometry: the triangles, some of them of tinted glass.
-        radiance: equirectangular, top row first. (height, width, 3) float32
+        radiance: equirectangular, top row first.
     """
 
-    def __init__(self, geometry: SceneBuffers, radiance: F32) -> None:
-        mean_radiance = float(radiance.mean(dtype=np.float64)) or 1.0  # as lamps and surfaces may be in any direction
+    def __init__(self, geometry: SceneBuffers, radiance: Shaped[F32, "h w 3"]) -> None:
+        mean_radiance = float(radiance.mean(dtype=np.float64)) or 1.0  # area lights may be in any direction
         lights = tessellate_environment(radiance + np.float32(mean_radiance), _NUM_LIGHTS)
         self._geometry, self._directions = geometry, lights.direction
         self._targets, self._weight = (
@@ -78,20 +78,20 @@ class TintedLight:
         self.num_groups = int(alpha_test.groups.max(initial=0))
         material_rule = alpha_test.alpha_masks.material_rule
         self._is_glass = (material_rule >= 0) & (alpha_test.alpha_masks.rules[material_rule, 0] == GLASS_RULE)
-        # the share of others is in what rays see
+        # camera rays already include the transmittance of untinted glass
         is_tinted_glass = self._is_glass & (alpha_test.groups[material_rule] > 0)
         self._tint = np.where(is_tinted_glass[:, None], alpha_test.alpha_masks.rules[material_rule, 1:4], np.float32(1))
         self._f0 = np.where(is_tinted_glass, alpha_test.alpha_masks.rules[material_rule, 4], np.float32(0))
 
-    def tints(self, position: F32, normal: F32) -> tuple[F32, int]:
-        """Find the mean tint of the light that each group lets through to points.
+    def tints(self, position: Shaped[F32, "n 3"], normal: Shaped[F32, "n 3"]) -> tuple[Shaped[F32, "n groups 3"], int]:
+        """Find the mean tint of the light that reaches points through each group.
 
         Args:
-            position, normal: of n points, neighbors mostly next to each other. (n, 3) each. What is found for them does
-                not change where others are left out by blocks of `POINTS_PER_BLOCK`.
+            position, normal: of n points, mostly ordered by neighborhood. Omitting other blocks of `POINTS_PER_BLOCK`
+                points does not change the result.
         Returns:
-            What glass passes of each channel on the way, of light that comes through this group and through none of a
-            higher number; NaN where it is too little. (n, groups, 3). How many rays that took.
+            Mean transmittance of light through this group and no group with a higher number, NaN if there is too
+            little light; and the number of traced rays.
         """
         visibility = [
             trace_visibility_masks(
@@ -117,7 +117,7 @@ class TintedLight:
         return tints, sum(num_rays)
 
     def _mean_tint(self, position: F32, weight: F32) -> tuple[F32, int]:
-        """Find the mean tint on the ways from points to lights. weight: of each light. (n, lights)"""
+        """Mean tint on paths from points to lights. weight: of each light. (n, lights)"""
         sums = np.cumsum(weight, axis=1, dtype=np.float64)
         steps = sums[:, -1:] * ((np.arange(_NUM_PATHS) + 0.5) / _NUM_PATHS)
         light = np.stack([(sums <= step[:, None]).sum(axis=1) for step in steps.T], axis=1)
@@ -127,7 +127,7 @@ class TintedLight:
         return transmittance.reshape(-1, _NUM_PATHS, NUM_CHANNELS).mean(axis=1), num_rays
 
     def _path_transmittance(self, position: F32, directions: F32) -> tuple[F32, int]:
-        """Multiply what all sides of tinted glass on the way of rays let pass. Returns (n, 3), how many were traced."""
+        """Transmittance of all tinted glass on rays (n, 3), and the number of traced rays."""
         geometry, transmittance = self._geometry, np.ones((len(position), NUM_CHANNELS), np.float32)
         ray, origin, num_rays = np.arange(len(position)), np.array(position, np.float32), 0
         for _ in range(_MAX_SIDES):
@@ -147,27 +147,27 @@ class TintedLight:
 
 
 class SplitWeights(NamedTuple):
-    """How some samples show light.
+    """Weights of split samples.
 
     Attributes:
-        alpha_sample: of their rays, see `relume.raytrace.surface_points.SurfacePoints`. (m,) float32
-        num_parts: how many share what one sample was. (m,)
-        channel_weights: what each shows of the channels, times `num_parts`. (m, 3) float32
+        alpha_sample: for their shadow rays, see `relume.raytrace.surface_points.SurfacePoints`.
+        num_parts: number of split samples that replace the same sample.
+        channel_weights: factor per channel, times `num_parts`.
     """
 
-    alpha_sample: F32
-    num_parts: NDArray[np.int64]
-    channel_weights: F32
+    alpha_sample: Shaped[F32, " n"]
+    num_parts: Shaped[NDArray[np.int64], " n"]
+    channel_weights: Shaped[F32, "n 3"]
 
 
 class TintSplit:
-    """Samples of which some are several.
+    """Split samples, in order.
 
     Args:
-        tints: of the light that comes to each sample through glass, see `TintedLight.tints`. (n, groups, 3)
-        bounds: between groups of samples that stay together, in which neighbors of one kind follow each other; the
-            first is 0, the last n.
-        by_channel: whether each shows one channel, and no tints.
+        tints: of the light that reaches each sample through glass, see `TintedLight.tints`. (n, groups, 3)
+        bounds: ascending, from 0 to n; the split samples of [bounds[i], bounds[i + 1]) stay together, so that neighbors
+            of the same tint group are adjacent.
+        by_channel: split by channel instead of by tint.
     """
 
     def __init__(self, tints: F32, bounds: NDArray[np.integer], *, by_channel: bool) -> None:
@@ -184,7 +184,7 @@ class TintSplit:
         self.row, self._kind = np.concatenate(rows), np.concatenate(part_indices)
 
     def weights(self, rows: slice) -> SplitWeights:
-        """How some samples that follow each other show light."""
+        """Weights of consecutive split samples."""
         part_index, tints = self._kind[rows].astype(np.int64), self._tints[self.row[rows]]
         lit = _is_lit(tints)
         is_split = np.asarray(lit.any(axis=1))
@@ -215,16 +215,16 @@ class TintSplit:
 
 
 def _is_lit(tints: F32) -> NDArray[np.bool_]:
-    """Whether light comes to samples through each group. (n, groups)"""
+    """True if light reaches a sample through a group. (n, groups)"""
     return np.asarray(~np.isnan(tints[..., 0]))
 
 
 class SplitColumn:
-    """A column of samples of which some were split, read as `relume.camera.external_sort.Column` is.
+    """Column of samples after splitting, read like `relume.camera.external_sort.Column`.
 
     Args:
-        name: of the column; weight, transmittance and alpha_sample change. whole: before.
-        split: how.
+        name: of the column; weight, transmittance and alpha_sample change. whole: the column before splitting.
+        split: the split samples.
     """
 
     def __init__(self, name: str, whole: Column, split: TintSplit) -> None:
@@ -232,7 +232,7 @@ class SplitColumn:
         self.dtype, self.shape = whole.dtype, (len(split.row), *whole.shape[1:])
 
     def __getitem__(self, rows: slice) -> NDArray[Any]:
-        """Some rows that follow each other."""
+        """Read consecutive rows."""
         values = self._whole.take(self._split.row[rows])
         if self._name not in ("weight", "transmittance", "alpha_sample"):
             return values

@@ -1,4 +1,4 @@
-"""What an eye sees in mirrors: surfaces whose own look has a highlight that is sharp enough send its rays on."""
+"""Specular reflection of camera rays at materials that are mirrors in the scene's own look."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.specular import is_mirror
@@ -15,11 +16,11 @@ from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_interaction import surface_at
 from relume.scene.model import Material
 
-MAX_MIRROR_BOUNCES = 2  # that a ray is sent on by; what the last one reflects is as coarse as lobes are
+MAX_MIRROR_BOUNCES = 2  # per camera ray; further reflections are as blurred as lobes
 
 
-def is_mirror_material(materials: Sequence[Material]) -> NDArray[np.bool_]:
-    """Tell which materials are mirrors by themselves. (materials,)"""
+def is_mirror_material(materials: Sequence[Material]) -> Shaped[NDArray[np.bool_], " materials"]:
+    """True for each material that is a mirror in the scene's own look."""
     return np.array([is_mirror(material.terms) for material in materials], np.bool_)
 
 
@@ -28,18 +29,18 @@ def reflect_rays(
     materials: Sequence[Material],
     paths: RayPaths,
     hits: Hits,
-    rows: NDArray[np.intp],
+    rows: Shaped[NDArray[np.intp], " k"],
     pixel_angle: float,
     num_keys: int,
 ) -> RayPaths:
-    """Send rays that met mirrors on.
+    """Continue the paths of rays that hit mirrors.
 
     Args:
         geometry: the triangles. materials: of the scene.
-        paths: of the rays. hits: what they met. rows: those that met mirrors. (k,)
-        pixel_angle: that a ray stands for, radians. num_keys: more than the numbers of meshes.
+        paths: of the rays. hits: of all paths. rows: paths that hit mirrors.
+        pixel_angle: angle of a pixel, radians. num_keys: larger than any mesh index.
     Returns:
-        How they go on.
+        The continued paths.
     """
     mirror_hits, directions = hits.rows(rows), paths.directions[rows]
     length = paths.length[rows] + mirror_hits.distance
@@ -47,7 +48,7 @@ def reflect_rays(
     reflected = _reflect(surface.points.normal, directions)
     face_normal = geometry.face_normals[mirror_hits.face]
     face_normal = face_normal * -np.sign(np.einsum("nc,nc->n", face_normal, directions))[:, None]
-    # by bumps, or where smooth normals turn from the triangle
+    # mapped normals, or smooth normals far from the triangle's, may reflect rays into the surface
     is_below_face = np.einsum("nc,nc->n", reflected, face_normal) <= 0
     reflected[is_below_face] = _reflect(face_normal[is_below_face], directions[is_below_face])
     cosine = np.clip(-np.einsum("nc,nc->n", surface.points.normal, directions), 0, 1)
@@ -65,6 +66,6 @@ def reflect_rays(
 
 
 def _reflect(normal: NDArray[np.float32], directions: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Mirror directions by planes with these unit normals. (n, 3) each"""
+    """Reflect directions at planes with unit normals. (n, 3) each"""
     reflected = directions - 2 * np.einsum("nc,nc->n", normal, directions)[:, None] * normal
     return np.asarray(reflected / np.linalg.norm(reflected, axis=1, keepdims=True), np.float32)

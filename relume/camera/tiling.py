@@ -1,7 +1,7 @@
-"""A picture window by window, so that what is found of it is never there all at once.
+"""Tiles of an image, so that its samples are never in memory all at once.
 
-Windows are squares whose sides are a power of two, in the order of a Morton curve: what is sorted along the curve in
-each of them is, one after another, sorted along it in all.
+Tiles are squares whose side is a power of two, in Morton order: samples sorted along the Morton curve within each tile
+are sorted along it over all tiles.
 """
 
 from __future__ import annotations
@@ -9,17 +9,18 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-TILE_SIZE = 256  # of a window, pixels; a power of two
-MAX_CONCURRENT_TILES = 4  # windows at most that are looked at by a thread each: a hundred megabytes each
+TILE_SIZE = 256  # pixels; a power of two
+MAX_CONCURRENT_TILES = 4  # one thread each; a tile needs about a hundred megabytes
 
 
 class ImageTile(NamedTuple):
-    """A rectangle of a picture.
+    """A rectangle of an image.
 
     Attributes:
-        x, y: its first column and row. width, height: pixels.
+        x, y: first column and row. width, height: in pixels.
     """
 
     x: int
@@ -27,31 +28,31 @@ class ImageTile(NamedTuple):
     width: int
     height: int
 
-    def pixels(self, size: tuple[int, int]) -> NDArray[np.int64]:
-        """Row-major numbers, in a picture of some size, of its pixels, row by row. (width · height,)"""
+    def pixels(self, size: tuple[int, int]) -> Shaped[NDArray[np.int64], " pixels"]:
+        """Row-major indices of the tile's pixels in an image of `size`. (width · height,)"""
         rows = np.arange(self.y, self.y + self.height)[:, None] * size[0]
         return (rows + np.arange(self.x, self.x + self.width)).ravel()
 
     def padded(self, size: tuple[int, int]) -> ImageTile:
-        """This and the pixels beside it, as far as a picture of some size has any."""
+        """Tile with a border of one pixel, clipped to an image of `size`."""
         x, y = max(0, self.x - 1), max(0, self.y - 1)
         right, bottom = min(size[0], self.x + self.width + 1), min(size[1], self.y + self.height + 1)
         return ImageTile(x, y, right - x, bottom - y)
 
-    def crop_from(self, padded: ImageTile, values: NDArray[np.generic]) -> NDArray[np.generic]:
-        """What is this window's of what a wider one's pixels have. values: (pixels of the wider one,)"""
+    def crop_from(
+        self, padded: ImageTile, values: Shaped[NDArray[np.generic], " padded_pixels"]
+    ) -> Shaped[NDArray[np.generic], " pixels"]:
+        """Crop values of a padded tile to this tile."""
         x, y = self.x - padded.x, self.y - padded.y
         padded_image = values.reshape(padded.height, padded.width)
         return padded_image[y : y + self.height, x : x + self.width].ravel()
 
 
-def morton(pixel: NDArray[np.int64], width: int) -> NDArray[np.uint64]:
-    """Interleave the bits of x and y: the order of a Z-curve.
+def morton(pixel: Shaped[NDArray[np.int64], " n"], width: int) -> Shaped[NDArray[np.uint64], " n"]:
+    """Morton codes of pixels: interleaved bits of x and y.
 
     Args:
-        pixel: row-major numbers. (n,) width: of the picture.
-    Returns:
-        (n,) uint64
+        pixel: row-major indices. width: of the image.
     """
     code = np.zeros(len(pixel), np.uint64)
     x, y = (pixel % width).astype(np.uint64), (pixel // width).astype(np.uint64)
@@ -63,7 +64,7 @@ def morton(pixel: NDArray[np.int64], width: int) -> NDArray[np.uint64]:
 
 
 def image_tiles(size: tuple[int, int]) -> list[ImageTile]:
-    """The windows of a picture. size: width and height, pixels."""
+    """Tiles of an image, in Morton order. size: width and height in pixels"""
     columns, rows = (-(-length // TILE_SIZE) for length in size)
     order = np.argsort(morton(np.arange(columns * rows), columns), kind="stable")
     return [

@@ -1,8 +1,8 @@
-"""What an eye sees, layer by layer: its rays meet surfaces, go on behind glass, and are sent back by mirrors.
+"""Transparency layers of camera rays: their hits behind glass and in mirrors.
 
-A pixel has samples in layers: what its rays meet first, what they meet behind glass, what they meet after a mirror.
-What glass lets through is baked; what a mirror sends back its look decides (`relume.brdf.specular`), so a bake keeps by
-which mirrors a ray came.
+A pixel has samples in layers: first hits, hits behind glass, and hits after a mirror. The transmittance of glass is
+baked. The look decides how much a mirror reflects (`relume.brdf.specular`), so a bake stores the specular chain of each
+sample.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.camera.ray_paths import RayPaths, SpecularChain
@@ -25,54 +26,44 @@ from relume.scene.model import Material
 F32 = NDArray[np.float32]
 
 
-# of a layer, a row a ray
-_ARRAYS = (
-    "ray",
-    "directions",
-    "transmittance",
-    "is_visible",
-    "origins",
-    "is_mirrored",
-    "key",
-)
+# arrays of a layer with one row per ray
+_ARRAYS = ("ray", "directions", "transmittance", "is_visible", "origins", "is_mirrored", "key")
 
 
 class TransparencyLayer(NamedTuple):
-    """What some of an eye's rays meet after as many surfaces.
+    """Hits of camera rays that passed the same number of surfaces.
 
     Attributes:
-        ray: which of the rays they are, ascending. (m,) int64
-        hits: what they meet; distances are along the whole way.
-        directions: of the rays there, unit. (m, 3) float32
-        transmittance: share of what is sent there that comes to the eye, but for what mirrors take of it. (m, 3)
-            float32
-        is_visible: whether there is something to be seen, and not just a way on. (m,)
-        origins: where the rays come from: the eye itself, or the last surface that turned them. (m, 3) float32
-        chain: the mirrors that sent them here; None where none did.
-        is_mirrored: whether the surface is a mirror, and another layer has what is seen in it. (m,)
-        key: number of the mesh there, −1 where nothing is met; larger ones after mirrors, others after others.
-            (m,) int64
+        ray: index of the camera ray, ascending.
+        hits: hits of the rays; distances are along the whole path.
+        directions: of the last path segment, unit.
+        transmittance: from the hit back to the camera, without the reflectance of mirrors.
+        is_visible: the surface itself is shown; false if the path only continues there.
+        origins: of the last path segment: the camera, or the last surface that changed the direction.
+        chain: mirrors on the path; None without mirrors.
+        is_mirrored: the surface is a mirror, and another layer has its reflection.
+        key: mesh index of the hit, −1 for the background; offset to distinguish paths over different mirrors.
     """
 
-    ray: NDArray[np.int64]
+    ray: Shaped[NDArray[np.int64], " n"]
     hits: Hits
-    directions: F32
-    transmittance: F32
-    is_visible: NDArray[np.bool_]
-    origins: F32
+    directions: Shaped[F32, "n 3"]
+    transmittance: Shaped[F32, "n 3"]
+    is_visible: Shaped[NDArray[np.bool_], " n"]
+    origins: Shaped[F32, "n 3"]
     chain: SpecularChain | None
-    is_mirrored: NDArray[np.bool_]
-    key: NDArray[np.int64]
+    is_mirrored: Shaped[NDArray[np.bool_], " n"]
+    key: Shaped[NDArray[np.int64], " n"]
 
     def rows(self, rows: NDArray[np.integer] | NDArray[np.bool_]) -> TransparencyLayer:
-        """Those of some rays."""
+        """Select rays."""
         chain = None if self.chain is None else self.chain.rows(rows)
         selection = self._replace(hits=self.hits.rows(rows), chain=chain)
         return selection._replace(**{name: getattr(self, name)[rows] for name in _ARRAYS})
 
     @staticmethod
     def concatenate(layers: Sequence[TransparencyLayer], max_mirrors: int) -> TransparencyLayer:
-        """Those of several, one after another. most_mirrors: that any ray has met."""
+        """Concatenate layers. max_mirrors: maximum number of mirrors on any path"""
         chains = [SpecularChain.padded(layer.chain, len(layer.ray), max_mirrors) for layer in layers]
         return TransparencyLayer(
             hits=Hits.concatenate([layer.hits for layer in layers]),
@@ -82,17 +73,17 @@ class TransparencyLayer(NamedTuple):
 
     @property
     def visible(self) -> TransparencyLayer:
-        """Where there is something to be seen."""
+        """Select rays whose hit is shown."""
         return self.rows(self.is_visible)
 
 
 def has_layers(materials: Sequence[Material]) -> bool:
-    """Tell whether rays go on from any material."""
+    """True if camera rays continue at any material."""
     return has_glass(materials) or bool(is_mirror_material(materials).any())
 
 
 def max_layers(materials: Sequence[Material]) -> int:
-    """The most layers that there are: what mirrors show is behind glass as well."""
+    """Maximum number of layers; reflections in mirrors may be behind glass."""
     glass, mirrors = has_glass(materials), bool(is_mirror_material(materials).any())
     return (
         2 * MAX_GLASS_HITS
@@ -106,7 +97,7 @@ def max_layers(materials: Sequence[Material]) -> int:
 
 
 def max_samples(materials: Sequence[Material]) -> int:
-    """The most layers of a ray in which there is something to be seen."""
+    """Maximum number of layers of a ray whose hits are shown."""
     has_glass_and_mirrors = has_glass(materials) and bool(is_mirror_material(materials).any())
     return 1 + MAX_VISIBLE_GLASS if has_glass(materials) and not has_glass_and_mirrors else max_layers(materials)
 
@@ -114,22 +105,22 @@ def max_samples(materials: Sequence[Material]) -> int:
 def trace_layers(
     geometry: SceneBuffers,
     materials: Sequence[Material],
-    camera_position: F32,
-    directions: F32,
+    camera_position: Shaped[F32, " 3"],
+    directions: Shaped[F32, "n 3"],
     alpha_sample: F32 | np.float32,
     pixel_angle: float = 0.0,
     *,
     traces_mirrors: bool = True,
 ) -> list[TransparencyLayer]:
-    """Follow an eye's rays through glass, and off mirrors.
+    """Trace camera rays through glass and off mirrors.
 
     Args:
-        geometry: the triangles. materials: of the scene. camera_position: (3,) float32
-        directions: unit. (n, 3) float32. alpha_sample: of `trace_rays`.
-        pixel_angle: that a ray stands for, radians: what textures on mirrors are filtered by.
-        traces_mirrors: whether there are layers of what is seen in mirrors.
+        geometry: the triangles. materials: of the scene. camera_position: origin of the rays.
+        directions: unit. alpha_sample: see `trace_rays`.
+        pixel_angle: angle of a pixel, radians, to filter textures on mirrors.
+        traces_mirrors: add layers of reflections in mirrors.
     Returns:
-        All rays first; then, layer by layer, those that went on.
+        First a layer of all rays; then the layers of continued rays.
     """
     num, glass, mirrors = len(directions), glass_surfaces(materials), is_mirror_material(materials)
     mirrors &= traces_mirrors
@@ -138,7 +129,7 @@ def trace_layers(
     queue = deque([RayPaths.from_camera(camera_position, directions)])
 
     def fits() -> bool:
-        return len(layers) + 1 + len(queue) < layer_limit  # the one that is being followed is in neither
+        return len(layers) + 1 + len(queue) < layer_limit  # plus one for the path in progress
 
     while queue:
         paths = queue.popleft()

@@ -1,11 +1,11 @@
-"""View samples: the points of a view whose radiance makes its pixels.
+"""View samples: the surface points of a view whose radiance makes its pixels.
 
-One sample a pixel, more where material, normal or depth change across it (docs/direct-light.md#algorithm): eight
-positions are traced in such a pixel and those that see the same thing, turned alike, are merged into the most central
-of them: a silhouette has eight levels of coverage for a few samples, and thin chrome several reflections.
+Pixels have one sample, or more where material, normal or depth change (docs/direct-light.md#algorithm): eight positions
+of such a pixel are traced, and rays that hit the same surface with similar normals are merged into the most central
+one. A silhouette then has eight levels of coverage for a few samples, and thin chrome several reflections.
 
-A picture is looked at twice, window by window: for edges, then for samples, which go to files as they are found and are
-read from there in their order (docs/adr/0013-plans-and-tiled-sampling.md).
+An image is traced twice, tile by tile: for edges, then for samples. Samples are written to files and read back in
+sorted order (docs/adr/0013-plans-and-tiled-sampling.md).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from typing import IO, Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.environments.equirect import lookup
@@ -37,7 +38,7 @@ from relume.scene.roughness_levels import levels_of_material, select_level
 F32 = NDArray[np.float32]
 
 BACKGROUND = 65_535
-_SAMPLES_PER_SIDE = 2048  # of a pixel's samples, by the root of the number of pixels; a tuft of blades takes 1,600
+_SAMPLES_PER_SIDE = 2048  # limit of samples per pixel times √pixels; a tuft of grass needs 1,600
 _NUM_LEVELS = 256
 
 
@@ -46,54 +47,47 @@ _SURFACE_COLUMNS = ("diffuse", "specular", "uv", "roughness", "normal_length", "
 _CHAIN_COLUMNS = ("mirror", "mirror_cosine", "mirror_tint")
 _SAMPLE_COLUMNS = ("pixel", "weight", "material", "level", "transmittance", "camera", "is_mirrored", "alpha_sample")
 _COLUMNS = (*_SAMPLE_COLUMNS, *_POINT_COLUMNS, *_SURFACE_COLUMNS, *_CHAIN_COLUMNS)
-# to tell which samples light comes to through tinted glass
-_REQUIRED_COLUMNS = (
-    "material",
-    "level",
-    "position",
-    "normal",
-)
+# required to find samples that light reaches through tinted glass
+_REQUIRED_COLUMNS = ("material", "level", "position", "normal")
 
 
 @dataclass(frozen=True)
 class ViewSamples:
-    """Samples sorted by material, by level of roughness, then along a Morton curve: neighbours in memory are neighbours
-    in the picture.
+    """Samples sorted by material, by roughness level, then along a Morton curve: neighbors in memory are neighbors in
+    the image.
 
     Attributes:
-        pixel: row-major index. (n,) uint32
-        weight: share of the pixel; the shares of a pixel sum to one, but for what lies behind glass. (n,) float32
-        material: index into the scene's materials, `BACKGROUND` where the ray left the scene. (n,) uint16
+        pixel: row-major index.
+        weight: fraction of the pixel; the weights of a pixel sum to one, apart from samples behind glass.
+        material: index into the scene's materials, `BACKGROUND` if the ray left the scene.
         surface: points and textures; for background samples the position is the ray's direction and `diffuse` the
-            environment's radiance in it.
-        num_rays: how many were traced to find them.
-        level: of roughness, see `relume.scene.roughness_levels`; 0 where the material has but one. (n,) uint8
-        transmittance: what glass before a sample lets through. Samples on glass and those behind it, on mirrors and
-            those seen in them, have the same shares of a pixel. Where light comes to a sample through tinted glass,
-            several stand in its place, which share its `weight`, and this says how (`relume.camera.spectral_split`).
-            (n, 3) float32
-        camera: where each is seen from: the camera, or the last surface that bent the path to it. (n, 3) float32
-        chain: the mirrors that it is seen in, `NO_MIRROR` where it is seen in fewer.
-        is_mirrored: whether its surface is a mirror, and other samples have what is seen in it. (n,)
-        alpha_sample: of its rays at surfaces that blend, see `relume.raytrace.surface_points.SurfacePoints`. (n,)
-            float32
+            radiance of the environment.
+        num_rays: number of traced rays.
+        level: roughness level, see `relume.scene.roughness_levels`; 0 if the material has only one.
+        transmittance: of glass between the sample and the camera. Samples on glass and behind it, on mirrors and in
+            them, have the same weight. If light reaches a sample through tinted glass, several samples replace it; they
+            share its `weight`, and this contains their channel weights (`relume.camera.spectral_split`).
+        camera: origin of the view direction: the camera, or the last surface that changed the path's direction.
+        chain: mirrors on the path, padded with `NO_MIRROR`.
+        is_mirrored: the surface is a mirror, and other samples have its reflection.
+        alpha_sample: for rays at blended surfaces, see `relume.raytrace.surface_points.SurfacePoints`.
     """
 
-    pixel: NDArray[np.uint32]
-    weight: F32
-    material: NDArray[np.uint16]
+    pixel: Shaped[NDArray[np.uint32], " n"]
+    weight: Shaped[F32, " n"]
+    material: Shaped[NDArray[np.uint16], " n"]
     surface: SurfaceInteraction
     num_rays: int
-    level: NDArray[np.uint8]
-    transmittance: F32
-    camera: F32
+    level: Shaped[NDArray[np.uint8], " n"]
+    transmittance: Shaped[F32, "n 3"]
+    camera: Shaped[F32, "n 3"]
     chain: SpecularChain
-    is_mirrored: NDArray[np.bool_]
-    alpha_sample: F32
+    is_mirrored: Shaped[NDArray[np.bool_], " n"]
+    alpha_sample: Shaped[F32, " n"]
 
     @classmethod
     def from_columns(cls, columns: Mapping[str, Any], num_rays: int) -> ViewSamples:
-        """Those of columns as `sampled` names them, which are read. num_rays: that were traced."""
+        """Read samples from columns as `sample_pixels` names them. num_rays: number of traced rays"""
         arrays = {name: np.asarray(columns[name]) for name in _COLUMNS}
         seed = np.arange(len(arrays["pixel"]), dtype=np.uint32)
         points = SurfacePoints(seed=seed, **{name: arrays[name] for name in _POINT_COLUMNS})
@@ -105,18 +99,16 @@ class ViewSamples:
         )
 
     @property
-    def throughput(self) -> F32:
-        """What the radiance of each sample is multiplied by for its pixel, mirrors apart. (n, 3) float32"""
+    def throughput(self) -> Shaped[F32, "n 3"]:
+        """Factor of each sample's radiance in its pixel: weight · transmittance, without mirrors."""
         return self.weight[:, None] * self.transmittance
 
 
-def dither_thresholds(pixel: NDArray[np.int64], width: int) -> F32:
-    """Numbers between 0 and 1 that differ much from pixel to pixel (interleaved gradient noise, Jimenez 2014).
+def dither_thresholds(pixel: Shaped[NDArray[np.int64], " n"], width: int) -> Shaped[F32, " n"]:
+    """Interleaved gradient noise in [0, 1), which differs strongly between neighboring pixels (Jimenez 2014).
 
     Args:
-        pixel: row-major numbers. (n,) width: of the picture.
-    Returns:
-        (n,) float32
+        pixel: row-major indices. width: of the image.
     """
     y, x = np.divmod(pixel, width)
     return np.asarray((52.9829189 * ((0.06711056 * x + 0.00583715 * y) % 1)) % 1, np.float32)
@@ -135,11 +127,11 @@ def sample_view(
     """Find the view samples of one camera, in memory.
 
     Args:
-        scene: what is seen. geometry: its triangles.
+        scene: the scene. geometry: its triangles.
         view: name of the camera. size: width and height in pixels.
-        traces_mirrors: whether what is seen in mirrors has samples.
-        smooths_edges: whether pixels across edges have several; else each shows what is seen through its middle.
-        by_channel: whether samples that see light through tinted glass are split by channel, not by tint.
+        traces_mirrors: add samples of reflections in mirrors.
+        smooths_edges: take several samples in edge pixels; otherwise all pixels have one at their center.
+        by_channel: split samples that light reaches through tinted glass by channel instead of by tint.
     """
     setup = camera_setup(scene, geometry, view, size, traces_mirrors=traces_mirrors)
     return ViewSamples.from_columns(
@@ -150,7 +142,7 @@ def sample_view(
 def camera_setup(
     scene: Scene, geometry: SceneBuffers, view: str, size: tuple[int, int], *, traces_mirrors: bool = True
 ) -> CameraSetup:
-    """The eye of a view. See `sample_view`."""
+    """Set up the camera of a view. See `sample_view`."""
     camera = next(camera for camera in scene.cameras if camera.name == view)
     return CameraSetup(scene, geometry, camera, size, traces_mirrors)
 
@@ -163,13 +155,13 @@ def sample_pixels(
     smooths_edges: bool = True,
     by_channel: bool = False,
 ) -> tuple[dict[str, Column], int]:
-    """Find the view samples of an eye, of which no more than a window's are in memory.
+    """Find the view samples of a camera, with no more than a few tiles in memory.
 
     Args:
-        camera_setup: that sees them. scratch: opens a file that is gone when it is closed.
-        names: of the columns that are wanted. smooths_edges, by_channel: see `sample_view`.
+        camera_setup: the camera. scratch: opens a temporary file that is deleted when it is closed.
+        names: of the required columns. smooths_edges, by_channel: see `sample_view`.
     Returns:
-        The columns of `ViewSamples`, of its surface, points and chain, by name; how many rays were traced.
+        The columns of `ViewSamples`, of its surface, points and chain, by name; and the number of traced rays.
     """
     edges, size, materials = (
         camera_setup.find_edges(smooths=smooths_edges),
@@ -184,7 +176,7 @@ def sample_pixels(
         num_rays += num_traced
         if rows is not None:
             break
-    assert rows is not None  # for two samples of each pixel there is room
+    assert rows is not None  # two samples of each pixel always fit
     columns = rows.columns()
     if num_tints(materials):
         split, num_traced = _split_tinted(camera_setup, columns, sample_limit, by_channel=by_channel)
@@ -200,13 +192,13 @@ def _sample_tiles(
     scratch: Callable[[], IO[bytes]],
     names: Collection[str],
 ) -> tuple[ExternalSort | None, int]:
-    """Find samples window by window.
+    """Find samples tile by tile.
 
     Args:
-        camera_setup: that sees them. edges: of its picture. positions: of the rays in each pixel across edges. (n, 2)
-        sample_limit: samples that there is room for. scratch, names: see `sampled`.
+        camera_setup: the camera. edges: of its image. positions: of the rays in each edge pixel. (n, 2)
+        sample_limit: maximum number of samples. scratch, names: see `sample_pixels`.
     Returns:
-        None where they are more than there is room for; how many rays were traced.
+        The samples, None if they exceed the limit; and the number of traced rays.
     """
     rows, num_samples, num_rays = ExternalSort(scratch), edges.num_single_samples, 0
 
@@ -225,25 +217,25 @@ def _sample_tiles(
 
 
 def view_sample_limit(materials: Sequence[Material], num_pixels: int) -> int:
-    """Bound the samples of a view: each position of a pixel sees something else, glass before it, more in mirrors.
+    """Maximum number of samples of a view: several positions per pixel, times the layers of glass and mirrors.
 
-    Edges are lines: twice as many pixels a side are twice as many edges among four times as many pixels. So a large
-    picture has room for fewer samples of each pixel; where leaves or hair would take more, edges have fewer positions.
+    Edges are lines: twice the resolution has twice as many edge pixels among four times as many pixels. So a large
+    image may have fewer samples per pixel; if leaves or hair need more, edges get fewer positions.
 
     Args:
-        materials: of the scene. num_pixels: of the picture.
+        materials: of the scene. num_pixels: of the image.
     """
     samples_per_pixel = min(max(_SAMPLES_PER_SIDE / math.sqrt(num_pixels), len(PATTERNS[-1])), POSITIONS_PER_PIXEL)
     return math.ceil(samples_per_pixel * num_pixels) * max_samples(materials)
 
 
 def _sort_key(material: NDArray[np.uint16], level: NDArray[np.uint8]) -> NDArray[np.int32]:
-    """What samples are sorted by, before their places in the picture. (n,)"""
+    """Sort key of samples before their position in the image. (n,)"""
     return material.astype(np.int32) * _NUM_LEVELS + level
 
 
 def _roughness_levels(scene: Scene, material: NDArray[np.uint16], roughness: F32, threshold: F32) -> NDArray[np.uint8]:
-    """The level of roughness of each sample, by its material. (n,)"""
+    """Roughness level of each sample, by its material. (n,)"""
     level = np.zeros(len(material), np.uint8)
     for index, scene_material in enumerate(scene.materials):
         if ratios := levels_of_material(scene_material):
@@ -253,7 +245,7 @@ def _roughness_levels(scene: Scene, material: NDArray[np.uint16], roughness: F32
 
 
 def _sorted_samples(camera_setup: CameraSetup, rays: MergedRays) -> dict[str, NDArray[Any]]:
-    """Make samples of rays. Returns columns by name, sorted as `ViewSamples` are."""
+    """Make samples of rays. Returns columns by name, sorted like `ViewSamples`."""
     scene, geometry, width = camera_setup.scene, camera_setup.geometry, camera_setup.size[0]
     is_hit = rays.layer.hits.face >= 0
     face = np.maximum(rays.layer.hits.face, 0)
@@ -281,13 +273,13 @@ def _sorted_samples(camera_setup: CameraSetup, rays: MergedRays) -> dict[str, ND
 def _split_tinted(
     camera_setup: CameraSetup, columns: Mapping[str, Column], sample_limit: int, *, by_channel: bool
 ) -> tuple[dict[str, Any], int]:
-    """Split samples that light reaches through tinted glass; none where they were too many.
+    """Split samples that light reaches through tinted glass; return no columns if the limit is exceeded.
 
     Args:
-        camera_setup: that sees the samples. columns: of them. sample_limit: samples that a plan has room for.
+        camera_setup: the camera. columns: of its samples. sample_limit: maximum number of samples of the plan.
         by_channel: see `sample_view`.
     Returns:
-        Columns in place of those; how many rays were traced.
+        Columns that replace the given ones; and the number of traced rays.
     """
     key = _sort_key(np.asarray(columns["material"]), np.asarray(columns["level"]))
     num, num_surface = len(key), int(np.searchsorted(key, BACKGROUND * _NUM_LEVELS))

@@ -1,4 +1,4 @@
-"""Shared foundations: errors, validation, the cache, thread pools, files, hashes of sources, Numba options.
+"""Shared foundations: errors, validation, the cache, thread pools, files, source hashes, Numba options.
 
 Imports no other package of relume. Read first: `errors`, `cache`.
 """

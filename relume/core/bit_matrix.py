@@ -1,4 +1,4 @@
-"""Bits of points and lights, turned over: rows of lights for each point, or words of points for each light."""
+"""Transpose visibility bits: rows of lights for each point, or words of points for each light."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import numpy as np
 
 from relume.core.numba_options import UNCOUNTED
 
-WORD_BITS = 64  # points whose bits a word holds
+WORD_BITS = 64  # points per word
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _transpose_bits(words):  # type: ignore[no-untyped-def]
-    """Let bit j of word k become bit k of word j: halves of the square change places, then halves of those. (64,)"""
+    """Let bit j of word k become bit k of word j by swapping halves recursively. words: (64,)"""
     size, low = 32, np.uint64(0xFFFFFFFF)
     while size:
         for k in range(WORD_BITS):
@@ -26,11 +26,11 @@ def _transpose_bits(words):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def words_to_rows(words, rows):  # type: ignore[no-untyped-def]
-    """Turn words of points into rows of lights.
+    """Transpose words of points into rows of lights.
 
     Args:
-        words: bit k of each light's is point k. (M,) uint64
-        rows: light m of a point in bit m & 7 of byte m >> 3, written. (at most 64, ≥ M / 8) uint8
+        words: one per light; bit k is point k. (M,) uint64
+        rows: output; light m of a point is bit m & 7 of byte m >> 3. (at most 64, ≥ M / 8) uint8
     """
     block = np.empty(WORD_BITS, np.uint64)
     in_bytes = block.view(np.uint8)
@@ -48,7 +48,7 @@ def words_to_rows(words, rows):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def rows_to_words(rows, words):  # type: ignore[no-untyped-def]
-    """Turn rows of lights into words of points, the inverse of `words_to_rows`. words: written. (M,) uint64"""
+    """Transpose rows of lights into words of points, the inverse of `words_to_rows`. words: output. (M,) uint64"""
     block = np.empty(WORD_BITS, np.uint64)
     in_bytes = block.view(np.uint8)
     num_lights = words.shape[0]

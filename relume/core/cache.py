@@ -1,7 +1,7 @@
-"""The one memory of all that is made from bakes and may be made again: operators, images, lights; a budget for all.
+"""The one cache for everything computed from bakes (operators, images, lights), under one memory budget.
 
-Two parts. What *lasts* is what somebody looks at. What is made in *passing*, for a place that a light only moves
-through or for a picture that nobody watches, goes first, and takes no more than a share of the budget from the other.
+It has two pools. *Persistent* entries are displayed. *Transient* entries, such as images of a light position during a
+drag or of a view that nobody watches, are evicted first and may displace only a fraction of the persistent entries.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from relume.core.errors import MemoryBudgetError
 from relume.core.memory_usage import live_bytes
 
 _WORD_START = re.compile(r"(?<=[a-z])(?=[A-Z])")
-_ASSETS_BYTES = 1 << 30  # of a memory for assets alone
-TRANSIENT_BUDGET_DIVISOR = 8  # what is made in passing pushes out what lasts up to the budget over this
+_ASSETS_BYTES = 1 << 30  # for a cache of assets alone
+TRANSIENT_BUDGET_DIVISOR = 8  # transient entries evict persistent ones until they hold budget / this
 
-ASSETS = "assets"  # owner of what is made of files that looks of any bake name: see `stored`
+ASSETS = "assets"  # owner of entries computed from files that looks of any bake name: see `asset_cached`
 
 Key = tuple[Hashable, ...]
 
 
 class Sized(Protocol):
-    """What the memory may hold."""
+    """An entry that knows its size."""
 
     @property
     def num_bytes(self) -> int:
-        """Memory it holds."""
+        """Memory it holds, in bytes."""
         ...
 
 
@@ -44,10 +44,10 @@ Arguments = ParamSpec("Arguments")
 
 
 class CacheOwner(NamedTuple):
-    """Who holds memory.
+    """Owner of cached bytes.
 
     Attributes:
-        kind: what it is, e.g. "linear operator" or "lights". bake: the name of its store; "" where several share it.
+        kind: type of entry, e.g. "linear operator" or "lights". bake: the name of its store; "" if several share it.
     """
 
     kind: str
@@ -56,7 +56,7 @@ class CacheOwner(NamedTuple):
 
 @dataclass(frozen=True)
 class _CachedValue:
-    """Something that does not tell its size itself."""
+    """A value that does not report its own size, with its size."""
 
     value: Any
     kind: str
@@ -64,10 +64,10 @@ class _CachedValue:
 
 
 class _Computation:
-    """Of one key, as long as somebody makes it or waits for that.
+    """Lock for the computation of one key; it lives while a thread computes the value or waits for it.
 
     Attributes:
-        uncached: what was made and is not kept, for those who wait: each would make it again.
+        uncached: a value too large to cache, for the threads that wait: each would compute it again.
     """
 
     def __init__(self) -> None:
@@ -76,7 +76,7 @@ class _Computation:
 
 
 class _LruPool(OrderedDict[Hashable, Sized]):
-    """Entries, the one that was used longest ago first."""
+    """Entries, least recently used first."""
 
     used_bytes = 0
 
@@ -87,19 +87,19 @@ class _LruPool(OrderedDict[Hashable, Sized]):
         self.used_bytes += entry.num_bytes
 
     def drop(self, key: Hashable) -> int:
-        """Returns its bytes."""
+        """Remove an entry and return its size in bytes."""
         num_bytes = self.pop(key).num_bytes
         self.used_bytes -= num_bytes
         return num_bytes
 
 
 class _CacheState:
-    """What all handles on a memory share; only to be used under its lock."""
+    """State shared by all handles on a cache; use it only under its lock."""
 
     def __init__(self, budget_bytes: int) -> None:
         self.budget_bytes = budget_bytes
         self.lock = threading.Lock()
-        # one lives as long as somebody makes or waits: all who want a key share it
+        # weak values: an entry lives while threads compute or wait, so all threads that want a key share it
         self.computations: WeakValueDictionary[Hashable, _Computation] = WeakValueDictionary()
         self.persistent, self.transient = _LruPool(), _LruPool()
         self.reserved_bytes = 0
@@ -109,9 +109,10 @@ class _CacheState:
         return self.persistent.used_bytes + self.transient.used_bytes + self.reserved_bytes
 
     def make_space(self, num_bytes: int, *, is_transient: bool) -> bool:
-        """Drop what was used longest ago until there are so many bytes; False where nothing more may be dropped.
+        """Evict least recently used entries until `num_bytes` are free; False if nothing more may be evicted.
 
-        What was made in passing goes first; for such it is all that goes, once it would hold more than its share.
+        Transient entries go first. A transient request evicts only transient entries once they would exceed their
+        fraction of the budget.
         """
         transient_limit = self.budget_bytes // TRANSIENT_BUDGET_DIVISOR
         while self.used_bytes + num_bytes > self.budget_bytes:
@@ -125,10 +126,10 @@ class _CacheState:
 
 
 class Cache:
-    """Named entries, all of them together within a budget.
+    """Keyed entries within one memory budget.
 
-    Safe to use from several threads; two never make the same thing at once. Keys of what belongs to a bake begin with
-    the path of its store.
+    Safe to use from several threads; two threads never compute the same key at once. Keys of entries that belong to a
+    bake begin with the path of its store.
     """
 
     def __init__(self, budget_bytes: int) -> None:
@@ -137,23 +138,23 @@ class Cache:
 
     @property
     def transient(self) -> Cache:
-        """The same memory, for who makes things in passing; what others find there lasts from then on."""
+        """A handle on the same cache that adds transient entries; other handles make them persistent on access."""
         handle = copy.copy(self)
         handle._is_transient = True
         return handle
 
     @property
     def budget_bytes(self) -> int:
-        """What the entries hold at most."""
+        """Maximum size of all entries, in bytes."""
         return self._state.budget_bytes
 
     @property
     def used_bytes(self) -> int:
-        """What the entries hold now, and those that are being made."""
+        """Current size of all entries, including those that are being computed, in bytes."""
         return self._state.used_bytes
 
     def bytes_by_owner(self) -> Mapping[CacheOwner, int]:
-        """Bytes by who holds them."""
+        """Bytes by owner."""
         totals: Counter[CacheOwner] = Counter()
         with self._state.lock:
             for pool in (self._state.persistent, self._state.transient):
@@ -162,7 +163,7 @@ class Cache:
         return totals
 
     def get_cached(self, key: Hashable, kind: type[Entry]) -> Entry | None:
-        """The entry, now the most recently used, or None where there is none of that kind."""
+        """The entry, now the most recently used, or None if there is none of that type."""
         state = self._state
         with state.lock:
             if key in state.transient and not self._is_transient:
@@ -176,33 +177,33 @@ class Cache:
             return entry if isinstance(entry, kind) else None
 
     def contains(self, key: Hashable) -> bool:
-        """Whether there is an entry of that name; it is used no more recently for that."""
+        """True if the key is cached; does not count as a use."""
         with self._state.lock:
             return key in self._state.transient or key in self._state.persistent
 
     def evict(self, key: Hashable) -> None:
-        """Drop an entry that is of no use any more, where there is one."""
+        """Remove an entry that is no longer useful, if it exists."""
         with self._state.lock:
             for pool in (self._state.transient, self._state.persistent):
                 if key in pool:
                     pool.drop(key)
 
     def check(self, num_bytes: int) -> None:
-        """Raises MemoryBudgetError where an entry of so many bytes is larger than the budget."""
+        """Raise MemoryBudgetError if an entry of `num_bytes` is larger than the budget."""
         if num_bytes > self.budget_bytes:
             raise MemoryBudgetError(
-                "making this", num_bytes, self.budget_bytes, "bake a smaller picture or raise the cache budget"
+                "the result", num_bytes, self.budget_bytes, "bake a smaller image or raise the cache budget"
             )
 
     def get(self, key: Hashable, kind: type[Entry], num_bytes: int, compute: Callable[[], Entry]) -> Entry:
-        """The entry; made by `compute` where there is none, room for its `num_bytes` being made first.
+        """Return the entry, or compute it after making space for `num_bytes`.
 
-        What is made in passing is not kept where all room is taken by what lasts.
+        Transient results are not cached if persistent entries fill the cache.
 
         Args:
-            key: names it among all that is kept. kind: its class.
+            key: identifies the entry. kind: its class.
         Raises:
-            MemoryBudgetError: it alone is larger than the budget.
+            MemoryBudgetError: the entry alone is larger than the budget.
         """
         self.check(num_bytes)
         computation = self._get_computation(key)
@@ -211,13 +212,13 @@ class Cache:
             return cached if cached is not None else self._insert(key, num_bytes, compute)
 
     def get_value(self, key: Key, compute: Callable[[], Value]) -> Value:
-        """What `compute` makes, made once while there is room for it; larger than the budget, it is not kept, and those
-        who wait for it at the same time get the same.
+        """Return the value of `compute`, cached if it fits.
 
-        For what a picture cannot do without, however small the budget. Nobody may write to what is kept.
+        For values that an image requires however small the budget is. A value larger than the budget is not cached, but
+        threads that wait for it share it. Callers must not modify the value.
 
         Args:
-            key: the path of a store or a word for what is no bake's; in words what it is; what tells it from others.
+            key: (path of the store or an owner such as `ASSETS`, kind, distinguishing values…).
         """
         computation = self._get_computation(key)
         with computation.lock:
@@ -242,7 +243,7 @@ class Cache:
         with state.lock:
             if not state.make_space(num_bytes, is_transient=self._is_transient) and self._is_transient:
                 num_bytes, is_cached = 0, False
-            state.reserved_bytes += num_bytes  # so that two freezes at once stay under the budget together
+            state.reserved_bytes += num_bytes  # so that two concurrent computations stay within the budget together
         try:
             entry = compute()
         except BaseException:
@@ -256,10 +257,10 @@ class Cache:
         return entry
 
     def trim(self, floor_bytes: int, bakes: Collection[str]) -> None:
-        """Drop entries of all but some bakes, least recently used first, until those left hold at most a floor.
+        """Evict entries of all bakes except `bakes`, least recently used first, until they hold at most `floor_bytes`.
 
-        Under it are operators and images, which open a bake at once; lights and the like go with the bake. Assets stay
-        as long as any bake does.
+        Operators and images remain below that floor, because they open a bake at once; other values of those bakes
+        always go. Assets stay as long as `bakes` is not empty.
 
         Args:
             bakes: paths of stores whose entries stay.
@@ -292,23 +293,23 @@ def _cache_owner(key: Hashable, entry: Sized) -> CacheOwner:
 
 
 class _AssetCache:
-    """The memory of what is made of files that looks name: its own, until a process opens bakes with one."""
+    """The cache of assets that looks name: its own, until a process opens bakes with one cache."""
 
     cache = Cache(_ASSETS_BYTES)
 
 
 def use_for_assets(cache: Cache) -> None:
-    """Store in this memory from now on what is made of files that looks name: BTFs, images, measured materials."""
+    """Use this cache from now on for assets that looks name: BTFs, images, measured materials."""
     _AssetCache.cache = cache
 
 
 def asset_cached(kind: str) -> Callable[[Callable[Arguments, Value]], Callable[Arguments, Value]]:
-    """Have what a function makes of such files stored by its arguments, as long as there is room for it.
+    """Decorator: cache the results of a function of asset files by its arguments.
 
-    People have as many and as large ones as they like, so that no fixed number of them fits.
+    The cache is bounded by bytes, because users have any number of assets of any size.
 
     Args:
-        kind: names it among all that is stored, e.g. "BTF file"; one for each function.
+        kind: unique name of the function's results, e.g. "BTF file".
     """
 
     def decorate(compute: Callable[Arguments, Value]) -> Callable[Arguments, Value]:
@@ -322,14 +323,14 @@ def asset_cached(kind: str) -> Callable[[Callable[Arguments, Value]], Callable[A
 
 
 def get_asset(kind: str, key: tuple[Any, ...], compute: Callable[[], Value]) -> Value:
-    """What `compute` makes, stored under a key as `asset_cached` does by arguments.
+    """Return the cached result of `compute`.
 
     Args:
-        kind: as of `asset_cached`. key: tells it from others of its kind. compute: called where it is not there.
+        kind: as in `asset_cached`. key: distinguishes results of a kind. compute: called if the result is not cached.
     """
     return _AssetCache.cache.get_value((ASSETS, kind, *key), compute)
 
 
 def is_asset_cached(kind: str, *args: Hashable) -> bool:
-    """Whether what a function of that kind makes of these arguments is there now."""
+    """True if the result of the function of this kind for these arguments is cached."""
     return _AssetCache.cache.contains((ASSETS, kind, *args))

@@ -1,8 +1,9 @@
-"""Colour arithmetic on linear Rec. 709 RGB: luminance, the sRGB transfer curve, shared-exponent pixels."""
+"""Color arithmetic on linear Rec. 709 RGB: luminance, the sRGB transfer curve, shared-exponent pixels."""
 
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 F32 = NDArray[np.float32]
@@ -10,17 +11,17 @@ LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Y of linear Rec. 709 red, green and blue (ITU-R BT.709-6)."""
 
 
-def luminance(rgb: F32) -> F32:
-    """Y of linear Rec. 709 RGB. (..., 3) -> (...)"""
+def luminance(rgb: Shaped[F32, "*batch 3"]) -> F32:
+    """Luminance Y of linear Rec. 709 RGB, for each pixel."""
     return rgb @ np.array(LUMINANCE, rgb.dtype)
 
 
 def srgb_encode(linear: F32) -> F32:
-    """IEC 61966-2-1: linear to display values, clamped to [0, 1]. (...)"""
+    """Encode linear values as sRGB display values (IEC 61966-2-1), clamped to [0, 1]."""
     v = np.clip(linear, 0.0, 1.0)
     return np.where(v <= 0.0031308, 12.92 * v, 1.055 * v ** (1 / 2.4) - 0.055).astype(linear.dtype)
 
 
 def srgb_decode(display: F32) -> F32:
-    """The inverse of `srgb_encode`. (...)"""
+    """Decode sRGB display values to linear values, the inverse of `srgb_encode`."""
     return np.where(display <= 0.04045, display / 12.92, ((display + 0.055) / 1.055) ** 2.4).astype(display.dtype)

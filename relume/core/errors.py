@@ -1,4 +1,4 @@
-"""Every failure that relume knows by name. Messages end with what to do about it."""
+"""All errors that relume raises on purpose. Messages end with a remedy."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import errno
 
 
 def bytes_text(num_bytes: float) -> str:
-    """A number of bytes for people, to two or three digits: 34 kB, 1.2 GB."""
+    """Format a number of bytes for users, with two or three digits: 34 kB, 1.2 GB."""
     size, unit = float(num_bytes), "bytes"
     for larger in ("kB", "MB", "GB", "TB"):
         if abs(size) < 999.5:
@@ -16,11 +16,11 @@ def bytes_text(num_bytes: float) -> str:
 
 
 class RelumeError(Exception):
-    """The root of all of them; anything else that escapes is a defect."""
+    """Base class of all relume errors; any other exception that escapes is a defect."""
 
 
 class NotFoundError(RelumeError):
-    """Nothing of that name is here."""
+    """There is no object of that name."""
 
 
 class SceneError(RelumeError, ValueError):
@@ -32,12 +32,12 @@ class MaterialError(RelumeError, ValueError):
 
 
 class ParameterError(RelumeError, ValueError):
-    """A value lies outside what its parameter allows.
+    """A value is not allowed for its parameter.
 
     Attributes:
         name: JSON pointer or name of the parameter.
-        value: what was given.
-        allowed: what would have been accepted, in words.
+        value: the given value.
+        allowed: the accepted values, in words.
     """
 
     def __init__(self, name: str, value: object, allowed: str) -> None:
@@ -49,7 +49,7 @@ class ParameterError(RelumeError, ValueError):
 
 
 class ShapeMismatchError(RelumeError, ValueError):
-    """Two arrays that belong together do not fit."""
+    """Two arrays that belong together have incompatible shapes."""
 
 
 class PlanError(RelumeError):
@@ -57,7 +57,7 @@ class PlanError(RelumeError):
 
 
 class BudgetError(PlanError):
-    """A plan needs more than the budget allows; refused before anything is computed."""
+    """A plan needs more than the budget allows; raised before anything is computed."""
 
     def __init__(self, label: str, needed_bytes: int, allowed_bytes: int, remedy: str) -> None:
         needed, allowed = bytes_text(needed_bytes), bytes_text(allowed_bytes)
@@ -66,15 +66,15 @@ class BudgetError(PlanError):
 
 
 class MemoryBudgetError(BudgetError):
-    """It is memory that it needs more of."""
+    """A plan needs more memory than allowed."""
 
 
 class DiskBudgetError(BudgetError):
-    """It is room on the disk that it needs more of."""
+    """A plan needs more disk space than allowed."""
 
 
 class ResultUnavailableError(RelumeError):
-    """Something could not be made that a picture can do without: what is shown stays."""
+    """An optional result could not be computed; the displayed image stays."""
 
 
 class StoreError(RelumeError):
@@ -98,7 +98,7 @@ class StoreDeletedError(StoreNotFoundError):
 
     def __init__(self) -> None:
         super().__init__(
-            "the bake was deleted while it was shown; bake the scene again, import it where it is gone, too"
+            "the bake was deleted while it was open; bake the scene again, and import the scene again if it was deleted"
         )
 
 
@@ -111,31 +111,31 @@ class ChunkDamagedError(StoreError):
 
 
 class DiskFullError(RelumeError):
-    """Something cannot be written for want of room."""
+    """A file cannot be written because the disk is full."""
 
     def __init__(self, label: str) -> None:
         super().__init__(f"{label} cannot be written, the disk is full; free some space, then try again")
 
 
 def is_disk_full(error: OSError) -> bool:
-    """Whether a disk or a quota of it is full."""
+    """True if a disk or a disk quota is full."""
     return error.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
 class DatabaseDamagedError(RelumeError):
-    """The file of the database is none."""
+    """The database file is damaged or not a database."""
 
     def __init__(self, detail: str) -> None:
         super().__init__(
             f"the database is damaged ({detail}); stop relume and put a backup of relume.db in its place, or move"
-            " relume.db, relume.db-wal and relume.db-shm away: lists of scenes, bakes and looks then begin empty, their"
+            " relume.db, relume.db-wal and relume.db-shm away: lists of scenes, bakes and looks then start empty, their"
             " files stay"
         )
         self.detail = detail
 
 
 class LedgerVersionError(RelumeError):
-    """The database has a schema that this relume cannot work with, or may not change by itself."""
+    """The database has a schema that this relume cannot use, or may not migrate by itself."""
 
 
 class BackupError(RelumeError):
@@ -143,7 +143,7 @@ class BackupError(RelumeError):
 
 
 class StorageError(RelumeError):
-    """The object storage does not answer, refuses, or holds something damaged."""
+    """The object storage does not answer, refuses a request, or holds damaged data."""
 
 
 class EditError(RelumeError):
@@ -151,19 +151,19 @@ class EditError(RelumeError):
 
 
 class NotPrecomputedError(ResultUnavailableError):
-    """Something was asked of a curve that is not frozen yet."""
+    """An operation needs a curve that is not precomputed yet."""
 
 
 class EditNotSupportedError(EditError):
-    """The transfer method of this bake cannot follow such an edit."""
+    """The transfer method of this bake does not support such an edit."""
 
     def __init__(self, method: str, kind: str) -> None:
-        super().__init__(f"a bake of method {method!r} cannot follow an edit of {kind}; bake again for it")
+        super().__init__(f"a bake of method {method!r} does not support an edit of {kind}; bake again for it")
         self.method, self.kind = method, kind
 
 
 class ProtocolError(RelumeError):
-    """A client broke the rules of the session; carries the WebSocket close code."""
+    """A client violated the session protocol; carries the WebSocket close code."""
 
     def __init__(self, message: str, close_code: int) -> None:
         super().__init__(message)
@@ -175,4 +175,4 @@ class VersionMismatchError(ProtocolError):
 
 
 class CancelledError(RelumeError):
-    """Work was stopped because somebody asked for it."""
+    """Work was stopped on request."""

@@ -1,6 +1,4 @@
-"""Files and folders that are never half there: the one way in which relume writes a file that others may read, and
-deletes a folder that they may.
-"""
+"""Atomic writes and deletes: no reader finds a half-written file or a half-deleted folder."""
 
 from __future__ import annotations
 
@@ -14,20 +12,20 @@ from pathlib import Path
 from relume.core.errors import DiskFullError, RelumeError, is_disk_full
 
 UNFINISHED = ".unfinished-*"
-"""Names of files and folders that a killed process left."""
+"""Glob pattern of files and folders that a killed process left behind."""
 
 
 @contextmanager
 def atomic_write(path: Path) -> Iterator[Path]:
-    """Write a file that takes its name only when it is complete and on the disk; a failure leaves the old one.
+    """Write a file that takes its name only when it is complete and on disk; a failure leaves the old file.
 
     Args:
-        path: what the file will be called; its folder exists.
+        path: final path; its folder exists.
     Yields:
         The path to write to: hidden, in the same folder, with the same suffix in lower case, by which libraries choose
         a format.
     Raises:
-        DiskFullError: there is no room for it. RelumeError: it cannot be written. Other errors than OSError pass.
+        DiskFullError: the disk is full. RelumeError: any other OSError. Other exceptions propagate.
     """
     unfinished = _temporary_path(path)
     try:
@@ -45,12 +43,10 @@ def atomic_write(path: Path) -> Iterator[Path]:
 
 
 def remove_folder(path: Path) -> None:
-    """Delete a folder, which is gone at once: who comes while its files are deleted finds none, not some.
+    """Delete a folder atomically: it is renamed first, so readers find either all of its files or no folder.
 
-    Args:
-        path: of the folder.
     Raises:
-        OSError: it is not there, or may not be moved. What can be moved but not deleted is left under another name.
+        OSError: the folder does not exist or cannot be renamed. Files that cannot be deleted remain under another name.
     """
     unfinished = _temporary_path(path)
     path.rename(unfinished)

@@ -1,4 +1,4 @@
-"""Folders on the disk."""
+"""Disk usage of folders."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 
 
 def folder_bytes(folder: Path) -> int:
-    """What the files in a folder take, those of its folders too; nothing where there is none.
+    """Total size of the files in a folder and its subfolders, in bytes; 0 if it does not exist.
 
-    What somebody deletes while it is counted takes nothing either.
+    Files that are deleted during the count are skipped.
     """
     total = 0
     for parent, _, names in os.walk(folder, onerror=_raise_unless_missing):

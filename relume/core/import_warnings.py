@@ -1,4 +1,4 @@
-"""What an importer has to say about a file, told apart by what it does to the picture."""
+"""Warnings of importers about a file, classified by their effect on the image."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ SEVERITIES: tuple[Severity, ...] = get_args(Severity)
 
 
 class ImporterWarning(str):
-    """A sentence, and what the thing it tells of does to the picture; without that, a plain string.
+    """A sentence with a severity; otherwise a plain string.
 
     Attributes:
-        severity: "unsupported": something is missing, or looks other than the file says. "approximated": it looks much
-            the same, but not quite. "ignored": the picture is the same without it.
+        severity: "unsupported": something is missing or looks different from the file. "approximated": it looks almost
+            the same. "ignored": the image is the same without it.
     """
 
     severity: Severity
@@ -27,27 +27,27 @@ class ImporterWarning(str):
         return str(self), self.severity
 
     def document(self) -> dict[str, str]:
-        """As JSON."""
+        """Convert to JSON."""
         return {"text": str(self), "severity": self.severity}
 
 
 def unsupported(sentence: str) -> ImporterWarning:
-    """Something is missing in the picture, or looks other than the file says."""
+    """Make a warning for a feature that is missing in the image or looks different from the file."""
     return ImporterWarning(sentence, "unsupported")
 
 
 def approximated(sentence: str) -> ImporterWarning:
-    """Something looks much the same as the file says, but not quite."""
+    """Make a warning for a feature that looks almost as in the file."""
     return ImporterWarning(sentence, "approximated")
 
 
 def ignored(sentence: str) -> ImporterWarning:
-    """Something is not used, and the picture is the same without it."""
+    """Make a warning for a feature that is not used and does not change the image."""
     return ImporterWarning(sentence, "ignored")
 
 
 def warning_of(document: object) -> ImporterWarning:
-    """Read what `ImportRemark.document` wrote; plain sentences, of older scenes, may be anything."""
+    """Read the output of `ImporterWarning.document`; a plain string of an older scene counts as unsupported."""
     if isinstance(document, dict) and document.get("severity") in SEVERITIES:
         return ImporterWarning(str(document["text"]), document["severity"])
     return unsupported(str(document))

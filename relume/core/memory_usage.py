@@ -1,4 +1,4 @@
-"""What objects and processes hold in memory, and how memory that nobody holds goes back to the system."""
+"""Memory held by objects and processes, and its return to the system."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _SELF_COUNTING_MODULE = "relume.core.cache"
 
 
 def live_bytes(*roots: object) -> int:
-    """Bytes of all NumPy arrays that can be reached from objects of relume's own, each counted once.
+    """Bytes of all NumPy arrays reachable from relume's own objects, each array counted once.
 
-    Other libraries' objects are not looked into but for SciPy's matrices, nor is the budgeted memory, which tells by
-    itself what it holds; files mapped into memory are the system's and count nothing.
+    Objects of other libraries are not searched, except SciPy matrices; nor is the cache, which counts its own entries.
+    Memory-mapped files belong to the system and count nothing.
     """
-    visited: dict[int, object] = {}  # keeps what it has met: an id is one's own only while one lives
+    visited: dict[int, object] = {}  # keeps objects alive: an id is unique only while its object lives
     todo, total = list(roots), 0
     while todo:
         item = todo.pop()
@@ -52,7 +52,7 @@ def _own_bytes(array: NDArray[Any]) -> int:
 
 
 def resident_bytes(pid: int) -> int:
-    """Resident memory of a process; 0 where it has ended, or the system does not tell."""
+    """Resident memory of a process, in bytes; 0 if it has ended or the system does not report it."""
     try:
         num_pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     except (OSError, IndexError):
@@ -61,25 +61,25 @@ def resident_bytes(pid: int) -> int:
 
 
 def trim_heap() -> None:
-    """Free what only reference cycles hold, and return free memory to the system; some tenths of a second."""
+    """Collect reference cycles and return free heap memory to the system; takes some tenths of a second."""
     gc.collect()
     if _malloc_trim is not None:
         _malloc_trim(0)
 
 
 def limit_malloc_arenas() -> None:
-    """Have all threads of this process allocate from two of glibc's arenas, unless `MALLOC_ARENA_MAX` says how many.
+    """Limit all threads of this process to two glibc malloc arenas, unless `MALLOC_ARENA_MAX` sets a number.
 
-    Of itself each thread gets one of its own, up to eight for each core. What one arena has free no other can use, nor
-    the system where something small is left on each of its pages: a process of many threads grows for hours, though
-    nothing in it does. To be called before there are many threads.
+    By default each thread gets its own arena, up to eight per core. No other arena can use the free memory of one, and
+    a page with one small allocation cannot go back to the system: a process with many threads grows for hours without
+    a leak. Call this before there are many threads.
     """
     if _mallopt is not None and "MALLOC_ARENA_MAX" not in os.environ:
         _mallopt(_M_ARENA_MAX, _NUM_ARENAS)
 
 
 def _find_in_libc(name: str) -> Any:
-    """A function of glibc, which keeps what is freed for the next to ask; others do not, and have none of that name."""
+    """Look up a glibc function; None for other C libraries, which do not keep freed memory in arenas."""
     try:
         return getattr(ctypes.CDLL(None), name)
     except (AttributeError, OSError, TypeError):

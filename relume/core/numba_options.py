@@ -1,6 +1,6 @@
-"""How kernels are compiled that make no arrays and return none: `@nb.njit(…, **UNCOUNTED)`.
+"""Compiler options for kernels that allocate no arrays and return none: `@nb.njit(…, **UNCOUNTED)`.
 
-They count no references to those that they are handed, nor to views that live for one round of a loop
+They do not count references to their arguments or to views that live for one loop iteration
 (docs/adr/0009-numba-and-embree.md).
 """
 
@@ -8,4 +8,4 @@ from __future__ import annotations
 
 from typing import Any
 
-UNCOUNTED: Any = {"_nrt": False}  # an option that Numba's types do not know
+UNCOUNTED: Any = {"_nrt": False}  # Numba's type stubs lack this option

@@ -1,4 +1,4 @@
-"""Long work on rows, step by step: whoever is stopped goes on from there, and some of it may go first."""
+"""Long work on rows, in steps: interrupted work resumes, and selected rows can go first."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.thread_pools import Kernel, parallel_for_cancellable
@@ -14,22 +15,22 @@ from relume.core.thread_pools import Kernel, parallel_for_cancellable
 
 @dataclass(frozen=True, eq=False)
 class ResumableLoop:
-    """Which steps of work on n rows are done.
+    """Progress of work on `num_rows` rows.
 
     Attributes:
-        num_rows: n. grain: rows of a step.
-        done: which steps are. (steps,)
-        lock: held while some are worked on.
+        num_rows: n. grain: rows per step.
+        done: true for finished steps.
+        lock: held while steps run.
     """
 
     num_rows: int
     grain: int
-    done: NDArray[np.bool_]
+    done: Shaped[NDArray[np.bool_], " steps"]
     lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
     @classmethod
     def start(cls, num_rows: int, grain: int) -> ResumableLoop:
-        """None of them."""
+        """Make a loop with no step done."""
         return cls(num_rows, grain, np.zeros(-(-num_rows // grain), np.bool_))
 
     def run(
@@ -38,16 +39,16 @@ class ResumableLoop:
         progress: Callable[[float], object],
         is_canceled: Callable[[], bool],
         label: str,
-        selected_rows: NDArray[np.bool_] | None = None,
+        selected_rows: Shaped[NDArray[np.bool_], " n"] | None = None,
     ) -> None:
-        """Do what is lacking.
+        """Run the steps that are not done.
 
         Args:
-            kernel: called with the ends of the rows of a step. progress, is_canceled, label: as of
+            kernel: called with the first and last row of a step. progress, is_canceled, label: as in
                 `parallel_for_cancellable`.
-            selected_rows: rows that are worked on, with those of their steps; None: all. (n,)
+            selected_rows: true for rows to work on, with the rest of their steps; None: all.
         Raises:
-            CancelledError: `is_canceled` said so; what was done stays.
+            CancelledError: `is_canceled` returned true; finished steps stay done.
         """
         with self.lock:
             pending = np.flatnonzero(
@@ -62,5 +63,5 @@ class ResumableLoop:
             parallel_for_cancellable(step, len(pending), 1, progress, is_canceled, label)
 
     def _steps_containing(self, selected_rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Which steps have any of some rows."""
+        """Return true for each step that contains a selected row."""
         return np.logical_or.reduceat(selected_rows, np.arange(0, len(selected_rows), self.grain))

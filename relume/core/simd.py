@@ -1,7 +1,7 @@
-"""Parts of Numba intrinsics on LLVM vectors of eight floats, for inner sums that the compiler does not vectorise well.
+"""SIMD building blocks for Numba intrinsics: LLVM vectors of eight floats, for inner sums that LLVM vectorizes poorly.
 
-It cannot know that arrays are not the same memory, and looks before each short loop. LLVM lowers these vectors to
-whatever registers the machine has.
+LLVM cannot prove that arrays do not alias, and checks this before each short loop. It lowers these vectors to the
+registers of the machine.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ _INDEX = ir.IntType(32)
 _BYTE = ir.IntType(8)
 _BYTE_VECTOR, _INDEX_VECTOR = ir.VectorType(_BYTE, NUM), ir.VectorType(_INDEX, NUM)
 FAST = ("fast",)
-_L2_LOCALITY = 2  # the second cache: what 64 rays read would not all stay in the first
-_builders: Any = cgutils  # carries no types
-untyped_intrinsic: Any = intrinsic  # its declared type is that of the generator, not of what kernels call
+_L2_LOCALITY = 2  # prefetch to L2: the data of 64 rays does not fit in L1
+_builders: Any = cgutils  # has no type annotations
+untyped_intrinsic: Any = intrinsic  # it is annotated with the type of the generator, not of the function kernels call
 
 
 def constant_index(value: int) -> Any:
@@ -32,10 +32,10 @@ def constant_index(value: int) -> Any:
 
 
 class ArrayPointer:
-    """A contiguous array that an intrinsic was handed.
+    """A contiguous array argument of an intrinsic.
 
     Args:
-        context, builder: of the intrinsic. array_type: type of the array. array: itself.
+        context, builder: of the intrinsic. array_type: Numba type of the array. array: its LLVM value.
     """
 
     def __init__(self, context: Any, builder: Any, array_type: Any, array: Any) -> None:
@@ -45,31 +45,31 @@ class ArrayPointer:
         self._strides = _builders.unpack_tuple(builder, struct.strides)
 
     def pointer(self, index: Sequence[Any]) -> Any:
-        """Where an item stands."""
+        """Pointer to an item."""
         return _builders.get_item_pointer2(
             self._context, self._builder, self._data, self._shape, self._strides, "C", index
         )
 
     def load(self, *index: Any) -> Any:
-        """An item."""
+        """Load an item."""
         return self._builder.load(self.pointer(index))
 
     def vector_pointer(self, *index: Any) -> Any:
-        """Where the eight floats from an index on stand, in the last dimension."""
+        """Pointer to eight floats along the last dimension, starting at an index."""
         return self._builder.bitcast(self.pointer(index), VECTOR.as_pointer())
 
     def load_vector(self, *index: Any) -> Any:
-        """The eight floats from an index on."""
+        """Load eight floats along the last dimension, starting at an index."""
         return self._builder.load(self.vector_pointer(*index), align=4)
 
     def load_int8_vector(self, *index: Any) -> Any:
-        """Eight int8 from an index on, as floats."""
+        """Load eight int8 values, starting at an index, as floats."""
         loaded = self._builder.load(self._builder.bitcast(self.pointer(index), _BYTE_VECTOR.as_pointer()), align=1)
         return self._builder.sitofp(self._builder.sext(loaded, _INDEX_VECTOR), VECTOR)
 
 
 def shuffle(builder: Any, a: Any, b: Any, lanes: Iterable[int]) -> Any:
-    """Take lanes of two vectors, `a` and `b`; places of the second are counted from eight on. builder: LLVM's"""
+    """Select lanes of two vectors, `a` and `b`; lanes of `b` count from eight. builder: LLVM's"""
     return builder.shuffle_vector(a, b, ir.Constant(_INDEX_VECTOR, list(lanes)))
 
 
@@ -80,22 +80,22 @@ def broadcast(builder: Any, value: Any) -> Any:
 
 
 def extract_lane(builder: Any, vector: Any, lane: int) -> Any:
-    """One lane of a vector. builder: LLVM's"""
+    """Extract one lane of a vector. builder: LLVM's"""
     return builder.extract_element(vector, ir.Constant(_INDEX, lane))
 
 
 def multiply(builder: Any, a: Any, b: Any) -> Any:
-    """Multiply a · b, floats or all lanes. builder: LLVM's"""
+    """Multiply a · b, scalars or lanes. builder: LLVM's"""
     return builder.fmul(a, b, flags=FAST)
 
 
 def subtract(builder: Any, a: Any, b: Any) -> Any:
-    """Subtract a − b, floats or all lanes. builder: LLVM's"""
+    """Subtract a − b, scalars or lanes. builder: LLVM's"""
     return builder.fsub(a, b, flags=FAST)
 
 
 def sum_values(builder: Any, values: Sequence[Any]) -> Any:
-    """Σ of some floats or vectors."""
+    """Σ of floats or vectors."""
     accumulator = values[0]
     for value in values[1:]:
         accumulator = builder.fadd(accumulator, value, flags=FAST)
@@ -108,7 +108,7 @@ def dot(builder: Any, a_values: Iterable[Any], b_values: Iterable[Any]) -> Any:
 
 
 def sum_lanes(builder: Any, vector: Any) -> Any:
-    """Sum of all lanes."""
+    """Horizontal sum of a vector."""
     function_type = ir.FunctionType(FLOAT, [FLOAT, VECTOR])
     add_up = _builders.get_or_insert_function(builder.module, function_type, f"llvm.vector.reduce.fadd.v{NUM}f32")
     return builder.call(add_up, [ir.Constant(FLOAT, 0.0), vector], fastmath=FAST)
@@ -116,7 +116,7 @@ def sum_lanes(builder: Any, vector: Any) -> Any:
 
 @untyped_intrinsic
 def prefetch(typing_context, array, index):  # type: ignore[no-untyped-def]
-    """Ask for the line of the cache that an item is in, which is read soon.
+    """Prefetch the cache line of an item that will be read soon.
 
     Args:
         typing_context: Numba's. array: contiguous. index: of the item, a tuple.
@@ -131,7 +131,7 @@ def prefetch(typing_context, array, index):  # type: ignore[no-untyped-def]
         pointer = ArrayPointer(context, builder, signature.args[0], arguments[0]).pointer(indices)
         function_type = ir.FunctionType(ir.VoidType(), [_BYTE.as_pointer(), *[_INDEX] * 3])
         prefetch_function = _builders.get_or_insert_function(builder.module, function_type, "llvm.prefetch.p0i8")
-        hints = [ir.Constant(_INDEX, value) for value in (0, _L2_LOCALITY, 1)]  # to be read; how near; data
+        hints = [ir.Constant(_INDEX, value) for value in (0, _L2_LOCALITY, 1)]  # read access; locality; data cache
         builder.call(prefetch_function, [builder.bitcast(pointer, _BYTE.as_pointer()), *hints])
         return context.get_dummy_value()
 

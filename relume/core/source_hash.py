@@ -1,7 +1,7 @@
-"""Which code made what is kept on disk: a hash over the sources that decide it, part of the names of images and bakes.
+"""Hashes over the sources that determine stored results; they are part of the names of images and bakes.
 
-What decides a number is a module and all that it imports, so the sources are found by following imports, and a new
-module or a moved one is never forgotten. Comments count: telling them apart would cost more than making things anew.
+A module and everything that it imports determine a number, so the sources are collected by following imports; a new or
+moved module is never missed. Comments count: ignoring them would cost more than recomputing.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _IMPORT = re.compile(r"^\s*(?:from (\w[\w.]*) import (\([^)]*\)|[^\n#]*)|import 
 _IMAGES = ("methods", "operators", "live.fixed_camera")
 _COMPARISONS = (*_IMAGES, "reference")
 _BAKES = ("methods.registry", "scene.scene_folder", "store.run_bake")
-_AFTER_BAKES = (  # methods import these to open what was baked, and to look at it
+_AFTER_BAKES = (  # methods import these to open and display bakes
     "operators", "live.fixed_camera", "transport",
     "methods.local_lights", "methods.free_camera_error", "methods.free_camera_transfer", "methods.indirect_solver",
     "methods.opened", "methods.retrace",
@@ -27,24 +27,24 @@ _AFTER_BAKES = (  # methods import these to open what was baked, and to look at 
 
 @cache
 def image_code() -> str:
-    """Names the code that makes images of terms from a bake. 16 hexadecimal digits"""
+    """Hash of the code that makes images of terms from a bake. 16 hexadecimal digits"""
     return code_hash(collect_sources(_IMAGES))
 
 
 @cache
 def comparison_code() -> str:
-    """Names the code that compares images with brute force. 16 hexadecimal digits"""
+    """Hash of the code that compares images with the reference. 16 hexadecimal digits"""
     return code_hash(collect_sources(_COMPARISONS))
 
 
 @cache
 def bake_code() -> str:
-    """Names the code that makes bakes from scenes. 16 hexadecimal digits"""
+    """Hash of the code that makes bakes from scenes. 16 hexadecimal digits"""
     return code_hash(collect_sources(_BAKES, exclude=_AFTER_BAKES))
 
 
 def code_hash(sources: Iterable[Path], package: Path = _PACKAGE) -> str:
-    """Hash over the names and contents of sources. 16 hexadecimal digits"""
+    """Hash over the names and contents of source files. 16 hexadecimal digits"""
     digest = hashlib.sha256()
     for path in sorted(sources):
         digest.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
@@ -52,14 +52,14 @@ def code_hash(sources: Iterable[Path], package: Path = _PACKAGE) -> str:
 
 
 def collect_sources(names: Iterable[str], exclude: Collection[str] = (), package: Path = _PACKAGE) -> set[Path]:
-    """Sources of modules of a package, and of all those of its modules that they import, directly or through others.
+    """Collect the sources of modules of a package and of all modules of the package that they import, transitively.
 
     Args:
-        names: without the package's own, "store.fill"; of a package inside it, all of its modules.
-        exclude: packages and modules inside it that are left out, with what only they import.
+        names: modules relative to the package, e.g. "store.writer"; for a subpackage, all of its modules.
+        exclude: subpackages and modules to omit, with everything that only they import.
         package: folder of the package.
     Raises:
-        ModuleNotFoundError: one of `names` or `exclude` is not there.
+        ModuleNotFoundError: a name in `names` or `exclude` does not exist.
     """
     excluded = {source.with_suffix("") for name in exclude for source in _roots(package, name)}
     sources: set[Path] = set()
@@ -76,7 +76,7 @@ def _roots(package: Path, name: str) -> list[Path]:
     folder = package.joinpath(*name.split("."))
     sources = sorted(folder.rglob("*.py")) if folder.is_dir() else [folder.with_suffix(".py")]
     if not sources or not all(path.is_file() for path in sources):
-        raise ModuleNotFoundError(f"{package.name}.{name} has no sources; what is kept on disk cannot be named")
+        raise ModuleNotFoundError(f"{package.name}.{name} has no sources; stored results cannot be named")
     return sources
 
 

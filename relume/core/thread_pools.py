@@ -1,10 +1,10 @@
-"""The threads for every kernel of this process: pools for what a frame waits for, for what follows, and for long work.
+"""Thread pools for all kernels of this process: for frames, for work that follows a frame, and for long work.
 
-Kernels release the interpreter lock and work on ranges; they are split here and nowhere else, so that two layers of
-threads never fight over the same cores. A freeze hands out hundreds of ranges at once, which a frame's few must not
-queue behind: who calls decides whose threads work, and where both want a core the system gives frames most of it.
-Where as many frames are made at once as there are threads, each is made by its own: handing out ranges, and waiting for
-them, would only cost. `RELUME_THREADS` bounds each pool; worker processes set it to 1.
+Kernels release the GIL and work on ranges. Only this module splits work, so that nested threads never compete for the
+same cores. A precomputation submits hundreds of ranges at once, and the few ranges of a frame must not queue behind
+them: the calling thread decides which pool works, and the system gives frames most of a contended core. When as many
+frames are computed at once as there are threads, each uses its own thread: splitting and waiting would only cost time.
+`RELUME_THREADS` bounds each pool; worker processes set it to 1.
 """
 
 from __future__ import annotations
@@ -23,27 +23,27 @@ P = ParamSpec("P")
 T = TypeVar("T")
 Item = TypeVar("Item")
 Kernel = Callable[[int, int], object]
-"""Works on a range: its start and its stop."""
+"""Processes a range [start, stop)."""
 
-# two shares even out a core that is busy with something else; more cost more to hand out than they win
+# two chunks per thread balance a core that is busy with other work; more chunks cost more than they save
 _CHUNKS_PER_THREAD = 2
 
-# asked once: of an edit's frame of three milliseconds, asking at every kernel took a third of one
+# queried once: in an edit's frame of 3 ms, a query in every kernel took 1 ms
 _AVAILABLE = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 _FRAME, _LOW_PRIORITY, _LONG = "frame", "beside", "long"
-# where both want a core, frames get three quarters of it from long work, and nearly all from what follows them, which
-# takes no more than every other core: with both cores of two an edit's frame of 4 ms took 5
+# on a contended core, frames get three quarters of the time against long work and nearly all of it against low-priority
+# work, which uses at most half of the cores: with both of two cores in use, an edit's frame of 4 ms took 5 ms
 _NICE = {_FRAME: 0, _LOW_PRIORITY: 19, _LONG: 5}
 
 _lock = threading.Lock()
-_thread_state = threading.local()  # pool: that this thread's kernels go to. is_of_pool: it is one of those that work
+_thread_state = threading.local()  # pool: receives this thread's kernels. is_of_pool: this is a pool thread
 _pools: dict[str, ThreadPoolExecutor] = {}
-_frame_threads: list[int] = []  # threads that make them
+_frame_threads: list[int] = []  # threads that compute frames now
 
 
 def num_threads() -> int:
-    """How many ranges run at once: `RELUME_THREADS`, or the cores this process may use."""
+    """Number of ranges that run at once: `RELUME_THREADS`, or the cores available to this process."""
     requested = os.environ.get("RELUME_THREADS", "")
     return max(1, min(int(requested), 256)) if requested.isdigit() else _AVAILABLE
 
@@ -58,19 +58,19 @@ def _pool(name: str) -> ThreadPoolExecutor:
 
 def _init_worker(name: str) -> None:
     _thread_state.is_of_pool = True
-    if _NICE[name] and sys.platform == "linux":  # elsewhere it would be of the whole process
-        with suppress(OSError):  # not allowed to
+    if _NICE[name] and sys.platform == "linux":  # elsewhere the priority applies to the whole process
+        with suppress(OSError):  # not permitted
             os.setpriority(os.PRIO_PROCESS, 0, os.getpriority(os.PRIO_PROCESS, 0) + _NICE[name])
 
 
 def mark_background_thread() -> None:
-    """From now on kernels that this thread calls let those of frames go first; nobody waits for them."""
+    """Run later kernels of this thread in the pool for long work, which yields to frames."""
     _thread_state.pool = _LONG
 
 
 @contextmanager
 def low_priority() -> Iterator[None]:
-    """Inside, kernels that this thread calls let those of frames go first, and do not queue behind long work."""
+    """Context in which this thread's kernels yield to frames and do not queue behind long work."""
     before = getattr(_thread_state, "pool", _FRAME)
     _thread_state.pool = _LOW_PRIORITY
     try:
@@ -80,12 +80,12 @@ def low_priority() -> Iterator[None]:
 
 
 def run_frame(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-    """Call what makes a frame in this thread; while many do, each keeps to its own core.
+    """Compute a frame in this thread; while many threads do, each keeps to its own core.
 
     Args:
-        work: is called. args, kwargs: with these.
+        work: called with args and kwargs.
     Returns:
-        What it returns.
+        The result of `work`.
     """
     _frame_threads.append(threading.get_ident())
     try:
@@ -95,13 +95,13 @@ def run_frame(work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
 
 
 def _is_crowded(pool: str) -> bool:
-    """Whether all cores have frames of their own to make."""
+    """True if every core already computes a frame."""
     return pool == _FRAME and len(_frame_threads) >= max(2, num_threads())
 
 
 def _run(kernel: Kernel, count: int, grain: int) -> None:
     ranges = [(start, min(start + grain, count)) for start in range(0, count, grain)]
-    # a thread of a pool that waited for its own pool would wait for itself
+    # a pool thread that waits for its own pool would deadlock
     name = getattr(_thread_state, "pool", _FRAME)
     if num_threads() == 1 or len(ranges) == 1 or getattr(_thread_state, "is_of_pool", False) or _is_crowded(name):
         for start, stop in ranges:
@@ -117,11 +117,11 @@ def _run(kernel: Kernel, count: int, grain: int) -> None:
 
 
 def _run_cooperatively(kernel: Kernel, ranges: Sequence[tuple[int, int]]) -> None:
-    """Work through ranges with threads of the pool, whoever is free taking the next.
+    """Process ranges with threads of the pool; each free thread takes the next range.
 
-    The caller works, too: threads that wait are woken late, which took a quarter of a frame of three milliseconds.
+    The caller works too: waiting threads wake up late, which took a quarter of a frame of 3 ms.
     """
-    remaining = iter(ranges)  # whose next is one thread's, by the interpreter's lock
+    remaining = iter(ranges)  # the GIL gives each next() to one thread
 
     def work() -> list[BaseException]:
         return [error for start, stop in remaining if (error := _capture_error(kernel, start, stop)) is not None]
@@ -129,7 +129,7 @@ def _run_cooperatively(kernel: Kernel, ranges: Sequence[tuple[int, int]]) -> Non
     futures = [_pool(_FRAME).submit(work) for _ in range(min(num_threads(), len(ranges)) - 1)]
     errors = work()
     for future in futures:
-        if not future.cancel():  # else it would find nothing left
+        if not future.cancel():  # a canceled future would have found no range left
             errors += future.result()
     if errors:
         raise errors[0]
@@ -138,7 +138,7 @@ def _run_cooperatively(kernel: Kernel, ranges: Sequence[tuple[int, int]]) -> Non
 def _capture_error(kernel: Kernel, start: int, stop: int) -> BaseException | None:
     try:
         kernel(start, stop)
-    except BaseException as error:  # raised when all ranges have ended
+    except BaseException as error:  # raised by the caller after all ranges have ended
         return error
     return None
 
@@ -146,7 +146,7 @@ def _capture_error(kernel: Kernel, start: int, stop: int) -> BaseException | Non
 def for_ranges(kernel: Kernel, count: int, grain: int) -> None:
     """Call `kernel(start, stop)` over [0, count) in ranges of at most `grain`, on all threads of the pool.
 
-    Ranges must not depend on each other. The first exception is raised here after all ranges have ended.
+    Ranges must be independent. The first exception is raised here after all ranges have ended.
     """
     _run(kernel, count, grain)
 
@@ -159,21 +159,21 @@ def parallel_for_cancellable(
     is_canceled: Callable[[], bool],
     label: str,
 ) -> None:
-    """`for_ranges` for long work that is watched and may be stopped.
+    """Cancellable `for_ranges` with progress, for long work.
 
     Args:
-        kernel: called with the ends of ranges of at most `grain` out of `count`, from several threads.
-        progress: called with the share done after each range. is_canceled: asked before each.
-        label: the work is called, in the error.
+        kernel: called with ranges of at most `grain` out of `count`, from several threads.
+        progress: called with the finished fraction after each range. is_canceled: called before each.
+        label: name of the work in the error.
     Raises:
-        CancelledError: `is_canceled` said so.
+        CancelledError: `is_canceled` returned true.
     """
     lock, done = threading.Lock(), 0
 
     def step(start: int, stop: int) -> None:
         nonlocal done
         if is_canceled():
-            raise CancelledError(f"{label} was cancelled")
+            raise CancelledError(f"{label} was canceled")
         kernel(start, stop)
         with lock:
             done += stop - start
@@ -183,11 +183,11 @@ def parallel_for_cancellable(
 
 
 def map_ordered(work: Callable[[Item], T], items: Sequence[Item], max_concurrent: int) -> Iterator[T]:
-    """Call `work` with each item, several at once, and give what it returns in the order of the items.
+    """Call `work` with each item, several at once, and yield the results in the order of the items.
 
     Args:
         work: called from several threads. items: independent of each other.
-        max_concurrent: what of the results is in memory together, at most.
+        max_concurrent: maximum number of results in memory.
     """
     step = min(max_concurrent, num_threads())
     for first in range(0, len(items), step):
@@ -202,12 +202,12 @@ def map_ordered(work: Callable[[Item], T], items: Sequence[Item], max_concurrent
 
 
 def parallel_for_chunks(kernel: Kernel, count: int, chunks_per_thread: int = _CHUNKS_PER_THREAD) -> None:
-    """Call `kernel(start, stop)` over [0, count) in a few even shares for each thread.
+    """Call `kernel(start, stop)` over [0, count) in a few equal chunks for each thread.
 
-    For work of a few milliseconds, where handing out a range costs as much as doing it.
+    For work of a few milliseconds, where scheduling a range costs as much as running it.
 
     Args:
-        kernel: works on a range. count: of all. chunks_per_thread: more where one may cost much more than another.
+        kernel: processes a range. count: number of items. chunks_per_thread: more if the cost of items varies.
     """
     grain = max(1, -(-count // (chunks_per_thread * num_threads())))
     _run(kernel, count, grain)

@@ -1,4 +1,4 @@
-"""Checks of single values in a document from outside. Each raises ParameterError with a JSON pointer."""
+"""Checks of single values in an external document. Each raises ParameterError with a JSON pointer."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ MAX_COLOR = 1e4
 
 
 def pointer_text(pointer: Pointer) -> str:
-    """RFC 6901, each token cut at 80 characters: names may come from anybody."""
+    """Format a JSON pointer (RFC 6901), each token cut at 80 characters: names may come from any user."""
     return "".join("/" + str(token)[:80].replace("~", "~0").replace("/", "~1") for token in pointer) or "the look"
 
 
 def invalid_value(pointer: Pointer, value: object, allowed: str) -> ParameterError:
-    """The error to raise for a value that a document must not have.
+    """Make the error for a value that a document must not have.
 
     Args:
-        pointer: where in the document it stands. value: what stands there, of any size.
-        allowed: what may stand there, as the end of a sentence.
+        pointer: location in the document. value: the value there, of any size.
+        allowed: the allowed values, as the end of a sentence.
     """
     if isinstance(value, dict | list | tuple):
         value = f"{'an object' if isinstance(value, dict) else 'a list'} of {len(value)}"  # its text could be huge
@@ -31,38 +31,38 @@ def invalid_value(pointer: Pointer, value: object, allowed: str) -> ParameterErr
 
 
 def names_text(names: Iterable[str]) -> str:
-    """A list of names for a message, cut where it would be long."""
+    """Format names as a list for a message; long lists and names are cut."""
     ordered = sorted(names)
     text = ", ".join(repr(name[:40]) for name in ordered[:12])
     return text + (f" and {len(ordered) - 12} more" if len(ordered) > 12 else "") if ordered else "nothing"
 
 
 def is_number(value: object) -> bool:
-    """Whether a value is a number; booleans, which Python counts among them, are not."""
+    """True if a value is a number; booleans, which Python counts as numbers, are not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def check_number(pointer: Pointer, value: Any, minimum: float, maximum: float) -> None:
-    """Refuse what is no number in [minimum, maximum]; comparing refuses NaN and infinities too.
+    """Reject anything but a number in [minimum, maximum], NaN and infinities included.
 
     Args:
-        pointer: where in the document the value stands. value: of any type.
+        pointer: location in the document. value: of any type.
         minimum, maximum: both allowed.
     Raises:
-        ParameterError: it is none.
+        ParameterError: the value is not allowed.
     """
     if not is_number(value) or not minimum <= value <= maximum:
         raise invalid_value(pointer, value, f"a number in [{minimum:g}, {maximum:g}]")
 
 
 def check_number_or_rgb(pointer: Pointer, value: Any, minimum: float, maximum: float) -> None:
-    """Refuse what is neither one number nor one for each of R, G, B.
+    """Reject anything but one number or three numbers for R, G, B.
 
     Args:
-        pointer: where in the document the value stands. value: of any type.
+        pointer: location in the document. value: of any type.
         minimum, maximum: of each number, both allowed.
     Raises:
-        ParameterError: it is neither.
+        ParameterError: the value is not allowed.
     """
     if is_number(value):
         check_number(pointer, value, minimum, maximum)
@@ -71,14 +71,14 @@ def check_number_or_rgb(pointer: Pointer, value: Any, minimum: float, maximum: f
 
 
 def check_triple(pointer: Pointer, value: Any, minimum: float, maximum: float, label: str = "three numbers") -> None:
-    """Refuse what is not three numbers in [minimum, maximum].
+    """Reject anything but three numbers in [minimum, maximum].
 
     Args:
-        pointer: where in the document the value stands. value: of any type.
+        pointer: location in the document. value: of any type.
         minimum, maximum: of each number, both allowed.
-        label: how the message calls what is allowed.
+        label: name of the allowed values in the message.
     Raises:
-        ParameterError: it is not.
+        ParameterError: the value is not allowed.
     """
     if not isinstance(value, list | tuple) or len(value) != 3:
         raise invalid_value(pointer, value, f"{label} in [{minimum:g}, {maximum:g}]")
@@ -87,13 +87,13 @@ def check_triple(pointer: Pointer, value: Any, minimum: float, maximum: float, l
 
 
 def check_object(pointer: Pointer, value: Any, allowed: Iterable[str]) -> None:
-    """Refuse what is no object, or has other fields than those allowed.
+    """Reject anything but an object with fields from `allowed`.
 
     Args:
-        pointer: where in the document the value stands. value: of any type.
+        pointer: location in the document. value: of any type.
         allowed: names of fields.
     Raises:
-        ParameterError: it is none, or has others.
+        ParameterError: the value is not an object, or has an unknown field.
     """
     if not isinstance(value, Mapping):
         raise invalid_value(pointer, value, "an object")

@@ -1,1 +1,1 @@
-"""Images as files: decoding within bounds, EXR of linear radiance, display images as PNG and WebP."""
+"""Image files: decoding with limits, EXR of linear radiance, display images as PNG and WebP."""

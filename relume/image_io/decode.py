@@ -1,4 +1,4 @@
-"""Decodes PNG, JPEG and WebP, which may be hostile: nothing before its header has said that it is small enough."""
+"""Decoder for PNG, JPEG and WebP from untrusted sources: the header's size is checked before decoding."""
 
 from __future__ import annotations
 
@@ -6,25 +6,26 @@ import io
 
 import numpy as np
 import PIL.Image
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
 
 U8 = NDArray[np.uint8]
 MAX_SIDE = 8_192
-MAX_TEXELS = 1_000_000_000  # of all images of a scene together, as often as they are decoded
+MAX_TEXELS = 1_000_000_000  # of all images of a scene together, counted per decoding
 MAX_JPEG_SCANS = 200  # each scan of a progressive JPEG costs a pass over all texels
 FORMATS = ("PNG", "JPEG", "WEBP")
 
 
 class Decoder:
-    """Decodes images within one budget for all of them."""
+    """Decoder of images that share one texel budget."""
 
     def __init__(self) -> None:
         self._remaining_texels = MAX_TEXELS
 
-    def decode(self, data: bytes, label: str) -> U8:
-        """The texels as bytes, RGBA. (height, width, 4)
+    def decode(self, data: bytes, label: str) -> Shaped[U8, "height width 4"]:
+        """Decode an image to RGBA.
 
         Raises:
             SceneError: the image is too large, damaged, or of another format than PNG, JPEG and WebP.
@@ -40,7 +41,7 @@ class Decoder:
         except (PIL.Image.DecompressionBombError, PIL.Image.DecompressionBombWarning):
             raise SceneError(f"{label} is too large; at most {MAX_SIDE}×{MAX_SIDE} is read, scale it down") from None
         except Exception:  # decoders raise many kinds for damaged data (OSError, SyntaxError, struct.error …)
-            raise SceneError(f"{label} is damaged, or of a format that is not read here; save it as PNG") from None
+            raise SceneError(f"{label} is damaged, or its format is not supported; save it as PNG") from None
 
     def _check_size(self, width: int, height: int, label: str) -> None:
         if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
@@ -51,7 +52,7 @@ class Decoder:
 
 
 def _rgba(image: PIL.Image.Image) -> U8:
-    """8-bit RGBA, colours not multiplied by alpha; 16-bit grey is scaled."""
+    """Convert to 8-bit RGBA, not premultiplied; 16-bit gray is scaled."""
     if image.mode.startswith("I"):
         gray = np.clip(np.asarray(image, np.int64) // 257, 0, 255).astype(np.uint8)
         return np.stack([gray, gray, gray, np.full_like(gray, 255)], axis=-1)

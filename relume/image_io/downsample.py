@@ -1,20 +1,21 @@
-"""Smaller pictures from baked ones: averages of linear radiance over each new pixel's area."""
+"""Downsampling of baked images: averages of linear radiance over each new pixel's area."""
 
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from PIL import Image
 
 
-def downsample(image: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
-    """A smaller image, each of its pixels the mean over the area that it covers.
+def downsample(
+    image: Shaped[NDArray[np.float32], "height width channels"], size: tuple[int, int]
+) -> Shaped[NDArray[np.float32], "new_height new_width channels"]:
+    """Downsample an image with a box filter.
 
     Args:
-        image: linear radiance. (height, width, channels) float32
-        size: width and height, neither larger than the image's.
-    Returns:
-        (size[1], size[0], channels) float32
+        image: linear radiance.
+        size: new width and height, neither larger than the image's.
     """
     if size == (image.shape[1], image.shape[0]):
         return image

@@ -1,4 +1,4 @@
-"""Writes OpenEXR: channels by name, strip by strip, with attributes; half floats unless full ones are asked for."""
+"""OpenEXR writer: named channels, in strips, with attributes; half floats unless full ones are requested."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ _STRIP_ROWS = 64
 
 
 def image_channels(image: NDArray[np.floating], layer: str = "") -> Channels:
-    """The channels of a picture, (height, width, 3 or 4): R, G, B and A, or those of a layer."""
+    """Channels of an image, (height, width, 3 or 4): R, G, B and A, or those of a layer."""
     prefix = f"{layer}." if layer else ""
     return [(prefix + name, image[..., c]) for c, name in enumerate("RGBA"[: image.shape[2]])]
 
 
 def write_exr(path: Path, channels: Channels, attributes: Attributes, precision: Precision = "half") -> None:
-    """Write a file that appears whole or not at all.
+    """Write a file atomically.
 
     Args:
         path: the file, which is replaced.
@@ -42,13 +42,13 @@ def write_exr(path: Path, channels: Channels, attributes: Attributes, precision:
 
 
 def write_scanlines(path: Path, channels: Channels, attributes: Attributes, precision: Precision) -> None:
-    """Write one part of scan lines.
+    """Write one scan-line part.
 
     Args:
         path: the file.
-        channels: name, such as "R" or "light_Key.R", and values of each, (height, width); they may be memory maps.
-        attributes: text, numbers, vectors, and matrices (4, 4) in OpenEXR's order: a row is multiplied on the left.
-        precision: of the values; what no half can hold, above 65,504, is held to that.
+        channels: name, such as "R" or "light_Key.R", and values, (height, width), possibly memory-mapped.
+        attributes: text, numbers, vectors, and matrices (4, 4) in OpenEXR's convention of row vectors.
+        precision: of the values; half clamps them to 65,504.
     Raises:
         OSError: the file cannot be written.
     """

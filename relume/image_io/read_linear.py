@@ -1,4 +1,4 @@
-"""Reads pixels of .hdr and .exr files, which may be hostile, in linear Rec. 709."""
+"""Reader for .hdr and .exr files from untrusted sources, in linear Rec. 709."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813  (the name its own documentation gives it)
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
@@ -17,16 +18,16 @@ from relume.image_io.primaries import convert, to_rec_709
 
 F32 = NDArray[np.float32]
 
-MAX_EXPANSION = 1_000  # deflate packs zeros 1,032 : 1; no photograph comes near it
-FREE_BYTES = 64 << 20  # may be claimed by any file, however small
+MAX_EXPANSION = 1_000  # deflate compresses zeros 1,032 : 1; photographs do not come near it
+FREE_BYTES = 64 << 20  # any file may claim these, however small
 EXR_MAGIC = b"\x76\x2f\x31\x01"
-oiio.attribute("try_all_readers", 0)  # else what the reader of a suffix refuses goes to twenty others
+oiio.attribute("try_all_readers", 0)  # otherwise a file rejected by its suffix's reader goes to twenty others
 CheckSize = Callable[[int, int], None]
 ChooseRows = Callable[[int, int], int]
 
 
 def check_claim(claimed_bytes: int, data: bytes, label: str) -> None:
-    """Hold what a header claims to what the file could unpack to: a few bytes may claim gigabytes.
+    """Reject headers that claim more pixels than the file could contain: a few bytes may claim gigabytes.
 
     claimed_bytes: of pixels. data: of the file. label: of the file in messages. Raises SceneError.
     """
@@ -38,7 +39,7 @@ def check_claim(claimed_bytes: int, data: bytes, label: str) -> None:
 
 
 def _check_tiles(spec: oiio.ImageSpec, data: bytes, label: str) -> None:
-    """Hold tiles to what can be in the file: each has 8 bytes in its table, and the decoder holds a whole one."""
+    """Reject tiles that the file cannot contain: each has 8 bytes in a table, and the decoder allocates a whole one."""
     if spec.tile_width == 0:
         return
     num_tiles = -(-spec.width // spec.tile_width) * -(-spec.height // spec.tile_height)
@@ -47,16 +48,16 @@ def _check_tiles(spec: oiio.ImageSpec, data: bytes, label: str) -> None:
     check_claim(spec.tile_width * spec.tile_height * spec.nchannels * 4, data, label)
 
 
-def read_pixels(data: bytes, suffix: str, label: str, check_size: CheckSize) -> F32:
-    """Let OpenImageIO decode from a private temporary file, header first, pixels only when the size is allowed.
+def read_pixels(data: bytes, suffix: str, label: str, check_size: CheckSize) -> Shaped[F32, "height width 3"]:
+    """Decode an image with OpenImageIO from a private temporary file; the size is checked before pixels are read.
 
     Args:
-        data: of the file. suffix: that its first bytes tell. label: it is, in messages.
-        check_size: raises SceneError where width and height are not taken.
+        data: of the file. suffix: according to its first bytes. label: name in messages.
+        check_size: raises SceneError if width and height are not allowed.
     Returns:
-        The first R, G and B, or one channel for all. (height, width, 3) float32
+        The first R, G and B, or one channel for all
     Raises:
-        SceneError: damaged, too large, or of no plain image.
+        SceneError: the file is damaged, too large, or not a plain image.
     """
 
     def all_rows(width: int, height: int) -> int:
@@ -68,12 +69,12 @@ def read_pixels(data: bytes, suffix: str, label: str, check_size: CheckSize) -> 
 
 
 def read_strips(data: bytes, suffix: str, label: str, choose_rows: ChooseRows) -> Iterator[F32]:
-    """The same a few rows at a time, from the top.
+    """Decode an image like `read_pixels`, a few rows at a time, from the top.
 
     Args:
-        data, suffix, label: as of `read_pixels`.
-        choose_rows: of an image of some width and height, how many rows are wanted at once, at most all of them; raises
-            SceneError where it is not taken. Those of an image of tiles come all at once.
+        data, suffix, label: as in `read_pixels`.
+        choose_rows: returns the number of rows per strip for a width and height, at most all; raises SceneError if the
+            size is not allowed. Tiled images have a single strip.
     """
     handle, path = tempfile.mkstemp(suffix=suffix)
     try:
@@ -85,7 +86,7 @@ def read_strips(data: bytes, suffix: str, label: str, choose_rows: ChooseRows) -
             raise SceneError(f"{label} is damaged or not what its first bytes say; export it again")
         try:
             yield from _read_open_image(image, data, label, choose_rows)
-        except UnicodeDecodeError:  # names in the header that are no text
+        except UnicodeDecodeError:  # names in the header that are not valid text
             raise SceneError(f"{label} is damaged; export it again") from None
         finally:
             image.close()
@@ -117,23 +118,23 @@ def _read_open_image(image: oiio.ImageInput, data: bytes, label: str, choose_row
             raise SceneError(f"{label} ends early or is damaged; export it again")
         rgb = np.asarray(pixels, np.float32)
         rgb = rgb if order == [first, first + 1, first + 2] else rgb[..., [c - first for c in order]]
-        if matrix is not None and last > first:  # grey has no primaries
+        if matrix is not None and last > first:  # gray has no primaries
             convert(rgb, matrix)
         yield rgb
 
 
 def _conversion_matrix(spec: oiio.ImageSpec, label: str) -> NDArray[np.float64] | None:
-    """What converts the file's colours to ours; None where they are."""
+    """Matrix that converts the file's colors to linear Rec. 709; None if none is needed."""
     chromaticities = spec.getattribute("chromaticities")
     if chromaticities is None:
         return None
     try:
         return to_rec_709(chromaticities)
     except (TypeError, ValueError) as problem:
-        raise SceneError(f"{label} has odd primaries ({problem}); export it as linear Rec. 709") from None
+        raise SceneError(f"{label} has invalid primaries ({problem}); export it as linear Rec. 709") from None
 
 
 def _clear_error(take_error: Callable[[], str]) -> None:
-    """Take the message that OpenImageIO keeps until it is asked for; it may quote bytes that are no text."""
+    """Discard OpenImageIO's stored error message, which may contain invalid text."""
     with suppress(UnicodeDecodeError):
         take_error()

@@ -1,6 +1,6 @@
-"""From linear radiance to what a screen shows: exposure, tone map, sRGB. The editor's shader does the same sums.
+"""Display encoding of linear radiance: exposure, tone map, sRGB. The editor's shader computes the same.
 
-A view of an OpenColorIO config may stand in the place of tone map and sRGB: what it gives is what its display is sent.
+A view of an OpenColorIO config may replace tone map and sRGB; it outputs the values for its display.
 
 `agx`: Troy Sobotka's AgX, base look, its curve as the polynomial of Benjamin Wrensch ("Minimal AgX Implementation",
 2023). `filmic`: Krzysztof Narkowicz, "ACES Filmic Tone Mapping Curve", 2015. `none`: clipped at one.
@@ -12,6 +12,7 @@ import math
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import ParameterError, ShapeMismatchError
@@ -27,7 +28,7 @@ _AGX, _FILMIC = np.int64(1), np.int64(2)
 _PIXELS_PER_RANGE = 1 << 15
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
-_MAX_RADIANCE = np.float32(1e9)  # far above white in every map; keeps infinities out of the quotients
+_MAX_RADIANCE = np.float32(1e9)  # far above white in every map; keeps infinities out of divisions
 _INSET = np.array(
     [
         [0.842479062253094, 0.0784335999999992, 0.0792237451477643],
@@ -45,7 +46,7 @@ _OUTSET = np.array(
     np.float32,
 )
 _AGX_MIN_EV, _AGX_RANGE_EV = np.float32(-12.47393), np.float32(4.026069 + 12.47393)
-_MIN_RADIANCE = np.float32(1e-10)  # has a logarithm, and lies below AGX_MIN_EV
+_MIN_RADIANCE = np.float32(1e-10)  # has a logarithm, and lies below _AGX_MIN_EV
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
@@ -92,15 +93,15 @@ def _tone_map_rows(pixels, gain, kind, out, start, stop):  # type: ignore[no-unt
                 out[k, c] = _srgb(_filmic(rgb[c]) if kind == _FILMIC else rgb[c])
 
 
-def tone_map(image: F32, exposure: float, name: str | OcioView, *, use_table: bool = False) -> F32:
-    """Display values of linear radiance, sRGB-encoded, or as a view's display has them.
+def tone_map(
+    image: Shaped[F32, "height width channels"], exposure: float, name: str | OcioView, *, use_table: bool = False
+) -> Shaped[F32, "height width channels"]:
+    """Display values, in [0, 1], of linear radiance: sRGB-encoded, or for the display of an OpenColorIO view.
 
     Args:
-        image: linear Rec. 709; negative values and NaN are black. (height, width, 3) float32
-        exposure: stops. name: one of TONE_MAPS, or a view of the config in use.
-        use_table: views as the editor's shader shows them, by tables; else as the config does.
-    Returns:
-        In [0, 1]. (height, width, 3) float32
+        image: linear Rec. 709; negative values and NaN are black.
+        exposure: stops. name: one of TONE_MAPS, or a view of the active config.
+        use_table: evaluate views by LUTs, like the editor's shader; otherwise by OpenColorIO.
     Raises:
         ParameterError: no tone map of that name. ShapeMismatchError: not an RGB image.
     """

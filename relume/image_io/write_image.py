@@ -1,4 +1,4 @@
-"""Writing pictures: EXR keeps linear radiance, PNG and WebP hold what the screen shows."""
+"""Image output: EXR contains linear radiance, PNG and WebP contain display values."""
 
 from __future__ import annotations
 
@@ -21,28 +21,27 @@ F32 = NDArray[np.float32]
 
 
 def to_bytes(display: F32) -> NDArray[np.uint8]:
-    """Display values in [0, 1], rounded to 0…255. (...)"""
+    """Round display values in [0, 1] to 0…255."""
     return (np.clip(display, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
 
 
 def png_bytes(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
-    """A PNG file, 8 or 16 bits as the pixels have: grey, RGB or RGBA. (height, width[, 3 or 4])"""
+    """Encode a PNG, 8 or 16 bits like the pixels: gray, RGB or RGBA. (height, width[, 3 or 4])"""
     buffer = io.BytesIO()
     Image.fromarray(pixels).save(buffer, "PNG")
     return buffer.getvalue()
 
 
 def write_image(path: Path, image: F32, exposure: float = 0.0, tone_map_name: str | OcioView = "agx") -> None:
-    """Write a picture in the format that its name ends in; the file appears whole or not at all.
+    """Write an image in the format of its suffix, atomically.
 
     Args:
         path: ends in .exr (linear radiance, float32; exposure and tone map do not apply), .png or .webp (8 bit).
-        image: linear Rec. 709 radiance, top row first, with coverage as a fourth channel where it is not opaque: the
-            others are multiplied by it, as EXR has them; the other formats hold them without it.
-            (height, width, 3 or 4) float32
-        exposure: stops. tone_map_name: as for `tone_map`.
+        image: linear Rec. 709 radiance, top row first, (height, width, 3 or 4), premultiplied if there is coverage as a
+            fourth channel, as in EXR; the other formats contain colors that are not premultiplied.
+        exposure: stops. tone_map_name: as in `tone_map`.
     Raises:
-        ParameterError: another format, or no such tone map. ShapeMismatchError: neither RGB nor RGB with coverage.
+        ParameterError: unknown format or tone map. ShapeMismatchError: neither RGB nor RGB with coverage.
         RelumeError: the file cannot be written.
     """
     write = _WRITERS.get(path.suffix.lower())
@@ -59,7 +58,7 @@ def _write_exr(path: Path, image: F32, exposure: float, tone_map_name: str | Oci
 
 
 def _to_display_bytes(image: F32, exposure: float, tone_map_name: str | OcioView) -> NDArray[np.uint8]:
-    """What the screen shows of the surfaces themselves, and how much of each pixel they cover."""
+    """Display values of the surfaces without premultiplication, and coverage."""
     alpha = np.clip(image[..., 3:], 0, 1)
     surfaces = image[..., :3] if image.shape[2] == 3 else image[..., :3] / np.maximum(alpha, 1e-6)
     display = tone_map(np.asarray(surfaces, np.float32), exposure, tone_map_name)
@@ -69,7 +68,7 @@ def _to_display_bytes(image: F32, exposure: float, tone_map_name: str | OcioView
 def _write_png(path: Path, image: F32, exposure: float, tone_map_name: str | OcioView) -> None:
     tags = PngInfo()
     if isinstance(tone_map_name, str) or "sRGB" in tone_map_name.display:
-        tags.add(b"sRGB", b"\x00")  # to be shown perceptually
+        tags.add(b"sRGB", b"\x00")  # rendering intent: perceptual
     Image.fromarray(_to_display_bytes(image, exposure, tone_map_name)).save(path, "PNG", pnginfo=tags)
 
 

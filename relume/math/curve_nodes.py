@@ -1,8 +1,8 @@
-"""Curves along a parameter as combinations of those at a few of its values, each band to a share of itself.
+"""Curves along a parameter as linear combinations of the curves at a few values, with an error bound per band.
 
-A pixel is a sum of a curve's bands with weights that are never negative. So where a combination holds *every* band to a
-share ε of itself and of a floor, every pixel is held to ε of itself and of what the floor would show, whatever light
-falls on it. A norm over all bands promises nothing for a pixel that one lamp lights through one band.
+A pixel is a sum of a curve's bands with nonnegative weights. If a combination approximates *every* band to a relative
+error ε of the band plus a floor, every pixel has at most the error ε of its value plus the image of the floor, for any
+lighting. A norm over all bands guarantees nothing for a pixel that one light illuminates through one band.
 """
 
 from __future__ import annotations
@@ -10,60 +10,63 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 F64 = NDArray[np.float64]
 
-# The floor of a curve: this share of its mean over all directions, and of the same share of the largest mean.
+# The floor of a curve: this fraction of its mean over all directions, at least the second fraction of the largest mean.
 _FLOOR_PER_MEAN = 1e-2
 _FLOOR_PER_MAX_MEAN = 1e-5
-# Large coefficients of both signs would cancel, and rounding of images with them.
+# Large coefficients of opposite signs would cancel and amplify the rounding of images.
 _RIDGE = 1e-4
 _ROUNDS = 4
 _BATCH_ERROR_RATIO = 4
-_MIN_NODE_DISTANCE = (
-    3  # nodes that are added together stand further from each other: one mends the error of its neighbours too
-)
+_MIN_NODE_DISTANCE = 3  # between nodes of one batch: a node also reduces the error of its neighbors
 
 
 @dataclass(frozen=True)
 class CurveNodes:
-    """Values of a parameter whose curves combine to those of its whole range.
+    """Parameter values whose curves combine to the curves of the whole range.
 
     Attributes:
-        values: of the parameter, in the order in which they were found wanting. (k,)
-        curves: at these values. (k, J)
-        band_weights: of all directions that lie in each band; they sum to one. (J,)
-        min_floor: no curve's floor is lower.
-        error: the largest of any band of any curve in the range, as a share of itself and its floor.
+        values: parameter values, in the order of selection. curves: curves at these values.
+        band_weights: fraction of all directions in each band; they sum to one.
+        min_floor: lower bound of the floor of every curve.
+        error: largest error of any band of any curve in the range, relative to the band plus the floor.
     """
 
-    values: F64
-    curves: F64
-    band_weights: F64
+    values: Shaped[F64, " k"]
+    curves: Shaped[F64, "k J"]
+    band_weights: Shaped[F64, " J"]
     min_floor: float
     error: float
 
-    def coefficients(self, curve: F64) -> F64:
-        """Of a curve (J,) in the curves at the nodes: the least largest error of a band, nearly. (k,)"""
+    def coefficients(self, curve: Shaped[F64, " J"]) -> Shaped[F64, " k"]:
+        """Coefficients of a curve in the curves at the nodes, with nearly the least maximum error of a band."""
         return _fit(self.curves, curve, self.floor(curve))[0]
 
-    def floor(self, curve: F64) -> float:
-        """What a band's error is measured by, besides the band: a hundredth of what the curve is spread evenly."""
+    def floor(self, curve: Shaped[F64, " J"]) -> float:
+        """Constant added to each band as the scale of its error: a hundredth of the curve's mean over directions."""
         return max(_FLOOR_PER_MEAN * float(curve @ self.band_weights), self.min_floor)
 
 
 def choose_nodes(
-    values: F64, curves: F64, midpoint_curves: F64, weights: F64, max_nodes: int, tolerance: float
+    values: Shaped[F64, " n"],
+    curves: Shaped[F64, "n J"],
+    midpoint_curves: Shaped[F64, "midpoints J"],
+    weights: Shaped[F64, " J"],
+    max_nodes: int,
+    tolerance: float,
 ) -> CurveNodes:
-    """Nodes of a parameter: again and again a value beside the curve that those chosen describe worst.
+    """Choose nodes of a parameter greedily: add a value next to the curve with the largest error.
 
     Args:
-        values: in order, ends included. (n,) curves: at `values`. (n, J)
-        midpoint_curves: curves halfway from each value to the next, on which errors are measured. (n − 1, J)
-        weights: solid angle of each band. (J,)
-        max_nodes: how many nodes at most. tolerance: stop at this error.
-    Cost: O(n · most² · J) time.
+        values: ascending, ends included. curves: at `values`.
+        midpoint_curves: curves halfway from each value to the next, where errors are measured.
+        weights: solid angle of each band.
+        max_nodes: maximum number of nodes. tolerance: stop at this error.
+    Cost: O(n · max_nodes² · J) time.
     """
     band_weights = weights / weights.sum()
     min_floor = _FLOOR_PER_MAX_MEAN * float((curves @ band_weights).max())
@@ -72,7 +75,7 @@ def choose_nodes(
         nodes = CurveNodes(values[node_indices], curves[node_indices], band_weights, min_floor, np.inf)
         errors = np.array([_fit(nodes.curves, curve, nodes.floor(curve))[1] for curve in midpoint_curves])
         error = float(errors.max())
-        # many at once, as long as they are all of use
+        # add several nodes at once while the error is far above the tolerance
         batch_size = len(node_indices) // 5 if error > _BATCH_ERROR_RATIO * tolerance else 1
         num = 0 if error <= tolerance else min(max(1, batch_size), max_nodes - len(node_indices))
         new_indices = _worst_neighbors(errors, node_indices, num)
@@ -82,7 +85,7 @@ def choose_nodes(
 
 
 def _worst_neighbors(errors: F64, node_indices: list[int], num: int) -> list[int]:
-    """At most so many values that are no nodes yet, each beside one of the worst errors, the worst first.
+    """At most `num` values that are not nodes yet, each next to one of the largest errors, in descending order.
 
     Args:
         errors: halfway from each value to the next. (n − 1,)
@@ -98,12 +101,12 @@ def _worst_neighbors(errors: F64, node_indices: list[int], num: int) -> list[int
 
 
 def _fit(node_curves: F64, curve: F64, floor: float) -> tuple[F64, float]:
-    """Coefficients of a curve (J,) in some (k, J), and the largest error of a band.
+    """Coefficients of a curve (J,) in `node_curves` (k, J), and the largest relative error of a band.
 
-    Least squares of the relative errors, with more weight, a few times, where they were large. Each node's part is
-    scaled to be one at most, so that sharp nodes are cheap only where the curve is sharp too.
+    Iteratively reweighted least squares of the relative errors; large errors get more weight. Each node's scaled curve
+    is normalized to a maximum of one, so that the ridge makes sharp nodes cheap only where the curve is sharp too.
     """
-    if floor <= 0:  # the parameter makes nothing of its curves, anywhere
+    if floor <= 0:  # all curves of the parameter are zero
         return np.zeros(len(node_curves)), 0.0
     scale = 1 / (curve + floor)
     scaled_curves, target = node_curves * scale, curve * scale

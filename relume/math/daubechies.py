@@ -1,7 +1,7 @@
-"""Daubechies wavelets with four taps on bands: orthonormal, periodic; what incremental rendering keeps few of.
+"""Daubechies wavelets with four taps on bands: orthonormal, periodic; incremental rendering uses few coefficients.
 
-PyWavelets' `db2` in mode `periodization`, decomposed as deep as the taps allow (four coarsest coefficients). Order of
-coefficients: its `wavedec`, one after another: coarse, then details from coarse to fine.
+PyWavelets' `db2` in mode `periodization`, decomposed as deep as the taps allow (four coarsest coefficients).
+Coefficients are in the order of its `wavedec`: coarse, then details from coarse to fine.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from functools import lru_cache
 import numba as nb
 import numpy as np
 import pywt
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import ShapeMismatchError
@@ -29,16 +30,16 @@ def _num_levels(num_bands: int) -> int:
     return num_bands.bit_length() - _COARSEST.bit_length()
 
 
-def analysis(bands: F64) -> F64:
-    """Coefficients of band values, along the last axis. (..., J) -> (..., J) float64"""
+def analysis(bands: Shaped[F64, "*batch J"]) -> Shaped[F64, "*batch J"]:
+    """Wavelet coefficients of band values, along the last axis."""
     num_levels = _num_levels(bands.shape[-1])
     if num_levels == 0:
         return np.array(bands)
     return np.concatenate(pywt.wavedec(bands, _WAVELET, mode=_MODE, level=num_levels, axis=-1), axis=-1)
 
 
-def synthesis(coefficients: F64) -> F64:
-    """Band values of coefficients, along the last axis; the inverse of `analysis`. (..., J) -> (..., J) float64"""
+def synthesis(coefficients: Shaped[F64, "*batch J"]) -> Shaped[F64, "*batch J"]:
+    """Band values of wavelet coefficients, along the last axis; the inverse of `analysis`."""
     num_levels = _num_levels(coefficients.shape[-1])
     if num_levels == 0:
         return np.array(coefficients)
@@ -48,8 +49,8 @@ def synthesis(coefficients: F64) -> F64:
 
 
 @lru_cache(maxsize=16)
-def matrix(num_bands: int) -> F32:
-    """The orthonormal M with analysis(c) = M @ c; its rows are the basis functions. (J, J) float32, read-only"""
+def matrix(num_bands: int) -> Shaped[F32, "J J"]:
+    """Orthonormal M with analysis(c) = M @ c; its rows are the basis functions. Read-only."""
     basis = analysis(np.eye(num_bands)).T.astype(np.float32)
     basis.flags.writeable = False
     return basis
@@ -60,7 +61,7 @@ _H0, _H1, _H2, _H3 = (np.float32(tap) for tap in pywt.Wavelet(_WAVELET).dec_lo)
 
 @nb.njit("void(float32[:, ::1])", nogil=True, cache=True)
 def forward(block):  # type: ignore[no-untyped-def]
-    """`analysis` of each row, in place, for the transport vectors.
+    """Apply `analysis` to each row, in place, for the transport vectors.
 
     Args:
         block: J a power of two, at least 4. (n, J) float32, C-contiguous, overwritten by coefficients.

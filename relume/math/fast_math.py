@@ -1,4 +1,4 @@
-"""Inverse functions of angles and logarithms by polynomials: libm's are calls, which keep loops from vector code."""
+"""Polynomials for inverse trigonometric functions and logarithms: calls of libm prevent vectorization of loops."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def acos_clamped(x):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def azimuth_fraction(x, y):  # type: ignore[no-untyped-def]
-    """Share of a turn from the x axis, in [0, 1] where 1 is 0; error below 1e-7 (Abramowitz and Stegun 4.4.49)."""
+    """Azimuth from the x axis divided by 2π, in [0, 1], 1 being 0; error below 1e-7 (Abramowitz and Stegun 4.4.49)."""
     across, along = abs(y), abs(x)
     t = min(across, along) / max(max(across, along), _EPSILON)
     t2 = t * t
@@ -48,9 +48,9 @@ def azimuth_fraction(x, y):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def fast_log2(x):  # type: ignore[no-untyped-def]
-    """Logarithm to base 2 of a float32 that is 1 or more; error below 1e-6, exact for powers of 2.
+    """Base-2 logarithm of a float32 ≥ 1; error below 1e-6, exact for powers of 2.
 
-    Of a mantissa 1 + t it is t (1 + (t − 1) q(t)), q by least squares.
+    For a mantissa 1 + t it is t (1 + (t − 1) q(t)), with q from least squares.
     """
     bits = np.float32(x).view(np.int32)
     t = np.int32((bits & 0x7FFFFF) | 0x3F800000).view(np.float32) - _ONE

@@ -1,37 +1,38 @@
-"""Local PCA: rows in clusters, a mean and a few components for each (Kambhatla 1997; Müller 2003)."""
+"""Local PCA: rows in clusters, with a mean and a few components per cluster (Kambhatla 1997; Müller 2003)."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_ROUNDS = 6  # by means alone, then with components
+_ROUNDS = 6  # with means only, then with components
 
 
 class Clusters(NamedTuple):
     """Clusters of rows (n, R).
 
     Attributes:
-        cluster_index: which of K each row is in. (n,)
-        mean: (K, R) float32. components: orthonormal, the strongest first; nothing where there are no more. (K, C, R)
+        cluster_index: cluster of each row, below K. mean: of each cluster.
+        components: orthonormal, the strongest first; zeros if a cluster has fewer.
     """
 
-    cluster_index: NDArray[np.intp]
-    mean: F32
-    components: F32
+    cluster_index: Shaped[NDArray[np.intp], " n"]
+    mean: Shaped[F32, "K R"]
+    components: Shaped[F32, "K C R"]
 
 
-def cluster(rows: F32, num_clusters: int, num_components: int, rng: np.random.Generator) -> Clusters:
-    """Cluster rows by how well each cluster's mean and components tell them; the nearest means are the start.
+def cluster(rows: Shaped[F32, "n R"], num_clusters: int, num_components: int, rng: np.random.Generator) -> Clusters:
+    """Cluster rows by their reconstruction error, starting from the nearest means.
 
     Args:
-        rows: (n, R) float32. num_clusters: at most. num_components: C of each.
-        rng: chooses the first means.
+        rows: data. num_clusters: maximum number. num_components: C of each cluster.
+        rng: chooses the initial means.
     """
     centers = _choose_distant_rows(rows, num_clusters, rng)
     num = len(centers)
@@ -51,7 +52,7 @@ def cluster(rows: F32, num_clusters: int, num_components: int, rng: np.random.Ge
 
 
 def _choose_distant_rows(rows: F32, num: int, rng: np.random.Generator) -> F32:
-    """Choose rows that are unlike each other (k-means++)."""
+    """Choose distant rows as initial means (k-means++)."""
     indices = [int(rng.integers(len(rows)))]
     distance = ((rows - rows[indices[0]]) ** 2).sum(axis=1)
     while len(indices) < num and distance.max() > 0:
@@ -61,7 +62,7 @@ def _choose_distant_rows(rows: F32, num: int, rng: np.random.Generator) -> F32:
 
 
 def _means(rows: F32, cluster_index: NDArray[np.intp], num_clusters: int) -> F32:
-    """Mean of each cluster, of all rows where it is empty. (K, R)"""
+    """Mean of each cluster; the mean of all rows for an empty cluster. (K, R)"""
     overall_mean = rows.mean(axis=0)
     return np.stack(
         [
@@ -72,7 +73,7 @@ def _means(rows: F32, cluster_index: NDArray[np.intp], num_clusters: int) -> F32
 
 
 def _components(rows: F32, cluster_index: NDArray[np.intp], num_clusters: int, num: int) -> Clusters:
-    """Mean and components of each cluster; one that is empty has those of all rows."""
+    """Mean and components of each cluster; those of all rows for an empty cluster."""
     mean = _means(rows, cluster_index, num_clusters)
     components = np.zeros((num_clusters, num, rows.shape[1]), np.float32)
     for k in range(num_clusters):
@@ -82,37 +83,37 @@ def _components(rows: F32, cluster_index: NDArray[np.intp], num_clusters: int, n
     return Clusters(cluster_index, mean, components)
 
 
-def leading_components(rows: F32, num: int) -> F32:
-    """Find where rows (n, R) reach farthest, orthonormal. (≤ num, R)"""
-    if len(rows) < rows.shape[1]:  # then the vectors of their other side are fewer
-        exact = rows.astype(np.float64)  # what is found is divided by its length, which may be little
+def leading_components(rows: Shaped[F32, "n R"], num: int) -> Shaped[F32, "components R"]:
+    """Orthonormal directions of the largest variance of centered rows, at most `num`."""
+    if len(rows) < rows.shape[1]:  # then the Gram matrix of rows is smaller
+        exact = rows.astype(np.float64)  # the eigenvectors are divided by their lengths, which may be small
         eigenvectors = _leading_eigenvectors(exact @ exact.T, num) @ exact
         return np.ascontiguousarray(eigenvectors / np.linalg.norm(eigenvectors, axis=1, keepdims=True), np.float32)
     return np.ascontiguousarray(_leading_eigenvectors((rows.T @ rows).astype(np.float64), num), np.float32)
 
 
 def _leading_eigenvectors(symmetric: F64, num: int) -> F64:
-    """Find the eigenvectors of the largest eigenvalues, those of next to nothing left out. (≤ num, n)"""
+    """Eigenvectors of the largest eigenvalues, without those of nearly zero. (≤ num, n)"""
     values, vectors = np.linalg.eigh(symmetric)
     is_significant = values[::-1][:num] > 1e-9 * max(float(values.max(initial=0)), 1e-30)
     return np.asarray(vectors[:, ::-1][:, :num].T[is_significant])
 
 
 def _relative_squared_distances(rows: F32, centers: F32) -> F32:
-    """Squares of distances, but for what is the same for all centres. (n, K)"""
+    """Squared distances up to a term that is the same for all centers. (n, K)"""
     return np.asarray((centers**2).sum(axis=1) - 2 * rows @ centers.T)
 
 
-def distances(rows: F32, clusters: Clusters) -> F32:
-    """What means and components of each cluster miss of rows, squared. (n, K)"""
+def distances(rows: Shaped[F32, "n R"], clusters: Clusters) -> Shaped[F32, "n K"]:
+    """Squared reconstruction error of each row by each cluster's mean and components."""
     out = (rows**2).sum(axis=1)[:, None] + _relative_squared_distances(rows, clusters.mean)
     for k, (mean, components) in enumerate(zip(clusters.mean, clusters.components, strict=True)):
         out[:, k] -= ((rows @ components.T - components @ mean) ** 2).sum(axis=1)
     return np.asarray(out, np.float32)
 
 
-def residual_energy(rows: F32, clusters: Clusters) -> F64:
-    """What clusters miss of all rows, squared, by how many components are used, from none on. (C + 1,)"""
+def residual_energy(rows: Shaped[F32, "n R"], clusters: Clusters) -> Shaped[F64, " errors"]:
+    """Squared reconstruction error of all rows with 0, 1, … C components. (C + 1,)"""
     residual = np.zeros(1 + clusters.components.shape[1])
     for k, (mean, components) in enumerate(zip(clusters.mean, clusters.components, strict=True)):
         deviations = rows[clusters.cluster_index == k] - mean

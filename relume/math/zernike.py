@@ -1,11 +1,11 @@
-"""The in-basis: Zernike's polynomials, orthonormal over the hemisphere weighed by its cosine.
+"""Hemispherical (Zernike) basis: Zernike polynomials, orthonormal over the hemisphere with cosine weight.
 
-A direction (x, y, z) above a surface is a place (x, y) of the unit disc, and dx dy = cos θ dω. What is orthonormal on
-the disc keeps most of a BRDF by its cosine-weighted error:
+A direction (x, y, z) above a surface projects to (x, y) on the unit disk, and dx dy = cos θ dω. An orthonormal basis on
+the disk therefore minimizes the cosine-weighted error of a BRDF:
 
     h_nm(ω) = N_nm · (Re | Im)(x + iy)^m · P_s^(0,m)(2 (x² + y²) − 1),   s = (n − m) / 2,   N² = (n + 1) (1 or 2) / π
 
-with Jacobi's polynomials P. They are nested: those of degree n ≤ N are the first (N + 1)(N + 2) / 2
+with Jacobi polynomials P. The functions are nested: those of degree n ≤ N are the first (N + 1)(N + 2) / 2
 (docs/free-camera.md#the-zernike-basis).
 """
 
@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -25,45 +26,46 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 DEGREE = 7
-OUTGOING_DEGREE = 6  # of those by which surfaces send light to each other
-FAST_DEGREE = 4  # of those in which light is followed while a hand moves it
+OUTGOING_DEGREE = 6  # for reflection between surfaces
+FAST_DEGREE = 4  # for indirect light during a drag
 NUM_FUNCTIONS = (DEGREE + 1) * (DEGREE + 2) // 2  # K
 DEGREES = np.repeat(np.arange(DEGREE + 1), np.arange(DEGREE + 1) + 1)
 """Degree of each function. (K,)"""
 WINDOW_DECAY = 1 / (2 * 8.0**2)
-"""1 / 2d², d = 8, of windows e^(−n (n + 2) / 2d²). Functions cut off at a degree ring beside what is bright; a window
-takes a part of that away for a little blur (docs/free-camera.md#highlights, docs/indirect-light.md#bounces)."""
-BATCH_RAYS = 128  # rays that `add_light` takes; all columns of them stay in the first cache
+"""1 / 2d², d = 8, of windows e^(−n (n + 2) / 2d²). Truncation at a degree causes ringing around bright features; a
+window removes a part of it for a little blur (docs/free-camera.md#highlights, docs/indirect-light.md#bounces).
+"""
+BATCH_RAYS = 128  # maximum number of rays per call of `accumulate`; all their columns fit in the L1 cache
 WI, LIGHT, _X, _RE, _IM, _BEFORE, _LAST, NUM_COLUMNS = 0, *(BATCH_RAYS * k for k in (2, 5, 6, 7, 8, 9)), 10
-"""Where the columns of `add_light` begin, and how many there are."""
+"""Offsets of the columns of `accumulate`, and their number."""
 
 
 class Recurrence(NamedTuple):
-    """How functions follow from each other; one rung for each degree n and order m ≥ 0, orders outermost.
+    """Recurrence table of the basis: one row for each degree n and order m ≥ 0, sorted by order.
 
     Attributes:
-        order: m. (rungs,) int32. norm: N. (rungs,) float32
-        cosine, sine: which of the K functions its two parts are; the same where m is 0. (rungs,) int32
-        a, b, c: P_s = (a · x + b) P_(s−1) − c P_(s−2), with P_0 = 1; `a` is 0 where s is. (rungs,) float32
+        order: m. norm: N.
+        cosine, sine: basis indices of the two functions of the row; equal if m is 0.
+        a, b, c: P_s = (a · x + b) P_(s−1) − c P_(s−2), with P_0 = 1; `a` is 0 if s is 0.
     """
 
-    order: NDArray[np.int32]
-    norm: F32
-    cosine: NDArray[np.int32]
-    sine: NDArray[np.int32]
-    a: F32
-    b: F32
-    c: F32
+    order: Shaped[NDArray[np.int32], " rows"]
+    norm: Shaped[F32, " rows"]
+    cosine: Shaped[NDArray[np.int32], " rows"]
+    sine: Shaped[NDArray[np.int32], " rows"]
+    a: Shaped[F32, " rows"]
+    b: Shaped[F32, " rows"]
+    c: Shaped[F32, " rows"]
 
 
 def num_functions(degree: int) -> int:
-    """How many functions have at most a degree."""
+    """Number of functions up to a degree."""
     return (degree + 1) * (degree + 2) // 2
 
 
 @lru_cache(maxsize=DEGREE + 1)
 def recurrence(degree: int = DEGREE) -> Recurrence:
-    """The rungs of all functions up to a degree, at most `DEGREE`."""
+    """Recurrence table of all functions up to a degree, at most `DEGREE`."""
     rows: list[tuple[float, ...]] = []
     for m in range(degree + 1):
         for s, n in enumerate(range(m, degree + 1, 2)):
@@ -87,14 +89,8 @@ def _recurrence(s: int, m: int) -> tuple[float, float, float]:
     return (t - 1) * t * (t - 2) / divisor, -(t - 1) * m * m / divisor, 2 * (s - 1) * (s + m - 1) * t / divisor
 
 
-def project(wi: F64) -> F64:
-    """Evaluate all functions.
-
-    Args:
-        wi: local directions, unit, z = normal. (..., 3)
-    Returns:
-        (..., K) float64, zero below the horizon
-    """
+def project(wi: Shaped[F64, "*batch 3"]) -> Shaped[F64, "*batch K"]:
+    """Evaluate all basis functions at local unit directions, z = normal; zero below the horizon."""
     table, power = recurrence(), np.ones(wi.shape[:-1], np.complex128)
     disk_point = wi[..., 0] + 1j * wi[..., 1]
     x = 2 * np.abs(disk_point) ** 2 - 1
@@ -114,15 +110,15 @@ def project(wi: F64) -> F64:
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def accumulate(table, num, columns, out):  # type: ignore[no-untyped-def]
-    """Add the light of rays to a point's light vector, t_k += Σ w h_k(ωi).
+    """Add the light of rays to a point's incident radiance coefficients, t_k += Σ w h_k(ωi).
 
-    Columns lie in one flat array at constant places: of several arrays nobody could tell that they are not the same
-    memory, and loops would be of one ray at a time.
+    The columns are slices of one flat array at constant offsets: with several arrays the compiler could not exclude
+    aliasing and would process one ray at a time.
 
     Args:
-        table: the `recurrence`. num: how many rays there are, at most `BATCH_RAYS`.
-        columns: from `WI` on x and y of their local directions, from `LIGHT` on their light in each channel; the others
-            are written. (NUM_COLUMNS · AT_ONCE,) float32
+        table: the `recurrence`. num: number of rays, at most `BATCH_RAYS`.
+        columns: from `WI`, x and y of the local directions; from `LIGHT`, the weighted light per channel; the rest is
+            scratch. (NUM_COLUMNS · BATCH_RAYS,) float32
         out: added to. (3, K) float32
     """
     for n in range(num):
@@ -131,7 +127,7 @@ def accumulate(table, num, columns, out):  # type: ignore[no-untyped-def]
         columns[_RE + n], columns[_IM + n] = np.float32(1), np.float32(0)
     for row in range(table.order.shape[0]):
         a, b, c, m = table.a[row], table.b[row], table.c[row], table.order[row]
-        if a == 0:  # the first of its order
+        if a == 0:  # the first row of its order
             for n in range(num):
                 columns[_BEFORE + n], columns[_LAST + n] = np.float32(0), np.float32(1)
             if m > 0:
@@ -150,11 +146,11 @@ def accumulate(table, num, columns, out):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def evaluate_basis(table, num, wi, scratch, out):  # type: ignore[no-untyped-def]
-    """Evaluate all functions for some rays.
+    """Evaluate all basis functions for some rays.
 
     Args:
-        table: the `recurrence`. num: how many rays there are. wi: their local directions. (≥ 2, ≥ num) float32
-        scratch: (≥ 5, ≥ num) float32, written. out: written. (K, ≥ num) float32
+        table: the `recurrence`. num: number of rays. wi: x and y of local directions. (≥ 2, ≥ num) float32
+        scratch: (≥ 5, ≥ num) float32. out: output. (K, ≥ num) float32
     """
     x, re, im, before, last = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
     _start_recurrence(num, wi, x)
@@ -175,7 +171,7 @@ def _start_recurrence(num, wi, x):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _advance_recurrence(table, row, num, wi, x, re, im, before, last):  # type: ignore[no-untyped-def]
-    """Go from the rung before to this one."""
+    """Advance the recurrence by one row."""
     a, b, c = table.a[row], table.b[row], table.c[row]
     if a == 0:
         _next_power(table.order[row], num, wi, re, im)
@@ -202,7 +198,7 @@ def _next_power(m, num, wi, re, im):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", inline="always")
 def _add(num, columns, power_offset, norm, k, out):  # type: ignore[no-untyped-def]
-    """Add what rays bring of function k. part: where the column of its real or imaginary power begins."""
+    """Add the rays' light times basis function k. power_offset: column of the real or imaginary power."""
     red = green = blue = np.float32(0)
     for n in range(num):
         value = columns[_LAST + n] * columns[power_offset + n]

@@ -1,10 +1,11 @@
-"""One picture without a session: batch renders, `relume render`, thumbnails."""
+"""Rendering of single images without a session: batch renders, `relume render`, thumbnails."""
 
 from __future__ import annotations
 
 from typing import cast
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import PlanError
@@ -31,22 +32,21 @@ def render_image(
     for_display: bool = False,
     camera_and_size: tuple[Camera, tuple[int, int]] | None = None,
     static_views: StaticViewBuilder | None = None,
-) -> NDArray[np.float32]:
-    """Render a look exactly; what is made for it is kept in passing in the memory that the bake was opened with.
+) -> Shaped[NDArray[np.float32], "height width channels"]:
+    """Render a look exactly; intermediate results are transient entries of the cache of the bake.
 
     Args:
-        transfer: an opened bake. view_name: one of its views.
-        size: width and height; None means the baked one, and none else is possible where the view is fixed.
-        progress: called with about the share done. is_canceled: asked now and then.
-        for_display: coverage is for laying it over display values, as PNG and WebP are; see `Backdrop.alpha`.
-        camera_and_size: of a bake whose eyes move: another camera than the view's, and the size of its picture.
-        static_views: of such a bake: makes the picture exact; None: it is as true as the picture that moves.
+        transfer: an opened bake. view_name: one of its views. look: the look.
+        size: width and height; None means the baked size, the only one possible for a fixed camera.
+        progress: called with the approximate finished fraction. is_canceled: called regularly.
+        for_display: coverage is for compositing of display values, as in PNG and WebP.
+        camera_and_size: for a bake with a free camera: another camera than the view's, and the size of the image.
+        static_views: for such a bake: makes the image exact; None: it equals the free-camera image.
     Returns:
-        Linear radiance; where the look's background is transparent, coverage as a fourth channel, which the others
-        are multiplied by already. (height, width, 3 or 4) float32
+        Linear radiance; for a transparent background, coverage as a fourth channel, with premultiplied color.
     Raises:
-        PlanError: another size than the baked one.
-        CancelledError: `is_canceled` said so.
+        PlanError: the size differs from the baked one.
+        CancelledError: `is_canceled` returned true.
     """
     view = transfer.views[view_name]
     if isinstance(transfer, BakedFreeCamera):
@@ -71,14 +71,16 @@ def _pixels(picture: Picture | FreeCameraPicture, for_display: bool) -> NDArray[
     return image if alpha is None else np.dstack([image, alpha])
 
 
-def render_small(transfer: OpenBake, view_name: str, look: Look, width: int) -> NDArray[np.float32]:
-    """Render a look at no more pixels than a small picture needs: whole steps of the baked ones are left out.
+def render_small(
+    transfer: OpenBake, view_name: str, look: Look, width: int
+) -> Shaped[NDArray[np.float32], "h w channels"]:
+    """Render a look with only as many pixels as a small image needs, a whole fraction of the baked ones.
 
     Args:
-        transfer: an opened bake. view_name: one of its views.
-        width: of the small picture.
+        transfer: an opened bake. view_name: one of its views. look: the look.
+        width: of the small image.
     Returns:
-        Linear radiance, at least `width` wide where the bake is. (h, w, 3) float32
+        Linear radiance, at least `width` wide if the bake is.
     """
     view = transfer.views[view_name]
     step = max(1, view.width // width)
@@ -93,7 +95,7 @@ def render_small(transfer: OpenBake, view_name: str, look: Look, width: int) -> 
 def _render_free_camera(
     transfer: BakedFreeCamera, view_name: str, look: Look, camera_and_size: tuple[Camera, tuple[int, int]]
 ) -> FreeCameraPicture:
-    """What is seen while the eye moves."""
+    """Render the free-camera image."""
     picture = FreeCameraPicture(transfer, view_name)
     picture.set_look(look)
     picture.set_camera(*camera_and_size)

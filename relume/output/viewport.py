@@ -1,4 +1,4 @@
-"""What cameras are placed by: the scene in plain colours, from anywhere, before anything is baked."""
+"""Camera placement viewport: the scene in plain colors, from any camera, before anything is baked."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.albedo import pack_reflectance, scatters_diffusely, unpack_reflectance
@@ -23,29 +24,29 @@ from relume.scene_io.gltf.cameras import framing_camera
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_AMBIENT, _HEADLIGHT, _SKYLIGHT = 0.25, 0.45, 0.4  # shares of what a surface shows at most
+_AMBIENT, _HEADLIGHT, _SKYLIGHT = 0.25, 0.45, 0.4  # maximum shading by each light
 _MIN_COLOR = 0.04  # linear; black surfaces would show no shape
 _BACKGROUND = 0.03
 
 
 @dataclass(frozen=True)
 class Viewport:
-    """A scene as cameras are placed in it.
+    """A scene for camera placement.
 
     Attributes:
-        colors: of the materials, linear. (materials, 3) float32
-        default_camera: a camera that sees all of it. bounds_min, bounds_max: its corners, metres. (3,)
+        colors: of the materials, linear.
+        default_camera: a camera that frames the scene. bounds_min, bounds_max: corners of its bounds, meters.
     """
 
     geometry: SceneBuffers
-    colors: F32
+    colors: Shaped[F32, "materials 3"]
     default_camera: Camera
-    bounds_min: F64
-    bounds_max: F64
+    bounds_min: Shaped[F64, " 3"]
+    bounds_max: Shaped[F64, " 3"]
 
     @classmethod
     def from_scene(cls, scene: Scene) -> Viewport:
-        """Build the search tree, and find out what is where."""
+        """Build the acceleration structure, and compute bounds and colors."""
         geometry = build_scene_buffers(scene)
         terms = default_look(scene.materials, scene.lights)["materials"]
         colors = [_color(material, terms[material.name]["terms"]) for material in scene.materials]
@@ -58,13 +59,11 @@ class Viewport:
             corners.max(axis=0).astype(np.float64),
         )
 
-    def image(self, camera: Camera, size: tuple[int, int]) -> NDArray[np.uint8]:
-        """Draw what a camera sees, lit from the eye and from above.
+    def image(self, camera: Camera, size: tuple[int, int]) -> Shaped[NDArray[np.uint8], "height width 3"]:
+        """Render display values for a camera, with light from the camera and from above.
 
         Args:
             camera: any. size: width and height in pixels.
-        Returns:
-            Display values. (height, width, 3) uint8
         """
         width, height = size
         y, x = np.divmod(np.arange(width * height, dtype=np.int64), width)
@@ -76,22 +75,20 @@ class Viewport:
         return np.asarray(np.rint(255 * srgb_encode(colors)), np.uint8).reshape(height, width, 3)
 
     def _shade(self, face: NDArray[np.int32], uv: F32, directions: F32) -> F32:
-        """Shade hits by their normals alone; `surface_at` finds more, and takes several times as long. (n, 3)"""
+        """Shade hits by their normals alone; `surface_at` computes more and takes several times as long. (n, 3)"""
         corners, (u, v) = self.geometry.normals[self.geometry.faces[face]], uv.T[:, :, None]
         normal = (1 - u - v) * corners[:, 0] + u * corners[:, 1] + v * corners[:, 2]
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         cosine = -np.einsum("nc,nc->n", normal, directions)
-        upward = normal[:, 1] * np.sign(cosine)  # of the side that is seen
+        upward = normal[:, 1] * np.sign(cosine)  # of the visible side
         shading = _AMBIENT + _HEADLIGHT * np.abs(cosine) + _SKYLIGHT * (0.5 + 0.5 * upward)
         return np.asarray(self.colors[self.geometry.face_material[face]] * shading[:, None], np.float32)
 
-    def point_at(self, camera: Camera, size: tuple[int, int], x: float, y: float) -> F64 | None:
-        """Find the place that a position of the picture shows; None where that is the background.
+    def point_at(self, camera: Camera, size: tuple[int, int], x: float, y: float) -> Shaped[F64, " 3"] | None:
+        """Find the surface point at an image position, in world space, meters; None for the background.
 
         Args:
             camera: any. size: width and height in pixels. x, y: pixels from the left and from the top.
-        Returns:
-            World space, metres. (3,)
         """
         directions = camera_directions(camera, size, np.array([x], np.float32), np.array([y], np.float32))
         hits = self._trace(camera, directions)
@@ -104,7 +101,7 @@ class Viewport:
 
 
 def _color(material: Material, terms: Sequence[Mapping[str, Any]]) -> F64:
-    """About what a material looks like: its diffuse colour, else that of its highlights. (3,)"""
+    """Approximate color of a material: its diffuse color, else that of its highlights. (3,)"""
     constant, *textured_reflectances = unpack_reflectance(pack_reflectance(list(filter(scatters_diffusely, terms))))[
         ..., 0
     ].astype(np.float64)

@@ -1,9 +1,9 @@
-"""What Embree asks while it traces: is the surface there, where a ray meets a triangle that rays may pass?
+"""Embree filter function for alpha-tested, blended and glass surfaces.
 
-One function for all such triangles of a scene; Embree calls it with a packet's hits and takes back which of them
-count. A surface that blends is there for the share of rays that its opacity says. Which rays those are, their chance
-decides: a number that the caller gives an eye's rays, so that those of a pixel share out the opacity evenly; of others
-it follows from their direction: the same ray finds the same, in any packet. Rays that are given one always meet glass.
+One function for all such triangles of a scene; Embree calls it with the hits of a packet, and it rejects hits. A
+blended surface stops a fraction of rays equal to its opacity. A ray's alpha sample decides: the caller gives camera
+rays stratified samples, so that the rays of a pixel divide by opacity; for other rays it is a hash of the direction, so
+that a ray has the same result in any packet. Rays with a given alpha sample always hit glass.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
@@ -27,43 +28,43 @@ from relume.raytrace.texture import two_texels
 F32 = NDArray[np.float32]
 U32 = NDArray[np.uint32]
 
-_DIRECTION, _TIME = 4, 7  # rows of RTCRayN; triangles that do not move have no other use for the time
+_DIRECTION, _TIME = 4, 7  # rows of RTCRayN; the time is free for the alpha sample, because triangles do not move
 _U, _V, _PRIMITIVE = 3, 4, 5  # rows of RTCHitN
 _RED, _GREEN, _BLUE = (np.float32(share) for share in LUMINANCE)
-_MAX_ALPHA_SAMPLE = np.float32(254.5 / 255)  # a chance that texels of 255 reach, however they are rounded
-# chances of rays that are stopped by whatever is there a little, of those that only what is wholly there stops, and of
-# those that see no glass, and else what their direction makes them see
+_MAX_ALPHA_SAMPLE = np.float32(254.5 / 255)  # below the opacity of texels of 255, however it is rounded
+# alpha samples of rays that stop at any partly opaque surface, of rays that stop only at opaque surfaces, and of rays
+# that ignore glass and otherwise use the hash of their direction
 STOP_AT_PARTIAL, STOP_AT_OPAQUE, IGNORE_GLASS = np.float32(-1), np.float32(2), np.float32(-2)
-# of rays that only light of one channel takes
+# of rays for the light of one channel
 ONE_CHANNEL = np.array([-3, -4, -5], np.float32)
 _LAST_CHANNEL = ONE_CHANNEL[2]
-# of rays that tinted glass stops, and from then on of those that glass of one more group of tints lets pass altogether
+# of rays that tinted glass stops; each further value lets one more group of tints pass all light
 PASS_TINT_GROUPS = np.array([-6 - group for group in range(MAX_TINTS + 1)], np.float32)
 _NO_GROUP = PASS_TINT_GROUPS[0]
 
 
 class AlphaTest(NamedTuple):
-    """What the filter reads, kept for as long as the scene that it belongs to.
+    """Data of the filter function; it must live as long as its Embree scene.
 
     Attributes:
-        addresses: of the arrays below and of those of the cut-outs. (8,) int64
-        image: row of `AlphaMasks.images` of each triangle, −1 where it has no holes. (faces,) int32
-        sheet: those of one number are passed by one chance: all of an image, but each piece of glass. (faces,) int32
-        faces: corners. (faces, 3) uint32. uvs: places of corners in textures. (corners, 2) float32
-        alpha_masks: the images. groups: of the tints of each, see `tint_groups`. (images,) int32
+        addresses: of the arrays below and of the arrays of `alpha_masks`.
+        image: row of `AlphaMasks.images` of each triangle, −1 if it is opaque.
+        sheet: triangles with the same number share one hash: all of an image, but each piece of glass has its own.
+        faces: corner indices. uvs: texture coordinates of the corners.
+        alpha_masks: the images. groups: tint group of each image, see `tint_groups`.
     """
 
-    addresses: NDArray[np.int64]
-    image: NDArray[np.int32]
-    sheet: NDArray[np.int32]
-    faces: U32
-    uvs: F32
+    addresses: Shaped[NDArray[np.int64], " 8"]
+    image: Shaped[NDArray[np.int32], " faces"]
+    sheet: Shaped[NDArray[np.int32], " faces"]
+    faces: Shaped[U32, "faces 3"]
+    uvs: Shaped[F32, "corners 2"]
     alpha_masks: AlphaMasks
-    groups: NDArray[np.int32]
+    groups: Shaped[NDArray[np.int32], " images"]
 
     @property
     def blends(self) -> bool:
-        """Whether some surface is there for a share of an eye's rays."""
+        """True if a surface stops only a fraction of the camera rays."""
         is_blended = self.alpha_masks.rules[:, 0] < 0
         first, height, width = self.alpha_masks.images[is_blended, :3].T
         return any(
@@ -72,14 +73,18 @@ class AlphaTest(NamedTuple):
 
     @classmethod
     def build(
-        cls, faces: U32, positions: F32, uvs: F32, face_material: NDArray[np.int32], alpha_masks: AlphaMasks
+        cls,
+        faces: Shaped[U32, "faces 3"],
+        positions: Shaped[F32, "vertices 3"],
+        uvs: Shaped[F32, "vertices 2"],
+        face_material: Shaped[NDArray[np.int32], " faces"],
+        alpha_masks: AlphaMasks,
     ) -> AlphaTest:
-        """Gather what the filter reads.
+        """Collect the data of the filter function.
 
         Args:
-            faces: (num_faces, 3) uint32 into the next two.
-            positions: (num_vertices, 3) float32. uvs: (num_vertices, 2) float32
-            face_material: (num_faces,) int32 into `alpha_masks.material_textures`. alpha_masks: the images.
+            faces: indices into `positions` and `uvs`. positions, uvs: of the vertices.
+            face_material: index into `alpha_masks.material_rule`. alpha_masks: the images.
         """
         image = np.ascontiguousarray(alpha_masks.material_rule[face_material], np.int32)
         faces, uvs = np.ascontiguousarray(faces, np.uint32), np.ascontiguousarray(uvs, np.float32)
@@ -97,9 +102,9 @@ class AlphaTest(NamedTuple):
 
 
 def _number_sheets(positions: F32, faces: U32, image: NDArray[np.int32], alpha_masks: AlphaMasks) -> NDArray[np.int32]:
-    """The image of each triangle; of pieces of glass that do not touch its first, numbers of their own. (faces,)
+    """Sheet of each triangle: the row of its image, or a separate number per connected piece of glass. (faces,)
 
-    Panes one behind the other absorb as two.
+    Separate numbers let two glass surfaces in a row absorb independently.
     """
     sheet, (first, num) = image.copy(), (len(alpha_masks.rules), 0)
     for row in np.flatnonzero(alpha_masks.rules[:, 0] == GLASS_RULE):
@@ -128,7 +133,7 @@ _array: Any = nb.carray  # type: ignore[attr-defined]  # an array over the memor
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _opacity(image, texels, u, v):  # type: ignore[no-untyped-def]
-    """Look opacity up, between four texels. image: of `AlphaMasks.images`. u, v: v from the top"""
+    """Bilinear lookup of the opacity. image: row of `AlphaMasks.images`. u, v: v from the top"""
     first, height, width = image[0], image[1], image[2]
     left, right, x = two_texels(image[3], u, width)
     above, below, y = two_texels(image[4], v, height)
@@ -141,7 +146,7 @@ def _opacity(image, texels, u, v):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _hash_bits(bits):  # type: ignore[no-untyped-def]
-    """Mix the bits of a word (the finaliser of MurmurHash3). uint32"""
+    """Mix the bits of a word (the finalizer of MurmurHash3). uint32"""
     bits = np.uint32((bits ^ (bits >> np.uint32(16))) * np.uint32(0x85EBCA6B))  # a product of two has 64 bits
     bits = np.uint32((bits ^ (bits >> np.uint32(13))) * np.uint32(0xC2B2AE35))
     return np.uint32(bits ^ (bits >> np.uint32(16)))
@@ -149,10 +154,10 @@ def _hash_bits(bits):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def _alpha_sample(alpha_sample, face, sheet, x, y, z, is_back_face):  # type: ignore[no-untyped-def]
-    """A number in (0, 1) for a ray that meets a surface that blends: the given one, or one of its direction (x, y, z).
+    """Alpha sample in (0, 1) of a ray at a blended surface: the given one, or a hash of its direction (x, y, z).
 
-    A given one moves with the face: what a ray met before says nothing about what it meets behind that. All rays to
-    one light have one direction and so one chance, at fronts and at backs of each sheet: shadows of panes are even.
+    A given sample is shifted per face, so that successive surfaces are independent. All rays to one light have one
+    direction and so the same sample at the front or back of each sheet: shadows of glass have no noise.
     """
     if alpha_sample == STOP_AT_PARTIAL:
         return np.float32(1 / 512)
@@ -174,7 +179,7 @@ def _schlick(cosine, f0):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", inline="always")
 def _glass_transmittance(rule, alpha_sample):  # type: ignore[no-untyped-def]
-    """What a side of glass lets pass but for what it reflects: of a channel, or of luminance. rule: of `AlphaMasks`"""
+    """Transmittance of a glass surface without the Fresnel reflectance: of a channel, or the luminance."""
     if _LAST_CHANNEL <= alpha_sample < 0:
         return rule[np.int64(-alpha_sample) - 2]
     return _RED * rule[1] + _GREEN * rule[2] + _BLUE * rule[3]
@@ -182,7 +187,7 @@ def _glass_transmittance(rule, alpha_sample):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", inline="always")
 def _ignores_glass(group, alpha_sample):  # type: ignore[no-untyped-def]
-    """Whether glass lets all rays of a chance pass. group: of its tint, see `tint_groups`."""
+    """True if glass passes all rays with this alpha sample. group: of its tint, see `tint_groups`."""
     return alpha_sample == IGNORE_GLASS or (
         group > 0 and alpha_sample <= _NO_GROUP and np.float32(group) <= _NO_GROUP - alpha_sample
     )
@@ -190,7 +195,7 @@ def _ignores_glass(group, alpha_sample):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", inline="always")
 def _passes_fraction(group, alpha_sample):  # type: ignore[no-untyped-def]
-    """Whether glass lets a share of the rays of a chance pass, and else none. group: of its tint."""
+    """True if glass passes a fraction of the rays with this alpha sample, otherwise none. group: of its tint."""
     return (
         alpha_sample == 0 or _LAST_CHANNEL <= alpha_sample < IGNORE_GLASS or (alpha_sample <= _NO_GROUP and group == 0)
     )
@@ -198,7 +203,7 @@ def _passes_fraction(group, alpha_sample):  # type: ignore[no-untyped-def]
 
 @nb.cfunc("void(CPointer(int64))", cache=True, error_model="numpy")
 def _filter(arguments):  # type: ignore[no-untyped-def]
-    """RTCFilterFunctionN. arguments: valid, user pointer, context, ray, hit, and how many."""
+    """Implement RTCFilterFunctionN. arguments: valid, user pointer, context, ray, hit, and width."""
     pointers = _array(arguments, (6,))
     width = np.int64(np.uint32(pointers[5] & 0xFFFFFFFF))
     valid = _array(_to_pointer(pointers[0]), (width,), np.int32)
@@ -243,4 +248,4 @@ def _filter(arguments):  # type: ignore[no-untyped-def]
 
 
 FILTER = ctypes.c_void_p(_filter.address)
-"""What Embree calls."""
+"""Function pointer for Embree."""

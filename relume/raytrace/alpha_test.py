@@ -1,8 +1,8 @@
-"""Surfaces that rays may pass: which triangles are of them, and where.
+"""Alpha-tested, blended and glass surfaces: their triangles, opacity and tints.
 
-A material's opacity (`relume.scene.model.Opacity`) cuts: from a bound on, a surface is there; or it blends, and a
-surface is there for a share of the rays, its opacity. Glass is there for eyes, and for a share of light's rays. Rays
-find out while Embree traces them (`relume.raytrace.alpha_filter`), whatever they are traced for.
+A material's opacity (`relume.scene.model.Opacity`) has a cutoff, from which the surface is opaque, or blends: the
+surface stops a fraction of the rays equal to its opacity. Glass stops all camera rays, and a fraction of shadow rays.
+`relume.raytrace.alpha_filter` decides during traversal, for all rays.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import ChunkDamagedError
@@ -18,33 +19,30 @@ from relume.scene.model import WRAPS, Glass, Material, Opacity
 
 F32 = NDArray[np.float32]
 U32 = NDArray[np.uint32]
-BLEND_RULE, GLASS_RULE = -1.0, -2.0  # instead of a bound: shares of opacity; glass
-MAX_TINTS = 3  # groups of tints that are told from each other
-MIN_TINT_DIFFERENCE = (
-    0.05  # by how much the shares of channels differ at least that pass a side of glass which has a colour
-)
+BLEND_RULE, GLASS_RULE = -1.0, -2.0  # instead of a cutoff
+MAX_TINTS = 3  # groups of tints that are distinguished
+MIN_TINT_DIFFERENCE = 0.05  # between the channels' transmittances of a surface of tinted glass
 
 
 class AlphaMasks(NamedTuple):
-    """The opacity of a scene's materials.
+    """Opacity of a scene's materials.
 
     Attributes:
-        texels: opacity, 255 where a surface is there; images one after another, row after row. (texels,) uint8
-        images: first texel, height, width, how u and v continue. (num, 5) int64
-        rules: opacity from which a surface is there, or `BLEND_RULE`, or `GLASS_RULE`; then for glass the share of red,
-            green and blue that passes it but for what it reflects, the latter head-on, and how many sides it has.
-            (num, 6) float32
-        material_rule: row of the two above, −1 where nothing passes a material. (materials,) int32
+        texels: opacity, 255 is opaque; row-major images in sequence.
+        images: first texel, height, width, wrap modes of u and v.
+        rules: cutoff, or `BLEND_RULE`, or `GLASS_RULE`; then for glass the transmittance of red, green and blue without
+            Fresnel reflectance, the Fresnel reflectance at normal incidence, and the number of sides.
+        material_rule: row of `images` and `rules`, −1 for opaque materials.
     """
 
-    texels: NDArray[np.uint8]
-    images: NDArray[np.int64]
-    rules: F32
-    material_rule: NDArray[np.int32]
+    texels: Shaped[NDArray[np.uint8], " texels"]
+    images: Shaped[NDArray[np.int64], "images 5"]
+    rules: Shaped[F32, "images 6"]
+    material_rule: Shaped[NDArray[np.int32], " materials"]
 
 
 def collect_alpha_masks(materials: Sequence[Material]) -> AlphaMasks | None:
-    """Collect the opacity and the glass of materials; None where there is neither."""
+    """Collect the opacity and glass of materials; None if there is neither."""
     texels, images, rules = list[NDArray[np.uint8]](), list[list[int]](), list[tuple[float, ...]]()
     material_rule, num_texels = np.full(len(materials), -1, np.int32), 0
     for index, material in enumerate(materials):
@@ -63,16 +61,15 @@ def collect_alpha_masks(materials: Sequence[Material]) -> AlphaMasks | None:
 
 
 def is_tinted(glass: Glass) -> bool:
-    """Tell whether glass has a colour that its shadows show."""
+    """True if glass has a color that is visible in its shadows."""
     transmittance = _glass_rule(glass)[1:4]
     return max(transmittance) - min(transmittance) > MIN_TINT_DIFFERENCE
 
 
-def tint_groups(alpha_masks: AlphaMasks) -> NDArray[np.int32]:
-    """Number the tints of glass from 1 on: those that are nearly alike share a number, and all beyond the last do.
+def tint_groups(alpha_masks: AlphaMasks) -> Shaped[NDArray[np.int32], " images"]:
+    """Group the tints of glass images: similar tints share a number from 1; 0 has no tint.
 
-    Returns:
-        Of each image; 0 of what has no tint. (images,) int32
+    Tints beyond `MAX_TINTS` groups join the most similar group.
     """
     transmittance = alpha_masks.rules[:, 1:4]
     is_glass = alpha_masks.rules[:, 0] == GLASS_RULE
@@ -88,7 +85,7 @@ def tint_groups(alpha_masks: AlphaMasks) -> NDArray[np.int32]:
 
 
 def _glass_rule(glass: Glass) -> tuple[float, ...]:
-    """Half of what a solid absorbs at each of its two sides: light's rays do not know how long they were inside."""
+    """Rule of glass. Each side of a solid absorbs half, because shadow rays do not know their length inside."""
     transmittance = np.array(glass.tint) * np.exp(-np.array(glass.absorbed) * glass.thickness / 2)
     return (
         GLASS_RULE,
@@ -99,10 +96,10 @@ def _glass_rule(glass: Glass) -> tuple[float, ...]:
 
 
 def check_alpha_masks(arrays: Mapping[str, NDArray[Any]], num_materials: int) -> AlphaMasks:
-    """Make cut-outs of the arrays of a store, by the names of the fields.
+    """Make alpha masks of the arrays of a store, named like the fields.
 
     Raises:
-        ChunkDamagedError: they do not fit each other; rays would read beyond their ends.
+        ChunkDamagedError: their sizes do not match; rays would read out of bounds.
     """
     alpha_masks = AlphaMasks(*(np.ascontiguousarray(arrays[name]) for name in AlphaMasks._fields))
     shapes = (alpha_masks.images.shape, alpha_masks.rules.shape, alpha_masks.material_rule.shape)

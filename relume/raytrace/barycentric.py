@@ -1,10 +1,11 @@
-"""Places on triangles, off their edges and off their plane: where rays meet them, textures left out."""
+"""Points on triangles at ray hits, moved off edges and off the plane, without textures."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.raytrace.camera_rays import Hits
@@ -13,35 +14,35 @@ from relume.raytrace.tangents import unit
 
 F32 = NDArray[np.float32]
 
-# of the distance that ray origins keep from their surface; many times what positions are rounded by
+# relative to the offset of ray origins from their surface; many times the rounding of positions
 EDGE_OFFSET_FRACTION = 1 / 8
 
 
 class FacePoints(NamedTuple):
-    """Where n rays meet their triangles, textures left out.
+    """Points where n rays hit their triangles, without textures.
 
     Attributes:
-        is_hit: whether a ray meets any; else what follows is that of the first triangle. (n,)
-        p, uvs: corners. (n, 3, 3), (n, 3, 2). twice_area: (n,)
-        face_normal: to the side that is seen. (n, 3)
-        position: off the surface. normal: shading normals. (n, 3) each
-        tangents: with the sign of the bitangent. (n, 4)
-        uv: places in textures. (n, 2)
+        is_hit: false if a ray hits nothing; the other fields are then of the first triangle.
+        p, uvs: corners.
+        face_normal: toward the visible side.
+        position: off the surface. normal: shading normals.
+        tangents: with the sign of the bitangent.
+        uv: texture coordinates.
     """
 
-    is_hit: NDArray[np.bool_]
-    p: F32
-    uvs: F32
-    twice_area: F32
-    face_normal: F32
-    position: F32
-    normal: F32
-    tangents: F32
-    uv: F32
+    is_hit: Shaped[NDArray[np.bool_], " n"]
+    p: Shaped[F32, "n 3 3"]
+    uvs: Shaped[F32, "n 3 2"]
+    twice_area: Shaped[F32, " n"]
+    face_normal: Shaped[F32, "n 3"]
+    position: Shaped[F32, "n 3"]
+    normal: Shaped[F32, "n 3"]
+    tangents: Shaped[F32, "n 4"]
+    uv: Shaped[F32, "n 2"]
 
     @classmethod
-    def from_hits(cls, geometry: SceneBuffers, hits: Hits, directions: F32) -> FacePoints:
-        """Those of rays. geometry: the triangles. hits: the first of each. directions: of the rays. (n, 3)"""
+    def from_hits(cls, geometry: SceneBuffers, hits: Hits, directions: Shaped[F32, "n 3"]) -> FacePoints:
+        """Compute the points of hits. geometry: the triangles. directions: of the rays"""
         corners = geometry.faces[np.maximum(hits.face, 0)]
         p, uvs = geometry.positions[corners], geometry.uvs[corners]
         face_normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
@@ -56,11 +57,13 @@ class FacePoints(NamedTuple):
         tangents, uv = _interpolate(barycentrics, geometry.tangents[corners]), _interpolate(barycentrics, uvs)
         return cls(hits.face >= 0, p, uvs, twice_area, face_normal, position, normal, tangents, uv)
 
-    def footprint(self, distance: F32, directions: F32, pixel_angle: float) -> F32:
-        """Side of a pixel's footprint in textures: its area over the triangle's, in texture space. (n,)
+    def footprint(
+        self, distance: Shaped[F32, " n"], directions: Shaped[F32, "n 3"], pixel_angle: float
+    ) -> Shaped[F32, " n"]:
+        """Side of a pixel's footprint in texture space, from the ratio of the triangle's areas there and in the world.
 
         Args:
-            distance: that rays go. (n,) directions: of these. (n, 3) pixel_angle: that a pixel spans, radians.
+            distance, directions: of the rays. pixel_angle: angle of a pixel, radians.
         """
         (du_0, dv_0), (du_1, dv_1) = np.diff(self.uvs, axis=1).transpose(1, 2, 0)
         uv_area = np.abs(du_0 * dv_1 - dv_0 * du_1)
@@ -68,15 +71,15 @@ class FacePoints(NamedTuple):
         return np.asarray(distance * pixel_angle * np.sqrt(uv_area / np.maximum(self.twice_area, 1e-20) / cosine))
 
 
-def positions_on_faces(geometry: SceneBuffers, face: NDArray[np.integer], uv: F32, normal: F32) -> F32:
-    """Points of faces, moved off them, as `surface_at` has them, and nothing else of what is there.
+def positions_on_faces(
+    geometry: SceneBuffers, face: Shaped[NDArray[np.integer], " n"], uv: Shaped[F32, "n 2"], normal: Shaped[F32, "n 3"]
+) -> Shaped[F32, "n 3"]:
+    """Points on faces with the same offsets as in `surface_at`, and no other surface data.
 
     Args:
-        geometry: the triangles. face: numbers of n faces.
-        uv: places on them, barycentric, of the second and third corner. (n, 2)
-        normal: of the faces, unit, to the side that the points are on. (n, 3)
-    Returns:
-        (n, 3) float32
+        geometry: the triangles. face: face indices.
+        uv: barycentric coordinates of the second and third corner.
+        normal: face normals, unit, on the side of the points.
     """
     p = geometry.positions[geometry.faces[face]]
     twice_area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
@@ -86,25 +89,25 @@ def positions_on_faces(geometry: SceneBuffers, face: NDArray[np.integer], uv: F3
 
 
 def _interpolate(barycentrics: F32, corners: F32) -> F32:
-    """Interpolate what corners have. shares: barycentric. (n, 3). corners: (n, 3, c). Returns (n, c)"""
+    """Interpolate corner values. barycentrics: (n, 3). corners: (n, 3, c). Returns (n, c)"""
     return np.asarray(np.einsum("nk,nkc->nc", barycentrics, corners))
 
 
 def _move_off_edges(barycentrics: F32, p: F32, twice_area: F32, epsilon: float) -> F32:
-    """Move points that lie on an edge of their triangle inside.
+    """Move points on an edge of their triangle inside.
 
-    Where two walls meet, a point on the one would lie in the other's plane, and see what is behind it.
+    A point on the edge of two walls would lie in the plane of the other wall and see behind it.
 
     Args:
         barycentrics: barycentric coordinates. (n, 3). p: corners. (n, 3, 3). epsilon: least distance from the edges,
-            metres, but that a tenth of a height is enough.
+            meters, but at most a tenth of the triangle's height.
     """
     moved = np.maximum(barycentrics, min_barycentrics(p, twice_area, epsilon))
     return np.asarray(moved / moved.sum(axis=1, keepdims=True), np.float32)
 
 
-def min_barycentrics(p: F32, twice_area: F32, epsilon: float) -> F32:
-    """Find the least barycentric coordinates of points off triangles' edges. See `_move_off_edges`. (n, 3) float32"""
+def min_barycentrics(p: Shaped[F32, "n 3 3"], twice_area: Shaped[F32, " n"], epsilon: float) -> Shaped[F32, "n 3"]:
+    """Least barycentric coordinates of points off the edges of triangles. See `_move_off_edges`."""
     edges = np.linalg.norm(p[:, [1, 2, 0]] - p[:, [2, 0, 1]], axis=2)  # opposite to each corner
     minimum = np.minimum(epsilon * edges, 0.1 * twice_area[:, None]) / np.maximum(twice_area, 1e-20)[:, None]
     return np.asarray(minimum, np.float32)

@@ -1,4 +1,4 @@
-"""First hits of rays, and the camera's rays: what each position of the image plane sees first."""
+"""First hits of rays, and the rays of a camera through positions on the image plane."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -29,40 +30,40 @@ from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]
 
-_RAYS_PER_RANGE, _RANGES_PER_THREAD = 8192, 4  # at least; at most: to hand a range out takes as long as 700 rays
-_BY_DIRECTION = np.float32(0)  # the chance of rays that are given none
+_RAYS_PER_RANGE, _RANGES_PER_THREAD = 8192, 4  # minimum; maximum: scheduling a range takes as long as 700 rays
+_BY_DIRECTION = np.float32(0)  # the alpha sample is a hash of the direction
 
 
 @dataclass(frozen=True)
 class Hits:
-    """The first hits of n rays.
+    """First hits of n rays.
 
     Attributes:
-        face: index of the triangle, -1 where the ray leaves the scene. (n,) int32
-        uv: barycentric coordinates of its second and third corner. (n, 2) float32
-        distance: along the unit direction; infinite where nothing is hit. (n,) float32
+        face: index of the triangle, -1 if the ray leaves the scene.
+        uv: barycentric coordinates of its second and third corner.
+        distance: along the unit direction; infinite if nothing is hit.
     """
 
-    face: NDArray[np.int32]
-    uv: F32
-    distance: F32
+    face: Shaped[NDArray[np.int32], " n"]
+    uv: Shaped[F32, "n 2"]
+    distance: Shaped[F32, " n"]
 
     def rows(self, rows: NDArray[Any] | slice) -> Hits:
-        """Those of some rays."""
+        """Select rays."""
         return Hits(self.face[rows], self.uv[rows], self.distance[rows])
 
     @staticmethod
     def concatenate(batches: Sequence[Hits]) -> Hits:
-        """Those of several, one after another."""
+        """Concatenate hits."""
         return Hits(*(np.concatenate([getattr(batch, field.name) for batch in batches]) for field in fields(Hits)))
 
 
 @nb.njit(nogil=True, cache=True)
 def _trace(intersect, scene, arguments, origins, directions, alpha_sample, start, stop, face, uv, distance):  # type: ignore[no-untyped-def]
-    """Trace rays [start, stop). origins, chance: of n rays, or one of all."""
+    """Trace rays [start, stop). origins, alpha_sample: of n rays, or one for all."""
     last_origin, last_alpha_sample = origins.shape[0] - 1, alpha_sample.shape[0] - 1
     packet = new_packet(scene, arguments)
-    for k in range(LANES):  # Embree leaves origins as they are
+    for k in range(LANES):  # Embree does not modify origins
         set_origin(packet, k, origins[0, 0], origins[0, 1], origins[0, 2])
     for first in range(start, stop, LANES):
         width = min(LANES, stop - first)
@@ -77,18 +78,18 @@ def _trace(intersect, scene, arguments, origins, directions, alpha_sample, start
         for k in range(width):
             r = first + k
             face[r], distance[r] = get_hit(packet, k)
-            if face[r] >= 0:  # else there are those of a ray before
+            if face[r] >= 0:  # otherwise the packet contains values of an earlier ray
                 uv[r, 0], uv[r, 1] = get_uv(packet, k)
 
 
 def trace_rays(
-    scene: EmbreeScene, origin: F32, directions: F32, alpha_sample: F32 | np.float32 = _BY_DIRECTION
+    scene: EmbreeScene, origin: F32, directions: Shaped[F32, "n 3"], alpha_sample: F32 | np.float32 = _BY_DIRECTION
 ) -> Hits:
-    """Find the first hits of rays from one point, or from a point each.
+    """Find the first hits of rays from one origin, or from one origin each.
 
     Args:
-        scene: the triangles. origin: (3,) float32, or (n, 3). directions: unit. (n, 3) float32
-        alpha_sample: of each ray at surfaces that blend, within (0, 1], or one of all. (n,) float32
+        scene: the triangles. origin: (3,) or (n, 3). directions: unit.
+        alpha_sample: of each ray (n,), or one for all, in (0, 1] for blended surfaces or a constant of `alpha_filter`.
     """
     n = len(directions)
     origins = np.ascontiguousarray(origin, np.float32).reshape(-1, 3)
@@ -106,14 +107,14 @@ def trace_rays(
     return hits
 
 
-def camera_directions(camera: Camera, size: tuple[int, int], x: F32, y: F32) -> F32:
+def camera_directions(
+    camera: Camera, size: tuple[int, int], x: Shaped[F32, " n"], y: Shaped[F32, " n"]
+) -> Shaped[F32, "n 3"]:
     """Compute unit world directions through image positions.
 
     Args:
-        camera: where the picture is seen from. size: width and height in pixels.
-        x, y: pixels from the left and from the top. (n,) float32
-    Returns:
-        (n, 3) float32
+        camera: the camera. size: width and height in pixels.
+        x, y: pixels from the left and from the top.
     """
     width, height = size
     half_height = np.tan(camera.yfov / 2)
@@ -131,7 +132,7 @@ def camera_directions(camera: Camera, size: tuple[int, int], x: F32, y: F32) -> 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _aim(rotation, half_width, half_height, width, height, x, y, start, stop, out):  # type: ignore[no-untyped-def]
-    """Aim rays [start, stop), in double precision: pixels of wide pictures are a ten thousandth apart."""
+    """Compute directions [start, stop) in float64: pixels of wide images are 1e-4 apart."""
     for r in range(start, stop):
         right, up = (2 * x[r] / width - 1) * half_width, (1 - 2 * y[r] / height) * half_height
         length = math.sqrt(right * right + up * up + 1)

@@ -1,7 +1,7 @@
-"""Embree 4 through its C interface: the packet calls that embreex's own wrapper does not offer.
+"""Embree 4 through its C interface, for the packet calls that embreex's own wrapper does not offer.
 
-The library is the one that the embreex wheel bundles. Numba kernels receive `occluded` and `intersect` as first-class
-functions and call them without the interpreter: `PACKET_WIDTH` rays a call.
+The embreex wheel bundles the library. Numba kernels receive `occluded` and `intersect` as first-class functions and
+call them without the interpreter, with `PACKET_WIDTH` rays per call.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import embreex
 import embreex.rtcore
 import numba.experimental.function_type  # noqa: F401  (registers functions that are known by their addresses)
 import numpy as np
+from jaxtyping import Shaped
 from numba.core import types
 from numpy.typing import NDArray
 
@@ -71,7 +72,7 @@ _device_error = _function("rtcGetDeviceError", ctypes.c_int, _POINTER)
 _device = _new_device(b"threads=1")
 _property = _function("rtcGetDeviceProperty", ctypes.c_ssize_t, _POINTER, ctypes.c_int)
 
-# Rays of a packet: what this processor's vectors hold. Embree takes larger packets apart and traces ray by ray.
+# Rays per packet: the SIMD width of this processor. Embree splits larger packets and traces them ray by ray.
 PACKET_WIDTH = 16 if _property(_device, _NATIVE_RAY16) else 8
 
 
@@ -93,8 +94,8 @@ occluded = _ByAddress(f"rtcOccluded{PACKET_WIDTH}")
 intersect = _ByAddress(f"rtcIntersect{PACKET_WIDTH}")
 
 
-def packet_arguments(coherent: bool) -> NDArray[np.uint64]:
-    """Make RTCOccludedArguments or RTCIntersectArguments: flags, feature mask, and three empty pointers. (5,) uint64"""
+def packet_arguments(coherent: bool) -> Shaped[NDArray[np.uint64], " 5"]:
+    """Make RTCOccludedArguments or RTCIntersectArguments: flags, feature mask, and three null pointers."""
     arguments = np.zeros(5, np.uint64)
     halves = arguments.view(np.uint32)
     halves[0] = _COHERENT if coherent else 0
@@ -102,29 +103,30 @@ def packet_arguments(coherent: bool) -> NDArray[np.uint64]:
     return arguments
 
 
-_OMITTED_VERTEX = (
-    0xFFFFFFFF  # a corner that no scene has: Embree passes over the triangle, and others keep their numbers
-)
+_OMITTED_VERTEX = 0xFFFFFFFF  # an invalid index: Embree skips the triangle, and the others keep their indices
 
 
 @dataclass(frozen=True)
 class EmbreeScene:
-    """Committed triangles; `handle` goes to the kernels. Released with the object."""
+    """A committed Embree scene, released with this object. Kernels use `handle`."""
 
     handle: int
     alpha_test: AlphaTest | None = None
 
     @classmethod
     def build(
-        cls, positions: NDArray[np.float32], faces: NDArray[np.uint32], alpha_test: AlphaTest | None = None
+        cls,
+        positions: Shaped[NDArray[np.float32], "vertices 3"],
+        faces: Shaped[NDArray[np.uint32], "faces 3"],
+        alpha_test: AlphaTest | None = None,
     ) -> EmbreeScene:
         """Build the acceleration structure.
 
         Args:
-            positions: (num_vertices, 3) float32, finite. faces: (num_faces, 3) uint32.
-            alpha_test: of triangles that are not everywhere; None where all are.
+            positions: finite. faces: vertex indices.
+            alpha_test: of triangles that are not opaque; None if all are.
         Raises:
-            SceneError: Embree refused the geometry.
+            SceneError: Embree rejected the geometry.
         """
         scene = _new_scene(_device)
         _set_quality(scene, _BUILD_QUALITY_MEDIUM)
@@ -146,7 +148,7 @@ class EmbreeScene:
 def _attach(
     scene: int, positions: NDArray[np.float32], faces: NDArray[np.uint32], alpha_test: AlphaTest | None = None
 ) -> None:
-    """Add triangles to a scene, asking what `alpha_test` says about each hit. Raises SceneError."""
+    """Add triangles to a scene, with `alpha_test` as the filter of their hits. Raises SceneError."""
     geometry = _new_geometry(_device, _TRIANGLE)
     for kind, layout, rows in (
         (_VERTEX_BUFFER, _FLOAT3, np.ascontiguousarray(positions, np.float32)),
@@ -154,7 +156,7 @@ def _attach(
     ):
         buffer = _set_buffer(geometry, kind, 0, layout, 12, len(rows))
         if not buffer:
-            raise SceneError(f"Embree could not take {len(rows)} rows of geometry; use a smaller scene")
+            raise SceneError(f"Embree could not allocate {len(rows)} rows of geometry; use a smaller scene")
         ctypes.memmove(buffer, rows.ctypes.data, rows.nbytes)
     if alpha_test is not None:
         _set_user_data(geometry, alpha_test.addresses.ctypes.data)

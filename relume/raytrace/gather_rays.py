@@ -1,16 +1,16 @@
-"""Directions of gather rays, and what each of them stands for: made again wherever they are needed, never stored.
+"""Directions and weights of gather rays, recomputed wherever they are needed, never stored.
 
-A point has `num_cosine` rays of density cos θi / π and `num_glossy` rays about its mirror direction, whose half vectors
-have the density
+A point has `num_cosine` rays of density cos θi / π and `num_glossy` rays around its mirror direction, whose half
+vectors have the density
 
     p(h) = 1 / (2π ln(1 + 1/ε) (1 − cos θh + ε)),   p(ωi) = p(h) / (4 cos θd):
 
-as many in every octave of a highlight's size, since the highlight is not known when rays are traced. A ray weighs
-cos θi / (num_cosine · cos θi / π + num_glossy · p(ωi)), the balance heuristic of both.
+equally many in every octave of a highlight's size, because the highlight is unknown when rays are traced. A ray has the
+weight cos θi / (num_cosine · cos θi / π + num_glossy · p(ωi)), the balance heuristic of both.
 
-Both sets are Fibonacci's lattices on the unit square (u, v), sunflowers on the disc. A lattice that is shifted by all
-vectors of one of its cells comes everywhere equally often: points share one pattern, each shifted by a little that its
-seed alone decides. So the same ray of neighbours goes nearly the same way, and may be traced together with theirs.
+Both sets are Fibonacci lattices on the unit square (u, v), which map to spirals on the disk. Over all shifts within one
+lattice cell, samples are uniform: points share one pattern, each shifted within a cell by its seed (Cranley-Patterson).
+So the same ray of neighbors has nearly the same direction, and may be traced together with theirs.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import PlanError
@@ -29,50 +30,50 @@ F64 = NDArray[np.float64]
 
 MAX_RAYS = 4096
 _PI = np.float32(math.pi)
-_EPSILON = np.float32(1e-3)  # rays crowd towards the mirror direction up to highlights of about 3°
+_EPSILON = np.float32(1e-3)  # the density of rays rises up to highlights of about 3°
 _GROWTH = np.float32(1 + 1e3)  # 1 + 1/ε
 _LN = np.float32(math.log(1 + 1e3))
 _GOLDEN = (1 + math.sqrt(5)) / 2
-# the two last of Roberts' R4 sequence, as fractions of 2^32: steps that the lattices do not share
+# the last two steps of Roberts' R4 sequence, as fractions of 2^32: independent of the lattices
 _PLASTIC = 1.1673039782614187  # x⁵ = x + 1
 _STEP_U, _STEP_V = (np.uint32(round(2**32 / _PLASTIC**k)) for k in (3, 4))
 _PER_UNIT = np.float32(1 / (1 << 24))
 
 
 class RayPattern(NamedTuple):
-    """The rays of every point, before they are shifted.
+    """Gather rays of every point, before their shift.
 
     Attributes:
-        uv: on the unit square; the cosine rays' first, then the glossy ones'. (N, 2) float32
-        rays: of each u, (1 + 1/ε)^u, cos 2πv and sin 2πv. (N, 4) float32
-        num_cosine: how many are distributed by the cosine.
-        sides: of a cell of each set's lattice, two vectors. (2 sets, 2, 2) float32
+        uv: on the unit square; first the cosine rays, then the glossy rays.
+        rays: u, (1 + 1/ε)^u, cos 2πv and sin 2πv.
+        num_cosine: number of cosine-distributed rays.
+        sides: two edge vectors of a lattice cell for each of the two sets.
         seed: of the shifts.
     """
 
-    uv: F32
-    rays: F32
+    uv: Shaped[F32, "N 2"]
+    rays: Shaped[F32, "N 4"]
     num_cosine: int
-    sides: F32
+    sides: Shaped[F32, "2 2 2"]
     seed: int
 
     @property
     def num_rays(self) -> int:
-        """Their number N."""
+        """Number of rays N."""
         return len(self.rays)
 
 
 def make_pattern(num_cosine: int, num_glossy: int, seed: int) -> RayPattern:
-    """Spread two sets of rays evenly.
+    """Distribute two sets of rays uniformly.
 
     Args:
-        num_cosine: rays distributed by the cosine, at least 1. num_glossy: rays about the mirror direction, or 0.
-        seed: of the shifts; what lies above 31 bits does not count.
+        num_cosine: cosine-distributed rays, at least 1. num_glossy: rays around the mirror direction, or 0.
+        seed: of the shifts; only the lowest 31 bits count.
     Raises:
         PlanError: there are no rays, or more than `MAX_RAYS`.
     """
     if not (num_cosine >= 1 and num_glossy >= 0 and num_cosine + num_glossy <= MAX_RAYS):
-        raise PlanError(f"{num_cosine} + {num_glossy} gather rays were asked for; give 1 to {MAX_RAYS} in all")
+        raise PlanError(f"{num_cosine} + {num_glossy} gather rays were requested; give 1 to {MAX_RAYS} in total")
     uv = np.concatenate([_lattice(num_cosine), _lattice(num_glossy)])
     u, v = uv.T
     rays = np.stack([u, (1 + 1e3) ** u, np.cos(2 * np.pi * v), np.sin(2 * np.pi * v)], axis=1)
@@ -83,7 +84,7 @@ def make_pattern(num_cosine: int, num_glossy: int, seed: int) -> RayPattern:
 
 
 def _step(count: int) -> int:
-    """Choose the step of a lattice of `count` points: where that is one of Fibonacci's numbers, its predecessor."""
+    """Choose the step of a lattice of `count` points: for a Fibonacci number, its predecessor."""
     step = max(1, round(count / _GOLDEN))
     while math.gcd(step, count) > 1:
         step += 1
@@ -91,13 +92,13 @@ def _step(count: int) -> int:
 
 
 def _lattice(count: int) -> F64:
-    """Spread points on the unit square. (count, 2)"""
+    """Lattice of points on the unit square. (count, 2)"""
     i = np.arange(count)
     return np.stack([(i + 0.5) / max(1, count), i * _step(count) % max(1, count) / max(1, count)], axis=1)
 
 
 def _shortest_lattice_vectors(count: int) -> F64:
-    """Find the shortest two vectors between points of the lattice, by Lagrange's reduction. (2, 2)"""
+    """Two shortest vectors between lattice points, by Lagrange reduction. (2, 2)"""
     shorter, longer = np.array([1.0, _step(count)]) / count, np.array([0.0, 1.0])
     while True:
         if shorter @ shorter > longer @ longer:
@@ -108,13 +109,13 @@ def _shortest_lattice_vectors(count: int) -> F64:
         longer = longer - multiple * shorter
 
 
-# What follows is inlined: a call would count references to the pattern's arrays, which threads share.
+# The following functions are inlined: calls would count references to the pattern's arrays, which threads share.
 @nb.njit(nogil=True, cache=True, inline="always")
 def cranley_patterson_offset(pattern, seed):  # type: ignore[no-untyped-def]
-    """Find the shift of the unit square for a point, by its seed. Two float32 in [0, 1).
+    """Offset of the unit square for a point, from its seed. Two float32 in [0, 1).
 
-    Points that follow each other are neighbours in the picture, and their shifts a low-discrepancy sequence: together
-    they see more than each alone, and what noise is left is as fine as the pixels.
+    Successive points are neighbors in the image, and their offsets a low-discrepancy sequence: together they sample
+    more directions than each alone, and the remaining noise has the frequency of the pixels.
     """
     start = np.uint32(pattern.seed) * np.uint32(0x9E3779B9)
     u = np.uint32(start + np.uint32(seed) * _STEP_U)
@@ -124,7 +125,7 @@ def cranley_patterson_offset(pattern, seed):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def _along_lattice(sides, s, t):  # type: ignore[no-untyped-def]
-    """Go s and t times along the two sides of a cell of a lattice: u, (1 + 1/ε)^u, cos 2πv and sin 2πv."""
+    """Vector s, t along the two edges of a lattice cell, as u, (1 + 1/ε)^u, cos 2πv and sin 2πv."""
     u = s * sides[0, 0] + t * sides[1, 0]
     azimuth = np.float32(2) * _PI * (s * sides[0, 1] + t * sides[1, 1])
     return np.float32(u), np.float32(math.exp(_LN * u)), np.float32(math.cos(azimuth)), np.float32(math.sin(azimuth))
@@ -132,7 +133,7 @@ def _along_lattice(sides, s, t):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def lattice_offsets(pattern, seed):  # type: ignore[no-untyped-def]
-    """Find a point's shift within a cell of each set's lattice: of u, (1 + 1/ε)^u, cos 2πv and sin 2πv."""
+    """Offset of a point within a cell of each set's lattice, as u, (1 + 1/ε)^u, cos 2πv and sin 2πv."""
     s, t = cranley_patterson_offset(pattern, seed)
     s, t = s - np.float32(0.5), t - np.float32(0.5)
     return _along_lattice(pattern.sides[0], s, t), _along_lattice(pattern.sides[1], s, t)
@@ -140,16 +141,16 @@ def lattice_offsets(pattern, seed):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def glossy_pdf(cos_theta_h, cos_theta_d):  # type: ignore[no-untyped-def]
-    """Compute p(ωi) of the glossy rays, 1/sr."""
+    """Density p(ωi) of the glossy rays, 1/sr."""
     one_minus_cosine = np.float32(1) - cos_theta_h + _EPSILON
     return np.float32(1) / (np.float32(8) * _PI * _LN * one_minus_cosine * max(cos_theta_d, np.float32(1e-6)))
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def cosine_ray(ray, offset):  # type: ignore[no-untyped-def]
-    """Direct a cosine ray, in the frame x = tangent, y = n × t, z = n.
+    """Direction of a cosine ray, in the frame x = tangent, y = n × t, z = n.
 
-    ray: a row of `RayPattern.rays`. shift: of the set, from `lattice_offsets`.
+    ray: a row of `RayPattern.rays`. offset: of the set, from `lattice_offsets`.
     """
     u = ray[0] + offset[0]
     u -= np.float32(u >= 1)
@@ -161,11 +162,11 @@ def cosine_ray(ray, offset):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def glossy_ray(ray, offset, ox, oy, oz):  # type: ignore[no-untyped-def]
-    """Direct a glossy ray in the same frame; it is below the horizon where it is not to be traced.
+    """Direction of a glossy ray in the same frame; rays below the horizon must not be traced.
 
     Args:
         ray: a row of `RayPattern.rays`. offset: of the set, from `lattice_offsets`.
-        ox, oy, oz: local wo, towards the viewer.
+        ox, oy, oz: local wo, toward the viewer.
     """
     u, growth = ray[0] + offset[0], ray[1] * offset[1]
     growth *= np.float32(1 / 1001) if u >= 1 else (_GROWTH if u < 0 else np.float32(1))
@@ -179,11 +180,11 @@ def glossy_ray(ray, offset, ox, oy, oz):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def local_ray(pattern, ray, offsets, ox, oy, oz):  # type: ignore[no-untyped-def]
-    """Direct a ray of a point, in the point's local frame.
+    """Direction of a ray of a point, in the point's local frame.
 
     Args:
-        pattern: the rays of every point. ray: number of one of them.
-        offsets: the point's, from `lattice_offsets`. ox, oy, oz: local wo.
+        pattern: the rays of every point. ray: index of the ray.
+        offsets: of the point, from `lattice_offsets`. ox, oy, oz: local wo.
     """
     if ray < pattern.num_cosine:
         return cosine_ray(pattern.rays[ray], offsets[0])
@@ -192,7 +193,7 @@ def local_ray(pattern, ray, offsets, ox, oy, oz):  # type: ignore[no-untyped-def
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def ray_weight(pattern, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
-    """Weigh a ray: cos θi over the expected number of rays per solid angle, sr.
+    """Weight of a ray: cos θi over the expected number of rays per solid angle, sr.
 
     Args:
         pattern: the rays of every point. ix, iy, iz: local wi of the ray. ox, oy, oz: local wo.

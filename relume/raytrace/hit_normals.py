@@ -1,4 +1,4 @@
-"""Normals at ray hits alone: what finds edges and groups rays needs no textures of what they hit."""
+"""Normals at ray hits without textures, for edge detection and ray merging."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -32,7 +33,7 @@ def _subtract(a, b):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def _unit(v, fallback):  # type: ignore[no-untyped-def]
-    """Scale a vector to length one; where it has none, take another."""
+    """Normalize a vector; return the fallback for zero."""
     length = math.sqrt(_dot(v, v))
     if length <= 1e-12:
         return fallback
@@ -46,7 +47,7 @@ def _flip(v, is_flipped):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _inner_barycentrics(uv, edges, twice_area, epsilon):  # type: ignore[no-untyped-def]
-    """Move barycentric coordinates off edges; see `relume.raytrace.surface_interaction`. edges: opposite to corners"""
+    """Move barycentric coordinates off edges; see `relume.raytrace.barycentric`. edges: opposite to corners"""
     per_area = 1 / max(twice_area, 1e-20)
     a = max(1.0 - uv[0] - uv[1], min(epsilon * edges[0], 0.1 * twice_area) * per_area)
     b = max(np.float64(uv[0]), min(epsilon * edges[1], 0.1 * twice_area) * per_area)
@@ -57,7 +58,7 @@ def _inner_barycentrics(uv, edges, twice_area, epsilon):  # type: ignore[no-unty
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _normals(positions, normals, faces, face, uv, directions, epsilon, start, stop, out):  # type: ignore[no-untyped-def]
-    """Find the normals at hits [start, stop). out: written. (n, 3) float32"""
+    """Compute the normals at hits [start, stop). out: output. (n, 3) float32"""
     for k in range(start, stop):
         d = np.float64(directions[k, 0]), np.float64(directions[k, 1]), np.float64(directions[k, 2])
         view_direction = -d[0], -d[1], -d[2]
@@ -85,13 +86,13 @@ def _normals(positions, normals, faces, face, uv, directions, epsilon, start, st
         out[k, 0], out[k, 1], out[k, 2] = _unit(n, view_direction)
 
 
-def normals_at(geometry: SceneBuffers, hits: Hits, directions: F32) -> F32:
-    """Interpolate the normals at ray hits. Oracle: `relume.raytrace.surface_interaction.surface_at` without materials.
+def normals_at(geometry: SceneBuffers, hits: Hits, directions: Shaped[F32, "n 3"]) -> Shaped[F32, "n 3"]:
+    """Interpolate normals at ray hits. Reference: `relume.raytrace.surface_interaction.surface_at` without materials.
 
     Args:
-        geometry: the triangles. hits: the first hits of n rays. directions: unit, of the rays. (n, 3) float32
+        geometry: the triangles. hits: the first hits of rays. directions: of the rays, unit.
     Returns:
-        Turned to the viewer; where a ray hit nothing, its way back. (n, 3) float32
+        Normals toward the viewer; the reversed direction for rays without a hit.
     """
     out, epsilon = np.empty((len(directions), 3), np.float32), EDGE_OFFSET_FRACTION * geometry.epsilon
     args = geometry.positions, geometry.normals, geometry.faces, hits.face, hits.uv, directions, epsilon

@@ -1,14 +1,15 @@
-"""Which samples of a local light each point sees, in packets of 16 neighbouring points × one sample; and their sum.
+"""Visibility of the samples of a local light from each point, in packets of 16 neighboring points, and irradiance.
 
-Both ends of a shadow ray lie off their surfaces, on the sides that face each other: neither shadows itself. Of lights
-of very many samples, four that lie side by side are asked by 16 points together, each of which asks for one of them:
-where all agree, all see all four or none.
+Both ends of a shadow ray are offset from their surfaces on the sides that face each other, to prevent self-shadowing.
+For lights with many samples, the 16 points first trace one ray each to a group of four adjacent samples: if all agree,
+all points see all four samples or none.
 """
 
 from __future__ import annotations
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -31,23 +32,21 @@ from relume.raytrace.surface_points import SurfacePoints
 
 F32 = NDArray[np.float32]
 
-MIN_GROUPED_SAMPLES = (
-    1024  # samples, of which four side by side are traced one by one only where neighbours do not see them alike
-)
+MIN_GROUPED_SAMPLES = 1024  # number of samples from which groups of four are traced singly only if neighbors disagree
 _POINTS_PER_RANGE = 4096
 _GROUP_SIZE = 4
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def shadow_ray(dx, dy, dz, distance, nx, ny, nz, surface_offset):  # type: ignore[no-untyped-def]
-    """Aim the shadow ray to a sample of a light, off whose surface it ends.
+    """Compute the shadow ray to a light sample; it ends off the light's surface.
 
     Args:
-        dx, dy, dz, distance, nx, ny, nz: from `light_sample`. surface_offset: metres.
+        dx, dy, dz, distance, nx, ny, nz: from `light_sample`. surface_offset: meters.
     Returns:
-        Direction (three), not normalised where the ray ends, and how many times its length the ray is long.
+        Direction (three), not normalized if the ray ends, and the ray's length in units of the direction's length.
     """
-    # not normalised, but where it never ends: it ends at one
+    # not normalized, so that the ray ends at 1; normalized for infinite rays
     length, num_lengths = (np.float32(1), distance) if distance == np.inf else (distance, np.float32(1))
     return (
         length * dx + surface_offset * nx,
@@ -59,13 +58,13 @@ def shadow_ray(dx, dy, dz, distance, nx, ny, nz, surface_offset):  # type: ignor
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def _aim_packet(packet, light, strata, surface_offset, points, first, width, sample, num_samples):  # type: ignore[no-untyped-def]
-    """Aim shadow rays of points [first, first + width) at one sample of a light, or at several side by side.
+    """Aim shadow rays of points [first, first + width) at one light sample, or at several adjacent ones.
 
     Args:
         packet, light, strata, surface_offset, points: as in `_trace`.
-        sample, num_samples: lane k's is `sample` + k mod `num_samples`; a power of two.
+        sample, num_samples: lane k uses sample `sample` + k mod `num_samples`; a power of two.
     Returns:
-        How many of them are to be traced: those of points that this sample may light.
+        Number of active rays, whose points this sample may light.
     """
     position, normal, _, seed, alpha_sample = points
     num_active = 0
@@ -89,7 +88,7 @@ def _aim_packet(packet, light, strata, surface_offset, points, first, width, sam
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def _count_unoccluded(packet, width):  # type: ignore[no-untyped-def]
-    """Count the traced rays that met nothing."""
+    """Count the traced rays that are unoccluded."""
     count = 0
     for k in range(width):
         count += 1 if packet.is_active[k] != 0 and is_unoccluded(packet, k) else 0
@@ -128,16 +127,16 @@ def _trace(  # type: ignore[no-untyped-def]
 
 def trace_light_visibility(
     scene: EmbreeScene, surface_offset: float, light: LocalLight, strata: LightStrata, points: SurfacePoints
-) -> NDArray[np.uint8]:
-    """Trace every point against every sample of a light that is above its horizon and gives it light.
+) -> Shaped[NDArray[np.uint8], "n bytes"]:
+    """Trace every point against every light sample above its horizon with nonzero weight.
 
     Args:
-        scene: the triangles that may be in the way.
-        surface_offset: metres by which rays end before the light's own surface.
-        light: the light. strata: its samples, from `make_light_strata`; the points' seeds shift them.
-        points: n points that the light may reach; neighbours follow each other.
+        scene: the occluding triangles.
+        surface_offset: distance in meters between the ends of rays and the light's surface.
+        light: the light. strata: its samples, from `make_light_strata`, shifted by the points' seeds.
+        points: n points that the light may reach, ordered by neighborhood.
     Returns:
-        Sample k of a point in bit k & 7 of byte k >> 3. (n, ceil(samples / 8)) uint8
+        Visibility of sample k at bit k & 7 of byte k >> 3; ceil(samples / 8) bytes
     """
     bits = np.zeros((points.num_points, (len(strata.uv) + 7) // 8), np.uint8)
     arguments = packet_arguments(coherent=True)
@@ -152,7 +151,7 @@ def trace_light_visibility(
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _sum_irradiance(light, strata, points, visible, start, stop, irradiance):  # type: ignore[no-untyped-def]
-    """Sum what points [start, stop) see of a light into `irradiance`. (n,)"""
+    """Add the irradiance of points [start, stop) from visible samples to `irradiance`. (n,)"""
     position, normal, _, seed, _ = points
     for p in range(start, stop):
         x, y, z = position[p, 0], position[p, 1], position[p, 2]
@@ -166,14 +165,12 @@ def _sum_irradiance(light, strata, points, visible, start, stop, irradiance):  #
 
 
 def compute_irradiance(
-    light: LocalLight, strata: LightStrata, points: SurfacePoints, visible: NDArray[np.uint8]
-) -> F32:
-    """Irradiance of points under a light of unit emission.
+    light: LocalLight, strata: LightStrata, points: SurfacePoints, visible: Shaped[NDArray[np.uint8], "n bytes"]
+) -> Shaped[F32, " n"]:
+    """Irradiance E of points under a light of unit emission (see `relume.lights.local_lights`).
 
     Args:
-        light, strata, points: as `trace_light_visibility` had them. visible: what it returned. (n, bytes) uint8
-    Returns:
-        E over the unit of emission (see `relume.lights.local_lights`). (n,) float32
+        light, strata, points: as in `trace_light_visibility`. visible: its result.
     """
     out = np.empty(points.num_points, np.float32)
     args = (light, strata, points, visible)

@@ -1,9 +1,9 @@
-"""What comes directly from a local light that moves: shadows traced at few points and predicted between them.
+"""Direct light of a local light during a drag: shadows traced at few points and predicted between them.
 
-Points that follow each other are neighbours in the picture. Of a block of 64, every fourth is traced against all
-samples of the light. Where all these rays agree, the light reaches the other points too, or none of them; where they do
-not, all others are traced as well. So edges of shadows are traced, but for shadows so thin that no ray asks about them:
-they come when the light rests and `relume.raytrace.light_visibility` traces every ray.
+Successive points are neighbors in the image. In a block of 64, every fourth point is traced against all samples of the
+light. If all these rays agree, the light is visible or occluded for the other points too; otherwise all of them are
+traced. So shadow edges are traced, except for shadows so thin that no ray hits them: they appear when the light stops
+and `relume.raytrace.light_visibility` traces every ray.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -39,26 +40,26 @@ BLOCK = 64
 
 
 class MovingLight(NamedTuple):
-    """What a light of unit emission gives to n points.
+    """Direct light of a light of unit emission at n points.
 
     Attributes:
-        irradiance: E of each point. (n,) float32
-        visible: sample k of a point in bit k & 7 of byte k >> 3. (n, ceil(samples / 8)) uint8
+        irradiance: E of each point.
+        visible: visibility of sample k at bit k & 7 of byte k >> 3; ceil(samples / 8) bytes.
     """
 
-    irradiance: F32
-    visible: NDArray[np.uint8]
+    irradiance: Shaped[F32, " n"]
+    visible: Shaped[NDArray[np.uint8], "n bytes"]
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def is_seed_sample(k):  # type: ignore[no-untyped-def]
-    """Tell whether a point of a block is traced in any case: the corners of squares of 4 × 4 along a Morton curve."""
+    """True if point k of a block is always traced: the corners of squares of 4 × 4 along a Morton curve."""
     return k & 3 == (k >> 2) & 3
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _flush(occluded, packet, num_waiting, visible):  # type: ignore[no-untyped-def]
-    """Trace the rays of the first lanes, which belong to rays of the block; returns how many reach the light."""
+    """Trace the rays in the first lanes; returns the number of rays that reach the light."""
     enable_first_lanes(packet, num_waiting)
     trace_shadows(occluded, packet)
     num_visible = 0
@@ -71,10 +72,10 @@ def _flush(occluded, packet, num_waiting, visible):  # type: ignore[no-untyped-d
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _trace_points(occluded, packet, position, alpha_sample, first, width, rays, contribution, are_seeds, visible):  # type: ignore[no-untyped-def]
-    """Trace the rays that would bring light to the probes of a block, or to its other points.
+    """Trace the rays with a contribution from the seed points of a block, or from its other points.
 
     Returns:
-        How many rays were traced, and how many of them reach the light.
+        Number of traced rays, and number of rays that reach the light.
     """
     num_rays, num_visible = 0, 0
     for r in range(contribution.shape[0]):
@@ -96,7 +97,7 @@ def _trace_points(occluded, packet, position, alpha_sample, first, width, rays, 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _aim(light, strata, surface_offset, points, first, width, rays, contribution):  # type: ignore[no-untyped-def]
-    """Aim the rays of a block's points, sample after sample of `BLOCK` each: direction and end, and w · cos θi."""
+    """Aim the rays of a block's points, `BLOCK` rays per sample: direction and end, and w · cos θi."""
     position, normal, _, seed, _ = points
     for k in range(width):
         p = first + k
@@ -115,7 +116,7 @@ def _aim(light, strata, surface_offset, points, first, width, rays, contribution
 def _light_block(  # type: ignore[no-untyped-def]
     occluded, scene, arguments, light, strata, surface_offset, points, start, stop, irradiance, bits
 ):
-    """Light points [start, stop); start is a multiple of `BLOCK`."""
+    """Compute the light at points [start, stop); start is a multiple of `BLOCK`."""
     packet = new_packet(scene, arguments)
     num_rays = BLOCK * strata.uv.shape[0]
     rays, contribution, visible = (
@@ -148,13 +149,13 @@ def _light_block(  # type: ignore[no-untyped-def]
 def trace_moving_light(
     scene: EmbreeScene, surface_offset: float, light: LocalLight, strata: LightStrata, points: SurfacePoints
 ) -> MovingLight:
-    """Light points, tracing where shadows end and predicting elsewhere.
+    """Compute the light at points; trace shadow edges and predict elsewhere.
 
     Args:
-        scene: the triangles that may be in the way.
-        surface_offset: metres by which rays end before the light's own surface.
-        light: the light. strata: its samples, from `make_light_strata`; the points' seeds shift them.
-        points: n points that the light may reach, neighbours in the picture mostly next to each other.
+        scene: the occluding triangles.
+        surface_offset: distance in meters between the ends of rays and the light's surface.
+        light: the light. strata: its samples, from `make_light_strata`, shifted by the points' seeds.
+        points: n points that the light may reach, mostly ordered by neighborhood.
     """
     num, num_bytes = points.num_points, (len(strata.uv) + 7) // 8
     moving_light = MovingLight(np.zeros(num, np.float32), np.zeros((num, num_bytes), np.uint8))

@@ -1,7 +1,7 @@
-"""`LANES` rays at once, in the memory that Embree reads them from: every kernel that traces goes through here.
+"""Packets of `LANES` rays in Embree's memory layout; every kernel that traces rays uses them.
 
-A kernel aims the lanes of one packet, asks Embree, reads the answers, and aims the same lanes again. The helpers are
-inlined: calls would count references to the packet's arrays, and the loops over lanes would not be vectors.
+A kernel aims the lanes of one packet, calls Embree, reads the results, and aims the same lanes again. The helpers are
+inlined: calls would count references to the packet's arrays, and the loops over lanes would not be vectorized.
 """
 
 from __future__ import annotations
@@ -10,14 +10,15 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.raytrace.embree import PACKET_WIDTH
 
 LANES = PACKET_WIDTH
 
-FAR = np.float32(1e30)  # where shadow rays end that no light's surface ends
-# rows of RTCRayHit8 or 16, a word of each lane; an origin and a direction take three
+FAR = np.float32(1e30)  # length of shadow rays to lights at infinity
+# rows of RTCRayHit8 or 16, one word per lane; an origin and a direction take three rows
 _ORIGIN, _DIRECTION, _ALPHA_SAMPLE, _FAR, _MASK = 0, 4, 7, 8, 9
 _U, _V, _PRIMITIVE, _GEOMETRY, _INSTANCE = 15, 16, 17, 18, 19
 _ROWS = 21
@@ -25,27 +26,27 @@ _INVALID_ID = 0xFFFFFFFF
 
 
 class RayPacket(NamedTuple):
-    """`LANES` rays, and what Embree is called with to trace them.
+    """`LANES` rays, and the other arguments of Embree's trace calls.
 
     Attributes:
-        rays: RTCRay8 or 16, then RTCHit with its instance ids; on a 64-byte boundary. (21 · `LANES`,) float32
-        words: the same memory. (21 · `LANES`,) uint32
-        is_active: −1 where the ray of a lane is to be traced, else 0. (`LANES`,) int32
-        owner: for the caller, whose ray lies in each lane. (`LANES`,) int64
+        rays: RTCRay8 or 16, then RTCHit with its instance ids; on a 64-byte boundary. Its size is 21 · `LANES`.
+        words: the same memory.
+        is_active: −1 if the ray of a lane is traced, else 0.
+        owner: index of each lane's ray, for the caller.
         scene, arguments: addresses of the scene and of `packet_arguments`.
     """
 
-    rays: NDArray[np.float32]
-    words: NDArray[np.uint32]
-    is_active: NDArray[np.int32]
-    owner: NDArray[np.int64]
+    rays: Shaped[NDArray[np.float32], " words"]
+    words: Shaped[NDArray[np.uint32], " words"]
+    is_active: Shaped[NDArray[np.int32], " lanes"]
+    owner: Shaped[NDArray[np.int64], " lanes"]
     scene: int
     arguments: int
 
 
 @nb.njit(nogil=True, cache=True)
 def _aligned(num_words):  # type: ignore[no-untyped-def]
-    """Zeroed float32 memory on a 64-byte boundary, as Embree's widest packets need it. (num_words,)"""
+    """Zeroed float32 memory on a 64-byte boundary, as required by Embree's widest packets. (num_words,)"""
     raw = np.zeros(num_words + 16, np.float32)
     skip = (64 - raw.ctypes.data % 64) // 4 % 16
     return raw[skip : skip + num_words]
@@ -53,7 +54,7 @@ def _aligned(num_words):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True)
 def new_packet(scene, arguments):  # type: ignore[no-untyped-def]
-    """Make a packet whose rays begin at their origins and meet all triangles.
+    """Make a packet whose rays start at their origins and hit all triangles.
 
     Args:
         scene: `EmbreeScene.handle`. arguments: address of `packet_arguments`, which the caller keeps alive.
@@ -66,7 +67,7 @@ def new_packet(scene, arguments):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def set_origin(packet, lane, x, y, z):  # type: ignore[no-untyped-def]
-    """Let the ray of a `lane` of a `packet` begin at a point (x, y, z)."""
+    """Set the origin of the ray of a `lane` of a `packet` to (x, y, z)."""
     packet.rays[_ORIGIN * LANES + lane] = x
     packet.rays[(_ORIGIN + 1) * LANES + lane] = y
     packet.rays[(_ORIGIN + 2) * LANES + lane] = z
@@ -74,7 +75,7 @@ def set_origin(packet, lane, x, y, z):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def set_direction(packet, lane, x, y, z, far):  # type: ignore[no-untyped-def]
-    """Send the ray of a `lane` of a `packet` in direction (x, y, z), of any length; it ends after `far` lengths."""
+    """Set the direction (x, y, z) of a `lane` of a `packet`, of any length; the ray ends after `far` lengths."""
     packet.rays[_DIRECTION * LANES + lane] = x
     packet.rays[(_DIRECTION + 1) * LANES + lane] = y
     packet.rays[(_DIRECTION + 2) * LANES + lane] = z
@@ -83,51 +84,51 @@ def set_direction(packet, lane, x, y, z, far):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def enable_stochastic_alpha(packet, lane, alpha_sample):  # type: ignore[no-untyped-def]
-    """Set the `alpha_sample` of the ray of a `lane` of a `packet`. See `relume.raytrace.alpha_filter`."""
+    """Set the `alpha_sample` of the ray of a `lane`. See `relume.raytrace.alpha_filter`."""
     packet.rays[_ALPHA_SAMPLE * LANES + lane] = alpha_sample
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def enable_lane(packet, lane, is_active):  # type: ignore[no-untyped-def]
-    """Say whether the ray of a `lane` of a `packet` is to be traced: `is_active`."""
+    """Enable the ray of a `lane` of a `packet` if `is_active`, else disable it."""
     packet.is_active[lane] = -1 if is_active else 0
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def enable_first_lanes(packet, num):  # type: ignore[no-untyped-def]
-    """Ask for the rays of the first lanes, and for no others."""
+    """Enable the first `num` lanes and disable the others."""
     for lane in range(LANES):
         packet.is_active[lane] = -1 if lane < num else 0
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def _call(embree, packet):  # type: ignore[no-untyped-def]
-    """Hand a packet to one of Embree's functions, which writes into it."""
+    """Call one of Embree's functions, which writes into the packet."""
     embree(np.int64(packet.is_active.ctypes.data), packet.scene, np.int64(packet.rays.ctypes.data), packet.arguments)
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def trace_shadows(occluded, packet):  # type: ignore[no-untyped-def]
-    """Find which of the asked rays reach their ends. occluded: `relume.raytrace.embree.occluded`"""
+    """Trace shadow rays of the active lanes. occluded: `relume.raytrace.embree.occluded`"""
     _call(occluded, packet)
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def is_unoccluded(packet, lane):  # type: ignore[no-untyped-def]
-    """Tell whether nothing is in the way of a ray that `trace_shadows` was asked for."""
-    return packet.rays[_FAR * LANES + lane] > 0  # Embree sets it to minus infinity where something is
+    """True if a ray traced by `trace_shadows` hit nothing."""
+    return packet.rays[_FAR * LANES + lane] > 0  # Embree sets it to minus infinity for an occluded ray
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def trace_hits(intersect, packet):  # type: ignore[no-untyped-def]
-    """Find what the asked rays hit first. intersect: `relume.raytrace.embree.intersect`"""
+    """Find the first hits of the active lanes. intersect: `relume.raytrace.embree.intersect`"""
     packet.words[_GEOMETRY * LANES : (_INSTANCE + 1) * LANES] = _INVALID_ID
     _call(intersect, packet)
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def get_hit(packet, lane):  # type: ignore[no-untyped-def]
-    """Read the first hit of a ray: its triangle, −1 for none, and how many of the direction's lengths away it is."""
+    """Read the first hit of a ray: its triangle, −1 for none, and its distance in lengths of the direction."""
     is_hit = packet.words[_GEOMETRY * LANES + lane] != _INVALID_ID
     face = np.int32(packet.words[_PRIMITIVE * LANES + lane]) if is_hit else np.int32(-1)
     return face, packet.rays[_FAR * LANES + lane]
@@ -135,18 +136,18 @@ def get_hit(packet, lane):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def get_uv(packet, lane):  # type: ignore[no-untyped-def]
-    """Read where the first hit lies: barycentric coordinates of the triangle's second and third corner."""
+    """Read the barycentric coordinates of the first hit, of the triangle's second and third corner."""
     return packet.rays[_U * LANES + lane], packet.rays[_V * LANES + lane]
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def get_position(packet, lane, axis):  # type: ignore[no-untyped-def]
-    """Compute a component (`axis`) of the place that the ray of a `lane` of a `packet` hit, or of its end."""
+    """Compute a component (`axis`) of the hit position of a `lane` of a `packet`, or of the ray's end."""
     far = packet.rays[_FAR * LANES + lane]
     return packet.rays[(_ORIGIN + axis) * LANES + lane] + far * packet.rays[(_DIRECTION + axis) * LANES + lane]
 
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def get_direction(packet, lane, axis):  # type: ignore[no-untyped-def]
-    """Read a component (`axis`) of the direction of the ray of a `lane` of a `packet`."""
+    """Read a component (`axis`) of the direction of a `lane` of a `packet`."""
     return packet.rays[(_DIRECTION + axis) * LANES + lane]

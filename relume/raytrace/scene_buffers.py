@@ -1,4 +1,4 @@
-"""All triangles of a scene in one set of arrays, as the kernels want them."""
+"""All triangles of a scene in one set of arrays, for kernels."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
@@ -25,63 +26,65 @@ class SceneBuffers:
     """All meshes of a scene, merged.
 
     Attributes:
-        positions, normals: (num_vertices, 3) float32. tangents: (num_vertices, 4). uvs: (num_vertices, 2).
-        faces: (num_faces, 3) uint32 into the above.
-        face_material: index into the scene's materials. (num_faces,) int32
-        face_mesh: index into the scene's meshes. (num_faces,) int32
-        epsilon: how far ray origins are moved off the surface, metres.
+        positions, normals, tangents, uvs: of the vertices; tangents have the sign of the bitangent.
+        faces: vertex indices of the corners.
+        face_material: index into the scene's materials.
+        face_mesh: index into the scene's meshes.
+        epsilon: offset of ray origins from surfaces, meters.
     """
 
-    positions: F32
-    normals: F32
-    tangents: F32
-    uvs: F32
-    faces: NDArray[np.uint32]
-    face_material: NDArray[np.int32]
-    face_mesh: NDArray[np.int32]
+    positions: Shaped[F32, "vertices 3"]
+    normals: Shaped[F32, "vertices 3"]
+    tangents: Shaped[F32, "vertices 4"]
+    uvs: Shaped[F32, "vertices 2"]
+    faces: Shaped[NDArray[np.uint32], "faces 3"]
+    face_material: Shaped[NDArray[np.int32], " faces"]
+    face_mesh: Shaped[NDArray[np.int32], " faces"]
     embree: EmbreeScene
     epsilon: float
 
     @cached_property
-    def face_normals(self) -> F32:
-        """Unit normals of the triangles, their corners counter-clockwise. (num_faces, 3) float32"""
+    def face_normals(self) -> Shaped[F32, "faces 3"]:
+        """Unit normals of the triangles, with their corners counterclockwise."""
         a, b, c = self.positions[self.faces].astype(np.float64).transpose(1, 0, 2)
         normal = np.cross(b - a, c - a)
         return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300), np.float32)
 
     @cached_property
-    def face_areas(self) -> F64:
-        """Of the triangles, square metres. (num_faces,) float64"""
+    def face_areas(self) -> Shaped[F64, " faces"]:
+        """Areas of the triangles, square meters."""
         a, b, c = self.positions[self.faces].astype(np.float64).transpose(1, 0, 2)
         return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
 
     @cached_property
-    def position_index(self) -> NDArray[np.intp]:
-        """Numbers of the vertices' places: those in the same place have one. (num_vertices,)"""
+    def position_index(self) -> Shaped[NDArray[np.intp], " vertices"]:
+        """Index of each vertex's distinct position."""
         as_bytes = np.ascontiguousarray(self.positions, np.float32).view("V12").ravel()
         return np.asarray(np.unique(as_bytes, return_inverse=True)[1])
 
-    def is_front(self, origin: F32, points: F32) -> NDArray[np.bool_]:
-        """Tell which points on surfaces (n, 3) are seen from places, (3,) or (n, 3), on their outer side."""
+    def is_front(self, origin: F32, points: Shaped[F32, "n 3"]) -> Shaped[NDArray[np.bool_], " n"]:
+        """True for points on surfaces whose outer side faces an origin, (3,) or (n, 3)."""
         return is_front(self.embree, self.positions, self.faces, origin, points)
 
 
-def offset_point(positions: F32) -> float:
-    """Choose how far ray origins are moved off surfaces with these corners (n, 3), metres."""
-    # float32 positions carry an error in proportion to their distance from the origin, so that counts besides the size
+def offset_point(positions: Shaped[F32, "n 3"]) -> float:
+    """Offset of ray origins from surfaces with these vertices, meters."""
+    # the rounding error of float32 grows with the distance from the world's origin, so that counts besides the size
     return 1e-5 * float(np.abs(positions).max() + np.linalg.norm(np.ptp(positions, axis=0)))
 
 
 def is_front(
-    embree: EmbreeScene, positions: F32, faces: NDArray[np.uint32], origin: F32, points: F32
-) -> NDArray[np.bool_]:
-    """Tell which points on triangles are seen on their outer side.
+    embree: EmbreeScene,
+    positions: Shaped[F32, "vertices 3"],
+    faces: Shaped[NDArray[np.uint32], "faces 3"],
+    origin: F32,
+    points: Shaped[F32, "n 3"],
+) -> Shaped[NDArray[np.bool_], " n"]:
+    """True for rays whose first hit shows the outer side of its triangle.
 
     Args:
-        embree: the triangles. positions: their vertices. (num_vertices, 3) float32. faces: (num_faces, 3) uint32
-        origin: where they are seen from. (3,) float32, or (n, 3). points: on the triangles. (n, 3) float32
-    Returns:
-        (n,)
+        embree: the triangles. positions: their vertices. faces: vertex indices.
+        origin: of the rays. (3,) or (n, 3). points: on triangles; the rays' targets.
     """
     directions = (points - origin) / np.linalg.norm(points - origin, axis=1, keepdims=True)
     face = trace_rays(embree, origin, directions.astype(np.float32), IGNORE_GLASS).face

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.thread_pools import for_ranges
@@ -28,32 +29,31 @@ _RAYS_PER_RANGE = 16_384
 
 @dataclass(frozen=True)
 class SurfaceInteraction:
-    """What n rays see: points of surfaces, and the textures there.
+    """Surface points and texture values at n ray hits.
 
     Attributes:
-        points: turned to the viewer, moved off the surface by the scene's epsilon; their seeds are their numbers.
-        diffuse, specular: texture channels, 1 where the material has none. (n, 3) float32
-        uv: places in textures (u, v), side of what a pixel covers there, angle from the tangent to the texture's x axis
-            in radians, −1 where the texture is seen mirrored, else 1. Where a triangle has no place in textures, it
-            is that of a projection along the axis of the world that it faces most, in metres. (n, 5) float32
-        roughness: over what the material's terms say, 1 where it has no map. (n,) float32
-        normal_length: of the mean of the normals that a pixel covers, 1 where there are no bumps. (n,) float32
-        emission: over the mean of the material's surfaces, 1 where it has no image. (n, 3) float32
-        surface_normal: normals without bumps, which images of others lean; the points' own where there are none.
-            (n, 3) float32
+        points: with normals toward the viewer, off the surface by the scene's epsilon; their seeds are their indices.
+        diffuse, specular: texture channels, 1 without a texture.
+        uv: texture coordinates (u, v), side of the pixel's footprint in UV space, angle from the tangent to the u axis
+            in radians, −1 if the texture is mirrored, else 1. Triangles without UV coordinates use tri-planar mapping
+            in meters.
+        roughness: relative to the material's terms, 1 without a roughness map.
+        normal_length: of the mean normal in the pixel, 1 without a normal map.
+        emission: relative to the mean of the material's surfaces, 1 without an emission texture.
+        surface_normal: normals without normal mapping, the base for overridden normal maps.
     """
 
     points: SurfacePoints
-    diffuse: F32
-    specular: F32
-    uv: F32
-    roughness: F32
-    normal_length: F32
-    emission: F32
-    surface_normal: F32
+    diffuse: Shaped[F32, "n 3"]
+    specular: Shaped[F32, "n 3"]
+    uv: Shaped[F32, "n 5"]
+    roughness: Shaped[F32, " n"]
+    normal_length: Shaped[F32, " n"]
+    emission: Shaped[F32, "n 3"]
+    surface_normal: Shaped[F32, "n 3"]
 
     def rows(self, rows: NDArray[np.integer]) -> SurfaceInteraction:
-        """Choose some of them; their seeds are their new numbers."""
+        """Select points; their seeds become their new indices."""
         points = self.points.rows(rows)._replace(seed=np.arange(len(rows), dtype=np.uint32))
         surface_columns = (
             self.diffuse, self.specular, self.uv, self.roughness, self.normal_length, self.emission,
@@ -65,7 +65,7 @@ class SurfaceInteraction:
 def surface_at(
     geometry: SceneBuffers,
     hits: Hits,
-    directions: F32,
+    directions: Shaped[F32, "n 3"],
     materials: Sequence[Material] = (),
     pixel_angle: float = 0.0,
 ) -> SurfaceInteraction:
@@ -73,11 +73,11 @@ def surface_at(
 
     Args:
         geometry: the triangles. hits: the first hits of n rays.
-        directions: unit, of the rays. (n, 3) float32
-        materials: where given, textures and normal maps are evaluated, filtered over the pixel.
-        pixel_angle: angle that a pixel spans, radians.
+        directions: of the rays, unit.
+        materials: if given, textures and normal maps are evaluated, filtered over the pixel.
+        pixel_angle: angle of a pixel, radians.
     Returns:
-        Points; where a ray hit nothing the normal faces the viewer and the position is the ray's direction.
+        Points; for rays without a hit the normal faces the viewer and the position is the ray's direction.
     """
     ranges: dict[int, tuple[F32, ...]] = {}
 
@@ -93,11 +93,11 @@ def surface_at(
 
 
 class _Textured(NamedTuple):
-    """What textures say of n points.
+    """Texture values at n points.
 
     Attributes:
-        channels: of images. (n, 3) each, roughness (n, 1). length: of the mean of normals that a pixel covers. (n,)
-        normal: leant by normal maps. (n, 3)
+        channels: of textures. (n, 3) each, roughness (n, 1). length: of the mean normal in the pixel. (n,)
+        normal: after normal mapping. (n, 3)
     """
 
     channels: dict[str, F32]
@@ -108,7 +108,7 @@ class _Textured(NamedTuple):
     def sample(
         cls, face_points: FacePoints, materials: Sequence[Material], material: NDArray[np.integer], footprint: F32
     ) -> _Textured:
-        """Those of points. material: that each is of, −1 for none. (n,) footprint: of a pixel in textures. (n,)"""
+        """Look up textures. material: index, −1 for none. (n,) footprint: of a pixel in UV space. (n,)"""
         channels = dict(zip(_TEXTURE_NAMES, np.ones((3, *face_points.position.shape), np.float32), strict=True))
         channels["roughness"] = np.ones((len(face_points.uv), 1), np.float32)
         length, normal = np.ones(len(face_points.uv), np.float32), face_points.normal
@@ -143,7 +143,7 @@ def _interpolate_range(
     materials: Sequence[Material],
     pixel_angle: float,
 ) -> tuple[F32, ...]:
-    """Interpolate a range of `surface_at`: position, normal, tangent, and the others of `Surface` in their order."""
+    """Interpolate a range of `surface_at`: position, normal, tangent, and the textures of `SurfaceInteraction`."""
     face_points = FacePoints.from_hits(geometry, hits, directions)
     is_hit, distance = face_points.is_hit, np.where(face_points.is_hit, hits.distance, 1.0)
     footprint = (
@@ -177,13 +177,13 @@ def _interpolate_range(
 
 
 def _texture_frame(p: F32, uvs: F32, uv: F32, normal: F32, tangent: F32) -> F32:
-    """Where points lie in textures, but for the footprint, and how textures lie there; see `Surface.uv`.
+    """Texture coordinates and orientation, without the footprint; see `SurfaceInteraction.uv`.
 
     Args:
-        p, uvs: corners of their triangles. (n, 3, 3), (n, 3, 2). uv: of the points. (n, 2)
+        p, uvs: corners of the triangles. (n, 3, 3), (n, 3, 2). uv: of the points. (n, 2)
         normal, tangent: of the points. (n, 3) each
     Returns:
-        (n, 5); the last is 0 where a triangle has no area in textures.
+        (n, 5); the last is 0 if a triangle has no area in UV space.
     """
     position_edges, uv_edges = p[:, 1:] - p[:, :1], uvs[:, 1:] - uvs[:, :1]
     area = uv_edges[:, 0, 0] * uv_edges[:, 1, 1] - uv_edges[:, 1, 0] * uv_edges[:, 0, 1]
@@ -196,14 +196,10 @@ def _texture_frame(p: F32, uvs: F32, uv: F32, normal: F32, tangent: F32) -> F32:
     return np.asarray(np.column_stack([uv, zeros, angle, np.where(area == 0, 0, np.where(is_upright, 1, -1))]))
 
 
-def triplanar_axes(face_normal: F32) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Axes of a texture that is projected along the axis of the world that faces look along most.
-
-    Args:
-        face_normal: of n faces. (n, 3)
-    Returns:
-        Along u, and against v, unit. (n, 3) each
-    """
+def triplanar_axes(
+    face_normal: Shaped[F32, "n 3"],
+) -> tuple[Shaped[NDArray[np.float64], "n 3"], Shaped[NDArray[np.float64], "n 3"]]:
+    """Unit axes along u and against v of the tri-planar mapping, the projection along the dominant axis of a face."""
     axis = np.abs(face_normal).argmax(axis=1)
     sign = np.where(np.take_along_axis(face_normal, axis[:, None], 1)[:, 0] < 0, -1, 1)
     u_axis = np.eye(3)[np.array([2, 0, 0])[axis]] * np.where(axis == 1, 1, np.where(axis == 0, -sign, sign))[:, None]
@@ -211,10 +207,10 @@ def triplanar_axes(face_normal: F32) -> tuple[NDArray[np.float64], NDArray[np.fl
 
 
 def _triplanar_frame(position: F32, face_normal: F32, normal: F32, tangent: F32, side: F32) -> F32:
-    """Places of a texture that is projected along the axes of the world, a metre wide; see `Surface.uv`.
+    """Texture coordinates of tri-planar mapping, one repeat per meter; see `SurfaceInteraction.uv`.
 
     Args:
-        position, face_normal, normal, tangent: of n points. (n, 3) each. side: of a pixel there, metres. (n,)
+        position, face_normal, normal, tangent: of n points. (n, 3) each. side: of a pixel there, meters. (n,)
     """
     u_axis, v_axis = triplanar_axes(face_normal)
     u, v = np.einsum("nc,nc->n", position, u_axis), -np.einsum("nc,nc->n", position, v_axis)

@@ -1,43 +1,43 @@
-"""Points on surfaces, whoever owns them: a pixel's samples, a gather cell, a vertex or a texel."""
+"""Points on surfaces, for any purpose: view samples, patches, vertices or texels."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 F32 = NDArray[np.float32]
 
 FIXED_ALPHA_SAMPLE = np.zeros(1, np.float32)
-"""The chance of rays that are given none: that all of one direction pass what they meet, or none."""
+"""Alpha sample of rays that use the hash of their direction: rays of one direction pass or stop together."""
 
 
 class SurfacePoints(NamedTuple):
-    """n points on surfaces, as the kernels want them.
+    """n points on surfaces, for kernels.
 
     Attributes:
-        position: off the surface already, so that rays may begin there; metres. (n, 3) float32
-        normal: unit shading normals, on the side that the points are seen from. (n, 3) float32
-        tangent: unit, across the normals; n × t completes the shading frame. (n, 3) float32
-        seed: number of each point in what owns it; decides how patterns of rays are shifted there. (n,) uint32
-        alpha_sample: of the rays of each at surfaces that blend: `relume.raytrace.alpha_filter`. (n,) float32, or (1,)
-            of all
+        position: off the surface, so that rays can start there; meters.
+        normal: unit shading normals, on the visible side.
+        tangent: unit, orthogonal to the normals; n × t completes the shading frame.
+        seed: index of each point in its set; it determines the shift of ray patterns.
+        alpha_sample: for rays at blended surfaces, see `relume.raytrace.alpha_filter`; one each, or one for all.
     """
 
-    position: F32
-    normal: F32
-    tangent: F32
-    seed: NDArray[np.uint32]
-    alpha_sample: F32 = FIXED_ALPHA_SAMPLE
+    position: Shaped[F32, "n 3"]
+    normal: Shaped[F32, "n 3"]
+    tangent: Shaped[F32, "n 3"]
+    seed: Shaped[NDArray[np.uint32], " n"]
+    alpha_sample: Shaped[F32, " #n"] = FIXED_ALPHA_SAMPLE
 
     @property
     def num_points(self) -> int:
-        """Their number n."""
+        """Number of points n."""
         return len(self.position)
 
     def rows(self, index: slice | NDArray[np.integer] | NDArray[np.bool_]) -> SurfacePoints:
-        """Choose some of the points, which keep their seeds."""
+        """Select points, which keep their seeds."""
         position, normal, tangent = (np.ascontiguousarray(array[index]) for array in self[:3])
         alpha_sample = (
             self.alpha_sample if len(self.alpha_sample) == 1 else np.ascontiguousarray(self.alpha_sample[index])

@@ -1,4 +1,4 @@
-"""Filtered texture lookups: a mip pyramid, trilinear."""
+"""Trilinear texture lookups in a MIP map."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -18,11 +19,11 @@ from relume.scene.texture_encoding import ROWS_PER_BATCH, decode, periodic
 F32 = NDArray[np.float32]
 
 _LOOKUPS_PER_RANGE = 16_384
-_REPEAT, _, _CLAMP = range(len(WRAPS))  # as kernels know them
+_REPEAT, _, _CLAMP = range(len(WRAPS))  # wrap modes in kernels
 
 
 class MipMap:
-    """A texture and its halvings down to one texel; these are kept in half precision."""
+    """A texture and its MIP levels down to one texel; the levels are stored in half precision."""
 
     def __init__(self, texture: Texture) -> None:
         self.wrap, self.coding = texture.wrap, texture.encoding
@@ -30,12 +31,12 @@ class MipMap:
         while max(self.levels[-1].shape[:2]) > 1:
             self.levels.append(self._downsample(len(self.levels) - 1))
 
-    def level(self, k: int) -> F32:
-        """The values of a level. (height, width, channels) float32"""
+    def level(self, k: int) -> Shaped[F32, "height width channels"]:
+        """Decoded values of a level."""
         return decode(self.levels[k], self.coding if k == 0 else None)
 
     def _downsample(self, k: int) -> NDArray[np.float16]:
-        """The level after level k, made a few rows at a time."""
+        """Compute the level after level k, a few rows at a time."""
         image, coding = self.levels[k], self.coding if k == 0 else None
         strips = [
             _halve(decode(image[start : start + ROWS_PER_BATCH], coding))
@@ -45,24 +46,22 @@ class MipMap:
 
     @staticmethod
     def for_texture(texture: Texture) -> MipMap:
-        """Find or make the pyramid of a texture, kept for as long as the texture is."""
+        """Get or make the MIP map of a texture, cached as long as the texture exists."""
         key = id(texture)
         if key not in _pyramids:
             _pyramids[key] = MipMap(texture)
             weakref.finalize(texture, _pyramids.pop, key, None).atexit = False
         return _pyramids[key]
 
-    def texels(self, footprint: F32) -> F32:
-        """Sides of filters, in texels. footprint: in uv. (n,)"""
+    def texels(self, footprint: Shaped[F32, " n"]) -> Shaped[F32, " n"]:
+        """Convert the sides of filters from UV space to texels."""
         return np.asarray(footprint * max(self.levels[0].shape[:2]), np.float32)
 
-    def sample(self, uv: F32, footprint: F32) -> F32:
-        """Look filtered values up.
+    def sample(self, uv: Shaped[F32, "n 2"], footprint: Shaped[F32, " n"]) -> Shaped[F32, "n channels"]:
+        """Look up filtered values.
 
         Args:
-            uv: v from the top. (n, 2) float32. footprint: side of the filter in uv. (n,) float32
-        Returns:
-            (n, channels) float32
+            uv: v from the top. footprint: side of the filter in UV space.
         """
         texels = np.maximum(self.texels(footprint), 1.0)
         level = np.minimum(np.log2(texels), len(self.levels) - 1)
@@ -88,14 +87,12 @@ class MipMap:
         return np.asarray(top * (1 - fy) + bottom * fy, np.float32)
 
 
-def sample_image(texture: Texture, uv: F32) -> F32:
-    """Look a texture up at places, some at once on every thread.
+def sample_image(texture: Texture, uv: Shaped[F32, "n uv"]) -> Shaped[F32, "n channels"]:
+    """Look up a texture on all threads.
 
     Args:
-        texture: any. uv: u, v, and the side of what a pixel covers there, as
-            `relume.raytrace.surface_interaction.SurfaceInteraction` has them. (n, ≥ 3) float32
-    Returns:
-        (n, channels) float32
+        texture: any. uv: u, v, and the side of the pixel's footprint, as in
+            `relume.raytrace.surface_interaction.SurfaceInteraction`; further columns are ignored.
     """
     pyramid, out = MipMap.for_texture(texture), np.empty((len(uv), texture.pixels.shape[2]), np.float32)
 
@@ -107,7 +104,7 @@ def sample_image(texture: Texture, uv: F32) -> F32:
 
 
 _pyramids: dict[int, MipMap] = {}
-"""By identity of their textures, for as long as these live; equal content is not worth comparing."""
+"""MIP maps by identity of their textures, as long as these exist; comparing contents is not worth the time."""
 
 
 def _halve(image: F32) -> F32:
@@ -122,7 +119,7 @@ def _halve(image: F32) -> F32:
 
 @nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
 def _texel(wrap, index, size):  # type: ignore[no-untyped-def]
-    """Fold a texel's index into an image that is mirrored outside, or clamp it."""
+    """Map a texel's index into an image with mirrored repeat, or clamp it."""
     if wrap == _CLAMP:
         return min(max(index, 0), size - 1)
     folded = index % (2 * size)
@@ -131,12 +128,12 @@ def _texel(wrap, index, size):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
 def two_texels(wrap, coordinate, size):  # type: ignore[no-untyped-def]
-    """Find the two texels about a place along one side of an image, and the share of the second.
+    """Find two adjacent texels for linear interpolation along one side of an image, and the weight of the second.
 
     wrap: of `WRAPS`. coordinate: along the image's side, 0 to 1. size: texels along it.
     """
     if wrap == _REPEAT:
-        # so that what is outside is so by one texel at most, and nothing is divided
+        # so that indices are out of range by at most one texel, and no division is needed
         coordinate -= math.floor(coordinate)
     texel_coordinate = coordinate * np.float32(size) - np.float32(0.5)
     below = math.floor(texel_coordinate)

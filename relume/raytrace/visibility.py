@@ -1,4 +1,4 @@
-"""Which light triangles each point sees: one bit a pair, traced in packets of 16 neighbouring points × one light."""
+"""Visibility of light triangles from points: one bit per pair, traced in packets of 16 neighboring points per light."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -28,7 +29,7 @@ from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE
 F32 = NDArray[np.float32]
 
 _POINTS_PER_RANGE = 512
-NO_EXCLUSION = np.zeros((1, 3), np.float32)  # a normal that no light is above
+NO_EXCLUSION = np.zeros((1, 3), np.float32)  # a normal without any light above its horizon
 
 
 @nb.njit(nogil=True, cache=True)
@@ -72,37 +73,35 @@ def _trace(  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True)
 class VisibilityBits:
-    """What n points see, and what it cost to find out.
+    """Visibility of m lights from n points, and its cost.
 
     Attributes:
-        visible: light m of a point in bit m & 7 of byte m >> 3. (n, ceil(m / 8)) uint8
-        num_rays: rays traced. trace_s: wall time of the tracing alone.
+        visible: light k of a point at bit k & 7 of byte k >> 3; ceil(m / 8) bytes.
+        num_rays: number of traced rays. trace_s: wall time of tracing alone.
     """
 
-    visible: NDArray[np.uint8]
+    visible: Shaped[NDArray[np.uint8], "n bytes"]
     num_rays: int
     trace_s: float
 
 
 def trace_visibility(
     scene: EmbreeScene,
-    origins: F32,
-    normals: F32,
-    directions: F32,
-    alpha_sample: F32 = FIXED_ALPHA_SAMPLE,
-    excluded_normals: F32 = NO_EXCLUSION,
+    origins: Shaped[F32, "n 3"],
+    normals: Shaped[F32, "n 3"],
+    directions: Shaped[F32, "m 3"],
+    alpha_sample: Shaped[F32, " #n"] = FIXED_ALPHA_SAMPLE,
+    excluded_normals: Shaped[F32, "#n 3"] = NO_EXCLUSION,
 ) -> VisibilityBits:
     """Trace every point against every light above its horizon.
 
     Args:
-        scene: the triangles that may be in the way.
-        origins: off the surface already. (n, 3) float32
-        normals: shading normals; lights below their horizon are not traced and count as hidden. (n, 3) float32
-        directions: unit, towards the lights. (m, 3) float32
-        alpha_sample: of the rays of each point, or of all, at surfaces that blend; see `SurfacePoints`. (n,) or (1,)
-            float32
-        excluded_normals: other normals; lights above their horizon are not traced and count as hidden, too. (n, 3) or
-            (1, 3)
+        scene: the occluding triangles.
+        origins: off the surface.
+        normals: shading normals; lights below their horizon are not traced and count as occluded.
+        directions: unit, toward the lights.
+        alpha_sample: for the rays at blended surfaces; see `SurfacePoints`.
+        excluded_normals: other normals; lights above their horizon are not traced and count as occluded too.
     Cost: O(n · m · log triangles) time.
     """
     bits = np.zeros((len(origins), (len(directions) + 7) // 8), np.uint8)
@@ -133,15 +132,16 @@ def _select_bits(visible, rows, lights, start, stop, out):  # type: ignore[no-un
 
 
 def select_visibility(
-    visible: NDArray[np.uint8], rows: NDArray[np.intp], lights: NDArray[np.intp]
-) -> NDArray[np.uint8]:
-    """What some points see of some lights.
+    visible: Shaped[NDArray[np.uint8], "n bytes"],
+    rows: Shaped[NDArray[np.intp], " m"],
+    lights: Shaped[NDArray[np.intp], " N"],
+) -> Shaped[NDArray[np.uint8], "m out_bytes"]:
+    """Select visibility bits of some points and some lights.
 
     Args:
-        visible: what all points see of all lights, as in `Traced`. (n, bytes) uint8
-        rows: the points. (m,). lights: (N,)
+        visible: of all points and lights, as in `VisibilityBits`. rows: the points. lights: the lights.
     Returns:
-        The same of them alone. (m, ceil(N / 8)) uint8
+        Their bits, renumbered; ceil(N / 8) bytes
     """
     out = np.zeros((len(rows), -(-len(lights) // 8)), np.uint8)
     parallel_for_chunks(lambda start, stop: _select_bits(visible, rows, lights, start, stop, out), len(rows))

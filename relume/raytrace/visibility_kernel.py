@@ -1,13 +1,13 @@
-"""The kernels of `relume.raytrace.visibility_masks`: few samples are traced, the others predicted, errors flood.
+"""Kernels of `relume.raytrace.visibility_masks`: trace few samples, predict the others, flood from wrong ones.
 
-A block is 64 view samples that follow each other. Over all lights at once, three levels do the same to a region:
+A block is 64 successive view samples. For all lights at once, three levels process a region in the same way:
 
-    the block       two samples as far apart as they can be, against all lights
-    a quarter of it two samples of its own, against the lights in doubt
-    a quarter       all its samples, against the lights still in doubt
+    the block       two samples as far apart as possible, against all lights
+    a quarter of it two samples of its own, against the doubtful lights
+    a quarter       all its samples, against the lights that are still doubtful
 
-A light is in doubt in a region where the traced samples disagree, or where a light beside it is predicted otherwise.
-Where a traced sample contradicts what the level above predicted, the lights beside it are traced as well, and so on.
+A light is doubtful in a region if the traced samples disagree, or if an adjacent light has another prediction. If a
+traced sample contradicts the prediction of the level above, the adjacent lights are traced as well, and so on.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numba.cpython.unsafe.numbers import trailing_zeros
 from numpy.typing import NDArray
 
@@ -38,50 +39,50 @@ U64 = NDArray[np.uint64]
 BLOCK = WORD_BITS
 _BLOCK_BITS = 6
 _QUARTER = BLOCK // 4
-_MIN_FULL_LANES = LANES * 3 // 4  # rays to one light from which on they do not wait for the next light's
-# predictions: what a region's untraced samples are held to see of a light
+_MIN_FULL_LANES = LANES * 3 // 4  # rays to one light from which on they are traced without rays of the next light
+# predictions of the visibility of a light from the untraced samples of a region
 _UNKNOWN, _LIT, _HIDDEN, _BELOW = 0, 1, 2, 3
-# of the predicted bits, one in this many is traced all the same; a power of two from the size of a quarter up
+# one in this many predicted bits is traced as a check; a power of two, at least the size of a quarter
 _CHECK_EVERY = 128
-# times eight bytes of one bit each: those bits in the highest byte, the first lowest; and the sum of eight bytes there
+# factors for eight bytes of one bit each: moves the bits into the highest byte, the first lowest; sums the bytes there
 _GATHER_BITS, _SUM_BYTES = np.uint64(0x0102040810204080), np.uint64(0x0101010101010101)
-_ZERO = np.int64(0)  # of NumPy: a kernel that is called with an int of Python is compiled anew for it
+_ZERO = np.int64(0)  # a NumPy integer: Numba compiles a kernel anew for each Python int literal
 _HASH = 2_654_435_761  # Knuth's multiplicative hash: 2^32 divided by the golden ratio
 
 
 class _Block(NamedTuple):
-    """A block against all lights; bit k of a word is the k-th sample.
+    """A block against all lights; bit k of a word is sample k.
 
     Attributes:
-        facing_bits, traced_bits, visibility_bits: above the horizon; traced; unoccluded. (num_lights,) uint64
-        alpha_sample: of the rays of each sample at surfaces that blend. (`BLOCK`,) float32
+        facing_bits, traced_bits, visibility_bits: above the horizon; traced; unoccluded.
+        alpha_sample: for the rays of each sample at blended surfaces. Its size is `BLOCK`.
     """
 
-    facing_bits: U64
-    traced_bits: U64
-    visibility_bits: U64
-    alpha_sample: NDArray[np.float32]
+    facing_bits: Shaped[U64, " lights"]
+    traced_bits: Shaped[U64, " lights"]
+    visibility_bits: Shaped[U64, " lights"]
+    alpha_sample: Shaped[NDArray[np.float32], " samples"]
 
 
 class _Level(NamedTuple):
-    """What a level knows about its region.
+    """State of a level in its region.
 
     Attributes:
-        prediction: of what was not traced. (num_lights,)
-        is_queued: whether the light was traced here. is_doubtful: whether the next level traces it. (num_lights,)
-        queue, samples: lights in the order in which they are traced, and against which samples. (num_lights,)
+        prediction: for untraced samples.
+        is_queued: the light was traced here. is_doubtful: the next level traces it.
+        queue, samples: lights in the order of tracing, and masks of the samples to trace.
     """
 
-    prediction: NDArray[np.uint8]
-    is_queued: NDArray[np.bool_]
-    is_doubtful: NDArray[np.bool_]
-    queue: NDArray[np.int64]
-    samples: U64
+    prediction: Shaped[NDArray[np.uint8], " lights"]
+    is_queued: Shaped[NDArray[np.bool_], " lights"]
+    is_doubtful: Shaped[NDArray[np.bool_], " lights"]
+    queue: Shaped[NDArray[np.int64], " lights"]
+    samples: Shaped[U64, " lights"]
 
 
 @nb.njit(nogil=True, cache=True)
 def _new_level(num_lights):  # type: ignore[no-untyped-def]
-    """Make room for a level that knows nothing."""
+    """Allocate a level without predictions."""
     return _Level(
         np.zeros(num_lights, np.uint8),
         np.zeros(num_lights, np.bool_),
@@ -93,7 +94,7 @@ def _new_level(num_lights):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _flush(occluded, packet, block, num_waiting):  # type: ignore[no-untyped-def]
-    """Trace the rays of the first lanes. A lane's owner: its light, then its sample in the lowest six bits."""
+    """Trace the rays in the first lanes. A lane's owner: its light, then its sample in the lowest six bits."""
     if num_waiting == 0:
         return
     enable_first_lanes(packet, num_waiting)
@@ -106,7 +107,7 @@ def _flush(occluded, packet, block, num_waiting):  # type: ignore[no-untyped-def
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _trace(occluded, packet, block, origins, directions, lights, samples):  # type: ignore[no-untyped-def]
-    """Trace lights against the samples of a mask each, those above the horizon and not yet traced; counts the rays."""
+    """Trace lights against masks of samples, only those above the horizon and not yet traced; counts the rays."""
     facing, traced = block.facing_bits, block.traced_bits
     num_rays, lane = 0, _ZERO
     for entry in range(lights.shape[0]):
@@ -136,7 +137,7 @@ def _trace(occluded, packet, block, origins, directions, lights, samples):  # ty
 @nb.njit(nogil=True, cache=True)
 def _find_facing(normals, directions, block):  # type: ignore[no-untyped-def]
     """Find the lights above each sample's horizon. Returns the number of pairs."""
-    by_axis = np.zeros((3, BLOCK), np.float32)  # samples that are not there face nothing
+    by_axis = np.zeros((3, BLOCK), np.float32)  # missing samples face no light
     by_axis[:, : normals.shape[0]] = normals.T
     nx, ny, nz = by_axis[0], by_axis[1], by_axis[2]
     is_above = np.empty(BLOCK, np.uint8)
@@ -199,7 +200,7 @@ def _mask(start, stop):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _predict(facing_bits, traced_bits, visible_bits):  # type: ignore[no-untyped-def]
-    """Predict what the traced samples of a region agree on."""
+    """Predict the visibility on which all traced samples of a region agree."""
     traced = facing_bits & traced_bits
     if not facing_bits:
         return _BELOW
@@ -210,7 +211,7 @@ def _predict(facing_bits, traced_bits, visible_bits):  # type: ignore[no-untyped
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _is_contradicted(traced_bits, visible_bits, prediction):  # type: ignore[no-untyped-def]
-    """Tell whether a traced sample sees what was not predicted."""
+    """True if a traced sample contradicts the prediction."""
     return (prediction == _LIT and ~visible_bits & traced_bits != 0) or (
         prediction == _HIDDEN and visible_bits & traced_bits != 0
     )
@@ -218,7 +219,7 @@ def _is_contradicted(traced_bits, visible_bits, prediction):  # type: ignore[no-
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _init_level(block, region, previous_level, level):  # type: ignore[no-untyped-def]
-    """Take over the predictions of the level before, and queue what it doubts. Returns the length of the queue."""
+    """Copy the predictions of the previous level, and queue its doubtful lights. Returns the length of the queue."""
     queue_length = 0
     for light in range(level.prediction.shape[0]):
         is_below = block.facing_bits[light] & region == 0
@@ -232,7 +233,7 @@ def _init_level(block, region, previous_level, level):  # type: ignore[no-untype
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _update_predictions(block, region, lights, previous_level, level, start, stop):  # type: ignore[no-untyped-def]
-    """Predict anew the lights of the queue in [start, stop); the neighbours of wrong predictions join its end."""
+    """Update predictions of queue entries [start, stop); append the neighbors of wrong predictions to the queue."""
     first, index = lights
     queue_length = stop
     for entry in range(start, stop):
@@ -257,7 +258,7 @@ def _update_predictions(block, region, lights, previous_level, level, start, sto
 def _flood(occluded, packet, block, positions, lights, region, samples, previous_level, level):  # type: ignore[no-untyped-def]
     """Trace `samples` against lights that `previous_level` doubts, then against neighbors of wrong predictions.
 
-    Returns the number of rays; `level.prediction` is what is held of the region now.
+    Returns the number of rays; `level.prediction` then holds the predictions for the region.
     """
     origins, (directions, first, index, _) = positions, lights
     level.samples[:] = samples
@@ -271,7 +272,7 @@ def _flood(occluded, packet, block, positions, lights, region, samples, previous
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _mark_doubtful(level, lights):  # type: ignore[no-untyped-def]
-    """Mark the lights that were traced, yet are unknown, strong, or predicted otherwise than a light beside them."""
+    """Mark traced lights that are unknown, strong, or predicted differently from an adjacent light."""
     _, first, index, strong = lights
     for light in range(level.prediction.shape[0]):
         prediction = level.prediction[light]
@@ -286,7 +287,7 @@ def _mark_doubtful(level, lights):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _check_predictions(occluded, packet, block, positions, lights, region, start, salt, level):  # type: ignore[no-untyped-def]
-    """Trace a few of the predicted samples; lights that are wrong come into doubt. Returns rays and wrong ones."""
+    """Trace a few predicted samples; lights with errors become doubtful. Returns the numbers of rays and errors."""
     origins, (directions, _, _, _) = positions, lights
     queue_length, num_wrong = 0, 0
     for light in range(directions.shape[0]):
@@ -316,7 +317,7 @@ def _check_predictions(occluded, packet, block, positions, lights, region, start
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _accept_predictions(block, region, level):  # type: ignore[no-untyped-def]
-    """Believe the predictions of what was not traced."""
+    """Set the visibility bits of untraced samples to the predictions."""
     for light in range(level.prediction.shape[0]):
         if level.prediction[light] == _LIT:
             block.visibility_bits[light] |= block.facing_bits[light] & ~block.traced_bits[light] & region
@@ -324,7 +325,7 @@ def _accept_predictions(block, region, level):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _trace_quarter(occluded, packets, block, positions, lights, span, salt, levels, counts):  # type: ignore[no-untyped-def]
-    """Trace samples `span` of a block: two of them, then all of them where need be; then check."""
+    """Trace samples `span` of a block: two of them, then all of them for doubtful lights; then check."""
     (packet, coherent_packet), (block_level, quarter_level, sample_level) = packets, levels
     start, stop = span
     region = _mask(start, stop)
@@ -357,13 +358,12 @@ def trace_blocks(  # type: ignore[no-untyped-def]
 
     Args:
         occluded: `occluded`. scene: `EmbreeScene.handle`. arguments: address of `packet_arguments`.
-        coherent_arguments: address of those of rays that go to one light from all samples of a quarter.
+        coherent_arguments: address of those for rays from all samples of a quarter to one light.
         origins: off the surface. normals: shading normals. (n, 3) float32
-        alpha_sample: of the rays of each sample, or of all, at surfaces that blend. (n,) or (1,) float32
-        lights: directions, the two arrays of `relume.lights.light_neighbors.LightNeighbors`, and which are always
-            traced.
-        start, stop: the samples. bits: written, light m in bit m & 7 of byte m >> 3. (n, bytes) uint8
-        counts: rays traced, rays that a full trace would take, predicted bits checked, found wrong: added to. (4,)
+        alpha_sample: for the rays of each sample, or for all, at blended surfaces. (n,) or (1,) float32
+        lights: directions, the two arrays of `relume.lights.neighbors`, and the strong lights, which are always traced.
+        start, stop: the samples. bits: output, light m at bit m & 7 of byte m >> 3. (n, bytes) uint8
+        counts: traced rays, rays of a full trace, checked predictions, wrong predictions: added to. (4,)
     """
     directions = lights[0]
     n = directions.shape[0]

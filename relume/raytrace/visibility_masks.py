@@ -1,9 +1,9 @@
-"""Which light triangles each view sample of a bake sees, with a fraction of the rays.
+"""Visibility of light triangles from the view samples of a bake, with a fraction of the rays.
 
-After Ben-Artzi et al. 2006b, "Efficient shadows from sampled environment maps": few samples are traced, the others are
-predicted, rays go where neighbours disagree, and a prediction found wrong floods its neighbours. Neighbours are samples
-that follow each other, and lights beside each other on the sphere (docs/direct-light.md#algorithm). Nothing is
-random, and blocks know nothing of each other: the same samples give the same bits whatever the threads.
+After Ben-Artzi et al. 2006b, "Efficient shadows from sampled environment maps": few samples are traced and the others
+predicted; rays are traced where neighbors disagree, and a wrong prediction floods to its neighbors. Neighbors are
+successive samples, and adjacent lights on the sphere (docs/direct-light.md#algorithm). Nothing is random, and blocks
+are independent: the result does not depend on the threads.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import luminance
@@ -25,19 +26,17 @@ from relume.raytrace.visibility_kernel import BLOCK, trace_blocks
 F32 = NDArray[np.float32]
 
 _SAMPLES_PER_RANGE = 8 * BLOCK
-_STRONG_LIGHT_FRACTION = (
-    5e-3  # of all the light; a triangle with more is not predicted: one wrong bit of it could be seen
-)
+_STRONG_LIGHT_FRACTION = 5e-3  # of all light; brighter triangles are always traced: a wrong bit could be visible
 
 
 @dataclass(frozen=True)
 class RayCounts:
-    """What prediction saved, and how far it can be believed.
+    """Rays saved by prediction, and its accuracy.
 
     Attributes:
-        num_traced: shadow rays. num_full: those that a full trace takes, all pairs above the horizon.
-        num_checked: predicted bits that were traced all the same, spread evenly. num_wrong: those of them that were
-            wrong.
+        num_traced: traced shadow rays. num_full: rays of a full trace, all pairs above the horizon.
+        num_checked: predicted bits that were traced as a check, uniformly distributed. num_wrong: wrong ones among
+            them.
     """
 
     num_traced: int
@@ -47,62 +46,65 @@ class RayCounts:
 
     @property
     def error_rate(self) -> float:
-        """The wrong share of checked bits times the share of predicted ones: an estimate of all wrong bits."""
+        """Estimated fraction of wrong bits: the error rate of checked bits times the fraction of predicted bits."""
         return self.num_wrong / max(1, self.num_checked) * (1 - self.num_traced / max(1, self.num_full))
 
 
 @dataclass(frozen=True)
 class VisibilityMasks:
-    """What n view samples see, and what it cost to find out.
+    """Visibility of m lights from n view samples, and its cost.
 
     Attributes:
-        visible: light m of a sample in bit m & 7 of byte m >> 3. (n, ceil(m / 8)) uint8
-        rays: what prediction saved. trace_s: wall time of the tracing and predicting alone.
+        visible: light k of a sample at bit k & 7 of byte k >> 3; ceil(m / 8) bytes.
+        rays: ray counts. trace_s: wall time of tracing and predicting alone.
     """
 
-    visible: NDArray[np.uint8]
+    visible: Shaped[NDArray[np.uint8], "n bytes"]
     rays: RayCounts
     trace_s: float
 
 
 class LightTargets(NamedTuple):
-    """What shadow rays are sent to.
+    """Lights as targets of shadow rays.
 
     Attributes:
-        directions: unit, towards the lights. (m, 3) float32
-        first, neighbors: `relume.lights.light_neighbors.LightNeighbors` of them.
-        is_strong: so much of the light that nothing is predicted. (m,)
+        directions: unit, toward the lights.
+        first, neighbors: adjacent lights, from `relume.lights.neighbors.find_neighbors`.
+        is_strong: lights so bright that their visibility is never predicted.
     """
 
-    directions: F32
+    directions: Shaped[F32, "m 3"]
     first: NDArray[np.int32]
     neighbors: NDArray[np.int32]
-    is_strong: NDArray[np.bool_]
+    is_strong: Shaped[NDArray[np.bool_], " m"]
 
 
-def make_light_targets(directions: F32, irradiance: F32) -> LightTargets:
-    """Make lights what `trace_visibility_masks` wants.
+def make_light_targets(directions: Shaped[F32, "m 3"], irradiance: Shaped[F32, "m 3"]) -> LightTargets:
+    """Prepare lights for `trace_visibility_masks`.
 
     Args:
-        directions: unit, towards the lights. (m, 3) float32. irradiance: of each light, per channel. (m, 3) float32
+        directions: unit, toward the lights. irradiance: of each light, per channel.
     """
     luminous = luminance(irradiance)
     return LightTargets(directions, *find_neighbors(directions), luminous > _STRONG_LIGHT_FRACTION * luminous.sum())
 
 
 def trace_visibility_masks(
-    scene: EmbreeScene, origins: F32, normals: F32, targets: LightTargets, alpha_sample: F32 = FIXED_ALPHA_SAMPLE
+    scene: EmbreeScene,
+    origins: Shaped[F32, "n 3"],
+    normals: Shaped[F32, "n 3"],
+    targets: LightTargets,
+    alpha_sample: Shaped[F32, " #n"] = FIXED_ALPHA_SAMPLE,
 ) -> VisibilityMasks:
-    """Find what samples see, tracing where it changes and predicting where it does not.
+    """Compute the visibility of lights from samples, traced where it changes and predicted elsewhere.
 
     Args:
-        scene: the triangles that may be in the way.
-        origins: off the surface already, neighbours in the picture mostly next to each other. (n, 3) float32
-        normals: shading normals; lights below their horizon are not traced and count as hidden. (n, 3) float32
+        scene: the occluding triangles.
+        origins: off the surface, mostly ordered by neighborhood in the image.
+        normals: shading normals; lights below their horizon are not traced and count as occluded.
         targets: the lights, from `make_light_targets`.
-        alpha_sample: of the rays of each sample, or of all, at surfaces that blend; see `SurfacePoints`. (n,) or (1,)
-            float32
-    Cost: O(n · m) time, O(m · log triangles) of it for each sample that lies on a shadow's edge.
+        alpha_sample: for the rays at blended surfaces; see `SurfacePoints`.
+    Cost: O(n · m) time, plus O(m · log triangles) for each sample on a shadow edge.
     """
     bits = np.zeros((len(origins), (len(targets.directions) + 7) // 8), np.uint8)
     mixed_arguments, single_light_arguments = (packet_arguments(coherent=is_coherent) for is_coherent in (False, True))

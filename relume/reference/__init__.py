@@ -1,4 +1,4 @@
-"""Reference images by brute force: every texel of the environment, traced visibility, BRDFs at exact angles."""
+"""Brute-force reference images: every environment texel, traced visibility, BRDFs at exact angles."""
 
 from relume.reference.environment_samples import EnvironmentSamples, environment_texels
 from relume.reference.image import ReferenceImage, reference_image, render_reference

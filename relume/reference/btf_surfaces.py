@@ -1,6 +1,6 @@
-"""Surfaces that are covered with a BTF, as brute force sees them: places drawn within what a pixel covers.
+"""BTF surfaces of the reference: texels sampled at random positions in the pixel's footprint.
 
-Methods sum means over texels that are as wide as a pixel; here single texels are looked up, of the finest level.
+Methods average over texels as wide as a pixel; the reference looks up single texels of the finest level.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.btf.outgoing_radiance import outgoing_radiance, sample_btf
@@ -17,46 +18,45 @@ from relume.brdf.terms.btf import BtfRef
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_NUM_STRATA = 2  # strata along each side of what a pixel covers
+_NUM_STRATA = 2  # along each side of the footprint
 _LEAST_COSINE = 1e-3
 
 
 @dataclass(frozen=True)
 class BtfSurface:
-    """What some points send that are covered.
+    """Reflection of BTF-textured points.
 
     Attributes:
-        texels: by which. samples: of each point, from `relume.assets.btf.outgoing_radiance.sample_btf`; nothing below
-            the horizon. (n, L, 3)
-        axes: of the texture, in the points' frames. (n, 2, 2)
+        texels: the BTF. samples: of each point, from `relume.assets.btf.outgoing_radiance.sample_btf`; zero below
+            the horizon.
+        axes: of the texture, in the points' frames.
     """
 
     texels: BtfRef
-    samples: F32
-    axes: F64
+    samples: Shaped[F32, "n L 3"]
+    axes: Shaped[F64, "n 2 2"]
 
-    def evaluate(self, point_index: NDArray[np.int64], wi: F64) -> F64:
-        """BRDF times cos θi of some of the points.
+    def evaluate(self, point_index: Shaped[NDArray[np.int64], " m"], wi: Shaped[F64, "m 3"]) -> Shaped[F64, "m 3"]:
+        """Evaluate BRDF times cos θi, not negative, at some of the points.
 
         Args:
-            point_index: which, for each direction. (m,). wi: in the frames of these, z = normal, unit. (m, 3)
-        Returns:
-            (m, 3), not negative
+            point_index: the point of each direction. wi: in the points' frames, z = normal, unit.
         """
         return np.maximum(outgoing_radiance(self.texels.btf, self.samples, self.axes, point_index, wi), 0)
 
 
-def sample_btf_surface(texels: BtfRef, uv: F32, wo: F64, rng: np.random.Generator) -> BtfSurface:
-    """Look up what points send.
+def sample_btf_surface(
+    texels: BtfRef, uv: Shaped[F32, "n 5"], wo: Shaped[F64, "n 3"], rng: np.random.Generator
+) -> BtfSurface:
+    """Look up the BTF at points.
 
     Args:
-        texels: how they are covered. wo: to the eye, in the points' frames, unit. (n, 3)
-        uv: as `relume.raytrace.surface_interaction.SurfaceInteraction.uv` has them. (n, 5). rng: draws places within
-            what pixels cover.
+        texels: mapping of the BTF. wo: in the points' frames, unit.
+        uv: see `relume.raytrace.surface_interaction.SurfaceInteraction.uv`. rng: chooses positions in footprints.
     """
     axes = _texture_axes(texels, uv)
     cosine, sine = math.cos(texels.rotation), math.sin(texels.rotation)
-    u, up = uv[:, 0].astype(np.float64), -uv[:, 1].astype(np.float64)  # up in a texture is down in its numbers
+    u, up = uv[:, 0].astype(np.float64), -uv[:, 1].astype(np.float64)  # v points down
     center = texels.scale * np.stack([cosine * u + sine * up, sine * u - cosine * up], axis=1)
     towards = np.column_stack([np.einsum("nij,nj->ni", axes, wo[:, :2]), wo[:, 2]])
     positions = center[:, None] + _footprint_offsets(texels.scale * uv[:, 2].astype(np.float64), towards, rng)
@@ -68,7 +68,7 @@ def sample_btf_surface(texels: BtfRef, uv: F32, wo: F64, rng: np.random.Generato
 
 
 def _texture_axes(texels: BtfRef, uv: F32) -> F64:
-    """The x and y axes of a turned texture in the frames of points. (n, 2, 2)"""
+    """Axes x and y of a rotated texture in the frames of points. (n, 2, 2)"""
     angle, side = uv[:, 3].astype(np.float64), uv[:, 4].astype(np.float64)
     x = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     y = side[:, None] * np.stack([-np.sin(angle), np.cos(angle)], axis=1)
@@ -77,12 +77,12 @@ def _texture_axes(texels: BtfRef, uv: F32) -> F64:
 
 
 def _footprint_offsets(side: F64, wo: F64, rng: np.random.Generator) -> F64:
-    """Places from the middle of what a pixel covers: a rectangle, longer in the plane of the eye and the normal.
+    """Random offsets in the pixel footprint: a rectangle, longer in the plane of the view direction and the normal.
 
     Args:
-        side: of the square of its area, in repeats. (n,). wo: to the eye, in the texture's frame. (n, 3)
+        side: of a square with the footprint's area, in repeats. (n,). wo: in the texture's frame. (n, 3)
     Returns:
-        One in each of its strata. (n, `_NUM_STRATA`², 2)
+        One per stratum. (n, `_NUM_STRATA`², 2)
     """
     slanted = np.sqrt(np.maximum(wo[:, 2], _LEAST_COSINE))[:, None, None]
     horizontal_length = np.hypot(wo[:, 0], wo[:, 1])[:, None]

@@ -1,13 +1,13 @@
-"""How true a frame is: its difference from brute force, with the noise of brute force told apart from it.
+"""Error of a frame relative to the reference, separated from the noise of the reference.
 
-Passes of the reference are independent, but their noise has heavy tails: that a highlight finds a small light is rare,
-and bright. So nothing here trusts a table of Student's t. Passes are added up in batches, and the batches say by
-themselves how far noise alone carries their mean: with the signs of half of them turned, the truth cancels and noise of
-the same spread is left. What a frame differs by, over its own noise, is compared with what such turned batches give,
-over pixels and over blocks of them, and the largest set is called different of which at most `FALSE_DISCOVERY_RATE` is
-so by chance (the false discovery rate of Benjamini and Hochberg 1995, counted as with decoys, Elias and Gygi 2007).
+Passes of the reference are independent, but their noise has heavy tails: a highlight rarely samples a small light, and
+is then bright. So Student's t distribution does not apply. Passes are summed in batches, and the batches themselves
+show how far noise moves their mean: with the signs of half of the batches flipped, the signal cancels and noise of the
+same spread remains. The frame's difference in units of its noise is compared with that of sign-flipped batches, over
+pixels and over blocks of pixels. The largest set of which at most `FALSE_DISCOVERY_RATE` is expected by chance is
+called different (false discovery rate of Benjamini and Hochberg 1995, counted with decoys, Elias and Gygi 2007).
 
-All that is said of a frame follows from that set: where it is empty no error was found, however large the differences.
+All results follow from that set: if it is empty, no error was found, however large the differences.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
@@ -24,64 +25,64 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-FALSE_DISCOVERY_RATE = 0.01  # of what is called different, at most
-_BLOCKS = (1, 4, 16)  # pixels across
-_NUM_SIGN_FLIPS = 16  # of the batches' signs
+FALSE_DISCOVERY_RATE = 0.01  # maximum expected fraction of false discoveries
+_BLOCKS = (1, 4, 16)  # block sizes, pixels
+_NUM_SIGN_FLIPS = 16  # trials with flipped signs
 _SEED = 1995
 _MAX_BATCHES, _MIN_BATCHES, _BATCH_BYTES = 16, 4, 256 << 20
-_ROUNDING = 1e-6  # of float32, relative: no difference
+_ROUNDING = 1e-6  # relative rounding of float32, not counted as a difference
 _FULL_COLOR_STOPS = 0.25
-_DARK = 0.01  # of the picture's mean: darker than that, stops say nothing
+_DARK = 0.01  # of the image's mean; stops are meaningless below it
 _GRAY, _TOO_BRIGHT, _TOO_DARK = (np.array(c, float) for c in ((56, 56, 56), (235, 94, 52), (66, 135, 245)))
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Passes of the reference, added up in batches: pass k in batch k modulo their number.
+    """Sums of reference passes in batches: pass k is in batch k modulo their number.
 
     Attributes:
-        sums: of red, green and blue. (batches, height, width, 3) float32
-        passes: number of them.
+        sums: per batch.
+        passes: number of passes.
     """
 
-    sums: F32
+    sums: Shaped[F32, "batches height width 3"]
     passes: int
 
     @classmethod
     def empty(cls, height: int, width: int) -> Estimate:
-        """No pass yet; so many batches that they take a bounded part of the memory."""
+        """Make an estimate without passes; memory bounds the number of batches."""
         num_fitting = _BATCH_BYTES // max(1, 12 * height * width)
         num = min(max(num_fitting, _MIN_BATCHES), _MAX_BATCHES)
         return cls(np.zeros((num, height, width, 3), np.float32), 0)
 
-    def add(self, picture: F32) -> Estimate:
-        """One more pass, (height, width, 3); what this estimate held is the new one's."""
+    def add(self, picture: Shaped[F32, "height width 3"]) -> Estimate:
+        """Add a pass; the new estimate reuses the arrays of this one."""
         self.sums[self.passes % len(self.sums)] += picture
         return Estimate(self.sums, self.passes + 1)
 
     @property
-    def means(self) -> F32:
-        """Of each batch that has a pass. (batches, height, width, 3)"""
+    def means(self) -> Shaped[F32, "batches height width 3"]:
+        """Mean of each batch that has a pass."""
         num = min(self.passes, len(self.sums))
         count = self.passes // len(self.sums) + (np.arange(num) < self.passes % len(self.sums))
         return np.asarray(self.sums[:num] / count.astype(np.float32)[:, None, None, None])
 
     @property
-    def mean(self) -> F32:
-        """Of all passes. (height, width, 3)"""
+    def mean(self) -> Shaped[F32, "height width 3"]:
+        """Mean of all passes."""
         return np.asarray(self.sums.sum(axis=0, dtype=np.float64) / self.passes, np.float32)
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A frame against an estimate of the truth, each relative to the truth's root mean square over pixels and channels.
+    """Errors of a frame, relative to the root mean square of the reference over pixels and channels.
 
     Attributes:
         rmse: of the difference, noise included. noise: of the estimate.
-        error: of the frame, noise taken off; None where that cannot be told from the noise.
-        standard_error: of `error`, one standard deviation of what other passes would make of it; None where that is.
-        error_upper_bound: what the error is very likely below.
-        significant_pixel_fraction: share of pixels that differ by more than noise explains; at most
+        error: of the frame, without noise; None if it cannot be separated from the noise.
+        standard_error: of `error`, one standard deviation over other passes; None if `error` is.
+        error_upper_bound: two standard deviations above the error.
+        significant_pixel_fraction: fraction of pixels that differ by more than noise explains; at most
             `FALSE_DISCOVERY_RATE` of these by chance.
     """
 
@@ -93,11 +94,13 @@ class Comparison:
     significant_pixel_fraction: float
 
 
-def compare(frame: F32, estimate: Estimate) -> tuple[Comparison, Mask]:
-    """Compare a frame, (height, width, 3), with an estimate of at least two passes.
+def compare(
+    frame: Shaped[F32, "height width 3"], estimate: Estimate
+) -> tuple[Comparison, Shaped[Mask, "height width"]]:
+    """Compare a frame with an estimate of at least two passes.
 
     Returns:
-        The figures, and which pixels differ. (height, width)
+        The errors, and a mask of significantly different pixels.
     """
     means = estimate.means
     differs = _differing_pixels(frame, means)
@@ -120,26 +123,27 @@ def compare(frame: F32, estimate: Estimate) -> tuple[Comparison, Mask]:
     return figures, differs
 
 
-def error_squared(frame: NDArray[np.floating], passes: F32) -> tuple[float, float]:
-    """The mean square of a frame's error, noise of the passes taken off, and its standard deviation.
+def error_squared(
+    frame: Shaped[NDArray[np.floating], "height width 3"], passes: Shaped[F32, "passes height width 3"]
+) -> tuple[float, float]:
+    """Mean squared error of a frame without the noise of the passes, and its standard deviation.
 
     Args:
-        frame: (height, width, 3). passes: independent noisy pictures of the truth. (passes, height, width, 3)
+        frame: the image. passes: independent noisy reference images.
     Returns:
-        Both in the frame's unit squared; the first may be negative where there is more noise than error.
+        Both in squared units of the frame; the first may be negative if there is more noise than error.
     """
     return _error_squared(_gram(frame, passes))
 
 
-def error_map(frame: F32, estimate: Estimate, differs: Mask) -> NDArray[np.uint8]:
-    """Where the frame is too bright (orange) or too dark (blue), in full colour from a quarter of a stop on.
+def error_map(
+    frame: Shaped[F32, "height width 3"], estimate: Estimate, differs: Shaped[Mask, "height width"]
+) -> Shaped[NDArray[np.uint8], "height width 3"]:
+    """Map of too bright (orange) and too dark (blue) pixels, in full color from a quarter of a stop, in sRGB.
 
     Args:
-        frame: linear radiance. (height, width, 3)
-        estimate: of the truth, of the same size.
-        differs: pixels as `compare` has found them; all others are grey. (height, width)
-    Returns:
-        sRGB. (height, width, 3) uint8
+        frame: linear radiance. estimate: of the reference.
+        differs: pixels from `compare`; all others are gray.
     """
     mean = luminance(estimate.mean).astype(np.float64)
     floor = _DARK * max(float(mean.mean()), 1e-300)
@@ -150,7 +154,7 @@ def error_map(frame: F32, estimate: Estimate, differs: Mask) -> NDArray[np.uint8
 
 
 def _gram(frame: NDArray[np.floating], means: F32) -> F64:
-    """Mean products of the batches' differences from the frame, over pixels and channels. (batches, batches)"""
+    """Gram matrix: mean products of the batches' differences from the frame. (batches, batches)"""
     differences = (frame[None] - means).reshape(len(means), -1)
     step, total = 1 << 20, np.zeros((len(means), len(means)))
     for start in range(0, differences.shape[1], step):
@@ -160,8 +164,8 @@ def _gram(frame: NDArray[np.floating], means: F32) -> F64:
 
 
 def _error_squared(gram: F64) -> tuple[float, float]:
-    """The frame's own error, squared, and its standard deviation: products of different batches have no noise in
-    their mean, and leaving each batch out in turn tells how they scatter."""
+    """Squared error of the frame and its standard deviation: products of different batches have no noise in
+    their mean, and the jackknife over batches gives their spread."""
     num = len(gram)
     all_pairs = gram.sum() - np.trace(gram)
     error = float(all_pairs / (num * (num - 1)))
@@ -172,7 +176,7 @@ def _error_squared(gram: F64) -> tuple[float, float]:
 
 
 def _differing_pixels(frame: F32, means: F32) -> Mask:
-    """Pixels that differ by themselves, or else as part of a block of such as do not. (height, width)"""
+    """Pixels that differ individually, or as part of a block of pixels that do not. (height, width)"""
     height, width = frame.shape[:2]
     batches, frame_luminance = luminance(means), luminance(frame)
     differs = np.zeros((height, width), np.bool_)
@@ -187,7 +191,7 @@ def _differing_pixels(frame: F32, means: F32) -> Mask:
 
 
 def _block_means(values: F32, pixel_weights: F64, size: int) -> F64:
-    """Means over blocks of size × size, by `pixel_weights`; 0 where that is. values: (h, w). Returns: (rows, cols)"""
+    """Means over blocks of size × size, weighted; 0 if all weights are. values: (h, w). Returns: (rows, cols)"""
     rows, columns = (np.arange(0, length, size) for length in values.shape)
     sums, weights = (
         np.add.reduceat(np.add.reduceat(array, rows, axis=0), columns, axis=1)
@@ -197,7 +201,7 @@ def _block_means(values: F32, pixel_weights: F64, size: int) -> F64:
 
 
 def _differing_blocks(frame_means: F64, batches: F64) -> Mask:
-    """Blocks that differ; none where there are too few batches. shown: (rows, columns). batches: (n, rows, columns)"""
+    """Mask of blocks that differ; empty if there are too few batches. batches: (n, rows, columns)"""
     num = len(batches)
     if num < _MIN_BATCHES:
         return np.zeros(frame_means.shape, np.bool_)
@@ -208,16 +212,16 @@ def _differing_blocks(frame_means: F64, batches: F64) -> Mask:
     null_ratios = []
     for batch_weights in _sign_flips(num):
         noise = np.tensordot(batch_weights, deviations, 1)
-        # what is left of the spread does not depend on this noise
+        # the remaining spread is independent of this noise
         residual = np.maximum(sum_squares - num * noise**2, 0.0)
         null_ratios.append(_noise_ratio(noise, residual / (num * (num - 2)), mean))
     return noise_ratios >= _threshold(noise_ratios.ravel(), np.concatenate(null_ratios, axis=None))
 
 
 def _noise_ratio(difference: F64, variance: F64, mean: F64) -> F64:
-    """How many standard deviations a difference is; 0 where it is rounding. Arguments: (rows, columns)
+    """Differences in standard deviations; 0 for rounding errors. Arguments: (rows, columns)
 
-    An event that neighbours have seen may have been missed here: their variance counts too, scaled to this brightness.
+    A rare event in neighboring pixels may be missing here: their relative variance counts too.
     """
     brightness_squared = mean**2 + 1e-300
     smoothed_variance = brightness_squared * uniform_filter(variance / brightness_squared, 3, mode="nearest")
@@ -227,7 +231,7 @@ def _noise_ratio(difference: F64, variance: F64, mean: F64) -> F64:
 
 
 def _sign_flips(num: int) -> list[F64]:
-    """Weights of batches by which their means cancel and their noise has that of the mean of all. (num,) each"""
+    """Weights of batches that cancel their means and have the same noise as the mean of all. (num,) each"""
     rng = np.random.default_rng((_SEED, num))
     flips = []
     for _ in range(_NUM_SIGN_FLIPS):
@@ -238,10 +242,10 @@ def _sign_flips(num: int) -> list[F64]:
 
 
 def _threshold(noise_ratios: F64, null_ratios: F64) -> float:
-    """The least value from which on at most `FALSE_DISCOVERY_RATE` are expected by chance; infinite if there is none.
+    """Least value above which at most `FALSE_DISCOVERY_RATE` are expected by chance; infinite if there is none.
 
     Args:
-        null_ratios: of so many trials as `_sign_flips` has.
+        null_ratios: of all `_NUM_SIGN_FLIPS` trials.
     """
     values = np.sort(noise_ratios[noise_ratios > 0])
     num_discoveries = len(values) - np.arange(len(values))

@@ -1,6 +1,6 @@
-"""Local lights of the reference: points of each drawn at random, their shadows found by what a ray hits first.
+"""Local lights of the reference: random points on each light, with shadow rays.
 
-It shares no kernel with pictures: float64, formulas as docs/direct-light.md#local-lights states them.
+It shares no kernel with interactive rendering: float64, formulas of docs/direct-light.md#local-lights.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import ArrayLike, NDArray
 
 from relume.look import LightLook, Look
@@ -22,17 +23,17 @@ from relume.scene.model import Scene, Texture
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_DIRECTIONAL_DISTANCE = 1e9  # metres: where directional light comes from
-_RAYS_PER_BATCH = 8192  # more would be shared out to threads that wait for this one already
-_SLACK = 4.0  # times the geometry's epsilon: a ray that ends on a surface may find it so much sooner
+_DIRECTIONAL_DISTANCE = 1e9  # meters to a directional light
+_RAYS_PER_BATCH = 8192  # larger batches would be split among threads that already wait for this one
+_SLACK = 4.0  # tolerance at the ends of shadow rays, in units of the geometry's epsilon
 
 
 @dataclass(frozen=True)
 class LocalLightSamples:
-    """Light of one lamp at points. direction: unit, (n, m, 3). power: irradiance across it, 0 if hidden, (n, m, 3)"""
+    """Samples of one light at points. direction: unit. power: irradiance facing the light, 0 if occluded."""
 
-    direction: F64
-    power: F64
+    direction: Shaped[F64, "n m 3"]
+    power: Shaped[F64, "n m 3"]
 
 
 @dataclass(frozen=True)
@@ -40,33 +41,32 @@ class ReferenceEmitter:
     """A light of a look in a scene.
 
     Attributes:
-        triangles: of one of kind "mesh". (T, 3, 3) float64. is_two_sided: whether they shine to both sides.
-        uvs: of their corners. (T, 3, 2) image: of what they shine, over its mean; None where that is even.
+        triangles: of a mesh light. is_two_sided: emits to both sides.
+        uvs: texture coordinates of their corners. image: emission relative to its mean; None if uniform.
     """
 
     look: LightLook
-    triangles: F64
+    triangles: Shaped[F64, "T 3 3"]
     is_two_sided: bool
-    uvs: F64
+    uvs: Shaped[F64, "T 3 2"]
     image: Texture | None
 
     def sample(
         self,
         geometry: SceneBuffers,
-        position: F64,
+        position: Shaped[F64, "n 3"],
         num: int,
         rng: np.random.Generator,
-        alpha_sample: F32 = FIXED_ALPHA_SAMPLE,
+        alpha_sample: Shaped[F32, " #n"] = FIXED_ALPHA_SAMPLE,
     ) -> LocalLightSamples:
-        """Light that arrives at points from places of the lamp's surface, or from the one place that it has.
+        """Sample the light at points: random positions on its surface, or its only position.
 
         Args:
-            geometry: in which shadow rays are traced.
-            position: of the points, metres. (n, 3) float64
-            num: places that are drawn for each point.
-            rng: where they are drawn from.
-            alpha_sample: of the rays of each point, or of all; see `relume.raytrace.surface_points.SurfacePoints`. (n,)
-                or (1,)
+            geometry: the occluding triangles.
+            position: of the points, meters.
+            num: number of samples per point.
+            rng: random number generator.
+            alpha_sample: for the rays of each point, or for all; see `relume.raytrace.surface_points.SurfacePoints`.
         """
         to_light, factor = self._sample_vectors(position, num, rng)
         distance = np.linalg.norm(to_light, axis=2)
@@ -79,7 +79,7 @@ class ReferenceEmitter:
         return LocalLightSamples(direction, factor * is_visible[..., None] * np.array(self.look.gain))
 
     def _sample_vectors(self, position: F64, num: int, rng: np.random.Generator) -> tuple[F64, F64]:
-        """Vectors to places of the lamp (n, m, 3), and what a unit of emission gives from there. (n, m, 1 or 3)"""
+        """Vectors to points of the light (n, m, 3), and irradiance per unit of emission. (n, m, 1 or 3)"""
         light = self.look
         if isinstance(light, DirectionalLook):
             to_light = np.broadcast_to(-_DIRECTIONAL_DISTANCE * _unit(light.direction), (len(position), 1, 3))
@@ -108,7 +108,7 @@ class ReferenceEmitter:
 
 
 def emitters(scene: Scene, look: Look) -> list[ReferenceEmitter]:
-    """The local lights of a look that give any light."""
+    """Collect the local lights of a look that emit light."""
     local_lights = []
     for light in look.lights.values():
         triangles, uvs, is_two_sided, image = np.zeros((0, 3, 3)), np.zeros((0, 3, 2)), False, None
@@ -125,17 +125,17 @@ def emitters(scene: Scene, look: Look) -> list[ReferenceEmitter]:
     return local_lights
 
 
-def hit_distance(geometry: SceneBuffers, start: F32, direction: F32, alpha_sample: F32 = FIXED_ALPHA_SAMPLE) -> F32:
-    """How far rays fly until they hit anything.
+def hit_distance(
+    geometry: SceneBuffers,
+    start: Shaped[F32, "n 3"],
+    direction: Shaped[F32, "n 3"],
+    alpha_sample: Shaped[F32, " #n"] = FIXED_ALPHA_SAMPLE,
+) -> Shaped[F32, " n"]:
+    """Distances to the first hits of rays, meters; infinite if nothing is hit.
 
     Args:
-        geometry: that is traced.
-        start: origins, metres. (n, 3) float32
-        direction: unit vectors. (n, 3) float32
-        alpha_sample: of the rays at surfaces that blend; see `relume.raytrace.surface_points.SurfacePoints`. (n,) or
-            (1,) float32
-    Returns:
-        Metres, infinite where nothing is hit. (n,) float32
+        geometry: the triangles. start: origins, meters. direction: unit vectors.
+        alpha_sample: for blended surfaces; see `relume.raytrace.surface_points.SurfacePoints`.
     """
     batches = (slice(k, k + _RAYS_PER_BATCH) for k in range(0, len(direction), _RAYS_PER_BATCH))
     return np.concatenate([
@@ -147,8 +147,8 @@ def hit_distance(geometry: SceneBuffers, start: F32, direction: F32, alpha_sampl
     ])  # fmt: skip
 
 
-def emitted_radiance(local_lights: Sequence[ReferenceEmitter], material: str) -> F64:
-    """Radiance that the surfaces of a material send out themselves. (3,)"""
+def emitted_radiance(local_lights: Sequence[ReferenceEmitter], material: str) -> Shaped[F64, " 3"]:
+    """Radiance emitted by the surfaces of a material."""
     gains = [
         local_light.look.gain
         for local_light in local_lights
@@ -170,7 +170,7 @@ def _areas(triangles: F64) -> F64:
 def _sample_rectangle(
     light: RectangleLook, num_points: int, num: int, rng: np.random.Generator
 ) -> tuple[F64, F64, float]:
-    """Places (n, m, 3), one in each cell of a grid; normals; the area."""
+    """Stratified points on a rectangle (n, m, 3); normals; the area."""
     facing, rotation = _unit(light.direction), np.radians(light.rotation)
     reference = (0.0, 1.0, 0.0) if np.hypot(facing[0], facing[2]) > 1e-3 else (0.0, 0.0, 1.0)
     across = _unit(np.cross(reference, facing))
@@ -187,7 +187,7 @@ def _sample_rectangle(
 
 
 def _sample_texels(image: Texture, uv: F64) -> F64:
-    """The texels of an image at places (n, m, 2), unfiltered but for the nearest four. (n, m, 3)"""
+    """Bilinear lookup of an image at texture coordinates (n, m, 2), without further filtering. (n, m, 3)"""
     flat = uv.reshape(-1, 2).astype(np.float32)
     texels = MipMap.for_texture(image).sample(flat, np.zeros(len(flat), np.float32))
     return np.asarray(texels.reshape(*uv.shape[:2], 3), np.float64)
@@ -196,7 +196,7 @@ def _sample_texels(image: Texture, uv: F64) -> F64:
 def _sample_triangles(
     triangles: F64, uvs: F64, num_points: int, num: int, rng: np.random.Generator
 ) -> tuple[F64, F64, float, F64]:
-    """Places (n, m, 3), evenly by area; their normals (n, m, 3); the area; their places in images (n, m, 2)."""
+    """Random points (n, m, 3), uniform by area; their normals (n, m, 3); the area; their UV coordinates (n, m, 2)."""
     areas = _areas(triangles)
     strata = (np.arange(num) + rng.random((num_points, num))) / num
     triangle_index = np.minimum(np.searchsorted(np.cumsum(areas) / areas.sum(), strata, side="right"), len(areas) - 1)

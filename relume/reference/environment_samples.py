@@ -1,10 +1,11 @@
-"""The environment as point lights, one a texel; and directions drawn by power within stratified choices of them."""
+"""The environment as one point light per texel, and importance sampling of directions by luminance."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.environments.environment import Environment
@@ -17,40 +18,40 @@ F64 = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class EnvironmentSamples:
-    """Texels that are not black.
+    """Environment texels that are not black.
 
     Attributes:
-        direction: unit, world space. (m, 3) float64
-        power: radiance times solid angle. (m, 3) float64
-        cdf: running sum of luminance, the last one is 1. (m,) float64
-        index: of each in the map, row-major. (m,)
-        map: the environment's radiance. (height, width, 3) float32
-        rotation: of the map about +Y, degrees. gain: what multiplies its channels.
-        luminance: of all of them, times solid angle, before the gain.
+        direction: unit, world space.
+        power: radiance times solid angle.
+        cdf: cumulative distribution of luminance, ending in 1.
+        index: of each texel in the map, row-major.
+        map: the environment's radiance.
+        rotation: of the map about +Y, degrees. gain: factor of each channel.
+        luminance: total luminance times solid angle, before the gain.
     """
 
-    direction: F64
-    power: F64
-    cdf: F64
-    index: NDArray[np.intp]
-    map: F32
+    direction: Shaped[F64, "m 3"]
+    power: Shaped[F64, "m 3"]
+    cdf: Shaped[F64, " m"]
+    index: Shaped[NDArray[np.intp], " m"]
+    map: Shaped[F32, "height width 3"]
     rotation: float
     gain: tuple[float, float, float]
     luminance: float
 
     @property
     def num_texels(self) -> int:
-        """m."""
+        """Number of texels m."""
         return len(self.direction)
 
     def scaled(self, gain: tuple[float, float, float]) -> EnvironmentSamples:
-        """Every channel multiplied; none of them where nothing is left."""
+        """Multiply the channels by a gain; no texels remain if it is zero."""
         if not any(gain):
             return replace(self, direction=self.direction[:0], power=self.power[:0], cdf=self.cdf[:0])
         return replace(self, power=self.power * np.array(gain), gain=gain)
 
-    def sample_directions(self, num_samples: int, rng: np.random.Generator) -> F64:
-        """Directions anywhere in texels drawn by luminance, one a stratum, with the density of `radiance`. (num, 3)"""
+    def sample_directions(self, num_samples: int, rng: np.random.Generator) -> Shaped[F64, "num 3"]:
+        """Sample directions by luminance, stratified and uniform within texels, with the density from `radiance`."""
         strata = (np.arange(num_samples) + rng.random(num_samples)) / num_samples
         texel_index = np.minimum(np.searchsorted(self.cdf, strata, side="right"), self.num_texels - 1)
         height, width, _ = self.map.shape
@@ -60,9 +61,8 @@ class EnvironmentSamples:
         v = 0.5 - np.arcsin(upper + rng.random(num_samples) * (lower - upper)) / np.pi
         return rotate_about_y(uv_to_direction(u, v), self.rotation)
 
-    def radiance(self, direction: F64) -> tuple[F64, F64]:
-        """What comes from unit directions (..., 3), texels having one value each, and the density with which
-        `sample_directions` draws them, per steradian. (..., 3), (...)"""
+    def radiance(self, direction: Shaped[F64, "*batch 3"]) -> tuple[Shaped[F64, "*batch 3"], Shaped[F64, "*batch"]]:
+        """Radiance from unit directions, without interpolation, and the density of `sample_directions`, 1/sr."""
         height, width, _ = self.map.shape
         u, v = direction_to_uv(rotate_about_y(direction.reshape(-1, 3), -self.rotation))
         column = np.minimum((u * width).astype(np.intp), width - 1)
@@ -73,7 +73,7 @@ class EnvironmentSamples:
 
 
 def environment_texels(environment: Environment, rotation: float = 0.0) -> EnvironmentSamples:
-    """All texels with light in them.
+    """All texels that are not black.
 
     Args:
         rotation: of the map about +Y, degrees.

@@ -1,7 +1,7 @@
-"""A whole picture by brute force, over the same view samples as a bake: what differs is transport, not antialiasing.
+"""Reference images by brute force, over the view samples of a bake: only light transport differs, not antialiasing.
 
-By all light paths that there are, and by those that a method follows: of one draw, so that the two differ by what the
-method leaves out alone.
+Renders all light paths and the light paths of a method with the same random numbers, so that the two images differ only
+by the paths that the method omits.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets import environments
@@ -36,9 +37,9 @@ from relume.store.bake_protocol import Recipe
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
-_SPP_PER_PATH = 16  # texels drawn for every place on a path
+_SPP_PER_PATH = 16  # environment samples per path vertex
 _POINTS_PER_BLOCK = 4096
-_DIRECT_FRACTION = 0.2  # of the time, where there are other paths
+_DIRECT_FRACTION = 0.2  # of the time, if there is indirect light
 
 
 def reference_image(
@@ -52,14 +53,14 @@ def reference_image(
     pass_index: int = 0,
     *,
     reflects: bool = False,
-) -> F32:
-    """Render a look under all its lights, with shadows, by the light paths that a method follows.
+) -> Shaped[F32, "height width 3"]:
+    """Render a look with all its lights, with shadows, by the light paths of a method.
 
     Args:
-        scene, view, look, size, spp, progress, is_canceled, pass_index: as of `render_reference`.
-        reflects: whether the method has light between surfaces, as the look's `transport` names it.
+        scene, view, look, size, spp, progress, is_canceled, pass_index: as in `render_reference`.
+        reflects: the method has indirect light, as chosen by the look's `transport`.
     Returns:
-        Linear radiance, the background seen where there is no surface. (height, width, 3) float32
+        Linear radiance, with the background.
     """
     light_paths = [look.transport.supported_by(has_indirect=reflects)]
     return _render_paths(scene, view, look, size, _Draw(spp, pass_index, is_canceled), light_paths, progress)[0]
@@ -67,22 +68,22 @@ def reference_image(
 
 @dataclass(frozen=True)
 class ReferenceImage:
-    """Pictures of one pass of brute force, (height, width, 3) float32 each.
+    """Images of one reference pass.
 
     Attributes:
-        all_paths_image: by all light paths; None where they were not asked for.
-        method_image: by those that the method follows.
-        omitted_paths: of the whole, by the method; unsupported_paths: by brute force, too. In sentences.
+        all_paths_image: with all light paths; None if not requested.
+        method_image: with the light paths of the method.
+        omitted_paths: paths that the method omits; unsupported_paths: paths that the reference omits too. In sentences.
     """
 
-    all_paths_image: F32 | None
-    method_image: F32
+    all_paths_image: Shaped[F32, "height width 3"] | None
+    method_image: Shaped[F32, "height width 3"]
     omitted_paths: tuple[str, ...]
     unsupported_paths: tuple[str, ...]
 
     @property
     def pictures(self) -> dict[str, F32]:
-        """By whose paths they are: "method", and "all" where they were asked for."""
+        """Images by their paths: "method", and "all" if requested."""
         return {"method": self.method_image} | ({} if self.all_paths_image is None else {"all": self.all_paths_image})
 
 
@@ -99,22 +100,21 @@ def render_reference(
     reflects: bool = False,
     is_whole: bool = True,
 ) -> ReferenceImage:
-    """Render a look by all light paths and by those that a method follows, which share what is drawn.
+    """Render a look with all light paths and with the paths of a method, from the same random numbers.
 
     Args:
-        scene: whose light it is. view: one of its cameras. look: that is shown.
+        scene: the scene. view: one of its cameras. look: the look.
         size: width and height in pixels.
-        spp: texels of the environment for each view sample, drawn by power with a fixed seed, and places of each local
-            light that has an extent; 0, or as many as the map has, for every texel. One path between surfaces for every
-            `_SPP_PER_PATH` of them.
-        progress: called with the share done. is_canceled: asked now and then.
-        pass_index: pictures with other indices draw independently.
-        reflects: whether the method has light between surfaces.
-        is_whole: whether all paths are asked for.
+        spp: environment texels per view sample, sampled by power with a fixed seed, and points per area light; 0, or as
+            many as the map has, for every texel. There is one indirect path per `_SPP_PER_PATH` of them.
+        progress: called with the finished fraction. is_canceled: called regularly.
+        pass_index: images with other indices have independent samples.
+        reflects: the method has indirect light.
+        is_whole: all paths are requested.
     Raises:
-        PlanError: the scene has no such view, or a bake of this size would be refused.
-        CancelledError: `is_canceled` said so.
-        NotFoundError: the look names an environment that is not here.
+        PlanError: the scene has no such view, or a bake of this size would be rejected.
+        CancelledError: `is_canceled` returned true.
+        NotFoundError: the look names an environment that does not exist.
     """
     light_paths = [look.transport.supported_by(has_indirect=reflects), *([unlimited_paths(look)] if is_whole else [])]
     images = _render_paths(scene, view, look, size, _Draw(spp, pass_index, is_canceled), light_paths, progress)
@@ -127,8 +127,8 @@ def _render_paths(
     scene: Scene, view: str, look: Look, size: tuple[int, int], draw: _Draw, light_paths: Sequence[LightPaths],
     progress: Callable[[float], object],
 ) -> list[F32]:  # fmt: skip
-    """One picture for each choice of paths."""
-    DirectMethod().plan(scene, Recipe("direct", (view,), size, MIN_LIGHTS))  # refuses what a bake refuses
+    """Render one image for each selection of paths."""
+    DirectMethod().plan(scene, Recipe("direct", (view,), size, MIN_LIGHTS))  # rejects what a bake rejects
     setup = _prepare_view(with_overrides(scene, look), view, look, size)
     is_direct = np.array([paths.direct for paths in light_paths], np.float64)
     has_indirect = any(paths.has_indirect for paths in light_paths) or (
@@ -150,11 +150,11 @@ def _render_paths(
 
 @dataclass(frozen=True)
 class _ViewSetup:
-    """What a view sees of a scene, and by which light.
+    """Samples of a view, and the lights of its look.
 
     Attributes:
-        points: those of `samples`, which are sorted by material.
-        light: the environment that the look names; texels: it as the look turns and weighs it.
+        points: of `samples`, which are sorted by material.
+        light: the environment of the look; texels: rotated and scaled by the look.
     """
 
     scene: Scene
@@ -167,19 +167,19 @@ class _ViewSetup:
     local_lights: Sequence[ReferenceEmitter]
 
     def samples_of(self, material: int) -> slice:
-        """The samples that see a material, by its number."""
+        """Samples of a material."""
         first, last = np.searchsorted(self.samples.material, (material, material + 1))
         return slice(int(first), int(last))
 
     @property
     def on_surface(self) -> slice:
-        """The samples that see a surface; they come before those of the background."""
+        """Surface samples; they precede those of the background."""
         return slice(0, int(np.searchsorted(self.samples.material, len(self.scene.materials))))
 
 
 @dataclass(frozen=True)
 class _Draw:
-    """How much is drawn, with which seed, and who may end it."""
+    """Sampling parameters and cancellation."""
 
     spp: int
     pass_index: int
@@ -187,9 +187,9 @@ class _Draw:
 
 
 def _prepare_view(scene: Scene, view: str, look: Look, size: tuple[int, int]) -> _ViewSetup:
-    """Trace a view's samples and find the look's light."""
+    """Trace a view's samples and load the look's environment."""
     geometry = build_scene_buffers(scene)
-    # here mirrors are lobes like others, and light through tinted glass is traced, not told by a mean
+    # here mirrors are lobes like others, and light through tinted glass is traced per channel, not by mean tints
     samples = sample_view(scene, geometry, view, size, traces_mirrors=False, by_channel=True)
     light = scene.environment if look.environment.map is None else environments.load_environment(look.environment.map)
     texels = environment_texels(light, look.environment.rotation).scaled(look.environment.gain)
@@ -199,7 +199,7 @@ def _prepare_view(scene: Scene, view: str, look: Look, size: tuple[int, int]) ->
 
 
 def _add_direct(radiance: F64, setup: _ViewSetup, draw: _Draw, progress: Callable[[float], object]) -> None:
-    """Add light that comes directly from lights, and that of surfaces which shine themselves."""
+    """Add direct light, and the emission of surfaces."""
     num_samples, classes = max(1, setup.on_surface.stop), roughness_classes(setup.scene, setup.look)
     class_index = classes.classify(setup.samples.material[setup.on_surface], setup.points.roughness[setup.on_surface])
     done = 0
@@ -223,7 +223,7 @@ def _add_direct(radiance: F64, setup: _ViewSetup, draw: _Draw, progress: Callabl
 
 
 def _add_background(radiance: F64, setup: _ViewSetup) -> None:
-    """Add the environment where there is no surface."""
+    """Add the environment to background samples."""
     environment, is_background = setup.look.environment, setup.samples.material == BACKGROUND
     direction = rotate_about_y(
         setup.samples.surface.points.position[is_background].astype(np.float64), -environment.rotation
@@ -238,12 +238,12 @@ def _add_indirect(
     draw: _Draw,
     progress: Callable[[float], object],
 ) -> None:
-    """Add light by way of other surfaces and of mirrors, block by block. radiance: (paths wanted, samples, 3)"""
+    """Add indirect light and light by way of mirrors, block by block. radiance: (light_paths, samples, 3)"""
     num_points = setup.on_surface.stop
     num_blocks, num_paths = -(-num_points // _POINTS_PER_BLOCK), max(1, draw.spp // _SPP_PER_PATH)
     for block in range(num_blocks):
         if draw.is_canceled():
-            raise CancelledError("the reference was cancelled")
+            raise CancelledError("the reference was canceled")
         rows = slice(block * _POINTS_PER_BLOCK, min((block + 1) * _POINTS_PER_BLOCK, num_points))
         indirect = reference_indirect(
             setup.scene, setup.geometry, setup.texels, setup.look, setup.points.samples_of(rows),
@@ -254,10 +254,12 @@ def _add_indirect(
         progress((block + 1) / num_blocks)
 
 
-def points_of_samples(samples: ViewSamples, textures: Mapping[str, F32], roughness: F32) -> ReferencePoints:
-    """View samples as points; those of the background have no surface and are not meant.
+def points_of_samples(
+    samples: ViewSamples, textures: Mapping[str, F32], roughness: Shaped[F32, " n"]
+) -> ReferencePoints:
+    """Convert view samples to points; points of background samples are meaningless.
 
-    samples: of a view. textures, roughness: there, see `ReferencePoints`.
+    samples: of a view. textures, roughness: at the samples, see `ReferencePoints`.
     """
     points = samples.surface.points
     to_camera = samples.camera.astype(np.float64) - points.position
@@ -269,7 +271,7 @@ def points_of_samples(samples: ViewSamples, textures: Mapping[str, F32], roughne
 
 
 def _resolve(samples: ViewSamples, radiance: F64, size: tuple[int, int]) -> F32:
-    """Samples to pixels by their weights. (height, width, 3)"""
+    """Sum samples to pixels by their weights. (height, width, 3)"""
     width, height = size
     weighted = samples.throughput * radiance
     pixels = [np.bincount(samples.pixel, weighted[:, c], width * height) for c in range(3)]

@@ -1,6 +1,6 @@
-"""Sums over lights at one point, float64: the loops of the reference.
+"""Sums over lights at one point, in float64: the loops of the reference.
 
-They share nothing with the projector: directions, angles and curves are those of single texels, at full precision.
+They share no code with the operators: directions, angles and curves are evaluated per texel, at full precision.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ _TILT_X, _TILT_Y = int(Angle.TILT_X), int(Angle.TILT_Y)
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def list_visible(normal, tangent, wo, visible, directions, wi, light):  # type: ignore[no-untyped-def]
-    """Directions of the lights that a point sees, in its frame x = tangent, y = n × t, z = n.
+    """Directions of the lights that are visible from a point, in its frame x = tangent, y = n × t, z = n.
 
     Args:
         normal, tangent, wo: world space. (3,) float64. visible: bits. (bytes,) uint8. directions: (m, 3) float64
-        wi: (3, ≥ m), written. light: (≥ m,) int64, written.
+        wi: (3, ≥ m), output. light: (≥ m,) int64, output.
     Returns:
         Number of lights, and wo in the frame, three floats.
     """
@@ -36,7 +36,7 @@ def list_visible(normal, tangent, wo, visible, directions, wi, light):  # type: 
             continue
         x, y, z = directions[m, 0], directions[m, 1], directions[m, 2]
         cosine = normal[0] * x + normal[1] * y + normal[2] * z
-        if cosine <= 0:  # float32 saw it a hair above the horizon
+        if cosine <= 0:  # in float32 it was slightly above the horizon
             continue
         wi[0, num] = tangent[0] * x + tangent[1] * y + tangent[2] * z
         wi[1, num] = bx * x + by * y + bz * z
@@ -76,7 +76,7 @@ def _angle(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _read(table, position, is_stepped):  # type: ignore[no-untyped-def]
-    """A table at a position in steps: linear between its entries, or constant up to the next one."""
+    """Look up a table at a fractional index: linear between entries, or constant up to the next one."""
     step = min(int(position), table.shape[0] - 2)
     if is_stepped:
         return table[step]
@@ -86,16 +86,16 @@ def _read(table, position, is_stepped):  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def add_lights(angles, axes, tables, is_stepped, is_gray, light, num, wi, ox, oy, oz, shading, power, out):  # type: ignore[no-untyped-def]
-    """Σ power · shading · Π curves over the listed lights, per channel, added to out (3,).
+    """Add Σ power · shading · Π curves over the listed lights, per channel, to out (3,).
 
     Args:
         angles, axes: `Curve.angle` and `Curve.axes` of each curve. (C,) int64, (C, 3) float64
         tables: each curve at equal steps over [0, π/2]. (C, 3, steps + 1) float64
-        is_stepped: the curve is constant from entry to entry, else linear. (C, 3) bool
+        is_stepped: the curve is constant between entries, else linear. (C, 3) bool
         is_gray: the curve is the same in all channels. (C,) bool
-        light: rows of `power` of the first `num` lights that are listed. (≥ num,) int64
-        wi: directions towards these lights, local frame, unit. (3, ≥ num) float64
-        ox, oy, oz: the direction towards the viewer, local frame, unit.
+        light: rows of `power` for the first `num` listed lights. (≥ num,) int64
+        wi: directions toward these lights, local frame, unit. (3, ≥ num) float64
+        ox, oy, oz: direction toward the viewer, local frame, unit.
         shading: quotient · cos θi, one for all channels or three. (1 or 3, ≥ num) float64. power: (m, 3) float64
     """
     blue_row = shading.shape[0] - 1

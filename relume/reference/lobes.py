@@ -1,8 +1,8 @@
-"""Directions in which a term reflects much: drawn beside those of lights, so that neither a narrow highlight under a
-wide sky nor a small sun above a dull floor is left to chance.
+"""Importance sampling of BRDF lobes, combined with sampling of lights, so that neither a narrow highlight under a wide
+environment nor a small sun above a diffuse floor causes noise.
 
-Local frame, z = normal. The density of a lobe is that of one of the term's own curves, constant between entries of its
-table; what is drawn by any of several lobes is weighed by the densities of all (Veach and Guibas 1995).
+Local frame, z = normal. The density of a lobe is proportional to one of the term's curves, constant between entries of
+its table; samples of several lobes are weighted by the densities of all (Veach and Guibas 1995).
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.term import Angle
@@ -23,29 +24,27 @@ _MIN_LENGTH = 1e-300
 
 @dataclass(frozen=True)
 class Lobe:
-    """Directions, or half vectors, about an axis.
+    """Distribution of directions, or half vectors, around an axis.
 
     Attributes:
-        axes: what multiplies wo, axis by axis, to make the axis; None: the normal.
-        is_half: half vectors are drawn and wo is mirrored by them.
-        cdf: running sum over equal steps of the angle from the axis, 0 first, 1 last. (steps + 1,) float64
-        pdf_table: within each step, per steradian. (steps,) float64
+        axes: factors of the components of wo that give the axis; None: the normal.
+        is_half: half vectors are sampled, and wo is reflected at them.
+        cdf: over equal steps of the angle from the axis, from 0 to 1.
+        pdf_table: density within each step, 1/sr.
     """
 
     axes: tuple[float, float, float] | None
     is_half: bool
-    cdf: F64
-    pdf_table: F64
+    cdf: Shaped[F64, " edges"]
+    pdf_table: Shaped[F64, " steps"]
 
-    def draw(self, wo: F64, num: int, rng: np.random.Generator) -> F64:
-        """Directions about a lobe, some of them below the horizon.
+    def draw(self, wo: Shaped[F64, "n 3"], num: int, rng: np.random.Generator) -> Shaped[F64, "n num 3"]:
+        """Sample directions toward the light; some are below the horizon.
 
         Args:
-            wo: towards the viewer, local frame, unit. (n, 3) float64
-            num: directions for each `wo`, stratified over the lobe.
-            rng: where they are drawn from.
-        Returns:
-            Towards the light, local frame, unit. (n, num, 3) float64
+            wo: toward the viewer, local frame, unit.
+            num: directions per `wo`, stratified over the lobe.
+            rng: random number generator.
         """
         strata = (np.arange(num) + rng.random((len(wo), num))) / num
         step = np.minimum(np.searchsorted(self.cdf, strata, side="right") - 1, len(self.pdf_table) - 1)
@@ -59,8 +58,8 @@ class Lobe:
             return np.asarray(directions)
         return np.asarray(2 * np.einsum("nmc,nc->nm", directions, wo)[..., None] * directions - wo[:, None])
 
-    def pdf(self, wi: F64, wo: F64) -> F64:
-        """Per steradian, of directions wi (n, m, 3) for wo (n, 3). (n, m)"""
+    def pdf(self, wi: Shaped[F64, "n m 3"], wo: Shaped[F64, "n 3"]) -> Shaped[F64, "n m"]:
+        """Density of directions wi for wo, 1/sr."""
         if not self.is_half:
             cosine = wi[..., 2] if self.axes is None else np.einsum("nmc,nc->nm", wi, self._axis(wo))
             return self._pdf_at(cosine)
@@ -73,24 +72,24 @@ class Lobe:
         return np.asarray(axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), _MIN_LENGTH))
 
     def _pdf_at(self, cosine: F64) -> F64:
-        """The density at an angle from the axis; none beyond 90°."""
+        """Density at an angle from the axis; zero beyond 90°."""
         angle = np.arccos(np.clip(cosine, 0.0, 1.0))
         step = np.minimum((angle * (len(self.pdf_table) / (0.5 * np.pi))).astype(np.intp), len(self.pdf_table) - 1)
         return np.asarray(np.where(cosine > 0, self.pdf_table[step], 0.0))
 
 
 def cosine_lobe(steps: int = 1024) -> Lobe:
-    """About the normal, as a surface sees light that it scatters everywhere."""
+    """Make the cosine-weighted lobe around the normal."""
     edges = np.cos(np.linspace(0.0, 0.5 * np.pi, steps + 1))
     return _lobe(0.5 * (edges[1:] + edges[:-1]), None, is_half=False)  # type: ignore[return-value]
 
 
-def curve_lobe(angle: Angle, axes: tuple[float, float, float], values: F64) -> Lobe | None:
-    """The lobe of a curve; None where it turns with no direction that has a lobe, or is nothing.
+def curve_lobe(angle: Angle, axes: tuple[float, float, float], values: Shaped[F64, " entries"]) -> Lobe | None:
+    """Make the lobe of a curve; None if its angle has no lobe, or the curve is zero.
 
     Args:
-        angle: that the curve is a function of.
-        axes: of the curve. values: at equal steps over [0, π/2], the mean of the channels. (steps + 1,)
+        angle: argument of the curve.
+        axes: of the curve. values: at equal steps over [0, π/2], mean of the channels.
     """
     midpoints = 0.5 * (values[1:] + values[:-1])
     if angle in _HALF_ANGLES:
@@ -112,7 +111,7 @@ def _lobe(values: F64, axes: tuple[float, float, float] | None, *, is_half: bool
 
 
 def _rotate(directions: F64, axis: F64) -> F64:
-    """Directions about +z (n, m, 3) turned to be about unit axes (n, 3)."""
+    """Rotate directions around +z (n, m, 3) to unit axes (n, 3)."""
     helper_axis = np.where(np.abs(axis[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
     x = np.cross(helper_axis, axis)
     x /= np.linalg.norm(x, axis=1, keepdims=True)

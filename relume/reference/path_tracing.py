@@ -1,12 +1,12 @@
-"""Light that reaches points by reflection, by path tracing: the truth that gathered light is compared with.
+"""Path tracing of indirect light at points: the reference for gathered light.
 
     R(x) = E[ f(ωi, ωo) cos θi / p(ωi) L(y, −ωi) ],   L(y, ω) = L_direct(y, ω) + R(y, ω)
 
-with y what ωi hits, and p the mean density of the lobes of its material: by the cosine, and by each of its highlights.
-Every surface reflects by all its terms. It shares neither cells nor links with what it checks.
+with y the hit of ωi, and p the mean density of the lobes of the material: the cosine lobe, and one for each highlight.
+Every surface reflects by all its terms. It uses neither the patches nor the gather hits that it checks.
 
-What is seen in a mirror counts as what it is there, as in pictures: the first reflections of a path, as long as they
-are a mirror's and no more than eyes follow, are none between surfaces.
+As in interactive rendering, reflections in mirrors at the start of a path, at most as many as camera rays follow, do
+not count as bounces.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
@@ -39,21 +40,21 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 _TEXTURE_ANGLE = 1e-3
-BtfSurfaces = dict[tuple[int, int], BtfSurface]  # by kinds of surfaces, and terms of these
+BtfSurfaces = dict[tuple[int, int], BtfSurface]  # by roughness class and term
 
 _MIN_SURVIVAL_PROBABILITY = 0.05
 _MIN_PDF = 1e-12
 
 
 class IndirectReference(NamedTuple):
-    """Radiance of points by light that surfaces have reflected.
+    """Radiance of points by indirect light.
 
     Attributes:
-        mean, variance: over paths, the second of the mean. (paths asked for, n, 3) float64
+        mean, variance: over paths; the variance of the mean.
     """
 
-    mean: F64
-    variance: F64
+    mean: Shaped[F64, "light_paths n 3"]
+    variance: Shaped[F64, "light_paths n 3"]
 
 
 def reference_indirect(
@@ -62,24 +63,24 @@ def reference_indirect(
     texels: EnvironmentSamples,
     look: Look,
     points: ReferencePoints,
-    material: NDArray[np.integer],
+    material: Shaped[NDArray[np.integer], " n"],
     light_paths: Sequence[LightPaths],
     num_paths: int,
     spp: int,
     seed: int = 0,
 ) -> IndirectReference:
-    """Radiance of points by light that surfaces have reflected onto them, by several choices of paths at once.
+    """Radiance of points by indirect light, for several selections of light paths at once.
 
     Args:
-        scene: its materials and lamps.
-        geometry: of the scene, that paths and shadow rays are traced in.
-        texels: of the environment, its gain in the look included.
-        look: terms and lights as they are shown.
-        points: n of them, seen from one direction each. material: index into the scene's materials. (n,)
-        light_paths: which paths count; direct ones are those that are seen in mirrors.
-        num_paths: for each point. spp: texels drawn for each place that a path visits.
-        seed: of the paths; other seeds are independent of this one.
-    Cost: O(n · num_paths · bounces · spp) shadow rays, bounces as many as any choice has.
+        scene: its materials and lights.
+        geometry: of the scene.
+        texels: of the environment, with its gain in the look.
+        look: terms and lights.
+        points: n of them. material: index into the scene's materials.
+        light_paths: selections; `direct` selects direct light in mirrors.
+        num_paths: per point. spp: environment texels per path vertex.
+        seed: of the paths; other seeds are independent.
+    Cost: O(n · num_paths · bounces · spp) shadow rays, with the maximum number of bounces of all selections.
     """
     classes, local_lights = roughness_classes(scene, look), emitters(scene, look)
     lobes = [material_lobes(class_terms) for class_terms in classes.terms]
@@ -130,17 +131,17 @@ def reference_indirect(
     return IndirectReference(mean, np.maximum(sum_squares / num_paths - mean**2, 0) / max(1, num_paths - 1))
 
 
-# A path's weight is told apart by how it began: all of it in mirrors so far, or after so many of them by a lobe.
+# A path's weight has one component per start: only mirrors so far, or a lobe after 0, 1, … mirrors.
 _IN_MIRRORS, _STATES = 0, MAX_MIRROR_BOUNCES + 2
 
 
 def _max_reflections(paths: LightPaths) -> int:
-    """Reflections of the longest path that counts, those in mirrors included."""
+    """Maximum number of reflections of the selected paths, mirrors included."""
     return MAX_MIRROR_BOUNCES + paths.last if paths.has_indirect else MAX_MIRROR_BOUNCES * paths.direct
 
 
 def _counted_states(paths: LightPaths, num: int) -> F64:
-    """Which states count at the end of `num` reflections. (states,) of 0 and 1"""
+    """States whose light counts after `num` reflections. (states,) of 0 and 1"""
     num_bounces = num - np.arange(MAX_MIRROR_BOUNCES + 1)
     return np.concatenate([[paths.direct], (paths.first <= num_bounces) & (num_bounces <= paths.last)]).astype(
         np.float64
@@ -148,14 +149,14 @@ def _counted_states(paths: LightPaths, num: int) -> F64:
 
 
 def _countable_states(light_paths: Sequence[LightPaths], num: int) -> F64:
-    """Which states count after `num` reflections, or may after more: paths in others end. (states, 1, 1) of 0 and 1"""
+    """States whose light counts after `num` or more reflections; paths in others end. (states, 1, 1) of 0 and 1"""
     last = max(paths.last if paths.has_indirect else 0 for paths in light_paths)
     is_countable = [num <= MAX_MIRROR_BOUNCES, *(num - mirrors <= last for mirrors in range(MAX_MIRROR_BOUNCES + 1))]
     return np.array(is_countable, np.float64)[:, None, None]
 
 
 def _reflect_weights(weight: F64, bounce_weight: F64, specular_weight: F64, bounce: int) -> F64:
-    """Weights after one more reflection. weight: (states, n, 3). share, of it mirrored: (n, 3)"""
+    """Weights after one more reflection. weight: (states, n, 3). specular_weight: part of `bounce_weight`. (n, 3)"""
     after = weight * bounce_weight
     if bounce < MAX_MIRROR_BOUNCES:
         after[1 + bounce] = weight[_IN_MIRRORS] * (bounce_weight - specular_weight)
@@ -168,7 +169,7 @@ def _reflect_weights(weight: F64, bounce_weight: F64, specular_weight: F64, boun
 def _russian_roulette(
     points: ReferencePoints, classes: NDArray[np.int64], rows: NDArray[np.intp], weight: F64, rng: np.random.Generator
 ) -> tuple[ReferencePoints, NDArray[np.int64], NDArray[np.intp], F64]:
-    """Russian roulette: dim paths end early, and those that go on stand for them. weight: (states, n, 3)"""
+    """Russian roulette: paths of low weight end early, and survivors compensate. weight: (states, n, 3)"""
     size = weight.sum(axis=0).max(axis=1, initial=0.0)
     survival_probability = np.where(size > 0, np.clip(size, _MIN_SURVIVAL_PROBABILITY, 1.0), 0.0)
     alive = np.nonzero(rng.random(len(rows)) < survival_probability)[0]
@@ -178,7 +179,7 @@ def _russian_roulette(
 def _hit_points(
     scene: Scene, geometry: SceneBuffers, look: Look, hits: Hits, directions: F32, hit: NDArray[np.intp]
 ) -> tuple[ReferencePoints, NDArray[np.int32]]:
-    """What some of the rays have hit, seen from where they come, and its materials."""
+    """Points and materials of ray hits, viewed along the rays."""
     surface_hits = hits.rows(hit)
     surface = surface_at(geometry, surface_hits, directions[hit], scene.materials, _TEXTURE_ANGLE)
     material = geometry.face_material[surface_hits.face]
@@ -190,7 +191,7 @@ def _hit_points(
 def _sample_btf_surfaces(
     classes: RoughnessClasses, points: ReferencePoints, class_index: NDArray[np.integer], seed: int
 ) -> BtfSurfaces:
-    """What covers the points that are seen, by their kinds and the terms of these."""
+    """Sample the BTFs of points, by roughness class and term."""
     rng, btf_surfaces = np.random.default_rng((seed, points.num_points)), {}
     for index, class_terms in enumerate(classes.terms):
         class_points = points.samples_of(np.nonzero(class_index == index)[0])
@@ -208,15 +209,15 @@ def _sample_directions(
     btf_surfaces: BtfSurfaces,
     rng: np.random.Generator,
 ) -> tuple[F32, F64, F64]:
-    """Draw a direction for each point by one of its material's lobes.
+    """Sample a direction for each point from one of its material's lobes.
 
     Args:
-        classes: there are. lobes: of each. points: n of them. class_index: of each. (n,)
-        btf_surfaces: of points that are all there are of their kind.
-        rng: draws.
+        classes: of the scene. lobes: of each class. points: n of them. class_index: of each. (n,)
+        btf_surfaces: by class and term, for all points of a class.
+        rng: random number generator.
     Returns:
-        World space, unit (n, 3); f cos θi over the density of all lobes together (n, 3), nothing below the horizon; and
-        how much of that a mirror sends on (n, 3).
+        World space, unit (n, 3); f cos θi over the density of all lobes together (n, 3), zero below the horizon; and
+        its specular part (n, 3).
     """
     frames = points.frames()
     wo = np.einsum("nij,nj->ni", frames, points.wo.astype(np.float64))

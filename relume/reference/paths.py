@@ -1,42 +1,42 @@
-"""Light paths: those that a look shows, those of them that a method follows, and what is left out, in sentences."""
+"""Light paths of a look, the paths of them that a method supports, and sentences about omitted paths."""
 
 from __future__ import annotations
 
 from relume.look import LightPaths, Look
 from relume.scene.model import Scene
 
-MAX_BOUNCES = 64  # between surfaces, of which Russian roulette leaves few
+MAX_BOUNCES = 64  # Russian roulette ends most paths earlier
 
 
 def unlimited_paths(look: Look) -> LightPaths:
-    """All light paths of the kind that a look shows, however many surfaces they have on their way.
+    """All light paths of the kind that a look selects, with any number of bounces.
 
     Args:
-        look: whose `transport` names the kind.
+        look: its `transport` selects the kind.
     """
     return look.transport.model_copy(update={"bounces": MAX_BOUNCES}).paths
 
 
 def omitted_paths(look: Look, *, reflects: bool) -> tuple[str, ...]:
-    """What a method leaves out of the paths of a look, in sentences.
+    """Paths of a look that a method omits, in sentences.
 
     Args:
-        look: whose `transport` names them. reflects: whether the method has light between surfaces.
+        look: its `transport` selects the paths. reflects: the method has indirect light.
     """
     unlimited, supported = unlimited_paths(look), look.transport.supported_by(has_indirect=reflects)
     if not unlimited.has_indirect or supported.last >= unlimited.last:
         return ()
     if not supported.has_indirect:
-        return ("Light that surfaces reflect onto each other, but for what is seen in mirrors.",)
-    return (f"Light that more than {supported.last} surfaces have reflected.",)
+        return ("Indirect light, except reflections in mirrors.",)
+    return (f"Light after more than {supported.last} bounces.",)
 
 
 def unsupported_paths(scene: Scene) -> tuple[str, ...]:
-    """What brute force leaves out of a scene's light as every method does, in sentences.
+    """Paths of a scene's light that the reference omits like every method, in sentences.
 
     Args:
-        scene: whose materials are looked at.
+        scene: its materials determine the paths.
     """
     if any(material.glass is not None and material.glass.thickness > 0 for material in scene.materials):
-        return ("Light that solid glass bends onto surfaces, and what its inner sides reflect.",)
+        return ("Caustics of solid glass, and reflections on its inner sides.",)
     return ()

@@ -1,5 +1,5 @@
-"""Outgoing radiance of points by brute force: R = Σ V · L ΔΩ · f(ωi, ωo) cos θi over texels and places of local lights,
-f the sum of a look's terms."""
+"""Outgoing radiance of points by brute force: R = Σ V · L ΔΩ · f(ωi, ωo) cos θi over texels and samples of local
+lights, with f the sum of a look's terms."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.curves import CHANNELS, curve_values, drawn_curves
@@ -31,50 +32,49 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 Document = Mapping[str, Any]
 
-_STEPS = 1 << 16  # linear between them, the narrowest highlight (σ = 0.005) is off by less than 1e-5 of its peak
-_POINTS_PER_PACKET = 16  # neighbours that Embree traces together; where texels are drawn, they share the draw
+_STEPS = 1 << 16  # with linear interpolation, the narrowest highlight (σ = 0.005) has an error below 1e-5 of its peak
+_POINTS_PER_PACKET = 16  # neighbors that Embree traces together; they share sampled texels
 _TEXELS_PER_BATCH = 8192
-_MAX_LIGHT_SAMPLES = 4096  # places of a local light, where every texel is asked for
+_MAX_LIGHT_SAMPLES = 4096  # points of a local light, if every texel is requested
 _SEED = 2006
-# of the texels drawn: so many directions more by the cosine and by lobes
+# numbers of directions sampled in addition by the cosine lobe and by all other lobes, relative to the sampled texels
 _COSINE_FRACTION, _LOBE_FRACTION = 1 / 8, 1 / 4
 
 
 @dataclass(frozen=True)
 class ReferencePoints:
-    """Points on surfaces, each seen from one direction; neighbours should be near each other.
+    """Points on surfaces with one view direction each; successive points should be neighbors.
 
     Attributes:
-        position: off the surface already. normal, tangent: shading frame. wo: towards the viewer. (n, 3) float32
-        textures: what multiplies terms of a channel, "diffuse" and "specular". (n, 3) float32 each
-        roughness: see `relume.raytrace.surface_interaction.SurfaceInteraction`. (n,) float32
-        uv: see there; None where what covers surfaces counts by its mean. (n, 5) float32
-        alpha_sample: of shadow rays at surfaces that blend; see `relume.raytrace.surface_points.SurfacePoints`. (n,) or
-            (1,) float32
+        position: off the surface. normal, tangent: shading frame. wo: toward the viewer.
+        textures: factors of terms by channel, "diffuse" and "specular". (n, 3) float32 each
+        roughness: see `relume.raytrace.surface_interaction.SurfaceInteraction`.
+        uv: see there; None to use the mean of BTFs.
+        alpha_sample: for shadow rays at blended surfaces; see `relume.raytrace.surface_points.SurfacePoints`.
     """
 
-    position: F32
-    normal: F32
-    tangent: F32
-    wo: F32
+    position: Shaped[F32, "n 3"]
+    normal: Shaped[F32, "n 3"]
+    tangent: Shaped[F32, "n 3"]
+    wo: Shaped[F32, "n 3"]
     textures: Mapping[str, F32]
-    roughness: F32
-    uv: F32 | None = None
-    alpha_sample: F32 = field(default_factory=lambda: FIXED_ALPHA_SAMPLE)
+    roughness: Shaped[F32, " n"]
+    uv: Shaped[F32, "n 5"] | None = None
+    alpha_sample: Shaped[F32, " #n"] = field(default_factory=lambda: FIXED_ALPHA_SAMPLE)
 
     @property
     def num_points(self) -> int:
-        """n."""
+        """Number of points n."""
         return len(self.position)
 
-    def frames(self) -> F64:
-        """To the local frames, z = normal, x = tangent. (n, 3, 3)"""
+    def frames(self) -> Shaped[F64, "n 3 3"]:
+        """Rotation matrices to the local frames, z = normal, x = tangent."""
         normal = self.normal / np.linalg.norm(self.normal.astype(np.float64), axis=1, keepdims=True)
         tangent = self.tangent / np.linalg.norm(self.tangent.astype(np.float64), axis=1, keepdims=True)
         return np.stack([tangent, np.cross(normal, tangent), normal], axis=1)
 
     def samples_of(self, index: slice | NDArray[np.intp]) -> ReferencePoints:
-        """Some of the points."""
+        """Select points."""
         textures = {name: values[index] for name, values in self.textures.items()}
         frame = self.normal[index], self.tangent[index], self.wo[index]
         uv = None if self.uv is None else self.uv[index]
@@ -82,7 +82,7 @@ class ReferencePoints:
         return ReferencePoints(self.position[index], *frame, textures, self.roughness[index], uv, alpha_sample)
 
     def btf_surfaces(self, terms: Sequence[Document], rng: np.random.Generator) -> list[BtfSurface | None]:
-        """What covers them, term by term; None where it is the same everywhere. rng: draws places in it."""
+        """Sample the BTF of each term at the points; None for other terms. rng: chooses positions in footprints"""
         btf_surfaces: list[BtfSurface | None] = []
         for document in terms:
             texels = TERMS[document["model"]].normalized(document).texels
@@ -116,7 +116,7 @@ def _tabulate(document: Document) -> _Tables:
 
 @asset_cached("tables of brute force")
 def _build_tables(term_text: str) -> _Tables:
-    """Paths ask for the terms of a scene at every bounce, of rough and smooth texels; some megabytes each."""
+    """Tabulate a term; cached, because paths need all terms of all roughness classes at every bounce; some MB."""
     document = json.loads(term_text)
     term = TERMS[document["model"]].normalized(document)
     curves = [curve for curve in term.curves if not curve.depends_on_view]
@@ -130,7 +130,7 @@ def _build_tables(term_text: str) -> _Tables:
 
 
 def _stepped_channels(document: Document, curve: Curve) -> list[bool]:
-    """Per channel, whether the curve was given as bands: it jumps from one to the next, at entries of the table."""
+    """Per channel, true if the curve was given as bands: it has steps, at entries of the table."""
     stepped = [False] * 3
     for drawn_curve in drawn_curves(document, curve):
         for channel in drawn_curve.get("channels", CHANNELS):
@@ -148,25 +148,23 @@ def reference_radiance(
     is_canceled: Callable[[], bool] = lambda: False,
     pass_index: int = 0,
     local_lights: Sequence[ReferenceEmitter] = (),
-) -> F64:
-    """Radiance of all points under several materials, which share their shadow rays.
+) -> Shaped[F64, "materials n 3"]:
+    """Radiance of all points with each of several materials, which share their shadow rays.
 
     Args:
-        geometry: in which shadow rays are traced.
+        geometry: the occluding triangles.
         texels: of the environment, with their radiance and solid angles.
-        points: n of them, seen from one direction each.
-        materials: of each its terms, as they stand in a complete look.
-        spp: texels drawn by power for each point, with some directions more by how the materials reflect, and places
-            drawn of each lamp that has an extent; 0, or as many as there are, for the middles of all texels.
-        progress: called with the share of the points that are done, in [0, 1].
-        is_canceled: asked between packets of points.
-        pass_index: passes with other indices draw independently.
+        points: n of them.
+        materials: terms of each, from a complete look.
+        spp: texels sampled by power per point, plus some directions sampled by the materials' lobes, and points per
+            area light; 0, or as many as there are, for all texels at their centers.
+        progress: called with the finished fraction of points, in [0, 1].
+        is_canceled: called between packets of points.
+        pass_index: passes with other indices have independent samples.
         local_lights: local lights, which are added.
-    Returns:
-        (materials, n, 3) float64
     Raises:
-        CancelledError: `is_canceled` said so.
-    Cost: O(n · min(spp, texels) · (log triangles + terms)) time; some MB of memory a thread.
+        CancelledError: `is_canceled` returned true.
+    Cost: O(n · min(spp, texels) · (log triangles + terms)) time; some MB of memory per thread.
     """
     tables = [[_tabulate(document) for document in terms] for terms in materials]
     lobes = _lobe_counts(tables, spp) if 0 < spp < texels.num_texels else []
@@ -203,7 +201,7 @@ def reference_radiance(
 def _with_btf_surfaces(
     tables: Sequence[Sequence[_Tables]], points: ReferencePoints, rng: np.random.Generator
 ) -> Sequence[Sequence[_Tables]]:
-    """The same of terms that cover a packet of points, with what covers it."""
+    """Add the BTFs at a packet of points to the tables of their terms."""
     if points.uv is None or not any(table.term.texels is not None for terms in tables for table in terms):
         return tables
     packet_tables = []
@@ -231,7 +229,7 @@ def _add_texels(
 
 
 def _lobe_counts(tables: Sequence[Sequence[_Tables]], spp: int) -> list[tuple[Lobe, int]]:
-    """What reflects much of the materials, and how many directions are drawn of each."""
+    """Lobes of the materials, and the number of directions sampled from each."""
     curve_lobes = [lobe for terms in tables for table in terms for lobe in _curve_lobes(table)]
     num_directions = max(1, round(_LOBE_FRACTION * spp / max(1, len(curve_lobes))))
     return [(cosine_lobe(), max(1, round(_COSINE_FRACTION * spp))), *((lobe, num_directions) for lobe in curve_lobes)]
@@ -247,10 +245,10 @@ def _curve_lobes(table: _Tables) -> list[Lobe]:
 
 
 def material_lobes(terms: Sequence[Document]) -> list[Lobe]:
-    """Find what reflects much of a material: all about the normal, then each lobe of its terms.
+    """Lobes of a material: the cosine lobe, then each lobe of its terms.
 
     Args:
-        terms: as they stand in a complete look.
+        terms: from a complete look.
     """
     return [cosine_lobe(), *(lobe for document in terms for lobe in _curve_lobes(_tabulate(document)))]
 
@@ -265,8 +263,8 @@ def _add_environment_samples(
     rng: np.random.Generator,
     out: F64,
 ) -> None:
-    """Add the environment's light to a packet of points: directions drawn by power, which they share, and directions
-    drawn of each point's lobes; each is divided by how often all of them together draw it. out: (materials, points, 3)
+    """Add the environment's light to a packet of points: directions sampled by power, shared by the points, and
+    directions sampled from lobes for each point, weighted by the balance heuristic. out: (materials, points, 3)
     """
     frames = points.frames()
     wo = np.einsum("nij,nj->ni", frames, points.wo.astype(np.float64))
@@ -297,7 +295,7 @@ def _add_environment_samples(
 def _add_light_samples(
     light_samples: LocalLightSamples, points: ReferencePoints, tables: Sequence[Sequence[_Tables]], out: F64
 ) -> None:
-    """Add the light of a lamp to a packet of points. out: (materials, points, 3)"""
+    """Add the light of light samples to a packet of points. out: (materials, points, 3)"""
     visible = np.packbits(light_samples.power.any(axis=2), axis=1, bitorder="little")
     for p in range(points.num_points):
         _add_lights(points, p, light_samples.direction[p], light_samples.power[p], visible[p], tables, out[:, p])
@@ -335,7 +333,7 @@ def _add_lights(
 
 
 def _factor(table: _Tables, points: ReferencePoints, p: int, cos_theta_o: float) -> F64:
-    """Colour, texture and curves of the outgoing angle. (3,)"""
+    """Product of color, texture and view-angle curves. (3,)"""
     factor = np.asarray(table.document["color"], np.float64)
     channel = texture_channel(table.document)
     if channel is not None:

@@ -1,4 +1,4 @@
-"""Materials of a look as surfaces reflect: one with a map of roughness is many, each as rough as some of its texels."""
+"""Roughness classes of a look's materials: a material with a roughness map has many, each for a range of texels."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.roughness_levels import scaled_roughness, uses_roughness_map
@@ -21,18 +22,18 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 Terms = Sequence[Mapping[str, Any]]
 
-# kinds of a material, and of a scene: far finer than pictures tell apart
+# maximum numbers of classes, far finer than the roughness levels of bakes
 _MAX_CLASSES_PER_MATERIAL, _MAX_CLASSES = 48, 96
 
 
 @dataclass(frozen=True)
 class RoughnessClasses:
-    """What the surfaces of a scene are made of.
+    """Roughness classes of a scene's surfaces.
 
     Attributes:
-        terms: of each kind. mirrors: how much of each term of a kind mirrors, where the scene's own material does, so
-            that pictures follow what is seen in it. (3,) each
-        first: kind of each material's first. ratios: of each material's kinds, none for one.
+        terms: of each class. mirrors: mirror fraction of each term of a class, per channel; zero unless the scene's own
+            material is a mirror, because only those are traced in bakes.
+        first: first class of each material. ratios: relative roughness of each material's classes, empty for one.
     """
 
     terms: list[Terms]
@@ -40,12 +41,14 @@ class RoughnessClasses:
     first: list[int]
     ratios: list[tuple[float, ...]]
 
-    def classify(self, material: NDArray[np.integer], roughness: F32) -> NDArray[np.int64]:
-        """The kinds of points.
+    def classify(
+        self, material: Shaped[NDArray[np.integer], " n"], roughness: Shaped[F32, " n"]
+    ) -> Shaped[NDArray[np.int64], " n"]:
+        """Return the classes of points.
 
         Args:
-            material: index into the scene's materials. (n,) roughness: over the material's, see
-                `relume.raytrace.surface_interaction.SurfaceInteraction`. (n,)
+            material: index into the scene's materials. roughness: relative to the material's, see
+                `relume.raytrace.surface_interaction.SurfaceInteraction`.
         """
         class_index: NDArray[np.int64] = np.array(self.first, np.int64)[material]
         for index, ratios in enumerate(self.ratios):
@@ -56,7 +59,7 @@ class RoughnessClasses:
 
 
 def _roughness_levels(material: Material, terms: Terms) -> tuple[float, ...]:
-    """Of the map that terms of a material follow."""
+    """Roughness levels of the map that terms of a material use."""
     name = roughness_image(terms)
     if name is None:
         return levels_of_material(material)
@@ -66,7 +69,7 @@ def _roughness_levels(material: Material, terms: Terms) -> tuple[float, ...]:
 
 
 def roughness_classes(scene: Scene, look: Look) -> RoughnessClasses:
-    """Find the kinds of a scene's surfaces under a look."""
+    """Make the roughness classes of a scene's surfaces under a look."""
     material_terms = [look.materials[material.name].terms for material in scene.materials]
     level_ranges = [
         _roughness_levels(m, terms) if any(map(uses_roughness_map, terms)) else ()

@@ -1,4 +1,4 @@
-"""What textures of places on surfaces show: the scene's own images, and those that a look names in their place."""
+"""Texture values at surface points: of the scene's own textures, or of images in the look that override them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.roughness_levels import uses_roughness_map
@@ -22,10 +23,10 @@ F32 = NDArray[np.float32]
 
 
 def with_overrides(scene: Scene, look: Look) -> Scene:
-    """The scene whose materials have the normal maps that a look names, as if its file had them.
+    """Apply the normal maps of a look to a scene, as if its file contained them.
 
     Args:
-        scene: any. look: that is shown.
+        scene: any. look: the look.
     """
     normals = [look.materials[material.name].normals for material in scene.materials]
     if not any(normals):
@@ -44,12 +45,12 @@ def with_overrides(scene: Scene, look: Look) -> Scene:
 
 
 def _with_tangents(mesh: Mesh) -> Mesh:
-    """A mesh with tangents along u, as imports make them for normal maps."""
+    """Add tangents along u, as imports make them for normal maps."""
     return replace(mesh, tangents=compute_tangents(mesh.positions, mesh.normals, mesh.uvs, mesh.faces))
 
 
 def _with_uvs(mesh: Mesh) -> Mesh:
-    """A mesh with texture coordinates; where there are none, those of a projection, as in `StoredScene`."""
+    """Add texture coordinates; without any, those of tri-planar mapping, as in `StoredScene`."""
     if mesh.uvs.any():
         return mesh
     corners = mesh.positions[mesh.faces]
@@ -67,7 +68,7 @@ def _with_uvs(mesh: Mesh) -> Mesh:
 
 
 def _terms_with_roughness_map(material: Material, look: Look) -> tuple[dict[str, Any], ...]:
-    """A material's own terms, which bumps widen where those of a look follow a map."""
+    """A material's own terms, with the roughness map if terms of the look use one, so that normal variation counts."""
     look_terms = look.materials[material.name].terms
     uses_map = [k < len(look_terms) and uses_roughness_map(look_terms[k]) for k in range(len(material.terms))]
     return tuple(
@@ -77,13 +78,13 @@ def _terms_with_roughness_map(material: Material, look: Look) -> tuple[dict[str,
 
 
 def surface_textures(
-    scene: Scene, look: Look, surface: SurfaceInteraction, material: NDArray[np.integer]
+    scene: Scene, look: Look, surface: SurfaceInteraction, material: Shaped[NDArray[np.integer], " n"]
 ) -> dict[str, F32]:
-    """What multiplies terms by their channel, at places on surfaces.
+    """Factors of terms by texture channel, at surface points.
 
     Args:
-        scene: whose materials they are. look: that is shown. surface: the places.
-        material: index of each into the scene's materials; others are left as they are. (n,)
+        scene: with its materials. look: the look. surface: the points.
+        material: index of each into the scene's materials; other values keep their textures.
     Returns:
         (n, 3) float32 each
     """
@@ -97,13 +98,13 @@ def surface_textures(
     return textures
 
 
-def surface_roughness(scene: Scene, look: Look, surface: SurfaceInteraction, material: NDArray[np.integer]) -> F32:
-    """How rough places on surfaces are, over what terms say.
+def surface_roughness(
+    scene: Scene, look: Look, surface: SurfaceInteraction, material: Shaped[NDArray[np.integer], " n"]
+) -> Shaped[F32, " n"]:
+    """Roughness at surface points, relative to the material's terms.
 
     Args:
         scene, look, surface, material: as in `surface_textures`.
-    Returns:
-        (n,) float32
     """
     roughness = surface.roughness
     for index, scene_material in enumerate(scene.materials):

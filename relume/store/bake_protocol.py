@@ -1,7 +1,7 @@
-"""What a bake is: plan (pure), tasks, compute (pure), and what a worker needs to run it.
+"""The bake protocol: plan (pure), tasks, compute (pure), and the interfaces for workers.
 
-bake (worker, once) → freeze (server, on touch) → frame (server, per edit). A method joins by one module and one line in
-`relume.methods.registry`, and inherits the contract suite in tests/contract.
+bake (worker, once) → freeze (server, on prepare) → frame (server, per edit). To add a method, write one module and add
+one line to `relume.methods.registry`; the contract suite in tests/contract then tests it.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from relume.scene.model import Scene
 
 
 class RowSource(Protocol):
-    """Rows that need not be in memory together: an array, or what reads them when they are asked for."""
+    """Rows that may exceed memory: an array, or an object that reads them on request."""
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of all rows."""
+        """Shape of all rows together."""
         ...
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """Of a number."""
+        """Type of an element."""
         ...
 
     def __getitem__(self, rows: slice, /) -> NDArray[Any]:
-        """Some rows that follow each other."""
+        """Read consecutive rows."""
         ...
 
 
@@ -40,18 +40,18 @@ Arrays = Mapping[str, RowSource]
 
 @dataclass(frozen=True)
 class Recipe:
-    """What to bake. The same scene and recipe give the same store under the same code, bit for bit.
+    """Input of a bake. The same scene, recipe and code give the same store, bit for bit.
 
     Attributes:
         method: name of a transfer method.
         views: camera names, in order.
         size: width and height in pixels.
-        num_lights: triangles that the environment is divided into.
-        relightable: choose them for an environment that will be turned or exchanged, not for the one that is there.
-        cameras: those of `views` that somebody placed; the others came with the scene.
-        num_probes: surface probes of a free camera; methods of fixed views have none.
-        num_patches: surface patches for indirect light. gather_rays: of each view sample, or probe. None: as many as
-            the method finds fit; `direct` has none.
+        num_lights: number of environment triangles.
+        relightable: choose them for any environment, not for the scene's own.
+        cameras: those of `views` that users placed; the others belong to the scene.
+        num_probes: surface probes for a free camera; methods with fixed cameras have none.
+        num_patches: surface patches for indirect light. gather_rays: per view sample or probe. None: the method
+            chooses; `direct` has none.
     """
 
     method: str
@@ -65,7 +65,7 @@ class Recipe:
     gather_rays: int | None = None
 
     def add_cameras(self, scene: Scene) -> Scene:
-        """The scene with the cameras that this recipe brings: what its method plans and bakes."""
+        """Add the cameras of this recipe to a scene; the method plans and bakes the result."""
         return with_cameras(scene, [placed_camera.camera for placed_camera in self.cameras]) if self.cameras else scene
 
 
@@ -90,8 +90,8 @@ class Task:
     """A piece of a bake that one process computes alone.
 
     Attributes:
-        stage: index into `BakeMethod.stages`; a stage starts when the one before is complete.
-        index: position within the stage; (stage, index) names the task.
+        stage: index into `BakeMethod.stages`; a stage starts when the previous one is complete.
+        index: position within the stage; (stage, index) identifies the task.
         group: the view it belongs to, "" for none.
         start, stop: the rows of the stage's arrays that it owns, shard-aligned.
     """
@@ -105,16 +105,16 @@ class Task:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a bake will cost, before anything is traced. Upper bounds.
+    """Cost of a bake before anything is traced. Upper bounds unless noted.
 
     Attributes:
         num_rays: shadow and camera rays.
         store_bytes: on disk, uncompressed.
-        disk_bytes: on disk, as a little of it takes; no bound. 0 where none was tried: then `store_bytes` counts.
-        scratch_bytes: of files that are there besides while it is baked.
+        disk_bytes: on disk, extrapolated from a compressed sample; no bound. 0 without a sample: use `store_bytes`.
+        scratch_bytes: temporary files during the bake.
         peak_bytes: memory of one worker process.
-        lone_bytes: what of it one process takes while the others do without: of a step that is one task.
-        work_s: about what one core takes that was measured once: plans are compared by it. 0 in plans of before.
+        lone_bytes: part of it that only one process needs at a time: for a step with a single task.
+        work_s: approximate time on one core, for comparing plans. 0 in older plans.
     """
 
     num_view_samples: int
@@ -128,17 +128,17 @@ class Plan:
 
     @property
     def planned_bytes(self) -> int:
-        """Of the finished store, on disk."""
+        """Expected size of the finished store on disk."""
         return self.disk_bytes or self.store_bytes
 
 
 @dataclass(frozen=True)
 class TaskOutput:
-    """What a task computed: rows [start, stop) of each array, and what it cost.
+    """Result of a task: rows [start, stop) of each array, and its cost.
 
     Attributes:
-        arrays: by array path, the task's rows.
-        num_rays: rays traced. trace_s: seconds spent in the tracing kernels alone.
+        arrays: the task's rows, by array path.
+        num_rays: number of traced rays. trace_s: seconds in the tracing kernels alone.
     """
 
     arrays: Arrays
@@ -147,10 +147,10 @@ class TaskOutput:
 
 
 class StoreReader(Protocol):
-    """Reads what earlier stages wrote; raises `ChunkDamagedError` where a checksum fails."""
+    """Reader for the output of earlier stages; raises `ChunkDamagedError` if a checksum fails."""
 
     def read(self, path: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
-        """Rows [start, stop) of the array at a path inside the store; `stop` None for all that follow."""
+        """Read rows [start, stop) of the array at a path inside the store; `stop` None for all further rows."""
         ...
 
     def shape(self, path: str) -> tuple[int, ...]:
@@ -164,19 +164,19 @@ class StoreReader(Protocol):
 
 
 class TaskStore(StoreReader, Protocol):
-    """What a task reads, and where it puts aside what it would not hold in memory."""
+    """Input of a task, and scratch files for data that exceeds memory."""
 
     def scratch(self) -> IO[bytes]:
-        """A file, open for writing and reading, that is gone when it is closed."""
+        """Open a temporary file for writing and reading; it is deleted when it is closed."""
         ...
 
 
 class BakeMethod(Protocol):
-    """How one paper's light transport is baked; `relume.methods.base.TransferMethod` opens it as well."""
+    """Baking of a light transport method; `relume.methods.base.TransferMethod` adds opening."""
 
     @property
     def name(self) -> str:
-        """What recipes call it."""
+        """Name of the method in recipes."""
         ...
 
     @property
@@ -185,11 +185,11 @@ class BakeMethod(Protocol):
         ...
 
     def plan(self, scene: Scene, recipe: Recipe) -> Plan:
-        """Cost of a bake; pure, traces nothing. Raises PlanError where the recipe does not fit the scene."""
+        """Cost of a bake; pure, traces nothing. Raises PlanError if the recipe does not fit the scene."""
         ...
 
     def prepare(self, scene: Scene) -> None:
-        """Build what all tasks of a scene share in one process; kept for the next."""
+        """Build and cache data that all tasks of a scene share in one process."""
         ...
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
@@ -200,17 +200,17 @@ class BakeMethod(Protocol):
         """The tasks of a stage; pure.
 
         Args:
-            stage: index into `stages`. scene: that is baked. recipe: how.
-            store: what the stages before wrote.
+            stage: index into `stages`. scene: the scene. recipe: its recipe.
+            store: output of the earlier stages.
         """
         ...
 
     def arrays(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[ArraySpec]:
-        """The arrays that a stage fills and whose shape is known before it runs; pure.
+        """The arrays that a stage fills and whose shapes are known before it runs; pure.
 
         Args:
-            stage: index into `stages`. scene: that is baked. recipe: how.
-            store: what the stages before wrote.
+            stage: index into `stages`. scene: the scene. recipe: its recipe.
+            store: output of the earlier stages.
         """
         ...
 
@@ -218,11 +218,11 @@ class BakeMethod(Protocol):
         """Compute a task's rows; pure, seeded by (scene id, task).
 
         Args:
-            scene: that is baked. recipe: how.
+            scene: the scene. recipe: its recipe.
             task: one of `tasks`.
-            store: what the stages before wrote.
+            store: output of the earlier stages.
         Returns:
-            Rows of the arrays that `arrays` announces. Others are created by the task itself, whole (the view samples
-            of a view, whose number only tracing tells).
+            Rows of the arrays that `arrays` lists. The task itself creates others as a whole (the samples of a view,
+            whose number is unknown before tracing).
         """
         ...

@@ -1,4 +1,4 @@
-"""Publishes a finished store: verify every chunk, consolidate metadata, write the manifest, rename into place."""
+"""Publish a finished store: verify every chunk, consolidate metadata, write the manifest, rename into place."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from relume.store.small_files import read_json
 
 
 def publish(staging: Path, target: Path, check: Callable[[], object] = lambda: None) -> int:
-    """Make a staging store public, whole or not at all.
+    """Publish a staging store atomically.
 
-    Every chunk is read back first. Files that interrupted writes left behind are removed, so that the same bake gives
-    the same files, byte for byte, however often it was interrupted.
+    Every chunk is read back first. Leftovers of interrupted writes are removed, so that the same bake gives the same
+    files, byte for byte, however often it was interrupted.
 
     Args:
-        staging: the finished store, same file system as `target`.
-        target: where readers look for it; an older store there is replaced.
-        check: called after what takes long; raises where the store is not to be published any more.
+        staging: the finished store, on the same file system as `target`.
+        target: the path for readers; an older store there is replaced.
+        check: called after long steps; raises if the store must not be published any more.
     Returns:
         Size of the store in bytes.
     Raises:
@@ -40,7 +40,7 @@ def publish(staging: Path, target: Path, check: Callable[[], object] = lambda: N
         _verify(reader, path)
     check()
     with warnings.catch_warnings():
-        # Zarr warns that consolidated metadata is an extension; readers that do not know it fall back.
+        # Zarr warns that consolidated metadata is an extension; readers without it fall back.
         warnings.simplefilter("ignore")
         zarr.consolidate_metadata(LocalStore(staging))
     num_bytes = _write_manifest(staging)
@@ -78,7 +78,7 @@ def _write_manifest(staging: Path) -> int:
 
 
 def manifest_digests(path: Path) -> dict[str, str]:
-    """SHA-256 of every file of a published store, the manifest's own not among them.
+    """SHA-256 of every file of a published store except the manifest.
 
     Raises:
         StoreNotFoundError: there is no published store. StoreError: its manifest is unreadable.

@@ -1,6 +1,6 @@
-"""Reads a store. Damage is an error with the array's name, never zeros.
+"""Store reader. Damage is an error with the array's name, never zeros.
 
-Zarr fills what it does not find; here a missing shard, a cut shard and a failed checksum all raise ChunkDamagedError.
+Zarr fills missing chunks; here a missing shard, a truncated shard and a failed checksum all raise ChunkDamagedError.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from relume.store.schema import (
 )
 from relume.store.small_files import read_json
 
-# Zarr decodes on one event loop and a pool of threads that all readers share; the defaults (10 and 32) only make the
-# threads of a small machine wait for each other. They take effect when zarr first reads.
+# All readers share Zarr's event loop and its thread pool; with the defaults (10 and 32) the threads of a small machine
+# only wait for each other. The settings take effect when zarr first reads.
 zarr.config.set({"async.concurrency": 4, "threading.max_workers": 4})
 
 
 class Reader:
-    """A store open for reading; implements `relume.store.bake_protocol.TaskStore`. Safe to use from several threads."""
+    """A store that is open for reading; implements `relume.store.bake_protocol.TaskStore`. Thread-safe."""
 
     def __init__(self, path: Path, attributes: Mapping[str, Any]) -> None:
         self.path = path
@@ -49,21 +49,21 @@ class Reader:
         return self._attributes
 
     def spec(self, path: str) -> ArraySpec:
-        """Shape, type, chunks and shards of an array. Raises StoreError where there is none."""
+        """Shape, type, chunks and shards of an array. Raises StoreError if it does not exist."""
         return self._open(path)[0]
 
     def shape(self, path: str) -> tuple[int, ...]:
-        """Shape of an array. Raises StoreError where there is none."""
+        """Shape of an array. Raises StoreError if it does not exist."""
         return self.spec(path).shape
 
     def read(self, path: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
-        """Rows [start, stop) of an array.
+        """Read rows [start, stop) of an array.
 
         Args:
-            path: of the array inside the store. start, stop: rows; all without them.
+            path: of the array inside the store. start, stop: rows; by default all.
         Raises:
-            StoreGoneError: the whole store was deleted.
-            ChunkDamagedError: a shard is missing or cut, or a checksum fails.
+            StoreDeletedError: the whole store was deleted.
+            ChunkDamagedError: a shard is missing or truncated, or a checksum fails.
             StoreError: there is no such array, or the rows lie outside it.
         """
         try:
@@ -74,7 +74,7 @@ class Reader:
             raise
 
     def scratch(self) -> IO[bytes]:
-        """A file beside the arrays, of no name that anybody would read. See `relume.store.bake_protocol.TaskStore`."""
+        """Open a nameless file beside the arrays. See `relume.store.bake_protocol.TaskStore`."""
         return scratch_file(self.path)
 
     def _rows(self, path: str, start: int, stop: int | None) -> NDArray[Any]:
@@ -115,7 +115,7 @@ class Reader:
 
 
 def open_staging(path: Path) -> Reader:
-    """Open a store that is still being written: no manifest yet. Raises StoreNotFoundError, SchemaVersionError."""
+    """Open a store that is still being written, without a manifest. Raises StoreNotFoundError, SchemaVersionError."""
     attributes = read_json(path / "zarr.json").get("attributes")
     if not isinstance(attributes, dict):
         raise StoreError(f"{path.name} has no attributes; bake the scene again")
@@ -124,7 +124,7 @@ def open_staging(path: Path) -> Reader:
 
 
 def read_code(path: Path) -> str | None:
-    """Hash of the code that wrote a store, see `relume.core.source_hash.bake_code`; None where it is unknown."""
+    """Hash of the code that wrote a store, see `relume.core.source_hash.bake_code`; None if it is unknown."""
     try:
         code = open_staging(path).attributes.get("code")
     except StoreError:
@@ -133,15 +133,15 @@ def read_code(path: Path) -> str | None:
 
 
 def open_store(path: Path) -> Reader:
-    """Open a published store; checks version, sizes of all files, and that every array has all its shards.
+    """Open a published store; check its version, the sizes of all files, and that every array has all its shards.
 
-    Checksums of the content are verified when rows are read.
+    Checksums of the content are checked when rows are read.
 
     Raises:
         StoreNotFoundError: there is no published store.
-        SchemaVersionError: it was written by a relume with another layout.
-        ChunkDamagedError: a file is missing or has another size than when it was published.
-        StoreError: its metadata is unreadable or absurd.
+        SchemaVersionError: another version of relume wrote it with another layout.
+        ChunkDamagedError: a file is missing or its size has changed since it was published.
+        StoreError: its metadata is unreadable or invalid.
     """
     path = Path(path)
     if not (path / MANIFEST_NAME).is_file():
@@ -160,7 +160,7 @@ def open_store(path: Path) -> Reader:
 
 
 def _manifest_sizes(path: Path) -> dict[str, int]:
-    """Size in bytes of every file by name; names stay inside the store."""
+    """Size in bytes of every file by name; rejects names outside the store."""
     try:
         sizes = {str(entry["path"]): int(entry["bytes"]) for entry in read_json(path / MANIFEST_NAME)["files"]}
     except (KeyError, TypeError, ValueError) as error:
@@ -171,7 +171,7 @@ def _manifest_sizes(path: Path) -> dict[str, int]:
 
 
 def _check_array(path: Path, document: str, num_present: Mapping[str, int]) -> None:
-    """Raises ChunkDamagedError where an array has not all its shards. num_present: shards by the path of an array."""
+    """Raise ChunkDamagedError if shards of an array are missing. num_present: number of shards by array path"""
     metadata = read_json(path / document)
     if metadata.get("node_type") == "group":
         return
@@ -183,6 +183,6 @@ def _check_array(path: Path, document: str, num_present: Mapping[str, int]) -> N
 
 
 def rows_per_shard(spec: ArraySpec) -> int:
-    """Rows that one read should take to touch each shard once and stay near 64 MB."""
+    """Rows per read that touch each shard once and stay near 64 MB."""
     row_bytes = max(1, math.prod(spec.shape[1:]) * np.dtype(spec.dtype).itemsize)
     return max(spec.chunks[0], min(spec.shards[0], (64 << 20) // row_bytes // spec.chunks[0] * spec.chunks[0]))

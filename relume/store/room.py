@@ -1,4 +1,4 @@
-"""The rest of the disk that bakes leave: a plan is no bound, so whoever writes something large looks for room first."""
+"""Disk space checks during bakes: a plan is no bound on disk use, so large writes check the free space first."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from typing import IO, Any, cast
 
 from relume.core.errors import DiskFullError
 
-RESERVE_BYTES = 64 << 20  # left for the server's own work and for the system
+RESERVE_BYTES = 64 << 20  # left for the server's own files and for the system
 _BUFFER_BYTES = 1 << 20
 
 
 def check_disk_space(folder: Path) -> None:
-    """Raise DiskFullError where a bake is to stop: without the rest of the disk the ledger could not even delete."""
+    """Raise DiskFullError if a bake must stop: without the reserve, the database could not even delete entries."""
     if shutil.disk_usage(folder).free < RESERVE_BYTES:
         raise DiskFullError("the store of a bake")
 
 
 class _ScratchFile(io.FileIO):
-    """A file that looks for room before each piece that it writes."""
+    """A file that checks the free space before each write."""
 
     def __init__(self, handle: int, folder: Path) -> None:
         super().__init__(handle, "r+b")
@@ -34,7 +34,7 @@ class _ScratchFile(io.FileIO):
 
 
 def scratch_file(folder: Path) -> IO[bytes]:
-    """Open a file in a folder that has no name and is gone when it is closed; writing raises DiskFullError."""
+    """Open a nameless temporary file in a folder; writing raises DiskFullError if space runs out."""
     with tempfile.TemporaryFile(dir=folder) as file:
         raw = _ScratchFile(os.dup(file.fileno()), folder)
     return cast("IO[bytes]", io.BufferedRandom(raw, _BUFFER_BYTES))

@@ -1,5 +1,5 @@
-"""Runs a transfer method into a store: the stages, their arrays, one task. The worker calls these from its processes;
-`bake_in_process` calls them one after another, for tests, notebooks and measurements."""
+"""Run a transfer method into a store: stages, their arrays, single tasks. The worker calls these from its processes;
+`bake_in_process` calls them sequentially, for tests, notebooks and measurements."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from relume.store.writer import StoreWriter, create_store
 
 
 def create_staging_store(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path) -> None:
-    """Create the store of a bake, or keep the unfinished one that is there, which this code must have made.
+    """Create the store of a bake, or keep the unfinished one, which this version of the code must have made.
 
     Args:
-        method: whose root attributes of this scene and recipe the store gets.
-        scene: that is baked. recipe: how.
-        staging: folder of the unfinished store; made where it is missing.
+        method: provides the root attributes for this scene and recipe.
+        scene: the scene. recipe: its recipe.
+        staging: folder of the unfinished store; made if missing.
     """
     create_store(staging, {**method.attributes(scene, recipe), "code": bake_code()})
 
 
 def create_stage(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path, stage: int) -> Sequence[Task]:
-    """Create the arrays that a stage announces and return its tasks.
+    """Create the arrays of a stage and return its tasks.
 
     Args:
-        method: whose stages the bake has.
-        scene: that is baked. recipe: how.
-        staging: folder of the unfinished store, in which the stages before this one are complete.
+        method: the bake method.
+        scene: the scene. recipe: its recipe.
+        staging: folder of the unfinished store, in which the earlier stages are complete.
         stage: index into the stages of `method`.
     """
     reader, writer = open_staging(staging), StoreWriter(staging)
@@ -45,11 +45,11 @@ def create_stage(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path
 
 @lru_cache(maxsize=4)
 def open_stage_reader(staging: Path, stage: int, scene_id: str, recipe: Recipe) -> Reader:
-    """One reader for all tasks of a stage that a process does: what they read is complete, and so read only once.
+    """Open one reader for all tasks of a stage in this process; its input is complete, so it is read only once.
 
     Args:
         staging: folder of the unfinished store.
-        stage, scene_id, recipe: tell this reader from those that were kept before.
+        stage, scene_id, recipe: identify the cached reader.
     """
     return open_staging(staging)
 
@@ -58,13 +58,13 @@ def run_task(method: BakeMethod, scene: Scene, recipe: Recipe, staging: Path, ta
     """Compute a task and write its rows; doing it twice leaves the same bytes.
 
     Args:
-        method: that computes. scene: that is baked. recipe: how.
-        staging: folder of the unfinished store, whose stage has begun.
-        task: one of those that `begin_stage` returned.
+        method: the bake method. scene: the scene. recipe: its recipe.
+        staging: folder of the unfinished store, whose stage was created.
+        task: one of those that `create_stage` returned.
     Returns:
-        What was computed, and what it cost.
+        The result and its cost.
     Raises:
-        StoreError: the method has computed another number of rows than the task owns.
+        StoreError: the number of rows differs from those that the task owns.
     """
     reader = open_stage_reader(staging, task.stage, scene.id, recipe)
     output = method.compute(scene, recipe, task, reader)
@@ -90,9 +90,9 @@ def bake_in_process(
     """Bake in this process and thread, and publish.
 
     Args:
-        method: that bakes. scene: what. recipe: how.
-        target: folder of the finished store; an unfinished one beside it is removed before.
-        progress: called with each task that is done and what it has written.
+        method: the bake method. scene: the scene. recipe: its recipe.
+        target: folder of the finished store; an unfinished one beside it is removed first.
+        progress: called with each finished task and its output.
     Returns:
         `target`.
     """

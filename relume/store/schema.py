@@ -1,11 +1,11 @@
 """Layout of a store: a Zarr v3 group whose arrays are sharded, compressed with Zstandard and checksummed (CRC-32C).
 
-    zarr.json            root group; attributes say what was baked; consolidated metadata of everything below
+    zarr.json            root group; attributes describe the bake; consolidated metadata of everything below
     <array>/zarr.json    shape, type, chunk (unit of reading) and shard (unit of writing)
-    <array>/c/…          one file per shard; every shard exists, also where all is zero
+    <array>/c/…          one file per shard; every shard exists, even if all values are zero
     manifest.json        every other file with its size and SHA-256; written last, so its presence means "complete"
 
-Bounds are checked on the way in and on the way out, so that a store whose metadata lies allocates nothing.
+Limits are checked on writing and on reading, so that false metadata of a store cannot allocate large memory.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ MAX_CHUNKS_PER_SHARD = 1 << 16
 MAX_ARRAY_BYTES = 1 << 40
 MAX_DIMENSIONS = 5
 
-# What a task creates without announcing it is read whole or in long runs: chunks of about this size suit both.
+# Arrays that a task creates itself are read as a whole or in long runs: chunks of about this size suit both.
 UNANNOUNCED_CHUNK_BYTES = 512 << 10
-UNANNOUNCED_CHUNKS_PER_SHARD = 32  # a shard is in memory while it is written, as it is and compressed
+UNANNOUNCED_CHUNKS_PER_SHARD = 32  # a shard is in memory during writing, uncompressed and compressed
 
-# Zarr runs whatever codec is named, with what is said of it; a store may come from where others can write.
+# Zarr runs any codec that the metadata names, with its configuration; a store may come from an untrusted source.
 CODECS = ("bytes", "zstd", "crc32c")
 INDEX_CODECS = ("bytes", "crc32c")
 
@@ -43,7 +43,7 @@ _SEGMENT = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
 
 
 def check_path(path: str) -> str:
-    """Return an array's path inside the store, or raise StoreError where it could not be a safe file name."""
+    """Return an array's path inside the store, or raise StoreError if it is not a safe file name."""
     segments = path.split("/")
     if not all(_SEGMENT.fullmatch(segment) for segment in segments) or {"c", "zarr.json"} & set(segments):
         raise StoreError(f"array path {path[:80]!r} is not allowed; use letters, digits, '_', '-' and '.' between '/'")
@@ -51,7 +51,7 @@ def check_path(path: str) -> str:
 
 
 def check_spec(spec: ArraySpec) -> ArraySpec:
-    """Return `spec`, or raise StoreError where its sizes or type lie outside what a store may hold."""
+    """Return `spec`, or raise StoreError if its sizes or type are not allowed in a store."""
     check_path(spec.path)
     if spec.dtype not in DTYPES:
         raise StoreError(f"array {spec.path} has type {str(spec.dtype)[:40]!r}; a store holds numbers only")
@@ -59,10 +59,10 @@ def check_spec(spec: ArraySpec) -> ArraySpec:
     if not 1 <= len(spec.shape) <= MAX_DIMENSIONS or len({len(size) for size in sizes}) != 1:
         raise StoreError(f"array {spec.path}: shape, chunks and shards need the same 1 to {MAX_DIMENSIONS} dimensions")
     if not all(type(n) is int and n >= 0 for n in spec.shape):
-        raise StoreError(f"array {spec.path} has an impossible shape {str(spec.shape)[:80]}")
+        raise StoreError(f"array {spec.path} has an invalid shape {str(spec.shape)[:80]}")
     if not all(type(c) is int and c > 0 and s % c == 0 for c, s in zip(spec.chunks, spec.shards, strict=True)):
         sizes_text = f"{str(spec.shards)[:80]} of {str(spec.chunks)[:80]}"
-        raise StoreError(f"array {spec.path}: shards are not whole chunks: {sizes_text}")
+        raise StoreError(f"array {spec.path}: shards are not multiples of chunks: {sizes_text}")
     _check_bytes(spec)
     return spec
 
@@ -77,7 +77,7 @@ def _check_bytes(spec: ArraySpec) -> None:
 
 
 def spec_from_metadata(path: str, metadata: Mapping[str, Any]) -> ArraySpec:
-    """Read shape, type, chunks and shards from an array's `zarr.json`, checked; raises StoreError."""
+    """Read and check shape, type, chunks and shards from an array's `zarr.json`; raises StoreError."""
     try:
         shards = metadata["chunk_grid"]["configuration"]["chunk_shape"]
         (codec,) = metadata["codecs"]
@@ -94,7 +94,7 @@ def spec_from_metadata(path: str, metadata: Mapping[str, Any]) -> ArraySpec:
     except (KeyError, TypeError, ValueError) as error:
         raise StoreError(f"array {path} has unreadable metadata ({error}); bake the scene again") from error
     if (inner, index) != (CODECS, INDEX_CODECS) or metadata.get("storage_transformers"):
-        raise StoreError(f"array {path} is packed by other codecs than relume's; bake the scene again")
+        raise StoreError(f"array {path} uses other codecs than relume's; bake the scene again")
     return check_spec(spec)
 
 
@@ -103,23 +103,23 @@ def _names(codecs: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
 
 
 def num_shards(spec: ArraySpec) -> int:
-    """How many shard files an array has when it is complete."""
+    """Number of shard files of a complete array."""
     return math.prod(-(-n // s) for n, s in zip(spec.shape, spec.shards, strict=True))
 
 
 def check_version(attributes: Mapping[str, Any]) -> None:
-    """Raise SchemaVersionError where the store's layout is not the one that this relume reads."""
+    """Raise SchemaVersionError if this version of relume does not read the store's layout."""
     stored = attributes.get("schema_version")
     if stored != SCHEMA_VERSION:
         raise SchemaVersionError(stored if isinstance(stored, int) else 0, SCHEMA_VERSION)
 
 
 def default_layout(path: str, shape: tuple[int, ...], dtype: str, item_bytes: int) -> ArraySpec:
-    """The layout of an array that its task writes whole: chunks of about half a megabyte, shards of some of them.
+    """Layout of an array that its task writes as a whole: chunks of about half a megabyte, shards of some chunks.
 
     Args:
-        path: of the array inside the store. shape: of at least one dimension.
-        dtype: NumPy's name of its type. item_bytes: of one element.
+        path: of the array inside the store. shape: with at least one dimension.
+        dtype: NumPy name of its type. item_bytes: size of one element.
     Raises:
         StoreError: the array has no dimensions.
     """

@@ -1,4 +1,4 @@
-"""Small files of a store, read within bounds."""
+"""Small JSON files of a store, read with a size limit."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from relume.store.schema import MAX_JSON_BYTES
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """A JSON object from a file of bounded size.
+    """Read a JSON object from a file of limited size.
 
     Raises:
         StoreNotFoundError: there is no such file.

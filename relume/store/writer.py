@@ -1,7 +1,7 @@
-"""Writes a store: arrays from their specifications, rows by whole shards.
+"""Store writer: creates arrays from specifications, and writes rows in whole shards.
 
 Several processes write one store at the same time, each its own shards. A shard appears by rename, so a killed process
-leaves either nothing or a whole shard; what is finished is recorded in the worker's ledger, never read off the files.
+leaves either no shard or a whole one. The worker's database records finished tasks; files are never used for that.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from relume.store.room import check_disk_space
 from relume.store.schema import SCHEMA_VERSION, check_spec, default_layout, spec_from_metadata
 from relume.store.small_files import read_json
 
-# Level 1 keeps up with tracing on one thread; higher levels save little on visibility bits.
+# Level 1 is as fast as tracing on one thread; higher levels save little on visibility bits.
 ZSTD_LEVEL = 1
 
 
 def create_store(path: Path, attributes: Mapping[str, Any]) -> StoreWriter:
-    """Create an empty store, or open the unfinished one that is there for writing on.
+    """Create an empty store, or open the existing unfinished one for writing.
 
     Args:
-        path: folder of the store; made where it is missing.
-        attributes: JSON; what readers need to understand the arrays.
+        path: folder of the store; made if missing.
+        attributes: JSON; metadata that readers need to interpret the arrays.
     """
     document = json.loads(json.dumps({**attributes, "schema_version": SCHEMA_VERSION}, sort_keys=True))
     path.mkdir(parents=True, exist_ok=True)
@@ -50,7 +50,7 @@ class StoreWriter:
         self._root = zarr.open_group(LocalStore(path), mode="r+", use_consolidated=False)
 
     def create_array(self, spec: ArraySpec) -> None:
-        """Create an array; one that is there with the same layout keeps its shards, any other is replaced."""
+        """Create an array; an existing one with the same layout keeps its shards, any other is replaced."""
         check_spec(spec)
         if self._spec(spec.path) == spec:
             return
@@ -71,7 +71,7 @@ class StoreWriter:
         )
 
     def _require_group(self, path: str) -> None:
-        """Have a group, which another process may make at the same moment."""
+        """Create a group unless it exists; another process may create it at the same time."""
         try:
             self._root.require_group(path)
         except ContainsGroupError:
@@ -81,30 +81,30 @@ class StoreWriter:
         """Write rows [start, start + len(rows)) of an array: whole shards, or up to the array's end.
 
         Args:
-            path: of the array, which was created before.
-            rows: of the array's type and shape, but for their number.
-            start: row of the array that the first of them becomes.
+            path: of the array, which must exist.
+            rows: with the array's type and shape except for their number.
+            start: index of the first row.
         Raises:
-            StoreError: there is no such array, or the rows do not fit it or cut a shard in two.
-            DiskFullError: so little of the disk is left that a bake stops.
+            StoreError: there is no such array, or the rows do not fit it or split a shard.
+            DiskFullError: the disk is almost full, so the bake must stop.
         """
         spec = self._spec(path)
         if spec is None:
-            raise StoreError(f"array {path} was not created; announce it, or write it whole with write_whole")
+            raise StoreError(f"array {path} was not created; create it first, or write it whole with write_whole")
         stop = start + rows.shape[0]
         fits = rows.shape[1:] == spec.shape[1:] and rows.dtype == np.dtype(spec.dtype)
         if not fits or not 0 <= start <= stop <= spec.shape[0]:
             given, expected = f"{rows.dtype}{rows.shape}", f"{spec.dtype}{spec.shape}"
             raise StoreError(f"rows {start}..{stop} {given} do not fit {path} {expected}")
         if start % spec.shards[0] or (stop % spec.shards[0] and stop != spec.shape[0]):
-            raise StoreError(f"rows {start}..{stop} of {path} cut a shard of {spec.shards[0]} rows; write whole shards")
+            raise StoreError(f"rows {start}..{stop} of {path} split a shard of {spec.shards[0]} rows; write whole ones")
         if rows.size:
             check_disk_space(self.path)
             array = cast("zarr.Array[Any]", self._root[path]).with_config({"write_empty_chunks": True})
             array[start:stop] = rows
 
     def write_whole(self, path: str, values: RowSource) -> None:
-        """Create an array that nobody announced, as large as `values`, and write it shard by shard."""
+        """Create an array with the shape of `values`, and write it shard by shard."""
         spec = default_layout(path, values.shape, values.dtype.name, values.dtype.itemsize)
         self.create_array(spec)
         for start in range(0, spec.shape[0], spec.shards[0]):

@@ -1,4 +1,4 @@
-"""Views of stored samples: pixels, samples, maps and their overrides, the image of an array of samples.
+"""Views of stored samples: pixels, samples, maps and their overrides, the image from an array of samples.
 
 Read first: `view`, `resolve`.
 """

@@ -1,9 +1,10 @@
-"""From term images to the radiance of view samples: colours, textures, outgoing curves multiply finished terms."""
+"""Compose term images to the radiance of view samples: color · texture · view-angle curves · image, per term."""
 
 from __future__ import annotations
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import UNCOUNTED
@@ -16,9 +17,9 @@ F32 = NDArray[np.float32]
 def _add_term_planes(  # type: ignore[no-untyped-def]
     image, color, texture, outgoing, has_texture, has_outgoing, first, num, replace, start, stop, radiance
 ):
-    """Add planes [start, stop) of one term, a plane being a channel of a tile, to radiance (3, samples of the view).
+    """Add planes [start, stop) of one term, one per channel and tile, to radiance (3, samples of the view).
 
-    first: the material's first sample in the view. num: of its samples.
+    first: the material's first sample in the view. num: number of its samples.
     """
     samples = image.shape[2]
     for plane in range(start, stop):
@@ -40,7 +41,7 @@ def _add_term_planes(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
 def _add_diffuse(irradiance, factor, start, stop, image):  # type: ignore[no-untyped-def]
-    """Add samples [start, stop) in all channels."""
+    """Add samples [start, stop) to all channels."""
     samples = image.shape[2]
     for tile in range(start // samples, (stop - 1) // samples + 1):
         tile_start = tile * samples
@@ -50,35 +51,36 @@ def _add_diffuse(irradiance, factor, start, stop, image):  # type: ignore[no-unt
                 image[tile, channel, s - tile_start] += factor[channel] * irradiance[s]
 
 
-def add_diffuse(irradiance: F32, factor: NDArray[np.floating], image: F32) -> None:
-    """Add light that a term scatters alike wherever it comes from and goes to.
+def add_diffuse(
+    irradiance: Shaped[F32, " n"], factor: Shaped[NDArray[np.floating], " 3"], image: Shaped[F32, "tiles 3 samples"]
+) -> None:
+    """Add diffusely reflected light, independent of directions.
 
     Args:
-        irradiance: E of each sample, of a light of unit emission. (n,) float32
-        factor: what the term makes of it, per channel. (3,). image: added to. (tiles, 3, samples) float32
+        irradiance: E of each sample, for a light of unit emission.
+        factor: reflected radiance per irradiance, per channel. image: added to.
     """
     args = (np.ascontiguousarray(irradiance, np.float32), np.asarray(factor, np.float32).reshape(3))
     parallel_for_chunks(lambda start, stop: _add_diffuse(*args, start, stop, image), len(irradiance))
 
 
 def add_term(
-    image: F32,
-    color: F32,
-    texture: F32 | None,
-    outgoing: F32 | None,
+    image: Shaped[F32, "tiles 3 samples"],
+    color: Shaped[F32, " 3"],
+    texture: Shaped[F32, "n 3"] | None,
+    outgoing: Shaped[F32, "3 n"] | None,
     first: int,
     num: int,
     replace: bool,
-    radiance: F32,
+    radiance: Shaped[F32, "3 view_samples"],
 ) -> None:
-    """Add one term of a material to the view's radiance, or begin with it.
+    """Add one term of a material to the view's radiance, or overwrite the radiance with it.
 
     Args:
-        image: Σ_j c_j T_j. (tiles, 3, samples) float32
-        color: (3,) float32. texture: per sample. (n, 3) float32, None for 1
-        outgoing: product of the curves of the outgoing angle. (3, n) float32, None for 1
-        first: the material's first sample in the view. num: of its samples. replace: overwrite instead of adding.
-        radiance: (3, samples of the view) float32, written.
+        image: Σ_j c_j T_j. color: of the term.
+        texture: per sample, None for 1. outgoing: product of the curves of the view angle, None for 1.
+        first: the material's first sample in the view. num: number of its samples. replace: overwrite.
+        radiance: output.
     """
     outgoing_values = outgoing if outgoing is not None else np.empty((3, 0), np.float32)
     texture_values = texture if texture is not None else np.empty((0, 3), np.float32)

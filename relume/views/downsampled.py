@@ -1,6 +1,6 @@
-"""A bake with fewer pixels: every `step`-th of every `step`-th row, for small pictures of large bakes.
+"""A bake with fewer pixels: every `step`-th pixel of every `step`-th row, for small images of large bakes.
 
-Shading costs a sample's time for each sample, so a thumbnail of all samples takes as long as opening the picture does.
+Shading takes the same time per sample, so a thumbnail of all samples would take as long as the full image.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from relume.store.bake_protocol import StoreReader
 
 
 class DownsampledStore:
-    """Another store's samples of one view, but for those of the pixels that are left out."""
+    """Another store's samples of one view, without the omitted pixels."""
 
     def __init__(self, store: StoreReader, view: int, step: int) -> None:
         width, height = store.attributes["size"]
@@ -28,16 +28,16 @@ class DownsampledStore:
 
     @property
     def attributes(self) -> Mapping[str, Any]:
-        """Those of the store, with the smaller size."""
+        """Attributes of the store, with the reduced size."""
         return self._attributes
 
     def shape(self, path: str) -> tuple[int, ...]:
-        """Shape of an array; of one of the view, with the rows that are left."""
+        """Shape of an array; for arrays of the view, with the remaining rows."""
         shape = self._store.shape(path)
         return (int(np.searchsorted(self._sample_rows, shape[0])), *shape[1:]) if self._is_downsampled(path) else shape
 
     def read(self, path: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
-        """Rows [start, stop) of the array at a path, counted among those that are left."""
+        """Read rows [start, stop) of the array at a path, counted among the remaining rows."""
         if not self._is_downsampled(path):
             return self._store.read(path, start, stop)
         if path == f"{self._prefix}pixel":
@@ -47,5 +47,5 @@ class DownsampledStore:
         return self._store.read(path, first, end)[rows - first]
 
     def _is_downsampled(self, path: str) -> bool:
-        """Whether an array has a row for each sample of the view."""
+        """True if an array has one row per sample of the view."""
         return path.startswith(self._prefix) and "/" not in path.removeprefix(self._prefix)

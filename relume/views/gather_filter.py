@@ -1,11 +1,11 @@
-"""What gather rays bring to a view sample is shared with its neighbours in the picture.
+"""Filter gathered light over neighboring view samples in the image.
 
-A few hundred rays a sample leave grain as fine as the pixels, and light between surfaces hardly changes from one to the
-next: a weighted mean over the eight pixels around, of samples on the same smooth piece of the same material, is nearer
-to the truth than the sample alone. The weights depend on places and normals only, so that the mean is linear in light
-and materials, and one for images and for operators.
+A few hundred rays per sample leave noise at pixel frequency, but indirect light hardly changes between pixels: a
+weighted mean over the 3 × 3 pixels, of samples on the same smooth part of the same material, has less error. The
+weights depend only on positions and normals, so that the mean is linear in lights and materials, for images and
+operators alike.
 
-What a highlight shows turns by twice as much as the normal: its neighbours are those that are turned alike
+The reflection in a highlight turns by twice the angle of the normal, so its neighbors need more similar normals
 (docs/indirect-light.md#measured).
 """
 
@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
@@ -22,14 +23,14 @@ from relume.raytrace.surface_points import SurfacePoints
 
 F32 = NDArray[np.float32]
 
-_MIN_NORMAL_COSINE = 0.985  # normals that differ by more than 10° are of another piece
+_MIN_NORMAL_COSINE = 0.985  # 10°: larger differences separate smooth parts
 _MIN_HIGHLIGHT_NORMAL_COSINE = 0.9986  # 3°
-_MAX_RISE = 0.2  # off the tangent plane, over the distance
+_MAX_RISE = 0.2  # distance from the tangent plane, relative to the distance
 
 
 @nb.njit(nogil=True, cache=True, **UNCOUNTED)
 def _max_entries(first, pixel, width):  # type: ignore[no-untyped-def]
-    """Count the samples of the pixels around all samples. first: where each pixel's samples begin. (pixels + 1,)"""
+    """Count the samples of the pixels around all samples. first: first sample of each pixel. (pixels + 1,)"""
     height, count = (first.shape[0] - 1) // width, 0
     for p in pixel:
         x, y = p % width, p // width
@@ -43,15 +44,15 @@ def _max_entries(first, pixel, width):  # type: ignore[no-untyped-def]
 def _fill_weights(  # type: ignore[no-untyped-def]
     order, first, pixel, width, position, normal, alpha_sample, min_normal_cosine, starts, column_index, weights
 ):
-    """Weigh samples for each other.
+    """Compute filter weights between samples.
 
     Args:
         order, first: samples of pixel p are order[first[p] : first[p + 1]]. pixel: of each sample. (n,) int64
-        position, normal: of each. (n, 3) float32. alpha_sample: of the rays of each, or of all; those of one share.
-        min_normal_cosine: of the normals of neighbours.
-        starts, column_index, weights: written, compressed rows. (n + 1,), (≥ entries,) each
+        position, normal: of each. (n, 3) float32. alpha_sample: of each, or of all; only equal ones are averaged.
+        min_normal_cosine: between the normals of neighbors.
+        starts, column_index, weights: output, compressed rows. (n + 1,), (≥ entries,) each
     Returns:
-        How many entries there are.
+        Number of entries.
     """
     height, count, num_alpha_samples = (first.shape[0] - 1) // width, 0, alpha_sample.shape[0]
     for a in range(pixel.shape[0]):
@@ -71,7 +72,7 @@ def _fill_weights(  # type: ignore[no-untyped-def]
                     if a == b or (
                         is_smooth and alpha_sample[a % num_alpha_samples] == alpha_sample[b % num_alpha_samples]
                     ):
-                        # a tent; samples of one pixel count as one
+                        # a tent filter; the samples of one pixel share its weight
                         weight = (2 - abs(row - y)) * (2 - abs(column - x)) / (run_stop - run_start)
                         column_index[count], weights[count] = b, weight
                         total += weight
@@ -83,14 +84,14 @@ def _fill_weights(  # type: ignore[no-untyped-def]
 
 
 def make_neighbor_filter(
-    pixel: NDArray[np.uint32], width: int, points: SurfacePoints, num_passes: int = 1
+    pixel: Shaped[NDArray[np.uint32], " n"], width: int, points: SurfacePoints, num_passes: int = 1
 ) -> NeighborFilter:
-    """Weigh a material's samples for each other; rows sum to one.
+    """Make the filter of a material's samples; its rows sum to one.
 
     Args:
-        pixel: y · width + x of each. (n,) uint32. width: of the picture, pixels.
-        points: where each is.
-        num_passes: how often what is scattered evenly is shared, one tent after another.
+        pixel: y · width + x of each sample. width: of the image, pixels.
+        points: of the samples.
+        num_passes: number of tent filter passes for diffuse light.
     Cost: O(n) time.
     """
     pixel_index, num_pixels = pixel.astype(np.int64), (int(pixel.max(initial=0)) // width + 1) * width

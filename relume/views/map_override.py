@@ -1,9 +1,8 @@
-"""Views whose materials wear other maps of roughness or of normals than they were baked with.
+"""Views with overridden roughness or normal maps.
 
-Levels of roughness are coefficients of one operator (docs/direct-light.md#textures-and-maps), and bakes say where
-samples lie in textures. So an image in the place of a map of roughness is another level for each sample, nothing else;
-as samples of a level lie together, they come in another order (docs/direct-light.md#textures-and-maps). An image of
-normals is another normal for each, and another level where bumps below a pixel widen it
+Roughness levels are coefficients of one operator, and bakes store texture coordinates. So an overridden roughness map
+only changes the level of each sample, and with it the order of samples, which are sorted by level. An overridden normal
+map changes the normal of each sample, and its level if normals vary within a pixel
 (docs/direct-light.md#textures-and-maps).
 """
 
@@ -38,11 +37,11 @@ F32 = NDArray[np.float32]
 
 
 class MapOverrides(NamedTuple):
-    """What a look names in the place of a material's maps.
+    """Overridden maps of a material.
 
     Attributes:
-        roughness: "image:<id>", None for its own. normals: None for its own.
-        base_roughness: the roughness of its terms, as the scene has it, that bumps widen; None where no term follows a
+        roughness: "image:<id>", None for its own map. normals: None for its own map.
+        base_roughness: roughness of its terms in the scene, which normal variation increases; None if no term uses a
             map.
     """
 
@@ -52,16 +51,15 @@ class MapOverrides(NamedTuple):
 
 
 def with_overrides(view: View, maps: tuple[MapOverrides | None, ...], tracer: RayTracer) -> View:
-    """Let materials of a baked view wear images in the place of their maps.
+    """Override maps of materials of a baked view.
 
     Args:
-        view: as it was baked. maps: of each material, None where it wears its own.
-        tracer: of rays that the bake did not trace.
+        view: the baked view. maps: of each material, None if it uses its own maps.
+        tracer: for rays that the bake did not trace.
     Returns:
-        The view; the same object for all who have it.
+        The view; the same object for all callers with the same maps.
     Raises:
-        StoreError: the store does not say where samples lie in textures. NotFoundError, SceneError: an image cannot be
-            had.
+        StoreError: the store has no texture coordinates. NotFoundError, SceneError: an image cannot be loaded.
     """
     cached = view.overridden.get(maps)
     if cached is not None or not any(maps):
@@ -95,7 +93,7 @@ def with_overrides(view: View, maps: tuple[MapOverrides | None, ...], tracer: Ra
 def _overridden_levels(
     view: View, material: int, override: MapOverrides, perturbed_normals: PerturbedNormals | None
 ) -> RoughnessLevels:
-    """How rough a material's samples are where images say it: what a bake finds whose scene has the images."""
+    """Roughness levels of a material's samples with overridden maps, as if baked with these maps."""
     rows, store, base_roughness = view.rows(material), view.store, override.base_roughness
     shortest = read_shortest_normals(store)[material]
     length = read_normal_length(store, view.index, rows.start, rows.stop)
@@ -104,7 +102,7 @@ def _overridden_levels(
     else:
         uv, texture = read_uv(store, view.index, rows.start, rows.stop), load_roughness_map(override.roughness)
         if uv is None:
-            raise StoreError("this bake is too old to show images; bake the scene again")
+            raise StoreError("this bake is too old for image overrides; bake the scene again")
         base_roughness = mean_roughness(override.roughness) or None
         ratio, (low, high) = sample_image(texture, uv)[:, 0], ratio_range(texture)
     if perturbed_normals is not None and override.normals is not None:
@@ -121,10 +119,10 @@ def _overridden_levels(
 def _map_roughness(
     view: View, material: int, base_roughness: float | None, length: F32, shortest: float
 ) -> tuple[F32, float, float]:
-    """The roughness of a material's samples over its own as the scene's map has it, without what bumps add; and the
-    ends of that map."""
+    """Relative roughness of a material's samples from the scene's map, without the effect of normal variation; and the
+    ends of the map's range."""
     ratios, level = view.ratios[material], view.level[view.rows(material)]
-    if not ratios or ratios[0] == 1:  # there is no map, or bumps alone widen it
+    if not ratios or ratios[0] == 1:  # there is no map; only normal variation adds levels
         return np.ones(len(level), np.float32), 1.0, 1.0
     ratio, low, high = np.array(ratios, np.float32)[level], ratios[0], ratios[-1]
     if base_roughness is None or shortest == 1:

@@ -1,7 +1,7 @@
-"""A store whose view wears other maps than it was baked with: samples in another order, and rays that lacked, traced.
+"""Store of a view with overridden maps: reordered samples, and rays traced for the overridden normals.
 
-Bakes trace what lies above the horizon of the normals that they find. Where these lean otherwise, shadow rays are
-traced to the lights that come up, and gather rays leave about the normals as they are now.
+A bake traces lights above the horizon of its normals. For overridden normals, shadow rays are traced to the lights
+that rise above the horizon, and gather rays around the new normals.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.cache import Cache
@@ -32,62 +33,64 @@ RowIndices = NDArray[np.int64]
 
 _PERTURBED_COLUMNS = ("normal", "tangent", "uv", "normal_length")
 _TRACED_COLUMNS = ("visibility", "gather_hits", "mirror_lights")
-_SAMPLES_PER_STEP = 1024  # samples; a tenth of a second's rays
+_SAMPLES_PER_STEP = 1024  # a tenth of a second of rays
 
 
 class RayTracer(Protocol):
-    """Rays of a bake, for normals that it did not know."""
+    """Tracer for the rays of overridden normals."""
 
     def check(self) -> None:
-        """Raises StoreError where they cannot be traced."""
+        """Raise StoreError if they cannot be traced."""
         ...
 
-    def visibility(self, points: SurfacePoints, baked_normals: F32, baked_bits: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Find which lights points see. baked_normals: before the override.
-
-        baked_bits: visible above those. Returns (n, bytes)
-        """
-        ...
-
-    def gather_hits(self, points: SurfacePoints, wo: F32, pattern: RayPattern) -> NDArray[np.uint16]:
-        """Find the cells that gather rays of points hit.
+    def visibility(
+        self,
+        points: SurfacePoints,
+        baked_normals: Shaped[F32, "n 3"],
+        baked_bits: Shaped[NDArray[np.uint8], "n bytes"],
+    ) -> Shaped[NDArray[np.uint8], "n bytes"]:
+        """Find the lights that are visible from points.
 
         Args:
-            points: where they leave. wo: towards the viewer. (n, 3) pattern: of the rays.
-        Returns:
-            (n, rays)
+            points: with overridden normals. baked_normals: before the override. baked_bits: visibility above those.
         """
         ...
 
-    def mirror_lights(self, points: SurfacePoints) -> NDArray[np.uint8]:
-        """Find which lights points see in flat mirrors. points: as they lean. Returns (n, bytes)"""
+    def gather_hits(
+        self, points: SurfacePoints, wo: Shaped[F32, "n 3"], pattern: RayPattern
+    ) -> Shaped[NDArray[np.uint16], "n rays"]:
+        """Find the patches that gather rays of points hit. wo: toward the viewer. pattern: of the rays"""
+        ...
+
+    def mirror_lights(self, points: SurfacePoints) -> Shaped[NDArray[np.uint8], "n bytes"]:
+        """Find the lights that points, with overridden normals, see in planar mirrors."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class PartialHits:
-    """Cells that gather rays of samples hit, of which some are traced.
+    """Gather hits of samples, some of which are traced.
 
     Attributes:
-        patch: that each ray hits. (n, rays) uint16
-        steps: which samples' are traced.
+        patch: hit by each ray.
+        steps: progress.
     """
 
-    patch: NDArray[np.uint16]
+    patch: Shaped[NDArray[np.uint16], "n rays"]
     steps: ResumableLoop
 
     @classmethod
     def empty(cls, num_samples: int, num_rays: int) -> PartialHits:
-        """Nothing of them."""
+        """Make hits of which none is traced."""
         return cls(np.zeros((num_samples, num_rays), np.uint16), ResumableLoop.start(num_samples, _SAMPLES_PER_STEP))
 
     def trace(self, trace_rows: Callable[[RowIndices], NDArray[np.uint16]], is_canceled: Callable[[], bool]) -> None:
-        """Trace what is left.
+        """Trace the remaining samples.
 
         Args:
-            trace_rows: finds the cells of some samples. is_canceled: asked now and then.
+            trace_rows: finds the patches of some samples. is_canceled: called regularly.
         Raises:
-            CancelledError: `is_canceled` said so; what was traced stays.
+            CancelledError: `is_canceled` returned true; traced samples stay.
         """
 
         def trace_range(start: int, stop: int) -> None:
@@ -97,13 +100,13 @@ class PartialHits:
 
 
 class MapOverrideStore:
-    """Another store's samples of one view under other maps; a `StoreReader`.
+    """Another store's samples of one view under overridden maps; a `StoreReader`.
 
     Args:
-        store: the other. view: number of the view. rows: of it, the row of each sample here. (surface samples,)
-        level: of each sample here. (surface samples,) uint8 ratios: of each material's levels.
-        perturbed: samples of materials whose normals are others, by the first row of each; in the order here.
-        materials: number of each of those. tracer: of the rays that they lack. cache, key: where these are kept.
+        store: the other store. view: index of the view. rows: row of each sample there. (surface samples,)
+        level: of each sample here. (surface samples,) uint8. ratios: of each material's levels.
+        perturbed: samples with overridden normals, by the first row of their material; in the order here.
+        materials: index of each of those materials. tracer: for their rays. cache, key: for traced rays.
     """
 
     def __init__(
@@ -126,7 +129,7 @@ class MapOverrideStore:
 
     @property
     def attributes(self) -> Mapping[str, Any]:
-        """Those of the store, with these levels."""
+        """Attributes of the store, with the levels of this one."""
         return self._attributes
 
     def shape(self, path: str) -> tuple[int, ...]:
@@ -134,7 +137,7 @@ class MapOverrideStore:
         return self._level.shape if path == f"{self._prefix}level" else self._store.shape(path)
 
     def read(self, path: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
-        """Rows [start, stop) of the array at a path, those of the view's samples as they are here."""
+        """Read rows [start, stop) of the array at a path, for the view in the order and with the values here."""
         name = path.removeprefix(self._prefix)
         if name == path or "/" in name:
             return self._store.read(path, start, stop)
@@ -149,7 +152,7 @@ class MapOverrideStore:
         return values
 
     def read_rows(self, path: str, rows: RowIndices) -> NDArray[Any]:
-        """Some rows of an array of the view, of one material's samples; for those alone rays are traced.
+        """Read some rows of an array of the view, of one material's samples; rays are traced only for those.
 
         Args:
             path: of the array. rows: in any order. (k,)
@@ -179,10 +182,10 @@ class MapOverrideStore:
         values = self._store.read(path, first, int(rows.max()) + 1)[rows - first]
         if end <= len(self._rows):
             return values
-        return np.concatenate([values, self._store.read(path, len(self._rows), end)])  # behind all surfaces
+        return np.concatenate([values, self._store.read(path, len(self._rows), end)])  # background samples
 
     def _apply_override(self, name: str, first: int, rows: slice, values: NDArray[Any]) -> None:
-        """Bring what was read of some samples of a material to their normals. first: row of the material's first."""
+        """Replace values of some samples of a material. first: first row of the material"""
         if name in _PERTURBED_COLUMNS:
             values[:] = getattr(self._perturbed[first], name)[rows]
         elif name == "gather_hits":
@@ -191,18 +194,18 @@ class MapOverrideStore:
             self._trace(name, first, self._all_rows(first)[rows], values)
 
     def trace_gather_rays(self, first: int, is_canceled: Callable[[], bool]) -> None:
-        """Trace the gather rays of a material's samples, where it leans; they are kept for a while.
+        """Trace the gather rays of a material's samples with overridden normals; they are cached.
 
         Args:
-            first: row of the material's first sample. is_canceled: asked now and then.
+            first: first row of the material. is_canceled: called regularly.
         Raises:
-            CancelledError: `is_canceled` said so; what was traced is there for who asks next.
+            CancelledError: `is_canceled` returned true; traced rays stay cached.
         """
         if first in self._perturbed:
             self._gather_hits(first, is_canceled)
 
     def _gather_hits(self, first: int, is_canceled: Callable[[], bool] = lambda: False) -> NDArray[np.uint16]:
-        """The cells that they hit, for each of the material's terms. (samples, rays)"""
+        """Patches that gather rays hit, shared by all terms of the material. (samples, rays)"""
         pattern, num = self._pattern(first), len(self._perturbed[first].normal)
         key = *self._key, "gather hits", first
         partial_hits = self._cache.transient.get_value(key, lambda: PartialHits.empty(num, pattern.num_rays))
@@ -218,7 +221,7 @@ class MapOverrideStore:
         return np.arange(len(self._perturbed[first].normal))
 
     def _trace(self, name: str, first: int, rows: RowIndices, values: NDArray[Any]) -> None:
-        """Trace rays of some samples of a material. found: what was baked; written."""
+        """Trace rays of some samples of a material. values: baked values; overwritten"""
         if name == "gather_hits":
             values[:] = self._tracer.gather_hits(
                 self._surface_points(first, rows), self._wo(first, rows), self._pattern(first)
@@ -231,7 +234,7 @@ class MapOverrideStore:
             values[:] = self._tracer.mirror_lights(surface_points)
 
     def _wo(self, first: int, rows: RowIndices) -> F32:
-        """Towards the viewer, of some samples of a material. (n, 3)"""
+        """Directions to the viewer, of some samples of a material. (n, 3)"""
         origins = read_ray_origins(self, self._view, first, first + len(self._perturbed[first].normal))
         return view_directions(
             origins if len(origins) == 1 else origins[rows], self._surface_points(first, rows).position
@@ -241,7 +244,7 @@ class MapOverrideStore:
         return make_material_pattern(self._store, self._view, self._materials[first])
 
     def _surface_points(self, first: int, rows: RowIndices) -> SurfacePoints:
-        """Some samples of a material, counted from its first."""
+        """Points of some samples of a material, counted from its first."""
         perturbed = self._perturbed[first]
         start, stop = first, first + len(perturbed.normal)
         alpha_samples = read_alpha_samples(self, self._view, start, stop)

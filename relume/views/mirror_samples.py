@@ -1,10 +1,11 @@
-"""Samples of a view that are seen in mirrors: by which, and how they count for their pixels."""
+"""Samples of a view in mirrors: their specular chains, and their weights in pixels."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.camera.ray_paths import NO_MIRROR, SpecularChain
@@ -15,42 +16,45 @@ F32 = NDArray[np.float32]
 
 
 class MirrorSamples(NamedTuple):
-    """m samples that are seen in mirrors, of a view's n.
+    """Samples in mirrors, m of a view's n.
 
     Attributes:
-        sample: their rows, ascending. (m,) int64
-        order_index: of each in the view's `order`. (m,) int64
-        throughput: what its radiance is multiplied by for its pixel, mirrors apart. (m, 3) float32
-        chain: the mirrors that it is seen in.
-        origin: where the last of them is. (m, 3) float32. direction: from there, unit. (m, 3) float32
-        distance: from there; infinite of the background. (m,) float32
+        sample: their rows, ascending.
+        order_index: index in the view's `order`.
+        throughput: factor of the radiance in its pixel, without mirrors.
+        chain: the mirrors on the path.
+        origin: on the last mirror. direction: from there, unit.
+        distance: from there; infinite for the background.
     """
 
-    sample: NDArray[np.int64]
-    order_index: NDArray[np.int64]
-    throughput: F32
+    sample: Shaped[NDArray[np.int64], " m"]
+    order_index: Shaped[NDArray[np.int64], " m"]
+    throughput: Shaped[F32, "m 3"]
     chain: SpecularChain
-    origin: F32
-    direction: F32
-    distance: F32
+    origin: Shaped[F32, "m 3"]
+    direction: Shaped[F32, "m 3"]
+    distance: Shaped[F32, " m"]
 
     def restrict_to(self, rows: slice) -> slice:
-        """Which of them are among some rows of the view."""
+        """Slice of the mirror samples that are among some rows of the view."""
         first, stop = np.searchsorted(self.sample, (rows.start, rows.stop))
         return slice(int(first), int(stop))
 
 
 def read_mirror_samples(
-    store: StoreReader, k: int, order: NDArray[np.int32], sample_throughput: F32, num_surface: int
+    store: StoreReader,
+    k: int,
+    order: Shaped[NDArray[np.int32], " n"],
+    sample_throughput: Shaped[F32, "n channels"],
+    num_surface: int,
 ) -> MirrorSamples | None:
-    """Read which samples of a view are seen in mirrors; None where none is.
+    """Read the samples of a view in mirrors; None if there are none.
 
     Args:
-        store: an open store. k: number of the view. order: of its samples, by pixel. (n,)
-        sample_throughput: of each sample. (n, 3) num_surface: of the samples, those that are on surfaces, which come
-            first.
+        store: an open store. k: index of the view. order: of its samples, by pixel.
+        sample_throughput: of each sample. num_surface: number of samples on surfaces, which come first.
     Raises:
-        ChunkDamagedError: a mirror is of a material that the scene has not.
+        ChunkDamagedError: a mirror has a material that does not exist in the scene.
     """
     if not store.attributes.get("has_layers"):
         return None
@@ -60,7 +64,7 @@ def read_mirror_samples(
     if not len(sample):
         return None
     if int(np.where(material == NO_MIRROR, 0, material).max()) >= len(store.attributes["materials"]):
-        raise ChunkDamagedError(prefix, "a mirror has a material that the scene has not")
+        raise ChunkDamagedError(prefix, "a mirror has a material that does not exist in the scene")
     order_index = np.empty(len(order), np.int64)
     order_index[order] = np.arange(len(order))
     chain = SpecularChain(material, store.read(f"{prefix}/mirror_cosine"), store.read(f"{prefix}/mirror_tint"))

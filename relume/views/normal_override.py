@@ -1,7 +1,7 @@
-"""Normals of a bake where an image says how they lean: what a bake finds whose scene has the image as its map.
+"""Normals of a bake with an overridden normal map, as if baked with that map.
 
-Bakes say where points lie in textures and how these are turned there. So the image is looked up, as wide as a pixel,
-and leans the surface's own normal in the frame of its texture; docs/direct-light.md#textures-and-maps.
+Bakes store texture coordinates and the orientation of textures at each sample. So the map is filtered over the pixel,
+and perturbs the surface's own normal in its texture frame; docs/direct-light.md#textures-and-maps.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.texture_slots import NormalMap
@@ -24,38 +25,38 @@ F32 = NDArray[np.float32]
 
 
 class PerturbedNormals(NamedTuple):
-    """Samples of a material under other bumps.
+    """Samples of a material with an overridden normal map.
 
     Attributes:
         normal, tangent, uv, normal_length: as in `relume.raytrace.surface_interaction.SurfaceInteraction`.
-        baked_normal: the normals that were baked. (n, 3) float32
+        baked_normal: before the override.
     """
 
-    normal: F32
-    tangent: F32
-    uv: F32
-    normal_length: F32
-    baked_normal: F32
+    normal: Shaped[F32, "n 3"]
+    tangent: Shaped[F32, "n 3"]
+    uv: Shaped[F32, "n 5"]
+    normal_length: Shaped[F32, " n"]
+    baked_normal: Shaped[F32, "n 3"]
 
     def rows(self, rows: NDArray[np.integer]) -> PerturbedNormals:
-        """Choose some of them."""
+        """Select samples."""
         return PerturbedNormals(*(column[rows] for column in self))
 
 
 def perturbed(view: View, material: int, map_: NormalMap) -> PerturbedNormals:
-    """Lean the normals of a material's samples, in the order that they were baked in.
+    """Perturb the normals of a material's samples, in baked order.
 
     Args:
-        view: as it was baked. material: index of the material. map_: the image.
+        view: the baked view. material: index of the material. map_: the image.
     Raises:
-        StoreError: the store does not say where samples lie in textures, or what their normals are without bumps.
-        NotFoundError, SceneError: the image cannot be had.
+        StoreError: the store has no texture coordinates, or no normals without normal mapping.
+        NotFoundError, SceneError: the image cannot be loaded.
     """
     rows = view.rows(material)
     sample_range = view.store, view.index, rows.start, rows.stop
     uv, smooth = read_uv(*sample_range), read_surface_normal(*sample_range, material)
     if uv is None or smooth is None:
-        raise StoreError("this bake is too old to show images of normals here; bake the scene again")
+        raise StoreError("this bake is too old for normal map overrides here; bake the scene again")
     normal, tangent, position = (
         view.store.read(f"views/{view.index}/{name}", rows.start, rows.stop)
         for name in ("normal", "tangent", "position")
@@ -65,15 +66,22 @@ def perturbed(view: View, material: int, map_: NormalMap) -> PerturbedNormals:
     )
 
 
-def perturb_normals(map_: NormalMap, uv: F32, smooth: F32, normal: F32, tangent: F32, wo: F32) -> PerturbedNormals:
-    """Lean the normals of points on surfaces.
+def perturb_normals(
+    map_: NormalMap,
+    uv: Shaped[F32, "n 5"],
+    smooth: Shaped[F32, "n 3"],
+    normal: Shaped[F32, "n 3"],
+    tangent: Shaped[F32, "n 3"],
+    wo: Shaped[F32, "n 3"],
+) -> PerturbedNormals:
+    """Perturb the normals of points on surfaces.
 
     Args:
-        map_: the image. uv: places in it, see `relume.raytrace.surface_interaction.SurfaceInteraction`. (n, 5) float32
-        smooth: normals of the surface without bumps. (n, 3) normal, tangent: as they were. (n, 3) each
-        wo: whence the points are seen, and normals must not lean away. (n, 3)
+        map_: the image. uv: texture coordinates, see `relume.raytrace.surface_interaction.SurfaceInteraction`.
+        smooth: normals without normal mapping. normal, tangent: before the override.
+        wo: toward the viewer; the new normals face it.
     Raises:
-        NotFoundError, SceneError: the image cannot be had.
+        NotFoundError, SceneError: the image cannot be loaded.
     """
     angle = uv[:, 3:4]
     texture_axis = np.asarray(np.cos(angle) * tangent + np.sin(angle) * np.cross(normal, tangent), np.float32)
@@ -89,11 +97,11 @@ def perturb_normals(map_: NormalMap, uv: F32, smooth: F32, normal: F32, tangent:
     return PerturbedNormals(new_normal, new_tangent, new_uv, length, np.asarray(normal, np.float32))
 
 
-def unproject(vector: F32, normal: F32, smooth: F32) -> F32:
-    """Find what was projected across bumps: the vector across the surface that differs from it along these alone.
+def unproject(vector: Shaped[F32, "n 3"], normal: Shaped[F32, "n 3"], smooth: Shaped[F32, "n 3"]) -> Shaped[F32, "n 3"]:
+    """Invert a projection to mapped tangent planes: move vectors along `normal` into the planes orthogonal to `smooth`.
 
     Args:
-        vector: across normals. (n, 3) normal: leant, unit. (n, 3) smooth: of the surface, unit. (n, 3)
+        vector: orthogonal to `normal`. normal: mapped, unit. smooth: without normal mapping, unit.
     """
     cosine = _dot(normal, smooth)
     safe_cosine = np.where(np.abs(cosine) < _MIN_FACING, _MIN_FACING, cosine)

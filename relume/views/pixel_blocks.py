@@ -1,9 +1,10 @@
-"""One sample of each square of pixels that a material is seen in, and which of those each sample is like."""
+"""One view sample per block of pixels of a material, and interpolation of all samples from them."""
 
 from __future__ import annotations
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.thread_pools import parallel_for_chunks
@@ -11,46 +12,49 @@ from relume.views.view import View
 
 F32 = NDArray[np.float32]
 
-_BLOCKS_PER_NORMAL_UNIT = 10.0  # a unit of normals counts as so many squares of pixels
+_BLOCKS_PER_NORMAL_UNIT = 10.0  # a unit of normal difference counts as so many blocks
 _MAX_DISTANCE = np.float32(1e30)
-_BLOCK_RADIUS = 2  # in each direction, that a sample looks for chosen ones in
+_BLOCK_RADIUS = 2  # search radius in blocks
 
 
 def num_blocks(view: View, material: int, block_size: int) -> int:
-    """Count the squares that a material is seen in.
+    """Count the pixel blocks in which a material is visible.
 
     Args:
-        view: by which it is seen. material: its index. block_size: side of a square, pixels.
+        view: the view. material: its index. block_size: side of a block, pixels.
     """
     is_occupied = np.zeros(view.width * view.height, np.bool_)
     is_occupied[_block_index(view, material, block_size)] = True
     return int(np.count_nonzero(is_occupied))
 
 
-def one_per_block(view: View, material: int, block_size: int) -> NDArray[np.intp]:
-    """Choose a sample of each square; counted from the material's first, rising. (squares,)
+def one_per_block(view: View, material: int, block_size: int) -> Shaped[NDArray[np.intp], " blocks"]:
+    """Choose one sample per block; ascending indices from the material's first sample.
 
     Args:
-        view: whose samples. material: its index. block_size: side of a square, pixels.
+        view: the view. material: its index. block_size: side of a block, pixels.
     """
     _, first_rows = np.unique(_block_index(view, material, block_size), return_index=True)
-    return np.sort(first_rows)  # samples of one level of roughness lie together
+    return np.sort(first_rows)  # samples of one roughness level are adjacent
 
 
 def nearest_chosen(
-    view: View, material: int, subset: NDArray[np.intp], block_size: int, num_neighbors: int, softening: float
-) -> tuple[NDArray[np.int32], F32]:
-    """Find what each sample of a material takes of chosen ones: the nearest, by place in the picture and by normal.
+    view: View,
+    material: int,
+    subset: Shaped[NDArray[np.intp], " blocks"],
+    block_size: int,
+    num_neighbors: int,
+    softening: float,
+) -> tuple[Shaped[NDArray[np.int32], "n k"], Shaped[F32, "n k"]]:
+    """Find the nearest chosen samples of each sample of a material, by pixel position and normal, and their weights.
 
-    Those of the sample's own square and of the squares about it, two in each direction, are looked among.
+    Searches the sample's own block and the blocks around it, up to two in each direction.
 
     Args:
-        view, material, block_size: of `one_per_block`, whose `subset` samples they are.
-        num_neighbors: how many of them each takes, at most. softening: pixels²; the nearest share a sample where they
-            are as near as this.
+        view, material, block_size: as in `one_per_block`, which returned `subset`.
+        num_neighbors: maximum number of neighbors. softening: pixels², added to squared distances in the weights.
     Returns:
-        Which of the chosen, and how much of each; rows sum to one, and where there are fewer the last take nothing.
-        (n, k) int32 and float32
+        Indices into `subset`, and weights; rows sum to one, and missing neighbors have zero weight.
     """
     rows = view.rows(material)
     y, x = np.divmod(view.pixel[rows].astype(np.int64), view.width)
@@ -82,11 +86,11 @@ def _find_nearest(
     start: int, stop: int,
     neighbors: NDArray[np.int32], weight: F32,
 ) -> None:  # fmt: skip
-    """Fill `neighbors` and `weight`, (n, k), of samples [start, stop), by distance in `features`, (n, 5): pixels, turn.
+    """Fill `neighbors` and `weight`, (n, k), of samples [start, stop), by distance of `features`, (n, 5).
 
     Args:
-        subset_features: `features` of the chosen. block_sample: which of them is in each square of step × step pixels,
-            -1 for none.
+        features: pixel position and scaled normal. subset_features: of the chosen samples. block_sample: index of the
+            chosen sample in each block, -1 for none.
     """
     rows, columns = block_sample.shape
     num_neighbors = neighbors.shape[1]
@@ -118,6 +122,6 @@ def _find_nearest(
 
 
 def _block_index(view: View, material: int, block_size: int) -> NDArray[np.int64]:
-    """The square that each sample of a material is in. (n,)"""
+    """Index of each sample's pixel block. (n,)"""
     y, x = np.divmod(view.pixel[view.rows(material)].astype(np.int64), view.width)
     return np.asarray(y // block_size * view.width + x // block_size, np.int64)

@@ -1,4 +1,4 @@
-"""From view samples to pixels, and pixels to bytes: the last two steps of a frame, a tile of the picture at a time."""
+"""Resolve view samples to pixels, and encode pixels as bytes: the last two steps of a frame, tile by tile."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import ArrayLike, NDArray
 
 from relume.core.errors import ParameterError
@@ -23,18 +24,18 @@ _FLOAT_BIAS = 127
 
 @nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
 def pack_rgb9e5(red: Any, green: Any, blue: Any) -> Any:
-    """Pack a pixel's red, green and blue into 32 bits: 9-bit mantissas, red lowest, and a 5-bit exponent they share."""
-    red = min(red, _LARGEST) if red > 0 else np.float32(0)  # not a number is no light
+    """Pack a pixel's red, green and blue into 32 bits: 9-bit mantissas, red lowest, and a shared 5-bit exponent."""
+    red = min(red, _LARGEST) if red > 0 else np.float32(0)  # NaN becomes zero
     green = min(green, _LARGEST) if green > 0 else np.float32(0)
     blue = min(blue, _LARGEST) if blue > 0 else np.float32(0)
     largest = max(red, max(green, blue))
-    # exponents are read from and written into the bits of a float32: three times as quick as frexp and ldexp
+    # read and write exponents in the bits of a float32: three times as fast as frexp and ldexp
     shared: Any = max(0, (np.float32(largest).view(np.int32) >> 23) - _FLOAT_BIAS + 1 + _BIAS)
     scale = np.int32((_MANTISSA_BITS + _BIAS - shared + _FLOAT_BIAS) << 23).view(np.float32)
-    if np.int32(np.float64(largest * scale) + 0.5) == 1 << _MANTISSA_BITS:  # rounding up needs one bit more
+    if np.int32(np.float64(largest * scale) + 0.5) == 1 << _MANTISSA_BITS:  # rounding up needs one more bit
         shared += 1
         scale *= np.float32(0.5)
-    # in double: the largest float below a half, and a half, would be rounded to one
+    # in float64: in float32 the largest float below 0.5, plus 0.5, would round to 1
     r = np.uint32(np.int32(np.float64(red * scale) + 0.5))
     g = np.uint32(np.int32(np.float64(green * scale) + 0.5))
     b = np.uint32(np.int32(np.float64(blue * scale) + 0.5))
@@ -68,16 +69,20 @@ def _pack_range(pixels, start, stop, out):  # type: ignore[no-untyped-def]
         out[p] = pack_rgb9e5(pixels[p, 0], pixels[p, 1], pixels[p, 2])
 
 
-def resolve(view: View, radiance: F32, tiles: Sequence[Tile], gain: ArrayLike, throughput: F32) -> F32:
-    """Sum view samples to the pixels of tiles, one tile after another, row-major.
+def resolve(
+    view: View,
+    radiance: Shaped[F32, "3 samples"],
+    tiles: Sequence[Tile],
+    gain: ArrayLike,
+    throughput: Shaped[F32, "samples channels"],
+) -> Shaped[F32, "pixels 3"]:
+    """Sum view samples to the pixels of tiles, in the order of the tiles, each row-major.
 
     Args:
-        view: whose samples they are. tiles: which pixels are wanted.
-        radiance: of every view sample. (3, samples) float32
-        gain: multiplies each channel, as the environment's scale and colour do: a number or three.
-        throughput: multiply the samples, in the view's order; `View.gains`, with those of what is seen in mirrors.
-    Returns:
-        (pixels, 3) float32
+        view: of the samples. tiles: the pixels.
+        radiance: of every view sample.
+        gain: factor of each channel, from the environment's intensity and color: a number or three.
+        throughput: factors of the samples, in the view's order; `View.gains`, with those of samples in mirrors.
     """
     table = np.array(tiles, np.int64).reshape(-1, 4)
     sizes = table[:, 2] * table[:, 3]
@@ -89,29 +94,36 @@ def resolve(view: View, radiance: F32, tiles: Sequence[Tile], gain: ArrayLike, t
     return out
 
 
-def encode(view: View, radiance: F32, tiles: Sequence[Tile], encoding: str, gain: ArrayLike, throughput: F32) -> bytes:
+def encode(
+    view: View,
+    radiance: Shaped[F32, "3 samples"],
+    tiles: Sequence[Tile],
+    encoding: str,
+    gain: ArrayLike,
+    throughput: Shaped[F32, "samples channels"],
+) -> bytes:
     """Encode pixels of tiles as a frame's payload.
 
     Args:
         view, radiance, tiles, gain, throughput: as in `resolve`. encoding: "rgb9e5" or "f32" (see docs/api.md).
     Raises:
-        ParameterError: another format.
+        ParameterError: the format is unknown.
     """
     return encode_pixels(resolve(view, radiance, tiles, gain, throughput), encoding)
 
 
-def encode_coverage(alpha: F32, tiles: Sequence[Tile]) -> bytes:
-    """Encode how much each pixel of tiles hides, a byte each, one tile after another. alpha: (height, width) float32"""
+def encode_coverage(alpha: Shaped[F32, "height width"], tiles: Sequence[Tile]) -> bytes:
+    """Encode the coverage of each pixel of tiles as one byte, in the order of the tiles."""
     return b"".join(to_bytes(alpha[y : y + height, x : x + width]).tobytes() for x, y, width, height in tiles)
 
 
-def encode_pixels(pixels: F32, encoding: str) -> bytes:
+def encode_pixels(pixels: Shaped[F32, "pixels 3"], encoding: str) -> bytes:
     """Encode pixels as a frame's payload.
 
     Args:
-        pixels: radiance. (n, 3) float32. encoding: "rgb9e5" or "f32" (see docs/api.md).
+        pixels: radiance. encoding: "rgb9e5" or "f32" (see docs/api.md).
     Raises:
-        ParameterError: another format.
+        ParameterError: the format is unknown.
     """
     if encoding == "f32":
         return pixels.tobytes()
@@ -120,8 +132,8 @@ def encode_pixels(pixels: F32, encoding: str) -> bytes:
     return pack_pixels(pixels).tobytes()
 
 
-def pack_pixels(pixels: F32) -> NDArray[np.uint32]:
-    """Pack pixels as RGB9_E5. pixels: radiance. (n, 3) float32"""
+def pack_pixels(pixels: Shaped[F32, "pixels 3"]) -> Shaped[NDArray[np.uint32], " pixels"]:
+    """Pack pixels (radiance) as RGB9_E5."""
     out = np.empty(len(pixels), np.uint32)
     parallel_for_chunks(lambda start, stop: _pack_range(pixels, start, stop, out), len(pixels))
     return out

@@ -1,4 +1,4 @@
-"""Cameras, view samples and their gather rays as a store keeps them."""
+"""Readers for the cameras, view samples and gather rays of a store."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import ChunkDamagedError, SceneError, StoreError
@@ -22,24 +23,24 @@ F32 = NDArray[np.float32]
 
 @runtime_checkable
 class TransferReader(Protocol):
-    """A store that is asked for rows that do not lie together."""
+    """A store that can read rows that are not adjacent."""
 
     def read_rows(self, path: str, rows: NDArray[np.int64]) -> NDArray[Any]:
-        """Some rows of an array. path: of the array. rows: in any order"""
+        """Read some rows of an array. path: of the array. rows: in any order"""
         ...
 
 
 @runtime_checkable
 class RayTracing(Protocol):
-    """A store whose gather rays may have to be traced."""
+    """A store that may have to trace its gather rays."""
 
     def trace_gather_rays(self, first: int, is_canceled: Callable[[], bool]) -> None:
-        """Those of a material. first: row of its first sample. is_canceled: asked now and then"""
+        """Trace the rays of a material. first: row of its first sample. is_canceled: called regularly"""
         ...
 
 
 def read_camera(store: StoreReader, k: int) -> Camera:
-    """Read the camera of the k-th view. Raises StoreError where there is no usable one."""
+    """Read the camera of the k-th view. Raises StoreError if it is missing or invalid."""
     try:
         attributes = store.attributes["views"][k]
         to_world = np.array(attributes["to_world"], np.float64).reshape(4, 4)
@@ -51,7 +52,7 @@ def read_camera(store: StoreReader, k: int) -> Camera:
 
 
 def make_material_pattern(store: StoreReader, k: int, material: int) -> RayPattern:
-    """Make the pattern of the gather rays of a material's samples in the k-th view of a store again."""
+    """Recreate the pattern of the gather rays of a material's samples in the k-th view of a store."""
     num_cosine, num_glossy = store.attributes["gather_rays"][material]
     return make_pattern(num_cosine, num_glossy, int(store.attributes["gather_seed"]) + 1 + k)
 
@@ -62,43 +63,43 @@ def read_gather_rays(
     """Read the gather rays of samples of one material.
 
     Args:
-        store: an open store. k: number of the view. material: index of the material.
-        start, stop: rows of the view's arrays. outgoing: by cells.
+        store: an open store. k: index of the view. material: index of the material.
+        start, stop: rows of the view's arrays. outgoing: light of the patches.
     """
     gather_hits = store.read(f"views/{k}/gather_hits", start, stop)
     return GatherRays(gather_hits, make_material_pattern(store, k, material), outgoing)
 
 
-def read_seeds(store: StoreReader, k: int, start: int, stop: int) -> NDArray[np.uint32]:
-    """Read the seeds of samples: those that their gather rays were traced with, else their rows.
+def read_seeds(store: StoreReader, k: int, start: int, stop: int) -> Shaped[NDArray[np.uint32], " n"]:
+    """Read the seeds of samples: those of their traced gather rays, else their rows.
 
     Args:
-        store: an open store. k: number of the view. start, stop: rows of its arrays.
-    Returns:
-        (stop - start,) uint32
+        store: an open store. k: index of the view. start, stop: rows of its arrays.
     """
     if "gather_rays" in store.attributes:
         return np.asarray(store.read(f"views/{k}/seed", start, stop), np.uint32)
     return np.arange(start, stop, dtype=np.uint32)
 
 
-def read_surface_points(store: StoreReader, k: int, start: int, stop: int, seed: NDArray[np.uint32]) -> SurfacePoints:
-    """Read samples of a view on surfaces as points.
+def read_surface_points(
+    store: StoreReader, k: int, start: int, stop: int, seed: Shaped[NDArray[np.uint32], " n"]
+) -> SurfacePoints:
+    """Read surface samples of a view as points.
 
     Args:
-        store: an open store. k: number of the view. start, stop: rows of its arrays.
-        seed: of these points. (stop - start,) uint32
+        store: an open store. k: index of the view. start, stop: rows of its arrays.
+        seed: of these points.
     """
     names = "position", "normal", "tangent"
     position, normal, tangent = (store.read(f"views/{k}/{name}", start, stop) for name in names)
     return SurfacePoints(position, normal, tangent, seed, read_alpha_samples(store, k, start, stop))
 
 
-def read_alpha_samples(store: StoreReader, k: int, start: int, stop: int) -> F32:
-    """Read the chance of the rays of samples at surfaces that blend; see `SurfacePoints`.
+def read_alpha_samples(store: StoreReader, k: int, start: int, stop: int) -> Shaped[F32, " n"]:
+    """Read the alpha samples of samples, one each or one for all; see `SurfacePoints`.
 
     Args:
-        store: an open store. k: number of the view. start, stop: rows of its arrays.
+        store: an open store. k: index of the view. start, stop: rows of its arrays.
     """
     if not store.attributes.get("has_tints"):
         return FIXED_ALPHA_SAMPLE
@@ -106,32 +107,30 @@ def read_alpha_samples(store: StoreReader, k: int, start: int, stop: int) -> F32
     return alpha_samples if alpha_samples.any() else FIXED_ALPHA_SAMPLE
 
 
-def read_ray_origins(store: StoreReader, k: int, start: int, stop: int) -> F32:
-    """Read where samples are seen from: the camera, or what turned the way to them.
+def read_ray_origins(store: StoreReader, k: int, start: int, stop: int) -> Shaped[F32, "n 3"]:
+    """Read the origins of view directions: the camera, or the last surface that changed the path; one for all if equal.
 
     Args:
-        store: an open store. k: number of the view. start, stop: rows of its arrays.
-    Returns:
-        (stop - start, 3) float32, or (1, 3) where it is the same for all
+        store: an open store. k: index of the view. start, stop: rows of its arrays.
     """
     if store.attributes.get("has_layers"):
         return np.asarray(store.read(f"views/{k}/camera", start, stop), np.float32)
     return read_camera(store, k).to_world[None, :3, 3].astype(np.float32)
 
 
-def view_directions(origin: F32, position: F32) -> F32:
-    """Find the unit directions from places (n, 3) to eyes (n or 1, 3): the wo of what they see. (n, 3) float32"""
+def view_directions(origin: Shaped[F32, "#n 3"], position: Shaped[F32, "n 3"]) -> Shaped[F32, "n 3"]:
+    """Unit view directions wo from positions to the origins of camera rays."""
     offset = origin - position
     return np.asarray(offset / np.linalg.norm(offset, axis=1, keepdims=True), np.float32)
 
 
-def read_uv(store: StoreReader, k: int, start: int, stop: int) -> F32 | None:
-    """Read where samples of a view lie in textures; None in stores that do not say so.
+def read_uv(store: StoreReader, k: int, start: int, stop: int) -> Shaped[F32, "n 5"] | None:
+    """Read the texture coordinates of samples, see `relume.raytrace.surface_interaction.SurfaceInteraction`.
 
     Args:
-        store: an open store. k: number of the view. start, stop: rows of its arrays.
+        store: an open store. k: index of the view. start, stop: rows of its arrays.
     Returns:
-        See `relume.raytrace.surface_interaction.SurfaceInteraction`. (stop - start, 5) float32
+        None if the store has none
     """
     try:
         store.shape(f"views/{k}/uv")
@@ -140,13 +139,11 @@ def read_uv(store: StoreReader, k: int, start: int, stop: int) -> F32 | None:
     return np.asarray(store.read(f"views/{k}/uv", start, stop), np.float32)
 
 
-def read_normal_length(store: StoreReader, k: int, start: int, stop: int) -> F32:
-    """Read how long the means of the normals are that pixels cover; one in stores that do not say so.
+def read_normal_length(store: StoreReader, k: int, start: int, stop: int) -> Shaped[F32, " n"]:
+    """Read the lengths of the mean normals in pixels; one if the store has none.
 
     Args:
-        store: an open store. k: number of the view. start, stop: rows of its arrays.
-    Returns:
-        (stop - start,) float32
+        store: an open store. k: index of the view. start, stop: rows of its arrays.
     """
     try:
         return np.asarray(store.read(f"views/{k}/normal_length", start, stop), np.float32)
@@ -156,13 +153,11 @@ def read_normal_length(store: StoreReader, k: int, start: int, stop: int) -> F32
         return np.ones(stop - start, np.float32)
 
 
-def read_surface_normal(store: StoreReader, k: int, start: int, stop: int, material: int) -> F32 | None:
-    """Read the normals of a material's samples as they are without bumps; None in stores that do not say so.
+def read_surface_normal(store: StoreReader, k: int, start: int, stop: int, material: int) -> Shaped[F32, "n 3"] | None:
+    """Read the normals of a material's samples without normal mapping; None if the store has none.
 
     Args:
-        store: an open store. k: number of the view. start, stop: rows of its arrays. material: index of it.
-    Returns:
-        (stop - start, 3) float32
+        store: an open store. k: index of the view. start, stop: rows of its arrays. material: its index.
     """
     shortest_lengths = store.attributes.get("shortest_normals")
     if shortest_lengths is None:
@@ -177,28 +172,27 @@ def read_surface_normal(store: StoreReader, k: int, start: int, stop: int, mater
 
 
 def read_shortest_normals(store: StoreReader) -> list[float]:
-    """Read about the shortest of them for each material, see `relume.scene.roughness_levels.min_mean_normal_length`.
+    """Read the minimum length of mean normals for each material of an open store.
 
-    Args:
-        store: an open store.
+    See `relume.scene.roughness_levels.min_mean_normal_length`.
     """
     lengths = store.attributes.get("shortest_normals")
     return [1.0] * len(store.attributes["materials"]) if lengths is None else list(map(float, lengths))
 
 
 def read_roughness_ratios(store: StoreReader) -> tuple[tuple[float, ...], ...]:
-    """Read the levels of roughness of all materials: each one's roughness over the material's, none without a map."""
+    """Read the roughness levels of all materials: relative to the material's roughness, none without a map."""
     ratios = store.attributes.get("roughness_levels")
     if ratios is None:
         return ((),) * len(store.attributes["materials"])
     return tuple(tuple(map(float, material_ratios)) for material_ratios in ratios)
 
 
-def read_roughness_levels(store: StoreReader, k: int, num_samples: int) -> NDArray[np.uint8]:
-    """Read the level of roughness of each sample on a surface.
+def read_roughness_levels(store: StoreReader, k: int, num_samples: int) -> Shaped[NDArray[np.uint8], " n"]:
+    """Read the roughness level of each surface sample.
 
     Args:
-        store: an open store. k: number of the view. num_samples: on surfaces.
+        store: an open store. k: index of the view. num_samples: number of surface samples.
     """
     if not any(read_roughness_ratios(store)):
         return np.zeros(num_samples, np.uint8)

@@ -1,4 +1,4 @@
-"""A baked view opened for rendering: its samples by material, and how they make pixels."""
+"""A baked view opened for rendering: its samples by material, and their weights in pixels."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 from weakref import WeakValueDictionary
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.roughness_levels import RoughnessLevels
@@ -56,21 +57,17 @@ class View:
     Attributes:
         bounds: samples of material k are [bounds[k], bounds[k + 1]); after the last material, background.
         key: of the bake in `cache`.
-        first: samples of pixel p are `order[first[p] : first[p + 1]]`. (pixels + 1,) int32
-        order: (n,) int32. throughput: what the radiance of each is multiplied by for its pixel, in that order: its
-            share of it, and what glass lets through that is before it; nothing of samples that are seen in mirrors, for
-            looks say how much these send on. (n, 1) float32, or (n, 3) where there is glass or a mirror
-        origin: where the samples on surfaces are seen from. (surface samples, 3) float32, or (1, 3)
-        mirrored: samples that are seen in mirrors; None where none is.
-        is_mirrored: which samples on surfaces are mirrors whose picture others have. (surface samples,)
-        textures: of each material, the images of the scene in which it is not 1 all over, by their names. (n, 3)
-        cos_theta_o: of the samples on surfaces. (surface samples,) float64
-        level: of their roughness, rising within a material. (surface samples,) uint8 ratios: of each material's levels
-        maps: images in the place of each material's own maps, see `relume.views.map_override`; none where nothing is
-            named.
-        baked_rows: where each sample on surfaces is among those that were baked; None: in that order. (surface
-            samples,)
-        overridden: views of the same samples that wear such images, by these, for as long as a picture has them.
+        first: samples of pixel p are `order[first[p] : first[p + 1]]`.
+        throughput: factor of each sample's radiance in its pixel, in `order`: weight times transmittance of glass; zero
+            for samples in mirrors, because the look decides their reflectance. One channel, or 3 with glass or mirrors.
+        origin: of the camera rays to surface samples; one each, or one for all.
+        mirrored: samples in mirrors; None if there are none.
+        is_mirrored: surface samples on mirrors whose reflection is in other samples.
+        textures: of each material, the scene's textures that are not 1 everywhere, by name. (n, 3)
+        level: roughness levels, ascending within a material. ratios: of each material's levels.
+        maps: overridden maps of each material, see `relume.views.map_override`; empty if there are none.
+        baked_rows: row of each surface sample in baked order; None: in that order.
+        overridden: views of the same samples by overridden maps, as long as an image uses them.
     """
 
     camera: Camera
@@ -80,30 +77,30 @@ class View:
     store: StoreReader = field(repr=False)
     cache: Cache = field(repr=False)
     key: str
-    bounds: NDArray[np.int64]
-    pixel: NDArray[np.uint32]
-    first: NDArray[np.int32]
-    order: NDArray[np.int32]
-    throughput: F32
-    origin: F32
+    bounds: Shaped[NDArray[np.int64], " bounds"]
+    pixel: Shaped[NDArray[np.uint32], " n"]
+    first: Shaped[NDArray[np.int32], " first"]
+    order: Shaped[NDArray[np.int32], " n"]
+    throughput: Shaped[F32, "n channels"]
+    origin: Shaped[F32, "#surface_samples 3"]
     mirrored: MirrorSamples | None
-    is_mirrored: NDArray[np.bool_]
+    is_mirrored: Shaped[NDArray[np.bool_], " surface_samples"]
     textures: Sequence[Mapping[str, F32]]
-    cos_theta_o: NDArray[np.float64]
-    level: NDArray[np.uint8]
+    cos_theta_o: Shaped[NDArray[np.float64], " surface_samples"]
+    level: Shaped[NDArray[np.uint8], " surface_samples"]
     ratios: tuple[tuple[float, ...], ...]
     maps: tuple[Hashable | None, ...] = ()
-    baked_rows: NDArray[np.int64] | None = field(default=None, repr=False)
+    baked_rows: Shaped[NDArray[np.int64], " surface_samples"] | None = field(default=None, repr=False)
     overridden: WeakValueDictionary[tuple[Hashable | None, ...], View] = field(
         default_factory=WeakValueDictionary, repr=False
     )
 
     def sample_key(self, material: int) -> tuple[Hashable, ...]:
-        """Name a material's samples among those of the bake: with the images in the place of its maps, if any."""
+        """Cache key of a material's samples: with its overridden maps, if any."""
         return self.name, material, *filter(None, self.maps[material : material + 1])
 
-    def unmodified(self) -> NDArray[np.int64]:
-        """Find where each sample on surfaces is among those that were baked. (surface samples,)"""
+    def unmodified(self) -> Shaped[NDArray[np.int64], " surface_samples"]:
+        """Row of each surface sample in baked order."""
         return np.arange(self.num_surface_samples) if self.baked_rows is None else self.baked_rows
 
     @property
@@ -122,47 +119,46 @@ class View:
         return int(self.bounds[-1])
 
     def rows(self, material: int) -> slice:
-        """Find the samples of a material."""
+        """Rows of a material's samples."""
         return slice(int(self.bounds[material]), int(self.bounds[material + 1]))
 
-    def is_in_region(self, material: int, region: Tile) -> NDArray[np.bool_]:
-        """Find which of a material's samples are seen in pixels of a region: x, y, width, height. (n,)"""
+    def is_in_region(self, material: int, region: Tile) -> Shaped[NDArray[np.bool_], " n"]:
+        """True for a material's samples in pixels of a region: x, y, width, height."""
         row, column = np.divmod(self.pixel[self.rows(material)].astype(np.int64), self.width)
         x, y, width, height = region
         return (column >= x) & (column < x + width) & (row >= y) & (row < y + height)
 
     def roughness_levels(self, material: int) -> RoughnessLevels:
-        """Find how rough a material's samples are."""
+        """Roughness levels of a material's samples."""
         return RoughnessLevels(self.ratios[material], self.level[self.rows(material)])
 
-    def image(self, material: int, name: str) -> F32:
-        """Look up what a material's samples show of an image that a look names. (n, 3) float32
+    def image(self, material: int, name: str) -> Shaped[F32, "n 3"]:
+        """Look up an image of a look at a material's samples.
 
         Args:
             material: its index. name: "image:<id>".
         Raises:
-            StoreError: the store does not say where samples lie in textures. NotFoundError, SceneError: the
-                image cannot be had.
+            StoreError: the store has no texture coordinates. NotFoundError, SceneError: the image cannot be loaded.
         """
 
         def sample() -> F32:
             rows = self.rows(material)
             uv = read_uv(self.store, self.index, rows.start, rows.stop)
             if uv is None:
-                raise StoreError("this bake is too old to show images; bake the scene again")
+                raise StoreError("this bake is too old for uploaded images; bake the scene again")
             return sample_image(load_texture(name), uv)
 
         return self.cache.get_value((self.key, "image", *self.sample_key(material), name), sample)
 
-    def emissive(self, material: int) -> F32:
-        """Read how brightly a material's samples shine, over its mean. (n, 1) float32, (n, 3) where images say it"""
+    def emissive(self, material: int) -> Shaped[F32, "n channels"]:
+        """Read the emission of a material's samples relative to its mean; 3 channels with emission textures, else 1."""
         rows = self.rows(material)
         if not self.store.attributes.get("has_emission_images"):
             return np.ones((rows.stop - rows.start, 1), np.float32)
         return np.asarray(self.store.read(f"views/{self.index}/emission", rows.start, rows.stop), np.float32)
 
-    def ray_origins(self, rows: slice) -> F32:
-        """Find where samples on surfaces are seen from. (n, 3) float32, or (1, 3)"""
+    def ray_origins(self, rows: slice) -> Shaped[F32, "n 3"]:
+        """Origins of camera rays to surface samples; one each, or one for all."""
         return self.origin if len(self.origin) == 1 else self.origin[rows]
 
     def surface_points(self, material: int) -> SurfacePoints:
@@ -185,13 +181,13 @@ class View:
         *,
         is_lit: bool = True,
     ) -> ShadingPoints:
-        """Read a material's samples from the store as points that light arrives at.
+        """Read a material's samples from the store as shading points.
 
         Args:
             material: its index.
-            outgoing: by gather cells, whose light arrives too; from `FixedViewTransfer.outgoing_patch_light`.
-            local: of lights that the samples see.
-            is_lit: whether light comes from the environment itself; else no bits are read.
+            outgoing: light of the patches for gather rays; from `FixedViewTransfer.outgoing_patch_light`.
+            local: of local lights that are visible from the samples.
+            is_lit: the environment emits light; else no visibility is read.
         """
         rows = self.rows(material)
         visible = self._read_visibility(material) if is_lit else np.empty((rows.stop - rows.start, 0), np.uint8)
@@ -203,7 +199,7 @@ class View:
         return ShadingPoints(surface_points, wo, visible, (*gather_rays, *local), uv, level)
 
     def _read_visibility(self, material: int) -> NDArray[np.uint8]:
-        """Read the bits of a material's samples, kept for a while: unpacking them takes longer than many a use."""
+        """Read the visibility of a material's samples, cached because decompression is slow."""
         rows = self.rows(material)
 
         def read() -> NDArray[np.uint8]:
@@ -211,11 +207,13 @@ class View:
 
         return self.cache.transient.get_value((self.key, "visibility", *self.sample_key(material)), read)
 
-    def read_rows(self, name: str, material: int, sample_indices: NDArray[np.integer]) -> NDArray[Any]:
-        """Read an array of the view at some of a material's samples; where rays are traced for it, for these alone.
+    def read_rows(
+        self, name: str, material: int, sample_indices: Shaped[NDArray[np.integer], " k"]
+    ) -> Shaped[NDArray[Any], "k ..."]:
+        """Read an array of the view at some of a material's samples; if rays must be traced, only for those.
 
         Args:
-            name: of the array. material: its index. sample_indices: counted from the material's first. (k,)
+            name: of the array. material: its index. sample_indices: counted from the material's first.
         """
         rows, path = self.rows(material), f"views/{self.index}/{name}"
         if isinstance(self.store, TransferReader):
@@ -224,24 +222,26 @@ class View:
             return np.asarray(self._read_visibility(material)[sample_indices])
         return np.asarray(self.store.read(path, rows.start, rows.stop)[sample_indices])
 
-    def subset_rays(self, material: int, sample_indices: NDArray[np.integer], outgoing: OutgoingLight) -> GatherRays:
-        """Read the rays of some of a material's samples, which do not share them. See `read_rows`, `gather_rays`."""
+    def subset_rays(
+        self, material: int, sample_indices: Shaped[NDArray[np.integer], " k"], outgoing: OutgoingLight
+    ) -> GatherRays:
+        """Read gather rays of some of a material's samples, unfiltered. See `read_rows`, `gather_rays`."""
         gather_hits = np.asarray(self.read_rows("gather_hits", material, sample_indices), np.uint16)
         return GatherRays(gather_hits, make_material_pattern(self.store, self.index, material), outgoing)
 
     def gather_rays(self, material: int, outgoing: OutgoingLight) -> GatherRays:
-        """Read from the store the rays of a material's samples that bring what gather cells send."""
+        """Read the gather rays of a material's samples, with the filter between neighbors."""
         rows = self.rows(material)
         unfiltered = read_gather_rays(self.store, self.index, material, rows.start, rows.stop, outgoing)
         return replace(unfiltered, sharing=self._neighbor_filter(material))
 
     def trace_gather_rays(self, material: int, is_canceled: Callable[[], bool]) -> None:
-        """Trace those that were not baked, as where an image leans the material; then reading them takes no time.
+        """Trace gather rays that were not baked, because of an overridden normal map; reading them is then immediate.
 
         Args:
-            material: its index. is_canceled: asked now and then.
+            material: its index. is_canceled: called regularly.
         Raises:
-            CancelledError: `is_canceled` said so.
+            CancelledError: `is_canceled` returned true.
         """
         if isinstance(self.store, RayTracing):
             self.store.trace_gather_rays(self.rows(material).start, is_canceled)
@@ -255,41 +255,41 @@ class View:
 
         return self.cache.get_value((self.key, "neighbor filter", *self.sample_key(material)), build_filter)
 
-    def background(self) -> F32:
-        """Read the radiance of the samples after the surfaces. (n, 3) float32"""
+    def background(self) -> Shaped[F32, "n 3"]:
+        """Read the radiance of the background samples."""
         return np.asarray(self.store.read(f"views/{self.index}/diffuse", self.num_surface_samples), np.float32)
 
-    def background_directions(self) -> NDArray[np.float64]:
-        """Read the unit directions in which the samples after the surfaces look. (n, 3)"""
+    def background_directions(self) -> Shaped[NDArray[np.float64], "n 3"]:
+        """Read the unit directions of the background samples."""
         return self.store.read(f"views/{self.index}/position", self.num_surface_samples).astype(np.float64)
 
-    def directions_to(self, material: int) -> NDArray[np.float64]:
-        """Find the unit directions in which a material's samples are seen, from the store. (n, 3)"""
+    def directions_to(self, material: int) -> Shaped[NDArray[np.float64], "n 3"]:
+        """Unit directions of the camera rays to a material's samples, from the store."""
         rows = self.rows(material)
         position = self.store.read(f"views/{self.index}/position", rows.start, rows.stop)
         return -view_directions(self.ray_origins(rows), position).astype(np.float64)
 
-    def surface_at(self, sample: int) -> tuple[F32, F32]:
-        """Read position and unit normal of a sample on a surface, world space. (3,) float32 each"""
+    def surface_at(self, sample: int) -> tuple[Shaped[F32, " 3"], Shaped[F32, " 3"]]:
+        """Read position and unit normal of a surface sample, in world space."""
         position, normal = (
             self.store.read(f"views/{self.index}/{name}", sample, sample + 1)[0] for name in ("position", "normal")
         )
         return position, normal
 
-    def material_ids(self) -> NDArray[np.uint16]:
-        """Find what material covers most of each pixel, 65535 for the background. (height, width) uint16"""
+    def material_ids(self) -> Shaped[NDArray[np.uint16], "height width"]:
+        """Material with the largest weight in each pixel, 65535 for the background."""
         material = np.full(self.num_view_samples, BACKGROUND, np.uint16)
         for index in range(len(self.bounds) - 1):
             material[self.rows(index)] = index
         ids = np.full(self.width * self.height, BACKGROUND, np.uint16)
-        by_weight = np.argsort(self.throughput.max(axis=1), kind="stable")  # the heaviest of a pixel is written last
+        by_weight = np.argsort(self.throughput.max(axis=1), kind="stable")  # the largest of a pixel is written last
         pixel_index = np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
         ids[pixel_index[by_weight]] = material[self.order[by_weight]]
         return ids.reshape(self.height, self.width)
 
     @cached_property
     def all_tiles(self) -> list[Tile]:
-        """The tiles that cover the picture: x, y, width, height in pixels."""
+        """Tiles that cover the image: x, y, width, height in pixels."""
         return [
             (x, y, min(TILE_PIXELS, self.width - x), min(TILE_PIXELS, self.height - y))
             for y in range(0, self.height, TILE_PIXELS)
@@ -314,16 +314,16 @@ def open_view(
     cache: Cache,
     key: str,
     maps: tuple[Hashable | None, ...] = (),
-    rows: NDArray[np.int64] | None = None,
+    rows: Shaped[NDArray[np.int64], " surface_samples"] | None = None,
 ) -> View:
-    """Read what every frame of a view needs; visibility stays in the store until a material is frozen.
+    """Read the data of a view that every frame needs; visibility stays in the store until an operator needs it.
 
     Args:
-        store: of the bake. index: of the view in it.
-        cache: where what neighbouring samples share is kept. key: of the bake in it.
+        store: of the bake. index: of the view.
+        cache: for data shared between frames. key: of the bake in it.
         maps: see `View`. rows: `View.baked_rows`.
     Raises:
-        ChunkDamagedError: arrays of the store do not fit each other.
+        ChunkDamagedError: arrays of the store are inconsistent.
     """
     width, height = store.attributes["size"]
     camera = read_camera(store, index)
@@ -339,11 +339,11 @@ def open_view(
     if len(pixel) == 0 or int(pixel.max()) >= width * height or np.any(material[1:] < material[:-1]):
         raise ChunkDamagedError(prefix, "its samples do not fit its size")
     if num_surface and int(material[num_surface - 1]) >= num_materials:
-        raise ChunkDamagedError(prefix, "a sample has a material that the scene has not")
+        raise ChunkDamagedError(prefix, "a sample has a material that does not exist in the scene")
     bounds = np.searchsorted(material[:num_surface], np.arange(num_materials + 1)).astype(np.int64)
     level, ratios = read_roughness_levels(store, index, num_surface), read_roughness_ratios(store)
     if any(not _are_valid_levels(level[a:b], r) for a, b, r in zip(bounds[:-1], bounds[1:], ratios, strict=True)):
-        raise ChunkDamagedError(prefix, "its levels of roughness do not fit its materials")
+        raise ChunkDamagedError(prefix, "its roughness levels do not fit its materials")
     order = np.argsort(pixel, kind="stable").astype(np.int32)
     origin = read_ray_origins(store, index, 0, num_surface)
     mirrored = read_mirror_samples(store, index, order, throughput, num_surface)
@@ -376,13 +376,13 @@ def open_view(
 
 
 def _textures(store: StoreReader, prefix: str, start: int, stop: int) -> dict[str, F32]:
-    """Read the images of the scene at a material's samples; none where it is 1 all over, as without an image."""
+    """Read the scene's textures at a material's samples, without those that are 1 everywhere."""
     read = {name: store.read(f"{prefix}/{name}", start, stop) for name in _TEXTURE_NAMES}
     return {name: values for name, values in read.items() if np.any(values != 1)}
 
 
 def _cos_theta_o(store: StoreReader, prefix: str, origin: F32, num: int) -> NDArray[np.float64]:
-    """Find the cosines at which samples on surfaces are seen, some after others. (num,)"""
+    """Cosines between normals and view directions of surface samples. (num,)"""
     cosines = np.empty(num)
     for start in range(0, num, _ROWS_PER_BATCH):
         rows = slice(start, min(start + _ROWS_PER_BATCH, num))
@@ -393,5 +393,5 @@ def _cos_theta_o(store: StoreReader, prefix: str, origin: F32, num: int) -> NDAr
 
 
 def _are_valid_levels(level: NDArray[np.uint8], ratios: tuple[float, ...]) -> bool:
-    """Whether the levels of a material's samples rise, and are among those that it has."""
+    """True if the levels of a material's samples are ascending and exist."""
     return len(level) == 0 or (int(level[-1]) < max(1, len(ratios)) and bool(np.all(level[1:] >= level[:-1])))

@@ -159,7 +159,7 @@ def test_an_exported_aces_image_is_read_back(tmp_path):
 
 @pytest.mark.parametrize("name", ["ACEScct", "Raw", "sRGB - Display", "../../etc/passwd", ""])
 def test_images_are_exported_only_in_linear_spaces(name):
-    with using_config(STUDIO), pytest.raises(ParameterError, match="linear colour space"):
+    with using_config(STUDIO), pytest.raises(ParameterError, match="linear color space"):
         find_space(name)
 
 

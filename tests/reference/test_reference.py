@@ -154,7 +154,7 @@ def test_the_omitted_light_is_the_difference_of_the_references() -> None:
     few = reference_of(True, bounces=1)
     np.testing.assert_allclose(few.all_paths_image, shown["all"], rtol=1e-5)
     assert shown["direct"].mean() < few.method_image.mean() < few.all_paths_image.mean()
-    assert few.omitted_paths == ("Light that more than 1 surfaces have reflected.",)
+    assert few.omitted_paths == ("Light after more than 1 bounces.",)
     direct_only = reference_of(False, show="direct")  # no displayed light is omitted
     np.testing.assert_array_equal(direct_only.all_paths_image, direct_only.method_image)
     assert direct_only.omitted_paths == direct_only.unsupported_paths == ()

@@ -241,7 +241,7 @@ def test_array_paths_stay_inside_the_store(tmp_path: Path, path: str) -> None:
 def test_partial_shards_are_rejected(tmp_path: Path) -> None:
     writer = create_store(tmp_path, {})
     writer.create_array(SPEC)
-    with pytest.raises(StoreError, match="cut a shard"):
+    with pytest.raises(StoreError, match="split a shard"):
         writer.write(SPEC.path, bits()[:16], 0)
     with pytest.raises(StoreError, match="do not fit"):
         writer.write(SPEC.path, bits()[:32].astype(np.float32), 0)

@@ -32,17 +32,17 @@ def quotient(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def
 
 
 def lobe_u(alpha: F64, params: Params) -> F64:
-    """sqrt(nu + 1) cos^nu γα: along the tangent."""
+    """Lobe sqrt(nu + 1) cos^nu γα along the tangent."""
     return math.sqrt(params["nu"] + 1.0) * np.cos(alpha) ** params["nu"]
 
 
 def lobe_v(beta: F64, params: Params) -> F64:
-    """sqrt(nv + 1) cos^nv γβ: across the tangent."""
+    """Lobe sqrt(nv + 1) cos^nv γβ across the tangent."""
     return math.sqrt(params["nv"] + 1.0) * np.cos(beta) ** params["nv"]
 
 
 def reflectance(theta_d: F64, params: Params) -> F64:
-    """schlick(f0), Ashikhmin and Shirley's own choice."""
+    """Schlick's reflectance for f0, the choice of Ashikhmin and Shirley."""
     return schlick(np.cos(theta_d), params["f0"])
 
 

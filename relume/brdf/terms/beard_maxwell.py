@@ -1,10 +1,10 @@
-"""beard_maxwell: the first-surface part of Maxwell 1973, a half-angle curve and a difference-angle curve.
+"""beard_maxwell: the first-surface reflection of Maxwell 1973, a half-angle curve and a difference-angle curve.
 
 f = F(θd) D(θh) SO / (4 (n·wi)(n·wo)), SO = (1 + θh/Ω · exp(-2 θd/τ)) / (1 + θh/Ω): shadowing and obscuration. Maxwell
 measures a scan s(θh) of the surface at θd = 0 and scales it by the exact Fresnel curve, F(θd)/F(0): D is 4 s cos² θh /
-F(0). Its curve can be drawn from such a scan; the parameters make Cauchy-like slopes, long in the tail as scans are. τ
-and Ω are fixed at freeze. The light out of the body is a sum apart and so a term apart: `lambert` for the diffuse part;
-Maxwell's volumetric one, 2 ρv / (cos θi + cos θo), is left out.
+F(0). The curve can be drawn from such a scan; the parameters generate Cauchy-like slopes with a long tail, like scans.
+τ and Ω are fixed. Light from the body is a separate sum and so a separate term: use `lambert` for the diffuse part;
+Maxwell's volumetric part, 2 ρv / (cos θi + cos θo), is not supported.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ def quotient(tau, omega, wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no
         return ZERO
     cos_theta_h, cos_theta_d = half_vector_cosines(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z)
     tilt = math.acos(cos_theta_h) / omega
-    theta_d = math.acos(min(cos_theta_d, ONE))  # rounding may carry it past one
+    theta_d = math.acos(min(cos_theta_d, ONE))  # rounding may exceed one
     obscuration = (ONE + tilt * math.exp(-TWO * theta_d / tau)) / (ONE + tilt)
     # within 2e-4 degrees of the horizon the division would overflow
     return _QUARTER * (obscuration / (max(wi_z, MIN_COSINE) * max(wo_z, MIN_COSINE)))
 
 
 def ndf(theta_h: F64, params: Params) -> F64:
-    """D = B / (cos θh (σ² + tan² θh)), with the B that makes ∫ D cos θh dωh one."""
+    """D = B / (cos θh (σ² + tan² θh)), with B such that ∫ D cos θh dωh is one."""
     sigma2 = params["sigma"] ** 2
     a2 = 1.0 - sigma2
-    # 1/(2πB) = ∫ t²/(1 - a² t²) dt over [0, 1]; near a = 0 the closed form loses its digits
+    # 1/(2πB) = ∫ t²/(1 - a² t²) dt over [0, 1]; near a = 0 the closed form loses precision
     a = math.sqrt(a2)
     integral = (math.atanh(a) / a - 1.0) / a2 if a2 > 1e-3 else 1.0 / 3.0 + a2 / 5.0 + a2 * a2 / 7.0
     cos = np.cos(theta_h)
@@ -53,12 +53,12 @@ def ndf(theta_h: F64, params: Params) -> F64:
 
 
 def reflectance(theta_d: F64, params: Params) -> F64:
-    """The unpolarised Fresnel reflectance F(η, k) at a difference angle."""
+    """Unpolarized Fresnel reflectance F(η, k) at a difference angle."""
     return fresnel(np.cos(theta_d), params["ior"], params["extinction"])
 
 
 def normalize(params: Params) -> dict[str, Any]:
-    """The quotient of this much shadowing."""
+    """Return the quotient with the parameters τ and Ω applied."""
     return {"quotient": partial(quotient, math.radians(params["tau"]), math.radians(params["omega"]))}
 
 

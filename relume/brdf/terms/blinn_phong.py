@@ -1,4 +1,4 @@
-"""blinn_phong: a highlight around the half vector, cos^s θh, with the normalisation of Nguyen 2010 (tables 3 and 4)."""
+"""blinn_phong: a highlight around the half vector, cos^s θh, with the normalization of Nguyen 2010 (tables 3 and 4)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from relume.brdf.term import F64, Angle, Curve, Parameter, Params, Term
 
 
 def lobe(theta_h: F64, params: Params) -> F64:
-    """The lobe (s + 2)/(2π) cos^s θh, s being `params["exponent"]`."""
+    """Lobe (s + 2)/(2π) cos^s θh, with s = `params["exponent"]`."""
     s = params["exponent"]
     return (s + 2.0) / (2.0 * math.pi) * np.cos(theta_h) ** s
 
@@ -26,6 +26,6 @@ BLINN_PHONG = Term(
     quotient=hemisphere_indicator,
     source="Nguyen 2010, tables 3 and 4: f = (s+2)/(2π) cos^s θh",
     texture="specular",
-    help="A simple round highlight without Fresnel effect; reflects up to four times its colour at high exponents.",
+    help="A simple round highlight without Fresnel effect; reflects up to four times its color at high exponents.",
     width=("exponent", -4),
 )

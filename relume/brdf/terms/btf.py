@@ -1,7 +1,7 @@
-"""measured_btf: a bidirectional texture function, each texel with a BRDF of its own (Müller 2004).
+"""measured_btf: a bidirectional texture function, with a BRDF for each texel (Müller 2004).
 
-As a BRDF it is the mean of its texels: so it is where no texel can be told, in light that it sends to other surfaces.
-Where a surface is seen, `relume.transport.btf_kernel` finds each texel's own.
+As a BRDF it is the mean of its texels, which is used for light between surfaces. At visible surfaces,
+`relume.transport.btf_kernel` evaluates the BRDF of each texel.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from relume.core.errors import ParameterError
 
 @dataclass(frozen=True, eq=False)
 class BtfRef:
-    """How a surface is covered with a BTF.
+    """Mapping of a BTF to a surface.
 
     Attributes:
-        data: the name of the BTF. components: that are used. btf: with these alone.
-        scale: how often it repeats along a unit of texture coordinates. rotation: counter-clockwise, radians.
+        data: name of the BTF. components: number in use. btf: with these components alone.
+        scale: repeats per unit of texture coordinates. rotation: counterclockwise, radians.
     """
 
     data: str
@@ -39,7 +39,7 @@ class BtfRef:
 
     @property
     def tables(self) -> F32:
-        """Of the BTF, see `LocalPcaBtf.tables`; made where they are asked for first, which takes a while."""
+        """Tables of the BTF, see `LocalPcaBtf.tables`; computed on first use, which takes a while."""
         return _tables(self.data, self.components)
 
 
@@ -70,8 +70,8 @@ MEASURED_BTF = Term(
     model="measured_btf",
     label="Measured texture (BTF)",
     parameters=(
-        Parameter("scale", "Repeats", 0.1, 200.0, 1.0, "", "log", "How often it repeats along the texture's side."),
-        Parameter("rotation", "Rotation", -180.0, 180.0, 0.0, "°", "linear", "Turns the texture on the surface."),
+        Parameter("scale", "Repeats", 0.1, 200.0, 1.0, "", "log", "Repeats per unit of texture coordinates."),
+        Parameter("rotation", "Rotation", -180.0, 180.0, 0.0, "°", "linear", "Rotates the texture on the surface."),
         Parameter(
             "components",
             "Quality",
@@ -80,7 +80,7 @@ MEASURED_BTF = Term(
             MAX_COMPONENTS,
             "",
             "linear",
-            "Components that are summed for each texel: fewer are quicker, and nearer to the mean.",
+            "Components per texel: fewer are faster, and closer to the mean.",
             step=1.0,
         ),
     ),
@@ -88,7 +88,7 @@ MEASURED_BTF = Term(
     quotient=_without_data,
     source="Müller 2004: B_v ≈ M_v + Σ α_v E_v",
     texture="diffuse",
-    help="A texture that looks different from every side and in every light: cloth, pebbles, leather.",
+    help="A texture with its own reflection per texel, by view and light direction: cloth, pebbles, leather.",
     fixed=("scale", "rotation", "components"),
     normalize=_normalize,
     num_channels=3,

@@ -25,19 +25,19 @@ def quotient(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def
         return ZERO
     cos_theta_h, cos_theta_d = half_vector_cosines(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z)
     masking = min(ONE, TWO * cos_theta_h * min(wi_z, wo_z) / cos_theta_d)
-    # within 2e-4 degrees of the horizon the division would overflow; masking has made the value vanish there anyway
+    # within 2e-4 degrees of the horizon the division would overflow; masking makes the value vanish there anyway
     return _SCALE * (masking / (max(wi_z, MIN_COSINE) * max(wo_z, MIN_COSINE)))
 
 
 def ndf(theta_h: F64, params: Params) -> F64:
     """D = exp(-tan² θh / σ²) / (σ² cos⁴ θh)."""
     sigma2 = params["sigma"] ** 2
-    cos2 = np.maximum(np.cos(theta_h) ** 2, 1e-30)  # at 90° the exponential wins over the vanishing cosine
+    cos2 = np.maximum(np.cos(theta_h) ** 2, 1e-30)  # at 90° the exponential dominates the vanishing cosine
     return np.asarray(np.exp(-(1.0 - cos2) / (cos2 * sigma2)) / (sigma2 * cos2 * cos2))
 
 
 def reflectance(theta_d: F64, params: Params) -> F64:
-    """The unpolarised Fresnel reflectance F(η, k) at a difference angle."""
+    """Unpolarized Fresnel reflectance F(η, k) at a difference angle."""
     return fresnel(np.cos(theta_d), params["ior"], params["extinction"])
 
 

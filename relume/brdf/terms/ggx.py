@@ -1,4 +1,4 @@
-"""ggx: Walter 2007 with separable Smith masking; what glTF means by metallic-roughness (its metals: f0 per channel)."""
+"""ggx: Walter 2007 with separable Smith masking; the metallic-roughness model of glTF (its metals: f0 per channel)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def quotient(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def
 
 
 def roughness_to_alpha(roughness: float) -> float:
-    """Width α of the facet distribution from the slider's roughness: its square (Burley 2012, and glTF)."""
+    """Width α of the facet distribution: the square of the slider's roughness (Burley 2012, and glTF)."""
     return roughness * roughness
 
 
@@ -48,7 +48,7 @@ def masking(theta: F64, params: Params) -> F64:
 
 
 def reflectance(theta_d: F64, params: Params) -> F64:
-    """Schlick's reflectance at a difference angle, for the reflectance f0 at the normal."""
+    """Schlick's reflectance at a difference angle, for the reflectance f0 at normal incidence."""
     return schlick(np.cos(theta_d), params["f0"])
 
 

@@ -1,4 +1,4 @@
-"""lambert: the ideal diffuse term. Quotient 1/π; one curve over θi, which is one until it is drawn by hand."""
+"""lambert: the ideal diffuse term. Quotient 1/π; one curve over θi, which is one until it is drawn."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from relume.brdf.term import F64, Angle, Curve, Params, Term
 
 @quotient_ufunc
 def quotient(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def]
-    """1/π above the horizon, in 1/sr.
+    """BRDF 1/π above the horizon, in 1/sr.
 
     Args:
         wi_x, wi_y, wi_z: light direction, local frame, unit. (...) each
@@ -24,7 +24,7 @@ def quotient(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def
 
 
 def constant(theta_i: F64, params: Params) -> F64:
-    """The unedited curve: one at every angle. (...) -> (...)"""
+    """Return one at every angle: the unedited curve."""
     return np.ones_like(theta_i)
 
 
@@ -37,5 +37,5 @@ LAMBERT = Term(
     source="Lambert 1760: f = 1/π",
     texture="diffuse",
     is_lambertian=True,
-    help="Light scattered evenly in all directions; the colour is the albedo.",
+    help="Light scattered uniformly in all directions; the color is the albedo.",
 )

@@ -1,10 +1,10 @@
-"""measured_lv, measured_hd, measured_hf: a measured material as curves that can be edited, times what they leave.
+"""measured_lv, measured_hd, measured_hf: a measured material as editable curves times a residual quotient.
 
     M = ρd + ρs     ρd = min(M, g g) = qd g(θi) g(θo)     ρs = M − ρd = qs f(θh) f'(θd)     eq. 18, Ben-Artzi 2006
     M = q P(θi) Q(θh) P(θo)                                                                 eq. 17, McCool 2001
 
-M is the material's table between its nodes, per channel; the curves come with it, and the quotients hold all that they
-do not tell, so that unedited terms add up to M exactly.
+M is the interpolated table of the material, per channel. Its import fits the curves; the quotients hold the rest, so
+that unedited terms add up to M exactly.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from functools import partial
 from typing import Any, NoReturn
 
 import numpy as np
+from jaxtyping import Shaped
 
 from relume.assets.measured.interpolate import (
     NUM_KNOTS,
@@ -36,24 +37,24 @@ _ROWS = {Angle.THETA_I: THETA_I, Angle.THETA_H: THETA_H, Angle.THETA_D: THETA_D,
 
 @dataclass(frozen=True, eq=False)
 class MeasuredFactor:
-    """A curve at its knots, linear between: along θh in the root of the angle, as the MERL grid has it.
+    """A measured curve, linear between its knots; along θh in the root of the angle, like the MERL grid.
 
     Attributes:
-        knots: (3, 90).
+        knots: one row per channel.
     """
 
     angle: Angle
-    knots: F64
+    knots: Shaped[F64, "3 knots"]
 
     def __call__(self, gamma: F64) -> F64:
-        """γ in radians (...) -> (3, ...)."""
+        """Evaluate the curve: γ in radians (...) -> (3, ...)."""
         fraction = np.clip(gamma / MAX_ANGLE, 0.0, 1.0)
         position = NUM_KNOTS * (np.sqrt(fraction) if self.angle is Angle.THETA_H else fraction)
         return np.stack([np.interp(position, np.arange(NUM_KNOTS), channel) for channel in self.knots])
 
 
 def _constant(gamma: F64, params: Params) -> F64:
-    """The declared curve, which stands where no data are named: one at every angle."""
+    """Return one at every angle: the curve of a term without data."""
     return np.ones_like(gamma)
 
 
@@ -71,7 +72,7 @@ _CURVES = {
 
 @asset_cached("measured quotient")
 def _normalize(kind: QuotientKind, data: str) -> dict[str, Any]:
-    """Quotient and curves of one material."""
+    """Return the quotient and curves of one material."""
     measured = load_material(data)
     knots = measured.homomorphic if kind is QuotientKind.HOMOMORPHIC else measured.lobes
     curves = tuple(replace(c, factor=MeasuredFactor(c.angle, knots[_ROWS[c.angle]])) for c in _declared_curves(kind))
@@ -113,7 +114,7 @@ MEASURED_LV = _term(
     QuotientKind.DIFFUSE,
     "Ben-Artzi 2006, eq. 18: ρd = q g(θi) g(θo)",
     "diffuse",
-    "The part of a measured material that hardly changes with the azimuth; adds up to it with measured_hd.",
+    "The component of a measured material that hardly depends on the azimuth; the rest is measured_hd.",
 )
 MEASURED_HD = _term(
     "measured_hd",
@@ -121,13 +122,13 @@ MEASURED_HD = _term(
     QuotientKind.SPECULAR,
     "Ben-Artzi 2006, eq. 18: ρs = q f(θh) f'(θd)",
     "specular",
-    "The highlight of a measured material; adds up to it with measured_lv.",
+    "The highlight of a measured material; the rest is measured_lv.",
 )
 MEASURED_HF = _term(
     "measured_hf",
-    "Measured, in one product",
+    "Measured, one product",
     QuotientKind.HOMOMORPHIC,
     "McCool 2001, Ben-Artzi 2006, eq. 17: ρ = q P(θi) Q(θh) P(θo)",
     "specular",
-    "A whole measured material in one product; for cloth and others without two lobes.",
+    "A whole measured material as one product; for cloth and other materials without two lobes.",
 )

@@ -1,4 +1,4 @@
-"""phong: a highlight around the mirror direction, cos^s θr; eq. 5, Mahajan 2008, that of a lobe of volume one."""
+"""phong: a highlight around the mirror direction, cos^s θr; eq. 5, Mahajan 2008, with a lobe of volume one."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from relume.brdf.term import F64, Angle, Curve, Parameter, Params, Term
 
 
 def lobe(theta_r: F64, params: Params) -> F64:
-    """The lobe (s + 1)/(2π) cos^s θr, s being `params["exponent"]`."""
+    """Lobe (s + 1)/(2π) cos^s θr, with s = `params["exponent"]`."""
     s = params["exponent"]
     return (s + 1.0) / (2.0 * math.pi) * np.cos(theta_r) ** s
 
@@ -26,6 +26,6 @@ PHONG = Term(
     quotient=hemisphere_indicator,
     source="Phong 1975, as Mahajan 2008, eq. 5: f = (s+1)/(2π) cos^s θr",
     texture="specular",
-    help="The oldest highlight: round at every angle, and never more light than arrives.",
+    help="The oldest highlight: round at every angle, and never brighter than the incident light.",
     width=("exponent", -4),
 )

@@ -28,13 +28,13 @@ def quotient(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def
 
 
 def ndf(theta_h: F64, params: Params) -> F64:
-    """Z = r / (1 + r t² - t²)², t = cos θh; written with the sine, for 1 - t² loses its digits at the peak."""
+    """Z = r / (1 + r t² - t²)², t = cos θh; uses the sine, because 1 - t² loses precision at the peak."""
     r = params["roughness"]
     return np.asarray(r / np.square(r * np.cos(theta_h) ** 2 + np.sin(theta_h) ** 2))
 
 
 def reflectance(theta_d: F64, params: Params) -> F64:
-    """Schlick's reflectance at a difference angle, for the reflectance f0 at the normal."""
+    """Schlick's reflectance at a difference angle, for the reflectance f0 at normal incidence."""
     return schlick(np.cos(theta_d), params["f0"])
 
 
@@ -42,7 +42,7 @@ SCHLICK = Term(
     model="schlick",
     label="Schlick",
     parameters=(
-        Parameter("roughness", "Roughness r", 0.0001, 1.0, 0.05, "", "log", "0 is a mirror, 1 all directions alike."),
+        Parameter("roughness", "Roughness r", 0.0001, 1.0, 0.05, "", "log", "0 is a mirror, 1 is uniform."),
         Parameter("f0", "Reflectance f0", 0.0, 1.0, 0.04, "", "linear", "Seen head-on; 0.04 for plastic and glass."),
     ),
     curves=(
@@ -52,6 +52,6 @@ SCHLICK = Term(
     quotient=quotient,
     source="Schlick 1994, without masking: f = Z(θh) F(θd) / (4π (n·wi)(n·wo))",
     texture="specular",
-    help="A cheap cousin of Cook–Torrance with a long tail; at the very horizon more light than arrives.",
+    help="A cheap variant of Cook–Torrance with a long tail; it gains energy very close to the horizon.",
     width=("roughness", 4),
 )

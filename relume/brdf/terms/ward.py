@@ -25,13 +25,13 @@ def quotient(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def
 
 
 def slope_distribution(angle: F64, alpha: float) -> F64:
-    """exp(-tan² γ / α²), zero at a right angle."""
-    cos2 = np.maximum(np.cos(angle) ** 2, 1e-30)  # there the exponential wins over the vanishing cosine
+    """Slope distribution exp(-tan² γ / α²), zero at π/2."""
+    cos2 = np.maximum(np.cos(angle) ** 2, 1e-30)  # at π/2 the exponential dominates the vanishing cosine
     return np.asarray(np.exp(-(1.0 - cos2) / (cos2 * alpha * alpha)))
 
 
 def ndf(theta_h: F64, params: Params) -> F64:
-    """exp(-tan² θh / α²) / (4π α²)."""
+    """Normalized slope distribution exp(-tan² θh / α²) / (4π α²)."""
     alpha = params["alpha"]
     return slope_distribution(theta_h, alpha) / (4.0 * math.pi * alpha * alpha)
 
@@ -44,6 +44,6 @@ WARD = Term(
     quotient=quotient,
     source="Ward 1992, eq. 4: f = exp(-tan² θh / α²) / (4π α² √((n·wi)(n·wo)))",
     texture="specular",
-    help="A highlight fitted to measurements of paints, plastics and metals; darkens towards the rim.",
+    help="A highlight fitted to measurements of paints, plastics and metals; darkens toward grazing angles.",
     width=("alpha", 2),
 )

@@ -15,12 +15,12 @@ _SCALE = 1.0 / math.sqrt(4.0 * math.pi)
 
 
 def lobe_x(tilt_x: F64, params: Params) -> F64:
-    """exp(-tan² γx / αx²) / (√(4π) αx): along the tangent."""
+    """Lobe exp(-tan² γx / αx²) / (√(4π) αx) along the tangent."""
     return slope_distribution(tilt_x, params["alpha_x"]) * (_SCALE / params["alpha_x"])
 
 
 def lobe_y(tilt_y: F64, params: Params) -> F64:
-    """exp(-tan² γy / αy²) / (√(4π) αy): across the tangent."""
+    """Lobe exp(-tan² γy / αy²) / (√(4π) αy) across the tangent."""
     return slope_distribution(tilt_y, params["alpha_y"]) * (_SCALE / params["alpha_y"])
 
 
@@ -36,7 +36,7 @@ WARD_ANISOTROPIC = Term(
         Curve("tilt_y", "tilt across the tangent γy", Angle.TILT_Y, lobe_y, ("alpha_y",), 256),
     ),
     quotient=quotient,
-    source="Ward 1992, eq. 5a, as two curves by the way of Ben-Artzi 2006, section 4.3",
+    source="Ward 1992, eq. 5a, as two curves by the method of Ben-Artzi 2006, section 4.3",
     texture="specular",
-    help="Ward's highlight on brushed metal, hair or varnished wood: wider one way than the other.",
+    help="Ward's highlight on brushed metal, hair or varnished wood: wider in one direction than in the other.",
 )

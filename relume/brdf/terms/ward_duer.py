@@ -1,4 +1,4 @@
-"""ward_duer: Ward's Gaussian of slopes with the normalisation of Dür 2006, which does not darken towards the rim."""
+"""ward_duer: Ward's Gaussian of slopes with the normalization of Dür 2006, which does not darken at grazing angles."""
 
 from __future__ import annotations
 
@@ -29,6 +29,6 @@ WARD_DUER = Term(
     quotient=quotient,
     source="Dür 2006: f = exp(-tan² θh / α²) / (4π α² (n·wi)(n·wo))",
     texture="specular",
-    help="Ward's highlight, as bright at the rim as in the middle; at the very horizon more than arrives.",
+    help="Ward's highlight, as bright at grazing angles as head-on; it gains energy very close to the horizon.",
     width=("alpha", 2),
 )

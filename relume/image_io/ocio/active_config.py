@@ -1,4 +1,4 @@
-"""The config of this process: one at most, read when it is first asked for."""
+"""The OpenColorIO config of this process: at most one, read on first use."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _active_config: Config | None = None
 
 
 def use_config(source: str | None, working: str | None = None) -> None:
-    """Use a config from now on, as `Config` takes it; None: none."""
+    """Use a config from now on, with the arguments of `Config`; None: no config."""
     global _requested, _active_config
     _requested, _active_config = None if source is None else (source, working), None
 
 
 @contextmanager
 def using_config(source: str | None, working: str | None = None) -> Iterator[None]:
-    """The same for as long as the block runs."""
+    """Context in which another config is used."""
     previous = _requested
     use_config(source, working)
     try:
@@ -30,12 +30,12 @@ def using_config(source: str | None, working: str | None = None) -> Iterator[Non
 
 
 def config_source() -> tuple[str, ...]:
-    """What `use` was told, for another process that is to use the same; nothing where there is none."""
+    """Arguments of `use_config`, for another process that shall use the same config; empty without a config."""
     return () if _requested is None else tuple(value for value in _requested if value is not None)
 
 
 def get_config() -> Config | None:
-    """The config in use; None where there is none. Raises ParameterError where it cannot be read."""
+    """The active config; None if there is none. Raises ParameterError if it cannot be read."""
     global _active_config
     if _requested is not None and _active_config is None:
         _active_config = Config(*_requested)
@@ -43,7 +43,7 @@ def get_config() -> Config | None:
 
 
 def require_config() -> Config:
-    """The config in use. Raises ParameterError where there is none."""
+    """The active config. Raises ParameterError if there is none."""
     config = get_config()
     if config is None:
         raise ParameterError("RELUME_OCIO", "not set", "an OpenColorIO config, which this needs")

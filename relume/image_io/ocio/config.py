@@ -1,7 +1,7 @@
-"""An OpenColorIO config: what of it pictures use, and its transforms of them.
+"""An OpenColorIO config: its views and color spaces for images, and their transforms.
 
-A config is the operator's, as are the files that it names. Clients name displays, views and colour spaces; only names
-that the config lists reach OpenColorIO, which fetches nothing from a network.
+The config and the files that it refers to belong to the operator. Clients name displays, views and color spaces; only
+names that the config lists reach OpenColorIO, which fetches nothing from a network.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import ParameterError
@@ -26,7 +27,7 @@ F64 = NDArray[np.float64]
 
 log = logging.getLogger(__name__)
 
-_NAMES = (  # of linear Rec. 709: the interop id, then what configs called it before there were any
+_NAMES = (  # of linear Rec. 709: the interop id, then older names in configs
     "lin_rec709_scene", "lin_rec709", "lin_rec709_srgb", "lin_srgb",
     "Linear Rec.709 (sRGB)", "Linear Rec.709", "Utility - Linear - Rec.709", "Utility - Linear - sRGB",
 )  # fmt: skip
@@ -36,19 +37,20 @@ _ROWS_PER_RANGE = 1 << 14
 
 
 class Config:
-    """A config that has been read, and looked through.
+    """A loaded and checked config.
 
     Attributes:
-        name: as the config says, or its file's. id: of what is in it and how tables are made. 16 hexadecimal digits
+        name: from the config, or its file name. id: hash of its contents and of the LUT layout. 16 hexadecimal digits
         working: its name of linear Rec. 709. displays: their views, both in the config's order.
-        default: the view that the config shows unasked.
+        default: the config's default view.
     """
 
     def __init__(self, source: str, working: str | None = None) -> None:
-        """
+        """Load a config.
+
         Args:
             source: path of a .ocio or .ocioz file, or ocio://… of a built-in one.
-            working: the config's name of linear Rec. 709; None: found by the names in use, then by what it does.
+            working: the config's name of linear Rec. 709; None: found by common names, then by its transform.
         Raises:
             ParameterError: the config cannot be used.
         """
@@ -75,44 +77,42 @@ class Config:
 
     @cached_property
     def spaces(self) -> tuple[str, ...]:
-        """Its linear colour spaces, which pictures are exported in."""
+        """Linear color spaces of the config, for exported images."""
         spaces = [space for space in self._config.getColorSpaces() if not space.isData()]
         return tuple(str(space.getName()) for space in spaces if self._is_linear(space))
 
     def _is_linear(self, space: Any) -> bool:
         try:
             return bool(self._config.isColorSpaceLinear(space.getName(), self._ocio.REFERENCE_SPACE_SCENE))
-        except _failures(self._ocio):  # a file that it needs is missing
+        except _failures(self._ocio):  # it needs a file that is missing
             return False
 
     def check_view(self, view: OcioView) -> None:
-        """Raise ParameterError unless it is one of the config's."""
+        """Raise ParameterError unless the config has this view."""
         if view.display not in self.displays:
             raise ParameterError("display", view.display, f"one of {_join_names(self.displays)}")
         if view.view not in self.displays[view.display]:
             raise ParameterError("view", view.view, f"one of {_join_names(self.displays[view.display])}")
 
     def canonical_space(self, name: str) -> str:
-        """The config's name of a linear colour space.
+        """Return the config's name of a linear color space.
 
         Args:
-            name: what it is called, an alias, or a role.
+            name: name, alias, or role.
         Raises:
-            ParameterError: the config has none that is called so.
+            ParameterError: the config has no such space.
         """
         canonical_name = str(self._config.getCanonicalName(name))
         if canonical_name not in self.spaces:
-            raise ParameterError(
-                "color_space", name, f"a linear colour space of the config: {_join_names(self.spaces)}"
-            )
+            raise ParameterError("color_space", name, f"a linear color space of the config: {_join_names(self.spaces)}")
         return canonical_name
 
-    def apply_view(self, pixels: F32, view: OcioView, *, use_table: bool = False) -> None:
-        """Turn light into what a display is sent, in place.
+    def apply_view(self, pixels: Shaped[F32, "n 3"], view: OcioView, *, use_table: bool = False) -> None:
+        """Convert radiance to display values, in place.
 
         Args:
-            pixels: linear Rec. 709, C-contiguous. (n, 3)
-            use_table: by the view's table, in a third of the time, as the editor shows it.
+            pixels: linear Rec. 709, C-contiguous.
+            use_table: use the view's LUT, in a third of the time, like the editor.
         Raises:
             ParameterError: the config has no such view, or it does not work.
         """
@@ -123,26 +123,26 @@ class Config:
             return apply_lut(self.table(view), pixels)
         return self._apply(self._to_view(view), pixels, f"the view {view.view!r} of {view.display!r}")
 
-    def convert(self, pixels: F32, space: str) -> None:
-        """Convert light to another linear colour space, in place.
+    def convert(self, pixels: Shaped[F32, "n 3"], space: str) -> None:
+        """Convert radiance to another linear color space, in place.
 
         Args:
-            pixels: linear Rec. 709, C-contiguous. (n, 3)
-            space: as `canonical_space` names it.
+            pixels: linear Rec. 709, C-contiguous.
+            space: from `canonical_space`.
         Raises:
             ParameterError: the conversion does not work.
         """
         transform = self._ocio.ColorSpaceTransform(src=self.working, dst=space)
-        self._apply(transform, pixels, f"the colour space {space!r}")
+        self._apply(transform, pixels, f"the color space {space!r}")
 
-    def primaries(self, space: str) -> F64:
-        """The primaries of a linear colour space, as `canonical_space` names it, in ours. (3, 3), columns"""
+    def primaries(self, space: str) -> Shaped[F64, "3 3"]:
+        """Primaries of a linear color space, from `canonical_space`, in linear Rec. 709, as columns."""
         rgb_axes = np.eye(3, dtype=np.float32)
         self.convert(rgb_axes, space)
         return np.asarray(np.linalg.inv(rgb_axes.T.astype(np.float64)))
 
-    def table(self, view: OcioView) -> NDArray[np.uint16]:
-        """The view as a table, see `relume.image_io.ocio.lut`. (N, N, N, 3) Raises ParameterError."""
+    def table(self, view: OcioView) -> Shaped[NDArray[np.uint16], "N N N 3"]:
+        """LUT of the view, see `relume.image_io.ocio.lut`. Raises ParameterError."""
         return self._table(view)
 
     def _build_table(self, view: OcioView) -> NDArray[np.uint16]:
@@ -156,16 +156,16 @@ class Config:
 
     def _apply(self, transform: Any, pixels: F32, label: str) -> None:
         try:
-            processor = self._processor(transform)  # the config keeps them
+            processor = self._processor(transform)  # cached by the config
         except _failures(self._ocio) as error:
             log.warning("%s does not work: %s", label, error)
-            allowed = "another: a file that it needs is missing or damaged, the server's log says which"
+            allowed = "another: it needs a file that is missing or damaged, the server's log says which"
             raise ParameterError("color", label, allowed) from None
         for_ranges(lambda start, stop: processor.applyRGB(pixels[start:stop]), len(pixels), _ROWS_PER_RANGE)
 
 
 def _module() -> Any:
-    """OpenColorIO, which processes without a config never load."""
+    """Import OpenColorIO, which processes without a config never load."""
     import PyOpenColorIO
 
     PyOpenColorIO.SetLoggingLevel(PyOpenColorIO.LOGGING_LEVEL_WARNING)
@@ -173,7 +173,7 @@ def _module() -> Any:
 
 
 def _failures(ocio: Any) -> tuple[type[Exception], ...]:
-    return ocio.Exception, ocio.ExceptionMissingFile, UnicodeError  # its words about what is no text are none either
+    return ocio.Exception, ocio.ExceptionMissingFile, UnicodeError  # messages about invalid text are invalid text too
 
 
 def _error_text(error: Exception) -> str:
@@ -195,7 +195,7 @@ def _read_config(ocio: Any, source: str) -> Any:
         raise ParameterError("RELUME_OCIO", source, f"{allowed}; {_error_text(error)}") from None
     try:
         config.validate()
-    except _failures(ocio) as error:  # many that work well have faults
+    except _failures(ocio) as error:  # many configs that work well are not valid
         log.warning("the OpenColorIO config %s is not valid: %s", source, _error_text(error))
     return config
 
@@ -205,7 +205,7 @@ def _working_space(ocio: Any, config: Any, requested: str | None) -> str:
     if requested is not None:
         space = config.getColorSpace(requested)
         if space is None or space.isData():
-            raise ParameterError("RELUME_OCIO_SPACE", requested, "a colour space of the config")
+            raise ParameterError("RELUME_OCIO_SPACE", requested, "a color space of the config")
         return str(space.getName())
     for name in _NAMES:
         if (space := config.getColorSpace(name)) is not None:
@@ -215,5 +215,5 @@ def _working_space(ocio: Any, config: Any, requested: str | None) -> str:
         return str(ocio.Config.IdentifyBuiltinColorSpace(config, built_in, _BUILT_IN_SPACE))
     except _failures(ocio):
         names = _join_names(str(space.getName()) for space in config.getColorSpaces())
-        allowed = f"the config's name of linear Rec. 709, which cannot be told from what it holds: {names}"
+        allowed = f"the config's name of linear Rec. 709, which could not be identified among: {names}"
         raise ParameterError("RELUME_OCIO_SPACE", None, allowed) from None

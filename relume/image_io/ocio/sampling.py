@@ -1,4 +1,4 @@
-"""The kernel that samples tables of views; `relume.image_io.ocio.lut.sample_lut` is its twin."""
+"""Kernel that samples LUTs of views."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 
 import numba as nb
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.thread_pools import for_ranges
@@ -22,7 +23,7 @@ def _sample_rows(pixels, table, start, stop):  # type: ignore[no-untyped-def]
     fraction, step = np.empty(3, np.float32), np.empty(3, np.int64)
     for k in range(start, stop):
         table_offset, stride = 0, 3
-        for c in (2, 1, 0):  # blue is the quickest
+        for c in (2, 1, 0):  # blue varies fastest
             position = min(scale * np.log1p(gain * np.sqrt(max(pixels[k, c], np.float32(0)))), np.float32(last))
             node = min(int(position), last - 1)
             fraction[c], step[c] = position - np.float32(node), stride
@@ -47,12 +48,12 @@ def _sample_rows(pixels, table, start, stop):  # type: ignore[no-untyped-def]
         pixels[k, 0], pixels[k, 1], pixels[k, 2] = red * _INVERSE_MAX, green * _INVERSE_MAX, blue * _INVERSE_MAX
 
 
-def apply_lut(table: NDArray[np.uint16], pixels: NDArray[np.float32]) -> None:
-    """Turn light into display values by a table, in place; see `sample`.
+def apply_lut(table: Shaped[NDArray[np.uint16], "N N N 3"], pixels: Shaped[NDArray[np.float32], "n 3"]) -> None:
+    """Convert radiance to display values with a LUT, in place.
 
     Args:
-        table: as `bake` makes it. (N, N, N, 3)
-        pixels: linear, after exposure, no NaN; C-contiguous. (n, 3)
+        table: from `build_lut`.
+        pixels: linear, after exposure, no NaN; C-contiguous.
     """
     flat = table.reshape(-1)
     for_ranges(lambda start, stop: _sample_rows(pixels, flat, start, stop), len(pixels), _ROWS_PER_RANGE)

@@ -1,4 +1,4 @@
-"""What a look names of an OpenColorIO config."""
+"""OpenColorIO names in a look."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ MAX_NAME = 256
 
 @dataclass(frozen=True)
 class OcioView:
-    """A view of a display of the server's OpenColorIO config, in the place of a tone map."""
+    """A view of a display of the server's OpenColorIO config, instead of a tone map."""
 
     display: str
     view: str

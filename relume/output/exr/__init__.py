@@ -1,1 +1,1 @@
-"""OpenEXR for compositing: linear radiance, one layer a light and a kind of light path, and provenance."""
+"""OpenEXR for compositing: linear radiance, layers per light and per light path, and provenance."""

@@ -1,4 +1,4 @@
-"""The colour space of an exported picture: ours, or a linear one of the OpenColorIO config in use."""
+"""Color spaces of exported images: linear Rec. 709, or a linear space of the active OpenColorIO config."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import ParameterError
@@ -18,13 +19,13 @@ F32 = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class ExportColorSpace:
-    """A linear colour space.
+    """A linear color space.
 
     Attributes:
-        name: that people read.
-        interop: the id that files name it by; None: it has none.
+        name: for users.
+        interop: id in files; None if it has none.
         chromaticities: of its primaries and white.
-        convert: turns light into it, in place, (n, 3); None: it is ours.
+        convert: converts linear Rec. 709 to it, in place, (n, 3); None for linear Rec. 709.
     """
 
     name: str
@@ -32,8 +33,8 @@ class ExportColorSpace:
     chromaticities: Chromaticities
     convert: Callable[[F32], None] | None
 
-    def convert_image(self, image: F32) -> F32:
-        """A picture in it. (height, width, 3 or 4), coverage as it is"""
+    def convert_image(self, image: Shaped[F32, "height width channels"]) -> Shaped[F32, "height width channels"]:
+        """Convert an image of 3 or 4 channels; alpha is unchanged."""
         if self.convert is None:
             return image
         light = np.array(image[..., :3], np.float32, order="C").reshape(-1, 3)
@@ -45,10 +46,10 @@ REC_709_SPACE = ExportColorSpace("Rec. 709", "lin_rec709_scene", REC_709, None)
 
 
 def find_space(name: str | None) -> ExportColorSpace:
-    """The colour space that a request names; None: ours.
+    """Look up the color space of a request; None is linear Rec. 709.
 
     Raises:
-        ParameterError: there is no config, or it has no linear space that is called so, or no file can say what it is.
+        ParameterError: there is no config, or it has no linear space of that name, or no file can describe the space.
     """
     if name is None:
         return REC_709_SPACE

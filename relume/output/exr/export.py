@@ -1,4 +1,4 @@
-"""A picture and its layers in one OpenEXR file."""
+"""Export of an image and its layers to one OpenEXR file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from relume.output.exr.layers import Layer
 
 Progress = Callable[[float], None]
 Render = Callable[[Look, Progress], NDArray[np.float32]]
-"""Renders a look, (height, width, 3) or with alpha (height, width, 4), and tells the share done."""
+"""Renders a look, (height, width, 3) or with alpha (height, width, 4), and reports the finished fraction."""
 
 
 def export_exr(
@@ -29,18 +29,18 @@ def export_exr(
     progress: Progress = lambda share: None,
     space: ExportColorSpace = REC_709_SPACE,
 ) -> None:
-    """Render a look and its layers, one after another, and write them; no more than one is in memory at a time.
+    """Render a look and its layers sequentially, and write them; no more than one image is in memory.
 
     Args:
-        path: of the file, which appears whole or not at all; parts are kept beside it until then.
-        render: makes the picture of a look, (height, width, 3 or 4), and is told whom to tell its progress.
-        look: of the picture itself. layers: named looks, whose pictures are layers of the file.
-        attributes: of the file, as `build_attributes` makes them.
+        path: of the file, which appears only when it is complete; layers are stored beside it until then.
+        render: renders a look, (height, width, 3 or 4); gets a callback for its progress.
+        look: of the image itself. layers: named looks, whose images become layers of the file.
+        attributes: of the file, from `build_attributes`.
         precision: of the values.
-        progress: called with the share done, in [0, 1].
-        space: that the values are written in, as `attributes` says.
+        progress: called with the finished fraction, in [0, 1].
+        space: of the values, as in `attributes`.
     Raises:
-        RelumeError: the file cannot be written. What `render` raises; then there is no file.
+        RelumeError: the file cannot be written. Errors of `render` propagate; then there is no file.
     """
     renders = [("", look), *((layer.name, layer.look) for layer in layers)]
     with tempfile.TemporaryDirectory(prefix=".layers-", dir=path.parent) as folder:
@@ -51,13 +51,13 @@ def export_exr(
                 progress((k + fraction) / len(renders))
 
             image = space.convert_image(render(layer_look, report_progress))
-            image = image[..., :3] if name else image  # coverage is the picture's
+            image = image[..., :3] if name else image  # only the image itself has alpha
             channels += image_channels(_save_as_memmap(Path(folder) / f"{k}.npy", image, precision), name)
         write_exr(path, channels, attributes, precision)
 
 
 def _save_as_memmap(path: Path, image: NDArray[np.float32], precision: Precision) -> NDArray[np.floating]:
-    """The same picture, in the values that are written, as a file that is read where it is needed."""
+    """Save an image in the output precision, and map the file into memory."""
     pixels = np.minimum(image, MAX_HALF).astype(np.float16) if precision == "half" else image
     np.save(path, pixels, allow_pickle=False)
     return np.load(path, mmap_mode="r", allow_pickle=False)  # type: ignore[no-any-return]

@@ -1,6 +1,5 @@
-"""The layers of a picture: what each light gives, and what comes by each kind of light path, each of the two groups
-summing to the picture, since light adds up; or light groups, what each light gives directly and by reflection, all of
-them together the picture.
+"""Layers of an image: one per light and one per class of light paths, where each of the two sets sums to the image; or
+light groups, the direct and the indirect light of each light, which together sum to the image.
 """
 
 from __future__ import annotations
@@ -14,20 +13,20 @@ from relume.look import Look
 from relume.look.model import PathFilter
 
 ENVIRONMENT, BACKGROUND = "environment", "background"
-_MAX_NAME_LENGTH = 29  # with ".R" the 31 characters that every reader of OpenEXR takes
+_MAX_NAME_LENGTH = 29  # plus ".R", 31 characters, which every OpenEXR reader accepts
 _PATH_KINDS: tuple[PathFilter, ...] = ("direct", "first_bounce", "further_bounces")
 Layering = bool | Literal["light_groups"]
-"""Which layers: none, those of lights and those of paths, or those of both at once."""
+"""Selection of layers: none, those of lights and those of paths, or light groups."""
 
 
 @dataclass(frozen=True)
 class Layer:
-    """A part of a picture.
+    """A layer of an image.
 
     Attributes:
-        name: of the layer in the file: letters, digits and underscores, at most 29 of them.
-        source: what it shows, as the look calls it.
-        look: of which it is the picture.
+        name: in the file: letters, digits and underscores, at most 29.
+        source: light or light path, by its name in the look.
+        look: look that renders the layer.
     """
 
     name: str
@@ -36,11 +35,10 @@ class Layer:
 
 
 def make_layers(layering: Layering, look: Look, *, has_indirect: bool) -> list[Layer]:
-    """The layers that are asked for; none where a ground only catches shadows: what it shows is a ratio, which does not
-    add up.
+    """Make the requested layers; none with a shadow catcher, whose ratio is not additive.
 
     Args:
-        layering: which. look: of which they are parts. has_indirect: whether light between surfaces was baked.
+        layering: selection. look: of the image. has_indirect: the bake has indirect light.
     """
     if not layering or any(material.shadow_catcher for material in look.materials.values()):
         return []
@@ -50,10 +48,10 @@ def make_layers(layering: Layering, look: Look, *, has_indirect: bool) -> list[L
 
 
 def light_and_path_layers(look: Look, *, has_indirect: bool) -> list[Layer]:
-    """One layer for each light that gives any, then one for each kind of light path; none of a group of one.
+    """Make one layer per light with emission, then one per class of light paths; a set of one layer is omitted.
 
     Args:
-        look, has_indirect: as of `make_layers`.
+        look, has_indirect: as in `make_layers`.
     """
     light_looks = _single_light_looks(look)
     unnamed_layers = (
@@ -73,10 +71,10 @@ def light_and_path_layers(look: Look, *, has_indirect: bool) -> list[Layer]:
 
 
 def light_group_layers(look: Look, *, has_indirect: bool) -> list[Layer]:
-    """One layer for each light and each of direct and indirect light; all of them together are the picture.
+    """Make one layer per light for each of direct and indirect light; together they sum to the image.
 
     Args:
-        look, has_indirect: as of `make_layers`.
+        look, has_indirect: as in `make_layers`.
     """
     paths = look.transport.supported_by(has_indirect=has_indirect)
     included: dict[PathFilter, bool] = {"direct": paths.direct, "indirect": paths.has_indirect}
@@ -92,7 +90,7 @@ def light_group_layers(look: Look, *, has_indirect: bool) -> list[Layer]:
 
 @dataclass(frozen=True)
 class _UnnamedLayer:
-    """A layer without its name: `group`, `source` and `ending` are what it is made of."""
+    """A layer whose name is still to be made from `group`, `source` and `ending`."""
 
     group: str
     source: str
@@ -101,7 +99,7 @@ class _UnnamedLayer:
 
 
 def _single_light_looks(look: Look) -> list[tuple[str, Look]]:
-    """Each light that gives any, and the look that it alone lights, before black where the background has a colour."""
+    """Each light with emission, and the look with only this light; its background is black if it was a color."""
     names = [name for name, light in look.lights.items() if any(light.gain)]
     light_looks: list[tuple[str, Look]] = (
         [(ENVIRONMENT, _lit_only_by(look, None))] if any(look.environment.gain) else []
@@ -115,12 +113,12 @@ def _single_light_looks(look: Look) -> list[tuple[str, Look]]:
 
 
 def _background_layers(look: Look) -> list[_UnnamedLayer]:
-    """A background of one colour, which is no light's."""
+    """Layer of a background color, which belongs to no light."""
     return [_UnnamedLayer("light", BACKGROUND, "", _lit_only_by(look, ""))] if look.background.kind == "color" else []
 
 
 def _lit_only_by(look: Look, source: str | None) -> Look:
-    """The look with one of its lights alone; None: its environment."""
+    """Return the look with only one of its lights; None: its environment."""
     lights = {
         name: light.model_copy(update={"enabled": light.enabled and name == source})
         for name, light in look.lights.items()
@@ -138,13 +136,13 @@ def _only_path_kind(look: Look, path_kind: PathFilter) -> Look:
 
 
 def _path_kinds(look: Look) -> list[PathFilter]:
-    """The kinds of light paths that a look shows."""
+    """Classes of light paths in a look."""
     kinds = _PATH_KINDS[: 1 + min(look.transport.bounces, 2)]
     return {"all": list(kinds), "indirect": list(kinds[1:])}.get(look.transport.show, [look.transport.show])
 
 
 def _name_layers(unnamed_layers: list[_UnnamedLayer]) -> list[Layer]:
-    """Layers whose names no program mistakes for each other's, however the lights are called."""
+    """Name layers uniquely, also for readers that ignore case, whatever the names of the lights."""
     layers: list[Layer] = []
     used_names: set[str] = set()
     for unnamed_layer in unnamed_layers:
@@ -163,6 +161,6 @@ def _with_ending(prefix: str, ending: str) -> str:
 
 
 def _ascii_name(name: str) -> str:
-    """The letters and digits of ASCII that are in a name, other characters as single underscores."""
+    """Convert a name to ASCII letters and digits, with single underscores for other characters."""
     ascii_only = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
     return re.sub(r"[^A-Za-z0-9]+", "_", ascii_only).strip("_") or "unnamed"

@@ -1,4 +1,4 @@
-"""What an exported picture says of where it comes from: camera, look, environment, units, scene, bake, version."""
+"""Provenance of an exported image: camera, look, environment, units, scene, bake, version."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from importlib.metadata import version
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.look import Look
@@ -24,11 +25,11 @@ _FLIP_Z = np.diag([1.0, 1.0, -1.0, 1.0])
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a picture comes from.
+    """Source of an image.
 
     Attributes:
         scene, bake: ids.
-        scene_name: that people read.
+        scene_name: for users.
     """
 
     scene: str
@@ -44,15 +45,15 @@ def build_attributes(
     layers: Sequence[Layer],
     space: ExportColorSpace = REC_709_SPACE,
 ) -> dict[str, str | float | F64]:
-    """Attributes of an OpenEXR file; those with a colon are ours, and but for plain text they hold JSON.
+    """Make the attributes of an OpenEXR file; those with a colon are relume's, and hold JSON or plain text.
 
     Args:
-        origin: scene and bake that the picture was made from.
-        camera: of the view that is shown.
+        origin: scene and bake of the image.
+        camera: of the view.
         size: width and height, in pixels.
-        look: that is shown, whole.
-        layers: of the file, besides the picture itself; what each holds is listed by its name.
-        space: that its values are in.
+        look: the complete look.
+        layers: of the file, besides the image itself; their contents are listed by name.
+        space: color space of the values.
     """
     environment = look.environment.map
     camera_document = {"view": camera.name, "to_world": camera.to_world.ravel().tolist(), "yfov": camera.yfov}
@@ -64,7 +65,7 @@ def build_attributes(
         "worldToNDC": world_to_ndc(camera, size),
         "screenWindowWidth": 2 * float(np.tan(camera.yfov / 2)) * size[0] / size[1],
         "relume:camera": _json(camera_document),
-        "relume:look": _json(look.model_dump(mode="json", exclude_unset=True)),  # only grounds may name `catcher`
+        "relume:look": _json(look.model_dump(mode="json", exclude_unset=True)),  # only grounds may have a catcher
         "relume:environment": "of the scene" if environment is None else environment,
         **({} if space is REC_709_SPACE else {"relume:colorSpace": _json(space.name)}),
         "relume:units": UNITS.format(
@@ -77,15 +78,15 @@ def build_attributes(
     }
 
 
-def world_to_camera(camera: Camera) -> F64:
-    """From the world to OpenEXR's camera: left-handed, x right, y up, z the way it looks. A row on the left. (4, 4)"""
+def world_to_camera(camera: Camera) -> Shaped[F64, "4 4"]:
+    """Transform to OpenEXR's camera space, left-handed, x right, y up, z forward. Row vectors multiply on the left."""
     return np.asarray((_FLIP_Z @ np.linalg.inv(camera.to_world)).T)
 
 
-def world_to_ndc(camera: Camera, size: tuple[int, int]) -> F64:
-    """From the world to the picture: after the division (0, 0) is its upper left corner, (1, 1) its lower right one.
+def world_to_ndc(camera: Camera, size: tuple[int, int]) -> Shaped[F64, "4 4"]:
+    """Projection to image space: after division (0, 0) is the upper left corner, (1, 1) the lower right corner.
 
-    A row on the left. (4, 4)
+    Row vectors multiply on the left.
     """
     half_height = np.tan(camera.yfov / 2)
     half_width = half_height * size[0] / size[1]
@@ -94,5 +95,5 @@ def world_to_ndc(camera: Camera, size: tuple[int, int]) -> F64:
 
 
 def _json(value: Mapping[str, Any] | str) -> str:
-    """ASCII alone: readers differ in what they take for text."""
+    """Encode JSON in ASCII, because readers differ in text encodings."""
     return json.dumps(value, separators=(",", ":"))

@@ -1,1 +1,1 @@
-"""Material previews: balls shaded in a fixed light, and the sheet of the library."""
+"""Material previews: spheres in fixed lighting, and the atlas of the library."""

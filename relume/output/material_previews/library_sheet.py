@@ -1,8 +1,8 @@
-"""The library's balls, rendered ahead: one file that comes with the package, a square for each material.
+"""Prerendered previews of the material library: one atlas image in the package, one tile per material.
 
-Rendering one takes half a second and there are hundreds, too long to wait for while looking through them.
-`python -m relume.output.material_previews.library_sheet` renders them all again, which is due when their fits or the
-way balls are lit change.
+Rendering one preview takes half a second, and there are hundreds, too slow for browsing the library.
+`python -m relume.output.material_previews.library_sheet` renders all of them again; run it when the materials or the
+lighting of previews change.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -22,23 +23,23 @@ from relume.look.library import Preset, presets
 from relume.output.material_previews.preview import THUMBNAIL_SIZE, preview_pixels
 
 ATLAS = Path(__file__).with_name("balls.webp")
-_NUM_COLUMNS = 32  # balls in a row
+_NUM_COLUMNS = 32  # previews per row
 _QUALITY = 90
 
 
 def library_preview_png(identity: str) -> bytes | None:
-    """The ball of a library material as a PNG; None where the library has no such material."""
+    """Preview of a library material as a PNG; None if the library has no such material."""
     index = _indices().get(identity)
     return None if index is None else png_bytes(_tile(index))
 
 
-def render(preset: Preset) -> NDArray[np.uint8]:
-    """The ball as the atlas is to show it. (THUMBNAIL_SIZE, THUMBNAIL_SIZE, 3)"""
+def render(preset: Preset) -> Shaped[NDArray[np.uint8], "size size 3"]:
+    """Render the preview of a material, of `THUMBNAIL_SIZE`, for the atlas."""
     return preview_pixels([complete_term(("library", k), term, None) for k, term in enumerate(preset.terms)])
 
 
 def write(path: Path, previews: Sequence[NDArray[np.uint8]]) -> None:
-    """Put balls into one picture, row after row."""
+    """Write previews into one atlas image, row by row."""
     size, rows = THUMBNAIL_SIZE, -(-len(previews) // _NUM_COLUMNS)
     atlas = np.zeros((rows * size, _NUM_COLUMNS * size, 3), np.uint8)
     for index, preview in enumerate(previews):
@@ -65,7 +66,7 @@ def _tile(index: int) -> NDArray[np.uint8]:
 
 
 def main() -> None:
-    """Render all of them."""
+    """Render all previews and write the atlas."""
     library_presets, previews = presets(), []
     for count, preset in enumerate(library_presets, 1):
         previews.append(render(preset))

@@ -1,4 +1,4 @@
-"""A ball of one material in the studio: thumbnails, lit by the machinery that lights pictures."""
+"""Preview of a material: a sphere in the studio environment, lit by the same code as views."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.environments.studio import studio
@@ -26,12 +27,12 @@ F32 = NDArray[np.float32]
 THUMBNAIL_SIZE = 64
 _EXPOSURE = 1.0
 _NUM_LIGHTS = 200
-_SUPERSAMPLING = 2  # samples a pixel, along each side
-_MAX_SIDE_TEXELS = 512  # a side that are read of an image
-_BLURRED_SIDE_TEXELS = 32  # a side that it is blurred to
+_SUPERSAMPLING = 2  # samples per pixel, along each side
+_MAX_SIDE_TEXELS = 512  # maximum side of an image that is read; larger ones are subsampled
+_BLURRED_SIDE_TEXELS = 32  # maximum side after blurring
 NO_IMAGES: Mapping[str, Texture] = MappingProxyType({})
-_BACKGROUND_RADIANCE = 0.05  # radiance around the ball
-_PIXEL = 2 / (_SUPERSAMPLING * THUMBNAIL_SIZE)  # side of one on the texture, a half turn being one
+_BACKGROUND_RADIANCE = 0.05  # around the sphere
+_PIXEL = 2 / (_SUPERSAMPLING * THUMBNAIL_SIZE)  # side of a sample in UV space, where one is half a turn
 _TO_CAMERA = np.array([0.0, 0.0, 1.0], np.float32)
 
 
@@ -40,15 +41,15 @@ def _lights() -> TriangleLights:
     return tessellate_environment(studio().radiance, _NUM_LIGHTS)
 
 
-def render_preview(documents: Sequence[Mapping[str, Any]], size: int, images: Mapping[str, Texture] = NO_IMAGES) -> F32:
-    """Render a ball seen from far away; nothing but itself is there to cast a shadow.
+def render_preview(
+    documents: Sequence[Mapping[str, Any]], size: int, images: Mapping[str, Texture] = NO_IMAGES
+) -> Shaped[F32, "size size 3"]:
+    """Render the linear radiance of a sphere from far away; it only shadows itself.
 
     Args:
-        documents: complete terms; roughness is the same everywhere.
+        documents: complete terms; roughness maps are ignored.
         size: width and height in pixels.
-        images: that terms name as their texture; others show none.
-    Returns:
-        Linear radiance. (size, size, 3) float32
+        images: textures by their names in terms; terms with other textures show none.
     """
     num_samples = _SUPERSAMPLING * size
     across = (np.arange(num_samples) + 0.5) / num_samples * 2.1 - 1.05
@@ -61,13 +62,13 @@ def render_preview(documents: Sequence[Mapping[str, Any]], size: int, images: Ma
 
 def preview_pixels(
     documents: Sequence[Mapping[str, Any]], images: Mapping[str, Texture] = NO_IMAGES
-) -> NDArray[np.uint8]:
-    """A ball as displayed. (THUMBNAIL_SIZE, THUMBNAIL_SIZE, 3)"""
+) -> Shaped[NDArray[np.uint8], "size size 3"]:
+    """Render a preview of `THUMBNAIL_SIZE` as display values."""
     return to_bytes(tone_map(render_preview(documents, THUMBNAIL_SIZE, images), _EXPOSURE, "agx"))
 
 
 def preview_png(documents: Sequence[Mapping[str, Any]], images: Mapping[str, Texture] = NO_IMAGES) -> bytes:
-    """The same as a PNG."""
+    """Render a preview as a PNG."""
     return png_bytes(preview_pixels(documents, images))
 
 
@@ -78,7 +79,7 @@ def _shading_points(x: NDArray[np.float64], y: NDArray[np.float64]) -> ShadingPo
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     visible = np.packbits(normal @ _lights().direction.T > 0, axis=1, bitorder="little")
     points = SurfacePoints(normal, normal, tangent, np.arange(len(x), dtype=np.uint32))
-    # a texture goes round it four times, and is seen the right way up
+    # a texture repeats four times around the sphere, upright
     azimuth, elevation = 2 * np.arctan2(x, normal[:, 2]) / np.pi, 2 * np.arcsin(y) / np.pi
     uv = np.stack([azimuth, -elevation, np.full(len(x), _PIXEL), np.zeros(len(x)), np.ones(len(x))], axis=1)
     return ShadingPoints(points, np.tile(_TO_CAMERA, (len(x), 1)), visible, uv=uv.astype(np.float32))
@@ -103,10 +104,10 @@ def _shade(
 
 
 def _sample_image(image: Texture, uv: F32) -> F32:
-    """The values of an image on a ball, which it goes round as BTFs do; blurred, as a ball is small. (n, 3)
+    """Values of an image on the sphere, mapped like BTFs; blurred, because previews are small. (n, 3)
 
     Args:
-        uv: places in it, in the first two columns. (n, 2 or more)
+        uv: texture coordinates in the first two columns. (n, 2 or more)
     """
     step = -(-max(image.pixels.shape[:2]) // _MAX_SIDE_TEXELS)
     values = decode(image.pixels[::step, ::step], image.encoding)

@@ -74,7 +74,7 @@ def test_colors_outside_the_gamut_are_clamped_with_a_warning(tmp_path):
     ],
 )
 def test_degenerate_primaries_are_rejected_with_a_message(tmp_path, primaries):
-    with pytest.raises(SceneError, match=r"odd primaries .* Rec\. 709"):
+    with pytest.raises(SceneError, match=r"invalid primaries .* Rec\. 709"):
         read_environment(write_map(tmp_path / "a.exr", dusk(), primaries), "dusk")
 
 

@@ -24,7 +24,7 @@ def test_truth_says_how_long_it_takes_and_can_be_stopped_and_gone_on_with(editor
     expect(panel.get_by_role("img", name="Error map")).to_be_visible()
     shown = panel.get_by_role("list", name="What the map shows")
     expect(shown).to_contain_text("The noise of brute force is")
-    expect(shown).to_contain_text("The method leaves out: light that surfaces reflect onto each other")
+    expect(shown).to_contain_text("The method leaves out: indirect light")
     assert ("no difference is found" in shown.inner_text()) != ("of the pixels differ" in shown.inner_text())
     verdicts = panel.get_by_role("list", name="How far it is from brute force")
     both = r"Against all light paths: .*Against the method's light paths: "

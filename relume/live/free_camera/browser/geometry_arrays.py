@@ -69,8 +69,8 @@ def array_factories(transfer: FreeCameraTransfer) -> Mapping[str, Callable[[], T
 
     Returns:
         (texels, 1, 2 or 4) each, float32, float16 or uint32:
-        corners: three corners of each face and its material. sides: two of each face, see `node_arrays`. facing: normals of
-        faces, `uv_scale`. positions: of corners. normals, points, weights: of slots. probe_positions, probe_normals,
+        corners: three corners of each face and its material. sides: two of each face, see `node_arrays`. facing: face
+        normals, `uv_scale`. positions: of corners. normals, points, weights: of slots. probe_positions, probe_normals,
         tangents: of probes. visible_lights: visibility bits of each probe's lights, 128 a texel, needed only for lobes.
         For scenes with textures also: texels; levels: of each texture (row of its first level, number of levels, both
         wrap modes), then of each level (first texel, height, width, 0); uvs: two of each corner, (u, v, sign of the
