@@ -27,14 +27,14 @@ RETIRED_PHRASES = re.compile(
     r"\b("
     r"(?:an|the|moving|each|fixed|free) eyes?|eyes|lamps?|the sky|skies|glimpses?|truths?|finder|leant|suns|caretaker"
     r"|shelf|shelves|oracles?|rungs?|ladder|dormant|untold|parted|panes|rims|moving (?:view|picture|image)s?"
-    r"|straight light|at rest|in hand|at hand|passed on|sent on|thrown by|seen from|is told|are told"
+    r"|straight light|at rest|in hand|at hand|passed on|sent on|thrown by|is told|are told"
     r")\b",
     re.IGNORECASE,
 )
 """What sentences do not say: docstrings, comments, messages, documents and the editor."""
 
 BRITISH = re.compile(
-    r"\b\w*(?:colour|grey|neighbour|centre\b|centred|normalis|initialis|quantis|optimis|recognis|behaviour|favour"
+    r"\b(?!CancelledError)\w*(?:colour|grey|neighbour|centre\b|centred|normalis|initialis|quantis|optimis|recognis|behaviour|favour"
     r"|cancelled|cancelling|labelled|modelled|travell|catalogue|organis|honour|metre\b|metres\b)\w*",
     re.IGNORECASE,
 )
@@ -109,7 +109,8 @@ def read_script(path: Path) -> Iterator[Finding]:
     for line, text in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
         if re.match(r"\s*(import|export \{)", text):
             continue
-        for name in set(re.findall(r"[A-Za-z_]\w*", text)):
+        code = re.sub(r"//.*|/\*.*?\*/|^\s*\*.*|\"[^\"]*\"|`[^`]*`", " ", text)
+        for name in set(re.findall(r"[A-Za-z_]\w*", code)):
             if retired := RETIRED.intersection(words_of(name)):
                 yield Finding("identifier", f"{path}:{line}", f"{name} ({', '.join(sorted(retired))})")
         for name in re.findall(r"\b(?:const|let|function)\s+(\w+)", text):

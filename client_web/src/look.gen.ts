@@ -1,14 +1,14 @@
 // Written by `python -m relume_server.typescript` from the server's models. Do not edit.
 
 
-/** The background: what the camera sees where no surface is; it lights nothing. The map of the environment, the same `blurred` by that many degrees, one `color` (radiance), or nothing. */
+/** The background, visible behind all surfaces; it lights nothing. The environment map, the same `blurred` by an angle in degrees, one `color` (radiance), or transparent. */
 export interface BackgroundLook {
   kind: "map" | "blurred" | "color" | "transparent";
   color: [number, number, number];
   blur: number;
 }
 
-/** Light from infinitely far that travels along `direction`; emission is irradiance across it, W/m². */
+/** Light from infinity that travels along `direction`; emission is irradiance perpendicular to it, W/m². */
 export interface DirectionalLook {
   intensity: number;
   color: [number, number, number];
@@ -18,13 +18,13 @@ export interface DirectionalLook {
   direction: [number, number, number];
 }
 
-/** How radiance becomes a picture: `exposure` in stops, then the tone map, or a view of an OpenColorIO config. */
+/** Conversion from radiance to display: `exposure` in stops, then the tone map or an OpenColorIO view. */
 export interface DisplayLook {
   exposure: number;
   tone_map: "agx" | "filmic" | "none" | OcioView;
 }
 
-/** A curve drawn by hand: `points`, [degrees, value], or `bands`, J values or three times J; or a change to one of them or to what the parameters give: `factors` and `offsets` of bands, `handles`, [degrees, was, becomes]. */
+/** A curve drawn by hand: `points`, [degrees, value], or `bands`, J values for all channels or 3 × J; or a change of that curve or of the generated one: `factors` and `offsets` per band, `handles`, [degrees, was, becomes]. */
 export interface DrawnCurve {
   points?: [number, number][];
   bands?: number[] | number[][];
@@ -34,7 +34,7 @@ export interface DrawnCurve {
   channels?: string;
 }
 
-/** The light around: multiplied by `intensity` and `color`, turned about +Y by `rotation` degrees, counter-clockwise seen from above. `map` names it, see `relume.assets.environments`; None: the scene's own. */
+/** The environment: multiplied by `intensity` and `color`, rotated about +Y by `rotation` degrees, counter-clockwise from above. `map` names it, see `relume.assets.environments`; None: the scene's own. */
 export interface EnvironmentLook {
   map: string | null;
   intensity: number;
@@ -42,7 +42,7 @@ export interface EnvironmentLook {
   rotation: number;
 }
 
-/** A complete, valid look; made by `relume.look.validate`. */
+/** A complete, valid look, made by `relume.look.validate`. */
 export interface Look {
   materials: Record<string, MaterialLook>;
   environment: EnvironmentLook;
@@ -52,14 +52,14 @@ export interface Look {
   display: DisplayLook;
 }
 
-/** A material is the sum of its terms. A `catcher` does not show them: it shows what lies behind it, as dark as its shadows and as bright as what is reflected onto it. `normal_map` stands in the place of the scene's own. */
+/** A material: the sum of its terms. A `shadow_catcher` hides its terms: it shows the background times the ratio of light with and without the objects. `normal_map` replaces the scene's own. */
 export interface MaterialLook {
   terms: TermLook[];
   shadow_catcher?: boolean;
   normal_map?: NormalMapLook | null;
 }
 
-/** All surfaces of a material shine, and are seen to; emission is radiance. */
+/** All surfaces of a material emit and are visible; emission is radiance. */
 export interface MeshLook {
   intensity: number;
   color: [number, number, number];
@@ -69,19 +69,19 @@ export interface MeshLook {
   material: string;
 }
 
-/** An image in the place of a material's normal map: "image:<id>", and how strong its bumps are, as `scale` of glTF. */
+/** An uploaded image that replaces a material's normal map: "image:<id>", and its strength as glTF's `scale`. */
 export interface NormalMapLook {
   image: string;
   scale?: number;
 }
 
-/** A view of a display of the server's OpenColorIO config, in the place of a tone map. */
+/** A view of a display of the server's OpenColorIO config, instead of a tone map. */
 export interface OcioView {
   display: string;
   view: string;
 }
 
-/** Shines alike in all directions; emission is radiant intensity, W/sr. */
+/** A point light that emits equally in all directions; emission is radiant intensity, W/sr. */
 export interface PointLook {
   intensity: number;
   color: [number, number, number];
@@ -91,7 +91,7 @@ export interface PointLook {
   position: [number, number, number];
 }
 
-/** Shines to the side that `direction` points to; emission is radiance. The camera does not see it. `rotation` turns it about `direction`, degrees; at 0 its height lies in the plane of `direction` and +Y, or +Z where `direction` is vertical. `size`: width and height, metres. */
+/** A rectangular area light that emits toward `direction`; emission is radiance. The camera does not see it. `rotation` rotates it about `direction`, degrees; at 0 its height lies in the plane of `direction` and +Y, or of +Z if `direction` is vertical. `size`: width and height, meters. */
 export interface RectangleLook {
   intensity: number;
   color: [number, number, number];
@@ -104,7 +104,7 @@ export interface RectangleLook {
   size: [number, number];
 }
 
-/** A point that shines into a cone of half-angles inner and outer, degrees; emission is W/sr along the axis. */
+/** A point light with inner and outer cone half-angles in degrees; emission is intensity on the axis, W/sr. */
 export interface SpotLook {
   intensity: number;
   color: [number, number, number];
@@ -116,7 +116,7 @@ export interface SpotLook {
   cone: [number, number];
 }
 
-/** One term: colour · texture · quotient · Π curves; drawn curves stand in for those that `params` would give. `data` names the measured material, for models that need one and for no other. `roughness_map`: what scales the width of the term: "roughness", the material's own map where it has one, or "image:<id>", one that was sent; null: nothing. `texture` names one of the material's own images by its channel, or one that was sent. */
+/** One term: color · texture · quotient · Π curves. Drawn curves replace those generated from `params`. `data`: name of the measured material, only for models that need one. `roughness_map`: scales the width of the highlight: "roughness" for the material's own map, "image:<id>" for an uploaded one, null for none. `texture`: a texture channel of the material, or an uploaded image. */
 export interface TermLook {
   model: string;
   data?: string;
@@ -127,7 +127,7 @@ export interface TermLook {
   curves: Record<string, DrawnCurve | DrawnCurve[]>;
 }
 
-/** Which light is shown: `bounces` reflections between surfaces at most, and of such paths all, those without any, those with any, those with one, or those with more. */
+/** Light paths to show: all, direct, indirect, first bounce or further bounces, with at most `bounces` bounces. */
 export interface TransportLook {
   show: "all" | "direct" | "indirect" | "first_bounce" | "further_bounces";
   bounces: number;

@@ -295,7 +295,7 @@ export interface BakeBody {
   user: string;
   created: string;
   scene: string;
-  state: "queued" | "running" | "ready" | "failed" | "cancelled";
+  state: "queued" | "running" | "ready" | "failed" | "canceled";
   progress: number;
   phase: "starting" | "loading" | "reading" | "building" | "compiling" | "sampling" | "tracing" | "publishing" | null;
   phase_seconds: number | null;

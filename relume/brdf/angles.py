@@ -12,7 +12,7 @@ import numba as nb
 import numpy as np
 
 from relume.brdf.term import Angle
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.math.fast_math import acos_clamped
 
 _HALF_PI = np.float32(math.pi / 2)
@@ -32,7 +32,7 @@ TILT_X = np.int64(Angle.TILT_X)
 TILT_Y = np.int64(Angle.TILT_Y)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def fast_pow(x, exponent):  # type: ignore[no-untyped-def]
     """x ** exponent for x in (0, 1] and exponent in [0, 1], relative error below 2e-6.
 
@@ -61,7 +61,7 @@ def fast_pow(x, exponent):  # type: ignore[no-untyped-def]
     return e * np.int32((k + np.int32(127)) << np.int32(23)).view(np.float32)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def angle_at(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """γ of one pair of directions, in radians.
 
@@ -99,7 +99,7 @@ def angle_at(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     return acos_clamped(fast_pow(cos_theta_h, power))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def compute_angles(kind, scale, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-untyped-def]
     """γ · scale for many directions wi and one wo.
 
@@ -142,7 +142,7 @@ def compute_angles(kind, scale, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no
             out[k] = scale * angle_at(THETA_O, ix[k], iy[k], iz[k], ox, oy, oz)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def compute_alpha_beta(scale, ix, iy, iz, ox, oy, oz, alpha, beta):  # type: ignore[no-untyped-def]
     """γα and γβ times scales, for many directions wi and one wo, with one power: cos γα · cos γβ = cos θh.
 

@@ -10,7 +10,7 @@ from typing import Any
 import numba as nb
 import numpy as np
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 
 # Cosines below this are within 2e-4 degrees of the horizon. Quotients divide by them; the inverse square, 1e12, stays
 # finite in float32.
@@ -19,7 +19,7 @@ MIN_COSINE = np.float32(1e-6)
 ZERO, ONE, TWO, HALF = np.float32(0), np.float32(1), np.float32(2), np.float32(0.5)
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def half_vector_cosines(wi_x, wi_y, wi_z, wo_x, wo_y, wo_z):  # type: ignore[no-untyped-def]
     """Cosines cos θh = n·h and cos θd = wo·h = |wi + wo| / 2 of unit directions above the horizon.
 

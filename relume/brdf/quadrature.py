@@ -22,7 +22,7 @@ from relume.brdf.curves import curve_values
 from relume.brdf.evaluate import angles_numpy
 from relume.brdf.registry import TERMS
 from relume.brdf.term import F64, Angle
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 
 F32 = NDArray[np.float32]
 Fixed = tuple[tuple[str, float | str], ...]  # from `Term.fixed_values`
@@ -93,7 +93,7 @@ def _quotient(pairs: Quadrature, model: str, fixed: Fixed) -> F64:
     return np.ascontiguousarray(values, np.float64).reshape(len(values), -1)
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, error_model="numpy", **NO_REFCOUNT)
 def _multiply(positions, values, out):  # type: ignore[no-untyped-def]
     """Multiply each pair by a curve, with linear interpolation."""
     for n in range(out.shape[0]):

@@ -140,7 +140,7 @@ def is_radiance_edge(
 def is_partial_coverage(
     geometry: SceneBuffers, origin: Shaped[F32, " 3"], directions: Shaped[F32, "n 3"]
 ) -> Shaped[NDArray[np.bool_], " n"]:
-    """True for rays that meet a blended surface first. geometry: the triangles. origin, directions: of the rays, unit"""
+    """True for rays that meet a blended surface first. geometry: the triangles. origin, directions: unit"""
     any_hit, opaque_hit = (
         trace_rays(geometry.embree, origin, directions, alpha_sample).face
         for alpha_sample in (STOP_AT_PARTIAL, STOP_AT_OPAQUE)

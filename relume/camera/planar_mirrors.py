@@ -15,7 +15,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.camera.specular_hits import is_mirror_material
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.raytrace.barycentric import positions_on_faces
 from relume.raytrace.camera_rays import trace_rays
@@ -152,7 +152,7 @@ def mirrored_lights(normal: Shaped[F32, "P 3"], directions: Shaped[F32, "T 3"]) 
     return np.asarray(directions[None] - twice_cosine[..., None] * normal[:, None], np.float32)
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _mark_candidates(position, normal, mirrors, mirrored_directions, start, stop, is_candidate):  # type: ignore[no-untyped-def]
     """Mark lights whose path from points [start, stop) crosses a plane within the mirrors. is_candidate: (n, P T)"""
     planes, offset, axes, low, high = mirrors

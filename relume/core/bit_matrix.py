@@ -5,12 +5,12 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 
 WORD_BITS = 64  # points per word
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _transpose_bits(words):  # type: ignore[no-untyped-def]
     """Let bit j of word k become bit k of word j by swapping halves recursively. words: (64,)"""
     size, low = 32, np.uint64(0xFFFFFFFF)

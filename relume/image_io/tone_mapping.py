@@ -16,7 +16,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import ParameterError, ShapeMismatchError
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges
 from relume.image_io.ocio.active_config import require_config
 from relume.image_io.ocio.view import OcioView
@@ -49,7 +49,7 @@ _AGX_MIN_EV, _AGX_RANGE_EV = np.float32(-12.47393), np.float32(4.026069 + 12.473
 _MIN_RADIANCE = np.float32(1e-10)  # has a logarithm, and lies below _AGX_MIN_EV
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _agx_curve(v):  # type: ignore[no-untyped-def]
     x = min(max((math.log2(max(v, _MIN_RADIANCE)) - _AGX_MIN_EV) / _AGX_RANGE_EV, _ZERO), _ONE)
     p = np.float32(15.5) * x - np.float32(40.14)
@@ -60,7 +60,7 @@ def _agx_curve(v):  # type: ignore[no-untyped-def]
     return p * x - np.float32(0.00232)
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _srgb(v):  # type: ignore[no-untyped-def]
     v = min(max(v, _ZERO), _ONE)
     if v <= np.float32(0.0031308):
@@ -68,7 +68,7 @@ def _srgb(v):  # type: ignore[no-untyped-def]
     return np.float32(1.055) * v ** np.float32(1 / 2.4) - np.float32(0.055)
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _filmic(x):  # type: ignore[no-untyped-def]
     above = x * (np.float32(2.51) * x + np.float32(0.03))
     return above / (x * (np.float32(2.43) * x + np.float32(0.59)) + np.float32(0.14))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.core.color import luminance
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.lights.sphere_tiles import SOLID_ANGLE_EXPONENT, UNIFORM_FRACTION, Tiles
 from relume.lights.spherical_triangles import TriangleLights, TriangleSubset, merge_groups
 from relume.lights.tile_hierarchy import highest_ancestors, sum_inner_nodes
@@ -81,7 +81,7 @@ def visible_fraction(visible, group, fraction, start, stop, visible_fractions): 
                 visible_fractions[cluster, p] += np.float32((bits[p] >> shift) & np.uint8(1)) * part_fraction
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def weight_by_visibility(first, light, visible_fractions, shading):  # type: ignore[no-untyped-def]
     """Multiply the shading of listed merged lights by their visible fractions.
 

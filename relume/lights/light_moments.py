@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 
 F64 = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ class LightTexels(NamedTuple):
         return np.asarray(np.bincount(self.tile, values, num_tiles), np.float64)
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, error_model="numpy", **NO_REFCOUNT)
 def _sum_moments(tile, luminous, directions, solid_angles, fitted_index, inverse_light, mean, frames, out):  # type: ignore[no-untyped-def]
     """Sum w x, w x xᵀ and w Ω of the texels of each fitted tile. out: added to. (F, 6)"""
     for n in range(tile.shape[0]):

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from relume.assets.environments.equirect import texel_directions, texel_solid_angles
 from relume.core.color import luminance
 from relume.core.errors import PlanError
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 
 F32 = NDArray[np.float32]
@@ -152,7 +152,7 @@ def _middle_edges(corners: F64) -> F64:
     return np.cross(middles, middles[:, (2, 0, 1)])
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _child(d, edges):  # type: ignore[no-untyped-def]
     """Return the child that contains a direction: 0, 1, 2 at the corners, 3 in the middle.
 
@@ -165,7 +165,7 @@ def _child(d, edges):  # type: ignore[no-untyped-def]
     return 3
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _locate(directions, edges, children, start, stop, tile_index):  # type: ignore[no-untyped-def]
     for n in range(start, stop):
         d = directions[n]
@@ -175,7 +175,7 @@ def _locate(directions, edges, children, start, stop, tile_index):  # type: igno
         tile_index[n] = -1 - node
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _find_children(texels, directions, edges, child_index):  # type: ignore[no-untyped-def]
     for k in range(texels.shape[0]):
         child_index[k] = _child(directions[texels[k]], edges)

@@ -20,7 +20,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -108,7 +108,7 @@ def project(wi: Shaped[F64, "*batch 3"]) -> Shaped[F64, "*batch K"]:
     return out * (wi[..., 2:] > 0)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def accumulate(table, num, columns, out):  # type: ignore[no-untyped-def]
     """Add the light of rays to a point's incident radiance coefficients, t_k += Σ w h_k(ωi).
 
@@ -144,7 +144,7 @@ def accumulate(table, num, columns, out):  # type: ignore[no-untyped-def]
             _add(num, columns, _IM, table.norm[row], table.sine[row], out)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def evaluate_basis(table, num, wi, scratch, out):  # type: ignore[no-untyped-def]
     """Evaluate all basis functions for some rays.
 

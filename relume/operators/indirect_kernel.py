@@ -7,7 +7,7 @@ import math
 import numba as nb
 import numpy as np
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.patches.patch_kdtree import NO_PATCH
 
 BLOCK_SAMPLES = 64
@@ -38,7 +38,7 @@ def number_patches(gather_hits, start, stop, patch_row):  # type: ignore[no-unty
     return patches
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
 def sum_by_patch(gather_hits, start, stop, patch_row, weight, sums):  # type: ignore[no-untyped-def]
     """Add the weights of the rays of samples [start, stop) to the patches that they hit.
 
@@ -164,7 +164,7 @@ def apply_rows(coefficients, scale, rows, light, start, stop, unfiltered):  # ty
             unfiltered[first + s, 0], unfiltered[first + s, 1], unfiltered[first + s, 2] = red[s], green[s], blue[s]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
 def add_filtered(first, neighbors, weight, unfiltered, start, stop, image):  # type: ignore[no-untyped-def]
     """Add filtered samples to samples [start, stop) of an image.
 

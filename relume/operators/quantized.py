@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.operators.operator import Operator
 from relume.operators.update_kernel import Columns, changed_columns, tile_offset
@@ -69,7 +69,7 @@ def quantize(
     return np.rint(rows * inverse_scale[:, None]).clip(-_MAX_CODE, _MAX_CODE).astype(np.int16), scale
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _stream(transport, scale, bounds, index, change, count, image, start, stop):  # type: ignore[no-untyped-def]
     """Add the changed columns of planes [start, stop), a plane being a channel of a tile; four columns at a time."""
     samples = image.shape[2]

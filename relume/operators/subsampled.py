@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.operators.linear_operator import LinearOperator, quantized_bytes
 from relume.operators.operator import Operator
@@ -79,7 +79,7 @@ def subsampled_bytes(num_samples: int, num_subset: int, num_bands: int) -> int:
     return quantized_bytes(num_subset, num_bands) + num_samples * _NEIGHBOR_BYTES
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _interpolate(rows, neighbors, weight, image, start, stop):  # type: ignore[no-untyped-def]
     """Interpolate tiles [start, stop) of an image and add them."""
     samples, num = image.shape[2], neighbors.shape[1]

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 
 F32 = NDArray[np.float32]
@@ -59,7 +59,7 @@ def tile_offset(bounds, level, tile, samples):  # type: ignore[no-untyped-def]
     return max(bounds[level] - tile * samples, 0), min(bounds[level + 1] - tile * samples, samples)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _stream(transport, bounds, index, change, count, image, start, stop):  # type: ignore[no-untyped-def]
     """Add the changed columns of planes [start, stop), a plane being a channel of a tile.
 

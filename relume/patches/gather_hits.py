@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges
 from relume.patches.patch_kdtree import NO_PATCH_NODE, PatchTree, locate
 from relume.raytrace.embree import intersect, packet_arguments
@@ -49,7 +49,7 @@ class GatherHits:
     trace_s: float
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _load_points(points, wo, pattern, first, width, packet, frame, local_wo, offsets):  # type: ignore[no-untyped-def]
     """Load points [first, first + width): ray origins, local frames, offsets; one lane each.
 
@@ -71,7 +71,7 @@ def _load_points(points, wo, pattern, first, width, packet, frame, local_wo, off
             offsets[0, m, k], offsets[1, m, k] = cosine_offset[m], glossy_offset[m]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
 def _aim(pattern, ray, frame, local_wo, offsets, packet, width):  # type: ignore[no-untyped-def]
     """Generate the same ray of all lanes; return the number of rays above their horizon."""
     pattern_ray, is_cosine = pattern.rays[ray], ray < pattern.num_cosine
@@ -93,7 +93,7 @@ def _aim(pattern, ray, frame, local_wo, offsets, packet, width):  # type: ignore
     return num_valid
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
 def _locate_hits(packet, surfaces, tree, keys, nodes):  # type: ignore[no-untyped-def]
     """Find the patches hit by the rays of all lanes, into nodes. (`LANES`,) int32. keys: scratch. (6, `LANES`)"""
     normals, sides, roots = surfaces[0], surfaces[1], tree.roots

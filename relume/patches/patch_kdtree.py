@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.raytrace.ray_packet import LANES
 
 F32 = NDArray[np.float32]
@@ -44,7 +44,7 @@ class PatchTree(NamedTuple):
     roots: Shaped[I32, " sides"]
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def locate(tree, keys, nodes):  # type: ignore[no-untyped-def]
     """Find the patches of `LANES` points; interleaves the lookups to hide memory latency.
 

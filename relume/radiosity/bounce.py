@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges, parallel_for_chunks
 from relume.lights.spherical_triangles import TriangleLights
 from relume.patches.patch_kdtree import NO_PATCH
@@ -26,7 +26,7 @@ _PREVIEW_BOUNCES = 6  # the error in a Cornell box is then a thousandth
 _MAX_BOUNCE_RATIO = 0.999
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
 def _irradiance(normal, visible, directions, normal_irradiance, start, stop, out):  # type: ignore[no-untyped-def]
     for p in range(start, stop):
         red = green = blue = 0.0

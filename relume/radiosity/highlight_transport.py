@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges
 from relume.lights.spherical_triangles import TriangleLights
 from relume.math.direction_grid import (
@@ -114,7 +114,7 @@ def _are_parallel(normals):  # type: ignore[no-untyped-def]
     return True
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _add_triangles(frames, normals, visible, direction, irradiance, bins):  # type: ignore[no-untyped-def]
     """Add the light triangles that are visible from the points of patches to bins.
 
@@ -143,7 +143,7 @@ def _add_triangles(frames, normals, visible, direction, irradiance, bins):  # ty
                     bins[g, reflection, b, channel] += point_weight * num_visible * cosine * irradiance[m, channel]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _add_ray_list(frames, points, first, wi, irradiance, bins):  # type: ignore[no-untyped-def]
     """Add listed rays, weighted by the cosine, to bins. points: of the patches. wi: (3, K) local"""
     num_points = points.normal.shape[0] // bins.shape[0]

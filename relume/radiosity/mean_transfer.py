@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.math.direction_grid import SIDE
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.transport.direction_bins import DirectionBins
@@ -16,7 +16,7 @@ from relume.transport.outgoing_patch_light import bin_means
 F32 = NDArray[np.float32]
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, error_model="numpy", **NO_REFCOUNT)
 def _count(gather_hits, bins, counts):  # type: ignore[no-untyped-def]
     """Count rays by the patch that they hit and their direction bin there. counts: (C, SIDE²)"""
     for p in range(gather_hits.shape[0]):

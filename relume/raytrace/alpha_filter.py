@@ -21,7 +21,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from relume.core.color import LUMINANCE
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.raytrace.alpha_test import GLASS_RULE, MAX_TINTS, AlphaMasks, tint_groups
 from relume.raytrace.texture import two_texels
 
@@ -131,7 +131,7 @@ _to_pointer: Any = intrinsic(_cast)  # makes an address (int64) a pointer
 _array: Any = nb.carray  # type: ignore[attr-defined]  # an array over the memory at a pointer
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, error_model="numpy", **NO_REFCOUNT)
 def _opacity(image, texels, u, v):  # type: ignore[no-untyped-def]
     """Bilinear lookup of the opacity. image: row of `AlphaMasks.images`. u, v: v from the top"""
     first, height, width = image[0], image[1], image[2]
@@ -144,7 +144,7 @@ def _opacity(image, texels, u, v):  # type: ignore[no-untyped-def]
     return ((unity - y) * top + y * bottom) / np.float32(255)
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, error_model="numpy", **NO_REFCOUNT)
 def _hash_bits(bits):  # type: ignore[no-untyped-def]
     """Mix the bits of a word (the finalizer of MurmurHash3). uint32"""
     bits = np.uint32((bits ^ (bits >> np.uint32(16))) * np.uint32(0x85EBCA6B))  # a product of two has 64 bits
@@ -152,7 +152,7 @@ def _hash_bits(bits):  # type: ignore[no-untyped-def]
     return np.uint32(bits ^ (bits >> np.uint32(16)))
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, error_model="numpy", **NO_REFCOUNT)
 def _alpha_sample(alpha_sample, face, sheet, x, y, z, is_back_face):  # type: ignore[no-untyped-def]
     """Alpha sample in (0, 1) of a ray at a blended surface: the given one, or a hash of its direction (x, y, z).
 

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges, num_threads, parallel_for_chunks
 from relume.raytrace.embree import EmbreeScene, intersect, packet_arguments
 from relume.raytrace.ray_packet import (
@@ -130,7 +130,7 @@ def camera_directions(
     return out
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _aim(rotation, half_width, half_height, width, height, x, y, start, stop, out):  # type: ignore[no-untyped-def]
     """Compute directions [start, stop) in float64: pixels of wide images are 1e-4 apart."""
     for r in range(start, stop):

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges
 from relume.raytrace.barycentric import EDGE_OFFSET_FRACTION
 from relume.raytrace.camera_rays import Hits
@@ -45,7 +45,7 @@ def _flip(v, is_flipped):  # type: ignore[no-untyped-def]
     return (-v[0], -v[1], -v[2]) if is_flipped else (v[0], v[1], v[2])
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _inner_barycentrics(uv, edges, twice_area, epsilon):  # type: ignore[no-untyped-def]
     """Move barycentric coordinates off edges; see `relume.raytrace.barycentric`. edges: opposite to corners"""
     per_area = 1 / max(twice_area, 1e-20)
@@ -56,7 +56,7 @@ def _inner_barycentrics(uv, edges, twice_area, epsilon):  # type: ignore[no-unty
     return a / total, b / total, c / total
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _normals(positions, normals, faces, face, uv, directions, epsilon, start, stop, out):  # type: ignore[no-untyped-def]
     """Compute the normals at hits [start, stop). out: output. (n, 3) float32"""
     for k in range(start, stop):

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges
 from relume.lights.light_sampling import LightStrata
 from relume.lights.local_lights import LocalLight, light_sample
@@ -149,7 +149,7 @@ def trace_light_visibility(
     return bits
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _sum_irradiance(light, strata, points, visible, start, stop, irradiance):  # type: ignore[no-untyped-def]
     """Add the irradiance of points [start, stop) from visible samples to `irradiance`. (n,)"""
     position, normal, _, seed, _ = points

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.lights.light_sampling import LightStrata
 from relume.lights.local_lights import LocalLight, light_sample
@@ -57,7 +57,7 @@ def is_seed_sample(k):  # type: ignore[no-untyped-def]
     return k & 3 == (k >> 2) & 3
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _flush(occluded, packet, num_waiting, visible):  # type: ignore[no-untyped-def]
     """Trace the rays in the first lanes; returns the number of rays that reach the light."""
     enable_first_lanes(packet, num_waiting)
@@ -70,7 +70,7 @@ def _flush(occluded, packet, num_waiting, visible):  # type: ignore[no-untyped-d
     return num_visible
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _trace_points(occluded, packet, position, alpha_sample, first, width, rays, contribution, are_seeds, visible):  # type: ignore[no-untyped-def]
     """Trace the rays with a contribution from the seed points of a block, or from its other points.
 
@@ -95,7 +95,7 @@ def _trace_points(occluded, packet, position, alpha_sample, first, width, rays, 
     return num_rays, num_visible
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _aim(light, strata, surface_offset, points, first, width, rays, contribution):  # type: ignore[no-untyped-def]
     """Aim the rays of a block's points, `BLOCK` rays per sample: direction and end, and w · cos θi."""
     position, normal, _, seed, _ = points

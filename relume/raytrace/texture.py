@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges
 from relume.scene.model import WRAPS, Texture
 from relume.scene.texture_encoding import ROWS_PER_BATCH, decode, periodic
@@ -117,7 +117,7 @@ def _halve(image: F32) -> F32:
     )
 
 
-@nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, forceinline=True, **NO_REFCOUNT)
 def _texel(wrap, index, size):  # type: ignore[no-untyped-def]
     """Map a texel's index into an image with mirrored repeat, or clamp it."""
     if wrap == _CLAMP:
@@ -126,7 +126,7 @@ def _texel(wrap, index, size):  # type: ignore[no-untyped-def]
     return min(folded, 2 * size - 1 - folded)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def two_texels(wrap, coordinate, size):  # type: ignore[no-untyped-def]
     """Find two adjacent texels for linear interpolation along one side of an image, and the weight of the second.
 

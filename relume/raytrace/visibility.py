@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges, parallel_for_chunks
 from relume.raytrace.embree import EmbreeScene, occluded, packet_arguments
 from relume.raytrace.ray_packet import (
@@ -122,7 +122,7 @@ def trace_visibility(
     return VisibilityBits(bits, sum(counts), time.perf_counter() - start_time)
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _select_bits(visible, rows, lights, start, stop, out):  # type: ignore[no-untyped-def]
     for i in range(start, stop):
         for k in range(len(lights)):

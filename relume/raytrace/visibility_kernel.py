@@ -21,7 +21,7 @@ from numba.cpython.unsafe.numbers import trailing_zeros
 from numpy.typing import NDArray
 
 from relume.core.bit_matrix import WORD_BITS, words_to_rows
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.raytrace.ray_packet import (
     FAR,
     LANES,
@@ -92,7 +92,7 @@ def _new_level(num_lights):  # type: ignore[no-untyped-def]
     )
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _flush(occluded, packet, block, num_waiting):  # type: ignore[no-untyped-def]
     """Trace the rays in the first lanes. A lane's owner: its light, then its sample in the lowest six bits."""
     if num_waiting == 0:
@@ -105,7 +105,7 @@ def _flush(occluded, packet, block, num_waiting):  # type: ignore[no-untyped-def
             block.visibility_bits[owner >> _BLOCK_BITS] |= np.uint64(1) << np.uint64(owner & (BLOCK - 1))
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _trace(occluded, packet, block, origins, directions, lights, samples):  # type: ignore[no-untyped-def]
     """Trace lights against masks of samples, only those above the horizon and not yet traced; counts the rays."""
     facing, traced = block.facing_bits, block.traced_bits
@@ -157,7 +157,7 @@ def _find_facing(normals, directions, block):  # type: ignore[no-untyped-def]
     return np.int64(count)
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _farthest(origins, start, stop, x, y, z):  # type: ignore[no-untyped-def]
     """Find the sample of [start, stop) that is farthest from a point."""
     max_squared, farthest = np.float32(-1), start
@@ -168,7 +168,7 @@ def _farthest(origins, start, stop, x, y, z):  # type: ignore[no-untyped-def]
     return farthest
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _center(origins, start, stop):  # type: ignore[no-untyped-def]
     """Average the positions [start, stop)."""
     x, y, z = np.float32(0), np.float32(0), np.float32(0)
@@ -180,7 +180,7 @@ def _center(origins, start, stop):  # type: ignore[no-untyped-def]
     return x * inverse_count, y * inverse_count, z * inverse_count
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _far_samples(origins, start, stop):  # type: ignore[no-untyped-def]
     """Choose two samples of [start, stop) far apart, as a mask."""
     x, y, z = _center(origins, start, stop)
@@ -189,7 +189,7 @@ def _far_samples(origins, start, stop):  # type: ignore[no-untyped-def]
     return np.uint64(1) << np.uint64(first) | np.uint64(1) << np.uint64(second)
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _mask(start, stop):  # type: ignore[no-untyped-def]
     """Set bits [start, stop) of a word."""
     mask = np.uint64(0)
@@ -198,7 +198,7 @@ def _mask(start, stop):  # type: ignore[no-untyped-def]
     return mask
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _predict(facing_bits, traced_bits, visible_bits):  # type: ignore[no-untyped-def]
     """Predict the visibility on which all traced samples of a region agree."""
     traced = facing_bits & traced_bits
@@ -209,7 +209,7 @@ def _predict(facing_bits, traced_bits, visible_bits):  # type: ignore[no-untyped
     return _LIT if visible_bits & traced else _HIDDEN
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _is_contradicted(traced_bits, visible_bits, prediction):  # type: ignore[no-untyped-def]
     """True if a traced sample contradicts the prediction."""
     return (prediction == _LIT and ~visible_bits & traced_bits != 0) or (
@@ -217,7 +217,7 @@ def _is_contradicted(traced_bits, visible_bits, prediction):  # type: ignore[no-
     )
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _init_level(block, region, previous_level, level):  # type: ignore[no-untyped-def]
     """Copy the predictions of the previous level, and queue its doubtful lights. Returns the length of the queue."""
     queue_length = 0
@@ -231,7 +231,7 @@ def _init_level(block, region, previous_level, level):  # type: ignore[no-untype
     return queue_length
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _update_predictions(block, region, lights, previous_level, level, start, stop):  # type: ignore[no-untyped-def]
     """Update predictions of queue entries [start, stop); append the neighbors of wrong predictions to the queue."""
     first, index = lights
@@ -254,7 +254,7 @@ def _update_predictions(block, region, lights, previous_level, level, start, sto
     return queue_length
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _flood(occluded, packet, block, positions, lights, region, samples, previous_level, level):  # type: ignore[no-untyped-def]
     """Trace `samples` against lights that `previous_level` doubts, then against neighbors of wrong predictions.
 
@@ -270,7 +270,7 @@ def _flood(occluded, packet, block, positions, lights, region, samples, previous
     return num_rays
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _mark_doubtful(level, lights):  # type: ignore[no-untyped-def]
     """Mark traced lights that are unknown, strong, or predicted differently from an adjacent light."""
     _, first, index, strong = lights
@@ -285,7 +285,7 @@ def _mark_doubtful(level, lights):  # type: ignore[no-untyped-def]
             level.is_doubtful[light] = is_doubtful
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _check_predictions(occluded, packet, block, positions, lights, region, start, salt, level):  # type: ignore[no-untyped-def]
     """Trace a few predicted samples; lights with errors become doubtful. Returns the numbers of rays and errors."""
     origins, (directions, _, _, _) = positions, lights
@@ -315,7 +315,7 @@ def _check_predictions(occluded, packet, block, positions, lights, region, start
     return num_rays, num_wrong
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _accept_predictions(block, region, level):  # type: ignore[no-untyped-def]
     """Set the visibility bits of untraced samples to the predictions."""
     for light in range(level.prediction.shape[0]):
@@ -323,7 +323,7 @@ def _accept_predictions(block, region, level):  # type: ignore[no-untyped-def]
             block.visibility_bits[light] |= block.facing_bits[light] & ~block.traced_bits[light] & region
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _trace_quarter(occluded, packets, block, positions, lights, span, salt, levels, counts):  # type: ignore[no-untyped-def]
     """Trace samples `span` of a block: two of them, then all of them for doubtful lights; then check."""
     (packet, coherent_packet), (block_level, quarter_level, sample_level) = packets, levels

@@ -10,14 +10,14 @@ import math
 import numba as nb
 
 from relume.brdf.term import Angle
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 
 _THETA_I, _THETA_H, _THETA_D = int(Angle.THETA_I), int(Angle.THETA_H), int(Angle.THETA_D)
 _THETA_R, _ALPHA, _LOBE = int(Angle.THETA_R), int(Angle.ALPHA), int(Angle.LOBE)
 _TILT_X, _TILT_Y = int(Angle.TILT_X), int(Angle.TILT_Y)
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def list_visible(normal, tangent, wo, visible, directions, wi, light):  # type: ignore[no-untyped-def]
     """Directions of the lights that are visible from a point, in its frame x = tangent, y = n × t, z = n.
 
@@ -49,7 +49,7 @@ def list_visible(normal, tangent, wo, visible, directions, wi, light):  # type: 
     return num, ox, oy, oz
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _angle(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """γ in radians, as `relume.brdf.evaluate.angles_numpy` defines it; wo is multiplied by the curve's axes."""
     if kind == _THETA_I:
@@ -74,7 +74,7 @@ def _angle(kind, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     return math.acos(cos_theta_h**power)
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _read(table, position, is_stepped):  # type: ignore[no-untyped-def]
     """Look up a table at a fractional index: linear between entries, or constant up to the next one."""
     step = min(int(position), table.shape[0] - 2)
@@ -84,7 +84,7 @@ def _read(table, position, is_stepped):  # type: ignore[no-untyped-def]
     return (1.0 - upper) * table[step] + upper * table[step + 1]
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def add_lights(angles, axes, tables, is_stepped, is_gray, light, num, wi, ox, oy, oz, shading, power, out):  # type: ignore[no-untyped-def]
     """Add Σ power · shading · Π curves over the listed lights, per channel, to out (3,).
 

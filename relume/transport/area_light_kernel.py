@@ -12,7 +12,7 @@ from typing import Any
 import numba as nb
 import numpy as np
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.lights.light_sampling import NOT_FLAT_RADIUS
 from relume.lights.local_lights import light_sample
 from relume.raytrace.gather_rays import cranley_patterson_offset
@@ -42,7 +42,7 @@ def _count_visible(bits, first, count):  # type: ignore[no-untyped-def]
     return num_visible
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _make_square(x, y, z, nx, ny, nz, half, corner):  # type: ignore[no-untyped-def]
     """Center a square at a point, perpendicular to a normal. half: half its side. corner: written. (4, 3)"""
     length = math.sqrt(max(nx * nx + nz * nz, ny * ny + nz * nz))
@@ -56,13 +56,13 @@ def _make_square(x, y, z, nx, ny, nz, half, corner):  # type: ignore[no-untyped-
         corner[k, 0], corner[k, 1], corner[k, 2] = x + s * ex + t * fx, y + s * ey + t * fy, z + s * ez + t * fz
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _unit(x, y, z):  # type: ignore[no-untyped-def]
     inverse = _ONE / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-30)))
     return x * inverse, y * inverse, z * inverse
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _triangle_nodes(corner, second, node):  # type: ignore[no-untyped-def]
     """Compute the directions of a triangle's corners (0, `second` and the next of four) and of its edge midpoints.
 
@@ -84,7 +84,7 @@ def _triangle_nodes(corner, second, node):  # type: ignore[no-untyped-def]
         node[3 + k, 0], node[3 + k, 1], node[3 + k, 2] = _unit(x, y, z)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _radius(x, y, z, node):  # type: ignore[no-untyped-def]
     """Return the angle from a direction to the farthest corner of a triangle."""
     max_squared = _ZERO

@@ -18,7 +18,7 @@ import numpy as np
 from llvmlite import ir
 from numba.core import types
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.simd import (
     FAST,
     FLOAT,
@@ -40,7 +40,7 @@ _ONE = np.float32(1)
 _CLOSE = np.float32(1e-4)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def overlap(a, b, c):  # type: ignore[no-untyped-def]
     """Return the parameters of the cumulative area of a triangle with the angles a, b, c at its corners, in bands.
 

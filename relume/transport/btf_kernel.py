@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from relume.assets.btf.direction_rings import interpolation_weights
 from relume.assets.btf.parallax import compute_shear, compute_shears, parallax_intersection
 from relume.brdf.terms.btf import BtfRef
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.lights.spherical_triangles import TriangleLights
 from relume.math.fast_math import fast_log2
 from relume.transport.shading_points import ShadingPoints
@@ -35,7 +35,7 @@ _MAX_SPACING = np.float32(1.5)  # texels between footprint samples
 _MAX_ELONGATION = np.float32(3)  # footprint length over width: longer ones sum coarser texels
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _linear_taps(coordinate, count):  # type: ignore[no-untyped-def]
     """Return the two texels of a row around a coordinate in [0, 1], and the fraction of the second."""
     x: Any = coordinate * np.float32(count) - np.float32(0.5)
@@ -45,7 +45,7 @@ def _linear_taps(coordinate, count):  # type: ignore[no-untyped-def]
     return (low if low >= 0 else count - 1), (low + 1 if low + 1 < count else 0), fraction
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def neighbor_texels(levels, u, v, footprint, texel, weight):  # type: ignore[no-untyped-def]
     """Select texels for trilinear interpolation.
 
@@ -60,13 +60,13 @@ def neighbor_texels(levels, u, v, footprint, texel, weight):  # type: ignore[no-
     return texels_at_level(levels, u, v, level, texel, weight)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def mip_level(footprint, finest):  # type: ignore[no-untyped-def]
     """Return the fractional mip level of a footprint, not clamped. finest: side of level 0, in texels."""
     return fast_log2(max(_TEXEL * footprint * finest, np.float32(1)))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def texels_at_level(levels, u, v, level, texel, weight):  # type: ignore[no-untyped-def]
     """Select texels for trilinear interpolation at a given level, as `neighbor_texels`.
 
@@ -99,7 +99,7 @@ def texels_at_level(levels, u, v, level, texel, weight):  # type: ignore[no-unty
     return num
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def anisotropic_offsets(footprint, up, finest):  # type: ignore[no-untyped-def]
     """Distribute samples along an anisotropic footprint.
 
@@ -122,7 +122,7 @@ def anisotropic_offsets(footprint, up, finest):  # type: ignore[no-untyped-def]
     return num, np.float32(math.sqrt(beyond / np.float32(num * num - 1))), width
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _add_weights(cluster, weight, view, texel, texel_weight, num, sample_weight, num_clusters, clusters, sums):  # type: ignore[no-untyped-def]
     """Add the weights of texels for one view, by cluster.
 
@@ -151,7 +151,7 @@ def _add_weights(cluster, weight, view, texel, texel_weight, num, sample_weight,
     return num_clusters
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _footprint_samples(levels, heights, footprint_center, x, y, z, slant, out):  # type: ignore[no-untyped-def]
     """Distribute samples along a footprint and look up the relief height of each.
 

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.math.zernike import num_functions, project
 from relume.raytrace.gather_rays import RayPattern, lattice_offsets, local_ray, ray_weight
@@ -38,7 +38,7 @@ def weighted_basis(pattern: RayPattern, seed: int, degree: int) -> Shaped[F32, "
     return np.ascontiguousarray((functions * weight[:, None]).T, np.float32)
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _generate_rays(pattern, seed, wi, weight):  # type: ignore[no-untyped-def]
     shifts, up = lattice_offsets(pattern, seed), np.float32(1)
     for ray in range(len(wi)):

@@ -13,7 +13,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.term import Term
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.lights.spherical_triangles import TriangleLights
 from relume.transport.shading_points import ShadingPoints
 
@@ -29,7 +29,7 @@ def diffuse_quotients(term: Term, receivers: ShadingPoints, start: int, stop: in
     return np.asarray(term.quotients(zeros, zeros, zeros + 1, zeros, zeros, cos_theta_o)[0])
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _sum_point(n_x, n_y, n_z, bits, x, y, z, red, green, blue, weight, out):  # type: ignore[no-untyped-def]
     """Sum the lights of a point; a separate function so that its loops are vectorized. weight: scratch. (M,)"""
     for m in range(weight.shape[0]):
@@ -58,7 +58,7 @@ def sum_lights(normal, visible, direction, irradiance, start, stop, out):  # typ
     _sum(normal, visible, direction, irradiance, start, stop, np.empty(direction.shape[1], np.float32), out)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _sum(normal, visible, direction, irradiance, start, stop, weight, out):  # type: ignore[no-untyped-def]
     """Implement `sum_lights`. weight: scratch. (M,)"""
     x, y, z = direction[0], direction[1], direction[2]

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.gather_rays import RayPattern, cosine_ray, lattice_offsets
@@ -24,7 +24,7 @@ DirectionBins = NDArray[np.uint8]
 _POINTS_PER_RANGE = 1024
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _ray_direction(n, t, pattern, ray, shifts):  # type: ignore[no-untyped-def]
     """Return the world-space direction of a ray of a point with normal n and tangent t."""
     x, y, z = cosine_ray(pattern.rays[ray], shifts)
@@ -32,7 +32,7 @@ def _ray_direction(n, t, pattern, ray, shifts):  # type: ignore[no-untyped-def]
     return t[0] * x + bx * y + n[0] * z, t[1] * x + by * y + n[1] * z, t[2] * x + bz * y + n[2] * z
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, error_model="numpy", **NO_REFCOUNT)
 def _fill_outgoing_bins(points, gather_hits, pattern, frames, start, stop, out):  # type: ignore[no-untyped-def]
     """Find the bins of patches in which points [start, stop) see them."""
     for p in range(start, stop):
@@ -67,7 +67,7 @@ def outgoing_bins(
     return out
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, error_model="numpy", **NO_REFCOUNT)
 def _fill_incoming_bins(points, points_per_patch, pattern, frames, start, stop, out):  # type: ignore[no-untyped-def]
     """Find the bins in which rays of points [start, stop) reach their own patches."""
     for p in range(start, stop):

@@ -11,7 +11,7 @@ import math
 import numba as nb
 import numpy as np
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.raytrace.gather_rays import glossy_pdf, lattice_offsets
 from relume.transport.outgoing_patch_light import bin_of
@@ -31,7 +31,7 @@ def in_frame(n, t, o):  # type: ignore[no-untyped-def]
     return (bx, by, bz), (ox, oy, oz)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _cosine_rays(rays, shift, x, y, z, radius_squared):  # type: ignore[no-untyped-def]
     """Generate the cosine rays of a point, as `cosine_ray` does. radius_squared: scratch. (rays,) each"""
     offset, cosine, sine = shift[0], shift[2], shift[3]
@@ -47,7 +47,7 @@ def _cosine_rays(rays, shift, x, y, z, radius_squared):  # type: ignore[no-untyp
         z[k] = math.sqrt(_ONE - radius_squared[k])
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _glossy_rays(rays, shift, o, x, y, z, distance, twice_cosine):  # type: ignore[no-untyped-def]
     """Generate the glossy rays of a point, as `glossy_ray` does. distance, twice_cosine: scratch. (rays,) each"""
     offset, scale, cosine, sine = shift[0], shift[1], shift[2], shift[3]
@@ -71,7 +71,7 @@ def _glossy_rays(rays, shift, o, x, y, z, distance, twice_cosine):  # type: igno
         z[k] = twice_cosine[k] * (_ONE - distance[k]) - oz
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _weights(num_cosine, x, y, z, o, weight):  # type: ignore[no-untyped-def]
     """Weight all rays of a point, as `ray_weight` does."""
     ox, oy, oz = o
@@ -88,7 +88,7 @@ def _weights(num_cosine, x, y, z, o, weight):  # type: ignore[no-untyped-def]
         weight[k] = cosine / (num_cosine_rays * cosine / _PI + num_glossy_rays * pdf)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _generate_rays(pattern, seed, o, local, weight):  # type: ignore[no-untyped-def]
     """Generate and weight all rays of a point. o: local wo. local: written, with scratch. (5, rays) weight: (rays,)"""
     num = pattern.num_cosine
@@ -100,7 +100,7 @@ def _generate_rays(pattern, seed, o, local, weight):  # type: ignore[no-untyped-
     _weights(num, x, y, z, o, weight)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _lobes_hit(gather_hits, lobe, rows, rays):  # type: ignore[no-untyped-def]
     """List the rays of a point that hit a patch with a lobe; return their number. Avoids unpredictable branches.
 
@@ -153,7 +153,7 @@ def list_gather_rays(  # type: ignore[no-untyped-def]
     return _list(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, first, wi, out, irradiance)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _list(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, first, wi, out, irradiance):  # type: ignore[no-untyped-def]
     """Implement `list_gather_rays`. scratch: of `_lobes_hit` and `_generate_rays`, and the list index of each ray."""
     _, normal, tangent, seed, _ = points
@@ -199,7 +199,7 @@ def sum_gather_rays(points, wo, gather_hits, pattern, outgoing, start, stop, out
     _sum(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, out)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _sum(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, out):  # type: ignore[no-untyped-def]
     """Implement `sum_gather_rays`. scratch: as in `_list`, except the last."""
     _, normal, tangent, seed, _ = points

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges, parallel_for_chunks
 from relume.lights.spherical_triangles import TriangleLights
 from relume.math.zernike import (
@@ -150,7 +150,7 @@ def add_scaled(
     )
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _add_scaled(addend, gain, source_rows, target_rows, start, stop, out):  # type: ignore[no-untyped-def]
     for i in range(start, stop):
         q, p = source_rows[i], target_rows[i]

@@ -8,7 +8,7 @@ import numba as nb
 import numpy as np
 
 from relume.brdf.angles import THETA_D, THETA_H, THETA_I, THETA_R
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.math.fast_math import acos_clamped
 
 _HALF = np.float32(0.5)
@@ -17,7 +17,7 @@ _ZERO = np.float32(0)
 _SLACK = np.float32(1e-3)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _half_angle_reach(radius, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untyped-def]
     """Return a bound of the half vector's rotation while wi rotates by `radius`, and cos θd.
 
@@ -33,13 +33,13 @@ def _half_angle_reach(radius, ix, iy, iz, ox, oy, oz):  # type: ignore[no-untype
     return half / max(farthest, np.float32(1e-6)), cos_theta_d
 
 
-@nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, forceinline=True, **NO_REFCOUNT)
 def is_bounded(kind):  # type: ignore[no-untyped-def]
     """Return True if `angle_lower_bounds` bounds an angle."""
     return kind in (THETA_I, THETA_R, THETA_D, THETA_H)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def angle_lower_bounds(kind, radius, ix, iy, iz, ox, oy, oz, out):  # type: ignore[no-untyped-def]
     """Bound γ(wi', wo) from below over all wi' within `radius` of wi; zero for angles without a bound.
 
@@ -67,7 +67,7 @@ def angle_lower_bounds(kind, radius, ix, iy, iz, ox, oy, oz, out):  # type: igno
         out[: ix.shape[0]] = 0
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def cull(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, nearest):  # type: ignore[no-untyped-def]
     """Remove lights in [begin, end) for which a fixed curve is zero; return the new end.
 
@@ -125,7 +125,7 @@ def list_lights(  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _list(  # type: ignore[no-untyped-def]
     normal, tangent, wo, visible, directions, radius, kinds, support, start, stop, scratch, first, light, wi, out
 ):

@@ -22,7 +22,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges
 from relume.math.direction_grid import SIDE, offsets_in_bin
 from relume.math.zernike import DEGREES, OUTGOING_DEGREE, WINDOW_DECAY, num_functions, project
@@ -139,7 +139,7 @@ def bin_of(frame, row, dx, dy, dz):  # type: ignore[no-untyped-def]
     return min(max(across, 0), SIDE - 1) * SIDE + min(max(along, 0), SIDE - 1)  # type: ignore[operator]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def incident_along(outgoing, gather_hits, bins, out):  # type: ignore[no-untyped-def]
     """Look up the radiance that arrives along the rays of a point.
 

@@ -14,7 +14,7 @@ import numba as nb
 import numpy as np
 
 from relume.brdf.angles import ALPHA, BETA, compute_alpha_beta, compute_angles
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.transport.triangle_kernel import add_subtriangles, weight_subtriangles
 
 _QUARTER = np.float32(0.25)
@@ -41,20 +41,20 @@ _MAX_SUBTRIANGLES = _BATCH * 4**_MAX_DEPTH
 _SUBTRIANGLES_PER_BATCH = 64  # multiplied by the settings of a curve
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _padded(num):  # type: ignore[no-untyped-def]
     """Round a number of triangles up to full vectors."""
     return (num + _LANES - 1) // _LANES * _LANES
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _relative_bend(a, b, c, ab, bc, ca):  # type: ignore[no-untyped-def]
     """Return the deviation of an angle at the edge midpoints from linear interpolation, relative to the tolerance."""
     bend = max(abs(ab - _HALF * (a + b)), max(abs(bc - _HALF * (b + c)), abs(ca - _HALF * (c + a))))
     return bend / (_TOLERANCE_BANDS + _TOLERANCE_FRACTION * min(a, min(b, c)))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _rotate_nodes(n, t, nodes, light, begin, end, local):  # type: ignore[no-untyped-def]
     """Rotate the nodes of listed lights into the frame of normal n and tangent t. local: (3, 6, entries), written."""
     bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
@@ -67,7 +67,7 @@ def _rotate_nodes(n, t, nodes, light, begin, end, local):  # type: ignore[no-unt
             local[2, node, entry - begin] = n[0] * x + n[1] * y + n[2] * z
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _bends(gamma, support, num, bend):  # type: ignore[no-untyped-def]
     """Find the largest bend over all angles of each light, or `_CULLED` if a fixed curve is zero all over it.
 
@@ -87,7 +87,7 @@ def _bends(gamma, support, num, bend):  # type: ignore[no-untyped-def]
             bend[e] = _CULLED if is_zero else max(bend[e], curve_bend)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _sum_bends(gamma, num, bend_sum):  # type: ignore[no-untyped-def]
     """Sum the deviation of each angle at the edge midpoints from linear. bend_sum: (C, …), written."""
     num = _padded(num)
@@ -98,7 +98,7 @@ def _sum_bends(gamma, num, bend_sum):  # type: ignore[no-untyped-def]
             curve_bend_sum[e] = ab[e] + bc[e] + ca[e] - (a[e] + b[e] + c[e])
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _append(  # type: ignore[no-untyped-def]
     gamma,
     bend_sum,
@@ -131,7 +131,7 @@ def _append(  # type: ignore[no-untyped-def]
     return num + count
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _classify_triangles(  # type: ignore[no-untyped-def]
     gamma, bend, bend_sum, num_triangles, level, fine, origin, subtriangles, area_fractions, entry_index, num, lists
 ):
@@ -192,7 +192,7 @@ def _classify_triangles(  # type: ignore[no-untyped-def]
     return num, num_divided
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _children(local, gamma, origin, triangle_index, count, child_local, child_gamma, child_origin):  # type: ignore[no-untyped-def]
     """Create the four children of the listed triangles: corners and edge midpoints. Return their number."""
     for child in range(4):
@@ -222,7 +222,7 @@ def _children(local, gamma, origin, triangle_index, count, child_local, child_ga
     return 4 * count
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _angles(kinds, scale, wo, local, first_node, num, gamma):  # type: ignore[no-untyped-def]
     """Compute the angles of all curves at nodes [first_node, 6) of the first triangles, in bands.
 
@@ -245,7 +245,7 @@ def _angles(kinds, scale, wo, local, first_node, num, gamma):  # type: ignore[no
                 compute_angles(kinds[k], scale[k], x, y, z, wo[k, 0], wo[k, 1], wo[k, 2], gamma[k, node])
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _divide(  # type: ignore[no-untyped-def]
     kinds, scale, wo, support, fine, local, gamma, origin, count, generations, lists, bend, bend_sum, subtriangles,
     area_fractions, entry_index, num

@@ -12,7 +12,7 @@ import numba as nb
 import numpy as np
 
 from relume.brdf.angles import compute_angles
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.lights.local_lights import light_sample
 from relume.raytrace.gather_rays import cranley_patterson_offset
 from relume.transport.gather_kernel import in_frame
@@ -20,7 +20,7 @@ from relume.transport.gather_kernel import in_frame
 _NONE = np.int64(-1)  # no curve is free
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def list_local_rays(  # type: ignore[no-untyped-def]
     points, wo, light, strata, gain, visible, start, stop, first, wi, out, irradiance
 ):
@@ -60,7 +60,7 @@ def list_local_rays(  # type: ignore[no-untyped-def]
     return end
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def list_mirror_lights(  # type: ignore[no-untyped-def]
     points, wo, direction, normal_irradiance, visible, start, stop, first, wi, out, irradiance
 ):
@@ -94,7 +94,7 @@ def list_mirror_lights(  # type: ignore[no-untyped-def]
     return end
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _multiply(bands, num_rows, band, weight, num):  # type: ignore[no-untyped-def]
     """Multiply the weights of rays by a fixed curve. bands: (3, ≥ J). band: of each ray. weight: (3, ≥ num)"""
     for channel in range(3):
@@ -103,7 +103,7 @@ def _multiply(bands, num_rows, band, weight, num):  # type: ignore[no-untyped-de
             weight[channel, n] *= bands[row, band[n]]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _add_settings(settings, setting_index, band, weight, num, product, out):  # type: ignore[no-untyped-def]
     """Add rays to all settings of the curves with several settings.
 
@@ -125,7 +125,7 @@ def _add_settings(settings, setting_index, band, weight, num, product, out):  # 
                 channel_out[j] += ray_weight * product[begin + j]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _contract(  # type: ignore[no-untyped-def]
     begin, end, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, setting_index, active,
     gamma, band, weight,
@@ -174,7 +174,7 @@ def weight_rays(first, wi, wo, irradiance, shading, kinds, axes, num_bands, band
                 out[channel, begin:end] = weight[channel, : end - begin]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def sum_rays(first, irradiance, shading, out):  # type: ignore[no-untyped-def]
     """Sum listed rays of a term without curves: only its quotient remains.
 
@@ -209,7 +209,7 @@ def project_rays(  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _project(  # type: ignore[no-untyped-def]
     first, wi, wo, irradiance, shading, kinds, axes, num_bands, bands, num_rows, settings, setting_index, active,
     scratch, out,

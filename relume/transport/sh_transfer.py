@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges, parallel_for_chunks
 from relume.math.local_pca import cluster, distances
 from relume.math.spherical_harmonics import NUM_HARMONICS, harmonics
@@ -140,7 +140,7 @@ class ClusteredTransfer(NamedTuple):
         return out
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _sum(transferred, cluster, weight, rows, start, stop, out):  # type: ignore[no-untyped-def]
     """Sum the mean and the components of points rows[start:stop]. out: (m, 3 K)"""
     for i in range(start, stop):

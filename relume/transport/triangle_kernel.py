@@ -8,14 +8,14 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.simd import NUM as EIGHT
 from relume.transport.band_overlap import add_means, deposit, mean_over_bands, overlap
 
 _ONE_MINUS_EPSILON = np.float32(1 - 2**-24)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _overlaps(corner, num_bands, num, overlaps):  # type: ignore[no-untyped-def]
     """Compute `overlap` of subtriangles, angles clamped to the last band. corner: (3, n), overlaps: (5, n), written."""
     end = np.float32(num_bands) * _ONE_MINUS_EPSILON
@@ -25,7 +25,7 @@ def _overlaps(corner, num_bands, num, overlaps):  # type: ignore[no-untyped-def]
         overlaps[3, n], overlaps[4, n] = rise, fall
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _multiply_means(overlaps, bands, decrements, num_bands, num_rows, num, weight):  # type: ignore[no-untyped-def]
     """Multiply the weights (3, n) of subtriangles by the average of a fixed curve over each.
 
@@ -50,7 +50,7 @@ def _multiply_means(overlaps, bands, decrements, num_bands, num_rows, num, weigh
         weight[2, n] *= blue + bands[2, top] if num_rows == 3 else red
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _deposit(overlaps, num_bands, num, weight, out):  # type: ignore[no-untyped-def]
     """Distribute subtriangles to the bands of the free curve (eq. 22). weight: (3, n), out: (3, ≥ J + 8)."""
     last = num_bands - 1
@@ -64,7 +64,7 @@ def _deposit(overlaps, num_bands, num, weight, out):  # type: ignore[no-untyped-
             )  # fmt: skip
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _multiply_settings(overlaps, settings, num_bands, num, mean, product):  # type: ignore[no-untyped-def]
     """Multiply each subtriangle's product (n, rows) by its averages of a fixed curve at all settings.
 
@@ -83,7 +83,7 @@ def _multiply_settings(overlaps, settings, num_bands, num, mean, product):  # ty
             product[n, row] *= mean[row]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _add_settings(subtriangles, num, num_bands, settings, setting_index, overlaps, weight, mean, product, out):  # type: ignore[no-untyped-def]
     """Add the subtriangles' weights (3, n) times their curves at all settings. out: (3, N)
 
@@ -105,7 +105,7 @@ def _add_settings(subtriangles, num, num_bands, settings, setting_index, overlap
                     out[channel, row] += channel_weight * product[n, offset * channel + row]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def weight_subtriangles(irradiance, light, shading, begin, entry_index, area_fractions, num, weight):  # type: ignore[no-untyped-def]
     """Weight the light of each subtriangle: irradiance · q cos θi · its fraction of the triangle.
 
@@ -123,7 +123,7 @@ def weight_subtriangles(irradiance, light, shading, begin, entry_index, area_fra
         weight[2, n] = irradiance[m, 2] * (shading[blue_row, entry] * area_fractions[n])
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def add_subtriangles(  # type: ignore[no-untyped-def]
     subtriangles, num, num_bands, bands, decrements, num_rows, settings, setting_index, active, overlaps, weight, mean,
     product, out

@@ -7,13 +7,13 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 
 F32 = NDArray[np.float32]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _add_term_planes(  # type: ignore[no-untyped-def]
     image, color, texture, outgoing, has_texture, has_outgoing, first, num, replace, start, stop, radiance
 ):
@@ -39,7 +39,7 @@ def _add_term_planes(  # type: ignore[no-untyped-def]
                 radiance[channel, first + row] += value
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _add_diffuse(irradiance, factor, start, stop, image):  # type: ignore[no-untyped-def]
     """Add samples [start, stop) to all channels."""
     samples = image.shape[2]

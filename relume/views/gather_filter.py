@@ -17,7 +17,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.patches.neighbor_filter import FilterWeights, NeighborFilter
 from relume.raytrace.surface_points import SurfacePoints
 
@@ -28,7 +28,7 @@ _MIN_HIGHLIGHT_NORMAL_COSINE = 0.9986  # 3°
 _MAX_RISE = 0.2  # distance from the tangent plane, relative to the distance
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _max_entries(first, pixel, width):  # type: ignore[no-untyped-def]
     """Count the samples of the pixels around all samples. first: first sample of each pixel. (pixels + 1,)"""
     height, count = (first.shape[0] - 1) // width, 0
@@ -40,7 +40,7 @@ def _max_entries(first, pixel, width):  # type: ignore[no-untyped-def]
     return count
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _fill_weights(  # type: ignore[no-untyped-def]
     order, first, pixel, width, position, normal, alpha_sample, min_normal_cosine, starts, column_index, weights
 ):

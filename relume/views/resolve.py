@@ -11,7 +11,7 @@ from jaxtyping import Shaped
 from numpy.typing import ArrayLike, NDArray
 
 from relume.core.errors import ParameterError
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.image_io.write_image import to_bytes
 from relume.views.view import Tile, View
@@ -22,7 +22,7 @@ _BIAS, _MANTISSA_BITS, _LARGEST = 15, 9, np.float32(65408.0)  # RGB9_E5 of OpenG
 _FLOAT_BIAS = 127
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, error_model="numpy", **NO_REFCOUNT)
 def pack_rgb9e5(red: Any, green: Any, blue: Any) -> Any:
     """Pack a pixel's red, green and blue into 32 bits: 9-bit mantissas, red lowest, and a shared 5-bit exponent."""
     red = min(red, _LARGEST) if red > 0 else np.float32(0)  # NaN becomes zero
@@ -42,7 +42,7 @@ def pack_rgb9e5(red: Any, green: Any, blue: Any) -> Any:
     return r | (g << np.uint32(9)) | (b << np.uint32(18)) | (np.uint32(shared) << np.uint32(27))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _resolve_tiles(radiance, gain, first, order, throughput, width, tiles, offsets, start, stop, out):  # type: ignore[no-untyped-def]
     """Sum the samples of each pixel of tiles [start, stop) into out (pixels, 3)."""
     green_column, blue_column = throughput.shape[1] // 2, throughput.shape[1] - 1  # columns of green and blue
@@ -62,7 +62,7 @@ def _resolve_tiles(radiance, gain, first, order, throughput, width, tiles, offse
                 out_row += 1
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, error_model="numpy", **NO_REFCOUNT)
 def _pack_range(pixels, start, stop, out):  # type: ignore[no-untyped-def]
     """Pack pixels [start, stop) of (pixels, 3) into words (pixels,)."""
     for p in range(start, stop):

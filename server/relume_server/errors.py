@@ -175,7 +175,7 @@ TABLE: Sequence[tuple[type[Exception], ErrorMapping]] = (
     (relume_errors.ResultUnavailableError, ErrorMapping(409, "generation-failed", "Generation failed", CLOSE_INTERNAL)),
     (relume_errors.EditError, ErrorMapping(422, "edit", "Edit cannot be applied", CLOSE_POLICY)),
     (relume_errors.ProtocolError, ErrorMapping(400, "protocol", "Protocol error", CLOSE_PROTOCOL)),
-    (relume_errors.CancelledError, ErrorMapping(409, "cancelled", "Cancelled", CLOSE_GOING_AWAY)),
+    (relume_errors.CancelledError, ErrorMapping(409, "canceled", "Canceled", CLOSE_GOING_AWAY)),
     (relume_errors.DiskFullError, ErrorMapping(507, "disk", "Disk is full", CLOSE_INTERNAL)),
     (relume_errors.StorageError, ErrorMapping(503, "storage", "Object storage cannot be used", CLOSE_BUSY)),
     (relume_errors.DatabaseDamagedError, ErrorMapping(503, "database", "Database damaged", CLOSE_BUSY)),

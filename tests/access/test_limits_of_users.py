@@ -110,7 +110,7 @@ class TestBytes:
         self, client: TestClient, access: AuthServices, baked: Baked
     ) -> None:
         access.quotas.assign_owner("Ann", "bake", baked.bake, 1_000)
-        for state, used in (("cancelled", 250), ("failed", 250), ("queued", 1_000), ("ready", 77)):
+        for state, used in (("canceled", 250), ("failed", 250), ("queued", 1_000), ("ready", 77)):
             with client.app.state.services.bakes.ledger.sessions.begin() as session:  # type: ignore[attr-defined]
                 changed = {"state": state, "progress": 0.25, "bytes": 77}
                 session.execute(update(BakeRow).where(BakeRow.id == baked.bake).values(changed))

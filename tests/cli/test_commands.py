@@ -398,7 +398,7 @@ def test_interrupt_without_a_terminal_cancels_and_the_same_command_goes_on(data:
     assert process.returncode == 130
     assert "canceled; finished tasks are saved" in err
     assert "Traceback" not in err
-    assert only_bake(data).state == "cancelled"
+    assert only_bake(data).state == "canceled"
     again = subprocess.run([*RELUME, *LONG], capture_output=True, check=False, text=True)
     assert again.returncode == 0, again.stderr
     assert only_bake(data).state == "ready"

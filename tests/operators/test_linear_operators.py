@@ -171,7 +171,7 @@ def test_operators_larger_than_the_budget_are_rejected_before_any_work():
     assert cache.get_cached("small", LinearOperator) is small
 
 
-@pytest.mark.parametrize("problem", [CancelledError("cancelled"), MemoryError(), KeyboardInterrupt()])
+@pytest.mark.parametrize("problem", [CancelledError("canceled"), MemoryError(), KeyboardInterrupt()])
 def test_an_interrupted_freeze_leaves_nothing(problem):
     cache = Cache(1000)
 
@@ -218,7 +218,7 @@ def test_a_cancelled_request_lets_the_others_compute_once():
     def give_up_midway():
         first_runs.set()
         go_on.wait(60)
-        raise CancelledError("cancelled")
+        raise CancelledError("canceled")
 
     def make():
         made.append(1)

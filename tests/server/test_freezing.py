@@ -1,4 +1,4 @@
-"""The one freeze of a session: told, handed over, cancelled, and nothing of it left behind."""
+"""The one freeze of a session: told, handed over, canceled, and nothing of it left behind."""
 
 import asyncio
 import gc

@@ -1,4 +1,4 @@
-"""Live sessions while something is frozen: what goes on, what waits and what is cancelled."""
+"""Live sessions while something is frozen: what goes on, what waits and what is canceled."""
 
 import time
 

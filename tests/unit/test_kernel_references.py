@@ -11,7 +11,7 @@ RELUME = Path(__file__).resolve().parents[2] / "relume"
 
 def kernels(source: str) -> Iterator[ast.FunctionDef]:
     for node in ast.parse(source).body:
-        if isinstance(node, ast.FunctionDef) and any("**UNCOUNTED" in ast.unparse(d) for d in node.decorator_list):
+        if isinstance(node, ast.FunctionDef) and any("**NO_REFCOUNT" in ast.unparse(d) for d in node.decorator_list):
             yield node
 
 
@@ -40,7 +40,7 @@ def test_kernels_without_references_return_no_arrays() -> None:
 
 
 def test_a_returned_array_is_detected() -> None:
-    source = "@nb.njit(**UNCOUNTED)\ndef f(a, k):\n    b = a[k]\n    b[0] = 1\n    return {}\n"
+    source = "@nb.njit(**NO_REFCOUNT)\ndef f(a, k):\n    b = a[k]\n    b[0] = 1\n    return {}\n"
     returned = {"b": True, "a": True, "b[1:]": True, "b[0]": False, "(k, b)": True, "k": False, "(k, b[0])": False}
     for text, is_array in returned.items():
         assert [returns_arrays(kernel) for kernel in kernels(source.format(text))] == [is_array], text

@@ -143,7 +143,7 @@ def test_cancelled_bake_keeps_its_tasks_and_can_be_queued_again(ledger: Ledger) 
     assert ledger.cancel(identity)
     assert not ledger.heartbeat(identity, owner)
     ledger.finish(identity, owner, "ready")
-    assert ledger.bake(identity).state == "cancelled"
+    assert ledger.bake(identity).state == "canceled"
     assert ledger.submit(SCENE.id, RECIPE, PLAN) == identity
     assert ledger.bake(identity).state == "queued"
     assert ledger.finished_tasks(identity) == {(0, 1): TaskCost(5, 0.1, 0.2)}

@@ -95,7 +95,7 @@ def test_cancelled_bake_resumes_without_repeating_finished_tasks(tmp_path: Path,
             for status in changes:
                 if status.progress > 0.3:
                     service.cancel(identity)
-        assert status.state == "cancelled"
+        assert status.state == "canceled"
         assert not service.store_path(identity).exists()
         service.submit(SCENE.id, RECIPE)
         assert follow(service, identity).state == "ready"

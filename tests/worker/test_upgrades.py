@@ -81,7 +81,7 @@ def test_a_bake_of_other_code_stays_usable_and_says_so(tmp_path: Path, running: 
         assert open_store(service.store_path(old)).attributes["code"] == OLD
 
 
-@pytest.mark.parametrize("how", ["closed", "cancelled"])
+@pytest.mark.parametrize("how", ["closed", "canceled"])
 def test_a_bake_that_other_code_has_begun_starts_again_and_says_why(
     tmp_path: Path, running: Callable[[str], None], how: str
 ) -> None:
@@ -90,23 +90,23 @@ def test_a_bake_that_other_code_has_begun_starts_again_and_says_why(
     with open_service(tmp_path, delay_s=0.02, log=str(log)) as service:
         identity = service.submit(SCENE.id, RECIPE)
         interrupt(service, identity)
-        if how == "cancelled":
+        if how == "canceled":
             service.cancel(identity)
-            assert follow(service, identity)[-1].state == "cancelled"
+            assert follow(service, identity)[-1].state == "canceled"
     num_old = len(log.read_text().split())
     assert 0 < num_old < NUM_TASKS
     running(NEW)
     service = open_service(tmp_path, delay_s=0.02, log=str(log))
-    if how == "cancelled":
+    if how == "canceled":
         service._delete_orphans()
         assert not staging_path(tmp_path, identity).exists()
-        service.ledger.requeue(identity, ("cancelled",))
+        service.ledger.requeue(identity, ("canceled",))
     with service.subscribe(identity) as changes, service:
         seen = list(changes)
         assert [seen[-1].state, seen[-1].problem, seen[-1].code] == ["ready", None, NEW]
         assert read_code(service.store_path(identity)) == NEW
         assert open_store(service.store_path(identity)).attributes["code"] == NEW
-    assert how == "cancelled" or CODE_CHANGED_MESSAGE in {status.problem for status in seen}
+    assert how == "canceled" or CODE_CHANGED_MESSAGE in {status.problem for status in seen}
     assert len(log.read_text().split()) == num_old + NUM_TASKS
 
 

@@ -2,7 +2,7 @@
 
     queued ──claim──▶ running ──▶ ready
       ▲                 │ └─────▶ failed     submitting a failed or canceled bake queues it again; finished tasks stay
-      └───submit────────┴───────▶ cancelled
+      └───submit────────┴───────▶ canceled
 
 Every change is one statement that names the state it expects, so that processes which race cannot both win.
 """
@@ -74,7 +74,7 @@ class Ledger:
             except IntegrityError:
                 if self._get(identity) is None:  # not a duplicate: the scene was deleted
                     raise NotFoundError(f"there is no scene {scene_id}; import it first") from None
-        self.requeue(identity, ("failed", "cancelled"))
+        self.requeue(identity, ("failed", "canceled"))
         return identity
 
     def requeue(self, identity: str, states: Sequence[BakeState]) -> None:
@@ -117,7 +117,7 @@ class Ledger:
 
     def cancel(self, identity: str) -> bool:
         """Cancel a queued or running bake; its owner notices at its next heartbeat."""
-        return self._change(identity, ("queued", "running"), state="cancelled", seconds_left=None, phase=None)
+        return self._change(identity, ("queued", "running"), state="canceled", seconds_left=None, phase=None)
 
     def claimable(self) -> list[WaitingBake]:
         """Bakes without a live owner, longest waiting first: queued, or left by a dead owner."""

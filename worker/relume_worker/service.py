@@ -344,7 +344,7 @@ class BakeService:
         for folder in folders:
             identity = folder.name.removesuffix(".zarr")
             state = states.get(identity, "ready")
-            is_stopped = state in ("failed", "cancelled")
+            is_stopped = state in ("failed", "canceled")
             if state == "ready" or (
                 is_stopped and (read_code(folder) != bake_code() or _age_s(folder) > STOPPED_RETENTION_S)
             ):

@@ -12,7 +12,7 @@ from relume.scene.custom_camera import read_custom_camera
 from relume.store.bake_protocol import Plan, Recipe
 from relume.store.schema import SCHEMA_VERSION
 
-BakeState = Literal["queued", "running", "ready", "failed", "cancelled"]
+BakeState = Literal["queued", "running", "ready", "failed", "canceled"]
 Phase = Literal["starting", "loading", "reading", "building", "compiling", "sampling", "tracing", "publishing"]
 PHASE_LABELS: dict[Phase, str] = {
     "starting": "starting worker processes",
@@ -24,7 +24,7 @@ PHASE_LABELS: dict[Phase, str] = {
     "tracing": "tracing",
     "publishing": "checking and publishing",
 }
-FINAL_STATES: frozenset[BakeState] = frozenset({"ready", "failed", "cancelled"})
+FINAL_STATES: frozenset[BakeState] = frozenset({"ready", "failed", "canceled"})
 
 # methods with a free camera: their images are exact once it stops, not at once
 FREE_CAMERA_METHODS = frozenset({"probes"})

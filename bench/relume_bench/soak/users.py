@@ -21,7 +21,7 @@ from relume_bench.soak.server import Server
 
 EDITS = 15
 SPEAKS = Subprotocol("relume.v2")
-DONE = ("ready", "failed", "cancelled")
+DONE = ("ready", "failed", "canceled")
 
 
 class Users:

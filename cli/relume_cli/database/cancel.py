@@ -37,7 +37,7 @@ def cancel(
                 print_result(
                     bake_document(data_folder.service.get(bake.id), data_folder.service), bake.id, as_json=as_json
                 )
-            elif bake.state != "cancelled":
+            elif bake.state != "canceled":
                 has_failed = True
                 typer.echo(
                     f"relume: bake {bake.id} is {data_folder.service.get(bake.id).state}; nothing to cancel", err=True

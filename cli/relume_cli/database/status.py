@@ -43,7 +43,7 @@ def _line(bake: BakeStatus) -> str:
     details = {
         "ready": bytes_text(bake.bytes),
         "failed": bake.problem or "",
-        "cancelled": "the same relume bake resumes it",
+        "canceled": "the same relume bake resumes it",
     }
     state = details.get(bake.state) or detail(bake)
     return f"{bake.id}  {bake.state}  {bake.progress:.0%}  {state}  {recipe_text(bake.recipe)}"

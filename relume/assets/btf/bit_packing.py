@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 
 I8 = NDArray[np.int8]
 U8 = NDArray[np.uint8]
@@ -44,7 +44,7 @@ def packed_bytes(num: int, bits: Shaped[U8, " columns"]) -> int:
     return -(-num * int(bits.sum(dtype=np.int64)) // 8)
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _unpack_kernel(data, bits, out):  # type: ignore[no-untyped-def]
     """data: (bytes,). bits: (C,). out: (n, C), written"""
     bit_offset: Any = 0

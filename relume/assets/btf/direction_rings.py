@@ -18,7 +18,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import MaterialError
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.math.fast_math import acos_clamped, azimuth_fraction
 
 F32 = NDArray[np.float32]
@@ -93,7 +93,7 @@ def polar(theta: Shaped[F64, " n"], phi: Shaped[F64, " n"]) -> Shaped[F64, "n 3"
     return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def interpolation_weights_at(grid, theta, azimuth_fraction, index, weight):  # type: ignore[no-untyped-def]
     """Same as `interpolation_weights`, for angles.
 
@@ -120,7 +120,7 @@ def interpolation_weights_at(grid, theta, azimuth_fraction, index, weight):  # t
         weight[2 * k], weight[2 * k + 1] = ring_weight * (np.float32(1) - phi_fraction), ring_weight * phi_fraction
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def interpolation_weights(grid, x, y, z, index, weight):  # type: ignore[no-untyped-def]
     """Find the four grid directions around a direction, and their weights.
 

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from relume.assets.btf.direction_rings import interpolation_weights
 from relume.assets.btf.local_pca_btf import F32, LocalPcaBtf
 from relume.assets.btf.parallax import compute_shear, compute_shears, parallax_intersection
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 
 F64 = NDArray[np.float64]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _add_texels(size, u, v, position_weight, cluster, weight, cluster_slot, used_clusters, factors):  # type: ignore[no-untyped-def]
     """Add the four texels around a position to the factors of their clusters' means and components.
 

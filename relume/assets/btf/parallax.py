@@ -20,7 +20,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.btf.direction_rings import DirectionGrid, directions
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -35,7 +35,7 @@ def compute_shears(grid: DirectionGrid) -> Shaped[F32, "n 2"]:
     return np.asarray(w[:, :2] / w[:, 2:], np.float32)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def compute_shear(grid, x, y, z):  # type: ignore[no-untyped-def]
     """s of a direction, limited to that of the last ring.
 
@@ -48,7 +48,7 @@ def compute_shear(grid, x, y, z):  # type: ignore[no-untyped-def]
     return x / denominator, y / denominator
 
 
-@nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, forceinline=True, **NO_REFCOUNT)
 def _interpolate_height(height, u, v):  # type: ignore[no-untyped-def]
     """Bilinear interpolation of the heights of texels, periodically repeated."""
     rows, columns = height.shape
@@ -63,7 +63,7 @@ def _interpolate_height(height, u, v):  # type: ignore[no-untyped-def]
     )
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def parallax_intersection(height, lowest, highest, u, v, shear):  # type: ignore[no-untyped-def]
     """Find the height at which a ray first meets the relief, in steps of half a texel and linear in the last.
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from relume.assets.measured.merl import CHANNEL_SCALE, F64, SHAPE, is_measured
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 
 F32 = NDArray[np.float32]
 
@@ -46,7 +46,7 @@ def build_table(planes: Shaped[F64, "3 90 90 180"]) -> Shaped[F32, "90 90 180 3"
     return np.ascontiguousarray(np.moveaxis(filled * CHANNEL_SCALE[:, None, None, None], 0, -1), np.float32)
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, error_model="numpy", **NO_REFCOUNT)
 def _knot_and_fraction(position, num):  # type: ignore[no-untyped-def]
     """Node below a position, and its fractional distance to the next; constant beyond the last one."""
     position = min(max(position, 0.0), num - 1.0)
@@ -54,13 +54,13 @@ def _knot_and_fraction(position, num):  # type: ignore[no-untyped-def]
     return node, position - node
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, error_model="numpy", **NO_REFCOUNT)
 def _on_curve(knots, position):  # type: ignore[no-untyped-def]
     node, fraction = _knot_and_fraction(position, NUM_KNOTS)
     return (1.0 - fraction) * knots[node] + fraction * knots[node + 1]
 
 
-@nb.njit(nogil=True, cache=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, error_model="numpy", **NO_REFCOUNT)
 def _interpolate_table(table, h, d, phi, out):  # type: ignore[no-untyped-def]
     """Trilinear interpolation, periodic in φd. h, d, phi: positions in nodes. out: (3,), written."""
     h0, th = _knot_and_fraction(h, _NUM_H)

@@ -17,7 +17,7 @@ import numpy as np
 
 from relume.brdf.half_vector import HALF, MIN_COSINE, ONE, TWO, ZERO, quotient_ufunc_with
 from relume.brdf.term import F64, Angle, Curve, Parameter, Params, Term
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 
 MIN_ROUGHNESS = 0.07  # as in the specification's sample implementation; less is a spike at the horizon
 _QUARTER = np.float32(0.25)
@@ -27,7 +27,7 @@ _FIT_ROUGH = (21.5473, 3.82987, 0.19823, -1.97760, -4.32054)
 _DEFAULT = 0.5
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _masking(a, b, c, d, e, cosine):  # type: ignore[no-untyped-def]
     """Masking Λ of fibers at a cosine, eq. 3: e^L(x), whose logarithm is odd about x = 1/2."""
     x = min(cosine, ONE - cosine)

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.raytrace.camera_rays import Hits
@@ -25,7 +25,7 @@ _COS_CREASE = np.float32(np.cos(np.radians(20.0)))
 _DEPTH_EDGE = np.float32(0.02)  # offset from the plane of the adjacent surface, as a fraction of the distance
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def is_edge(material, normals, faces, distance, directions, p, q):  # type: ignore[no-untyped-def]
     """Return whether two pixels show different materials, or one material with another normal or offset.
 
@@ -46,7 +46,7 @@ def is_edge(material, normals, faces, distance, directions, p, q):  # type: igno
     return (f != g) & (is_environment | is_different)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _mark(material, normals, faces, distance, directions, width, height, start, stop, edge_mask):  # type: ignore[no-untyped-def]
     """Mark pixels [start, stop) and their right and lower neighbors across edges; threads may mark a pixel twice."""
     column = start % width

@@ -14,7 +14,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import LUMINANCE, srgb_encode
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.fixed_camera.background.background import MAX_CATCHER_RATIO
 from relume.live.fixed_camera.illumination import Illumination
@@ -106,7 +106,7 @@ def composite_over(
     return coverage
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _composite_over(  # type: ignore[no-untyped-def]
     luminance, face, face_material, is_shadow_catcher, unoccluded, lattice_node, weight, background, gain, is_direct,
     start, stop, out,

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.math.fast_math import acos_clamped, azimuth_fraction
 
@@ -49,7 +49,7 @@ def build_environment_lookup(
     return EnvironmentLookup(np.concatenate([radiance.reshape(-1, 3) for radiance in maps]), np.array(levels, np.int64))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _direction_to_uv(rotation, dx, dy, dz):  # type: ignore[no-untyped-def]
     """Return u and v of a direction, both in [0, 1]."""
     u = azimuth_fraction(dx, dz) + rotation
@@ -59,7 +59,7 @@ def _direction_to_uv(rotation, dx, dy, dz):  # type: ignore[no-untyped-def]
     return u - np.float32(whole - 1 if u < whole else whole), v
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _sample_level(environment, level, u, v):  # type: ignore[no-untyped-def]
     """Sample one level, bilinear and periodic in u. Returns three numbers."""
     first, height, width = environment.levels[level, 0], environment.levels[level, 1], environment.levels[level, 2]
@@ -82,7 +82,7 @@ def _sample_level(environment, level, u, v):  # type: ignore[no-untyped-def]
     )
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def blur_level(sigma):  # type: ignore[no-untyped-def]
     """Return the level of a blur of σ radians, without an upper limit."""
     step = np.float32(_LEVELS_PER_OCTAVE) * math.log2(
@@ -92,7 +92,7 @@ def blur_level(sigma):  # type: ignore[no-untyped-def]
 
 
 # Inlined: calls would count references of arrays, for which threads wait for each other.
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def add_environment(environment, rotation, direction, level, gain, out):  # type: ignore[no-untyped-def]
     """Add the prefiltered radiance in a direction.
 
@@ -111,7 +111,7 @@ def add_environment(environment, rotation, direction, level, gain, out):  # type
         out[channel] += gain * (sharp[channel] + fraction * (blurred[channel] - sharp[channel]))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _sample(environment, rotation, gain, face, directions, start, stop, out):  # type: ignore[no-untyped-def]
     """Write the environment to pixels [start, stop) without a surface."""
     for p in range(start, stop):

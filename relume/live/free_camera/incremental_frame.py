@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.primary_visibility import GBuffer
 from relume.live.free_camera.probes.stored_scene import StoredScene
@@ -48,7 +48,7 @@ class DirtyPixels(NamedTuple):
     first_extra_ray: Shaped[NDArray[np.intp], " m"]
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _mark_nodes(lattice_nodes, is_visible, probe_mask, out):  # type: ignore[no-untyped-def]
     for v in range(is_visible.shape[0]):
         if is_visible[v]:
@@ -57,7 +57,7 @@ def _mark_nodes(lattice_nodes, is_visible, probe_mask, out):  # type: ignore[no-
                     out[v] = 1
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _mark_rays(material, is_changed, node_mask, face, lattice_node, weight, owner, out, pixel_mask):  # type: ignore[no-untyped-def]
     num_pixels = pixel_mask.shape[0]
     for r in range(face.shape[0]):
@@ -93,7 +93,7 @@ def find_dirty_pixels(
     return DirtyPixels(region, pixels, np.searchsorted(gbuffer.owner, pixels))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _resolve_subset(radiance, owner, first_extra_ray, pixels, start, stop, out, rgb9e5):  # type: ignore[no-untyped-def]
     """Resolve pixels[start:stop]."""
     num_pixels = out.shape[0]

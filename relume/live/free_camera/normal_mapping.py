@@ -21,7 +21,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import LUMINANCE
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.probes.texture_kernels import sample_texture
@@ -48,7 +48,7 @@ def basis_gradients() -> Shaped[F32, "3 K"]:
     return np.asarray(np.einsum("tpi,tpk,t->ik", wi, project(wi), solid_angle), np.float32)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _light_gradient(gradients, luminance, normal, tangent, vectors, is_needed, start, stop, out):  # type: ignore[no-untyped-def]
     """Compute D of probes [start, stop)."""
     for p in range(start, stop):
@@ -83,7 +83,7 @@ def light_gradient(
     return out
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def normalize(vector):  # type: ignore[no-untyped-def]
     """Normalize a vector, a tuple of three."""
     x, y, z = vector
@@ -91,7 +91,7 @@ def normalize(vector):  # type: ignore[no-untyped-def]
     return np.float32(scale * x), np.float32(scale * y), np.float32(scale * z)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def normal_tilt(textures, texture, texture_uv, footprint, n, t, handedness, outward, scratch):  # type: ignore[no-untyped-def]
     """Sample a mapped normal. See `relume.raytrace.surface_interaction` for fixed views.
 
@@ -116,7 +116,7 @@ def normal_tilt(textures, texture, texture_uv, footprint, n, t, handedness, outw
     return x, y, z
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def shading_ratio(gradient, n, perturbed):  # type: ignore[no-untyped-def]
     """Return n'·D / n·D, clamped.
 

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges, parallel_for_chunks
 from relume.live.free_camera.primary_visibility import GBuffer
 from relume.live.free_camera.probes.triangle_grids import ProbeGrid, node_index
@@ -68,7 +68,7 @@ def _aim_between(packet, lane, start, end):  # type: ignore[no-untyped-def]
     set_direction(packet, lane, end[0] - start[0], end[1] - start[1], end[2] - start[2], np.float32(1))
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _flush(occluded, packet, num_pending, ends, has_occluded_neighbor):  # type: ignore[no-untyped-def]
     """Trace the first lanes, and mark both ends of occluded ones. ends: nodes. (`LANES`, 2)"""
     enable_first_lanes(packet, num_pending)
@@ -179,7 +179,7 @@ def _reweight(  # type: ignore[no-untyped-def]
         _reweight_traced(occluded, packet, num_pending, weight)
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _reweight_traced(occluded, packet, num_pending, weight):  # type: ignore[no-untyped-def]
     """Trace three lanes for each pending ray; weights of occluded nodes become zero."""
     enable_first_lanes(packet, 3 * num_pending)

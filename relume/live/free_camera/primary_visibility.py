@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.antialiasing import EDGE_SAMPLE_POSITIONS, find_edges, samples_per_edge
 from relume.live.free_camera.glass import GlassLayers, find_glass_layers, trace_glass
@@ -65,7 +65,7 @@ class GBuffer(NamedTuple):
         return len(self.directions) - len(glass_rays) + glass_index if has_glass else pixel
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _aim(rotation, half_width, half_height, width, height, pixels, offsets, start, stop, out):  # type: ignore[no-untyped-def]
     """Compute directions through points of pixels [start, stop), those of one pixel in succession."""
     for i in range(start, stop):
@@ -80,7 +80,7 @@ def _aim(rotation, half_width, half_height, width, height, pixels, offsets, star
                 out[r, axis] = scale * (rotation[axis, 0] * a + rotation[axis, 1] * b - rotation[axis, 2])
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _find_nodes(probe_grid, face_normal, face, uv, directions, start, stop, lattice_node, weight, is_visible):  # type: ignore[no-untyped-def]
     """Find the lattice nodes around hits [start, stop); a side without nodes uses those of the other side."""
     for p in range(start, stop):
@@ -196,7 +196,7 @@ def _directions(camera: Camera, size: tuple[int, int], pixels: NDArray[np.int32]
     return directions
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def mark_needed_probes(lattice_nodes, is_visible, is_needed):  # type: ignore[no-untyped-def]
     """Mark the probes that lattice nodes interpolate.
 
@@ -210,7 +210,7 @@ def mark_needed_probes(lattice_nodes, is_visible, is_needed):  # type: ignore[no
                     is_needed[lattice_nodes.probe[v, k]] = 1
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, **NO_REFCOUNT)
 def _interpolate_to_nodes(lattice_nodes, rows, values, start, stop, out):  # type: ignore[no-untyped-def]
     """Interpolate probe values to the lattice nodes rows[start:stop]."""
     for v in rows[start:stop]:

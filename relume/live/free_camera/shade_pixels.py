@@ -11,7 +11,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import LUMINANCE
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS, Lobes
 from relume.live.free_camera.highlights.environment_lobe_lookup import (
@@ -53,7 +53,7 @@ class MirrorData(NamedTuple):
     is_fine: bool
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def blend(values, lattice_node, weight):  # type: ignore[no-untyped-def]
     """Interpolate vectors between the three lattice nodes of a pixel.
 
@@ -67,7 +67,7 @@ def blend(values, lattice_node, weight):  # type: ignore[no-untyped-def]
     return x, y, z
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _logistic_tail(x):  # type: ignore[no-untyped-def]
     """Approximate b, where 1 / (1 + b) is the fraction of a normal distribution above −x."""
     if x > _FULLY_ABOVE:
@@ -75,7 +75,7 @@ def _logistic_tail(x):  # type: ignore[no-untyped-def]
     return math.exp(np.float32(-1.702) * max(x, np.float32(-20)))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _lobe_radiance(mirror_data, lattice_node, weight, direction, outward, lobe, n, light):  # type: ignore[no-untyped-def]
     """Compute the incident radiance in the reflection lobe of a pixel.
 
@@ -117,7 +117,7 @@ def _lobe_radiance(mirror_data, lattice_node, weight, direction, outward, lobe, 
     return row, fraction
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _albedo(lobes, lobe, row, fraction, group):  # type: ignore[no-untyped-def]
     """Return the albedo of a lobe in a group of terms, three numbers; row, fraction: from `_lobe_radiance`."""
     lower, upper = lobes.albedo[lobe, row, group], lobes.albedo[lobe, row + 1, group]
@@ -128,7 +128,7 @@ def _albedo(lobes, lobe, row, fraction, group):  # type: ignore[no-untyped-def]
     )
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _gradient_term(gradients, lattice_node, weight, direction, n):  # type: ignore[no-untyped-def]
     """Return the change of incident luminance between the pixel's lobe and the interpolated ones, for unit albedo.
 
@@ -145,7 +145,7 @@ def _gradient_term(gradients, lattice_node, weight, direction, n):  # type: igno
     return np.float32(0.5) * (x * rx + y * ry + z * rz - probe_term)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def interpolate_uv(uvs, corners, uv):  # type: ignore[no-untyped-def]
     """Return the texture coordinates of a point in a triangle.
 
@@ -158,7 +158,7 @@ def interpolate_uv(uvs, corners, uv):  # type: ignore[no-untyped-def]
     return w0 * uvs[a, 0] + w1 * uvs[b, 0] + w2 * uvs[c, 0], w0 * uvs[a, 1] + w1 * uvs[b, 1] + w2 * uvs[c, 1]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def texture_footprint(distance, pixel_angle, uv_scale, cosine):  # type: ignore[no-untyped-def]
     """Return the side of a pixel's footprint in a texture.
 
@@ -169,7 +169,7 @@ def texture_footprint(distance, pixel_angle, uv_scale, cosine):  # type: ignore[
     return distance * pixel_angle * uv_scale / math.sqrt(max(abs(cosine), _MIN_SLANT))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _perturbed_normal(  # type: ignore[no-untyped-def]
     textures, texture, texture_uv, footprint, tangents, corners, uv, n, outward, is_back_face, scratch
 ):

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS
 from relume.live.free_camera.basis.material_tables import Tables
@@ -118,7 +118,7 @@ def _shade_probes(  # type: ignore[no-untyped-def]
                         out[p, group, channel] += max(outgoing[group, channel], np.float32(0))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _add_anisotropic(tables, table_index, material, kind, view_coordinates, vectors, non_environment, p, out):  # type: ignore[no-untyped-def]
     """Add the products of probe p's coefficients with tables over θo and φo. out: (groups, 3)"""
     row, fraction, cosine_phi, sine_phi = view_coordinates

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.transport.shading.light_list_kernel import (
     allocate_chunks,
     band_scales,
@@ -17,7 +17,7 @@ from relume.transport.shading.light_list_kernel import (
 from relume.transport.shading.table_averages import CHUNK, sum_up
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def select_groups(visibility_words, first, group_lights, whole):  # type: ignore[no-untyped-def]
     """Find groups of which a point sees all lights, and clear these lights' visibility.
 
@@ -37,7 +37,7 @@ def select_groups(visibility_words, first, group_lights, whole):  # type: ignore
                 visibility_words[group_lights[k]] &= ~common_word
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _restore_lights(bits, first, group_lights, group):  # type: ignore[no-untyped-def]
     """Set the visibility of a group's lights, to shade them individually."""
     for k in range(first[group], first[group + 1]):
@@ -79,7 +79,7 @@ def add_groups(  # type: ignore[no-untyped-def]
     )
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _add(  # type: ignore[no-untyped-def]
     normal, tangent, light_list, local_wo, lights, groups, axes, curves, start, stop, scratch_arrays, visible, out
 ):

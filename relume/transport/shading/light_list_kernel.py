@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.transport.shading.table_averages import CHUNK, evaluate, load_midpoints, load_weights, rotate_nodes, sum_up
 
 _ZERO, _ONE = np.float32(0), np.float32(1)
@@ -23,7 +23,7 @@ def band_scales(curves):  # type: ignore[no-untyped-def]
     return scale, max_rows
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def per_axis(axes, local_wo, entry, out):  # type: ignore[no-untyped-def]
     """Multiply wo by the axes of each curve.
 
@@ -43,7 +43,7 @@ def allocate_chunks(num, num_rows):  # type: ignore[no-untyped-def]
     return weight, radius, np.empty((num, CHUNK + 1), np.int64), value, error
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def evaluate_listed(  # type: ignore[no-untyped-def]
     n, t, light_list, begin, end, lights, curves, scale, wo, local, scratch, chunk_range, chunks, total
 ):
@@ -73,13 +73,13 @@ def evaluate_listed(  # type: ignore[no-untyped-def]
         sum_up(value[chunk], weight[chunk], num, total)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def error_tolerance(total, row):  # type: ignore[no-untyped-def]
     """Return the tolerated error given all light of a point. total: (3,) row: light it has already. (3,)"""
     return _TOLERANCE_OF_ALL * (total[0] + total[1] + total[2] + abs(row[0]) + abs(row[1]) + abs(row[2]))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def defer_triangles(value, weight, error, num, tolerance, deferred):  # type: ignore[no-untyped-def]
     """List the triangles that are not accurate enough and set their values to zero; return their number.
 

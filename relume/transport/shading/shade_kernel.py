@@ -11,7 +11,7 @@ import math
 import numba as nb
 import numpy as np
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.transport.shading.light_list_kernel import (
     allocate_chunks,
     band_scales,
@@ -28,19 +28,19 @@ _CHILDREN = np.array([(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)])
 _MAX_DEPTH = 6
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _copy(source, indices, target):  # type: ignore[no-untyped-def]
     for n in range(indices.shape[0]):
         target[n] = source[indices[n]]
 
 
-@nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, forceinline=True, **NO_REFCOUNT)
 def _add_to(row, total):  # type: ignore[no-untyped-def]
     for channel in range(3):
         row[channel] += total[channel]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _divide(local, weight, radius, indices, parent, to_local, to_weight, to_radius):  # type: ignore[no-untyped-def]
     """Create the four children of the listed triangles; return their number.
 
@@ -81,7 +81,7 @@ def _divide(local, weight, radius, indices, parent, to_local, to_weight, to_radi
     return 4 * count
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _add_divided(curves, scale, wo, no_group_range, num, tolerance, generations, division_scratch, scratch, total):  # type: ignore[no-untyped-def]
     """Add divided triangles: the first `num` of the first generation, and recursively their children.
 
@@ -173,7 +173,7 @@ def shade_points(  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _shade(normal, tangent, entries, local_wo, lights, axes, curves, start, stop, scratch_arrays, out):  # type: ignore[no-untyped-def]
     """Implement `shade_points` in the memory that it allocates."""
     (first, light, shading), (nodes, _, no_group_range), (curves, scale) = entries, lights, curves

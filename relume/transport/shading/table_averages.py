@@ -15,7 +15,7 @@ import numba as nb
 import numpy as np
 
 from relume.brdf.angles import LOBE, THETA_D, THETA_I, THETA_R, compute_angles
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 
 _ZERO, _HALF, _THIRD = np.float32(0), np.float32(0.5), np.float32(1 / 3)
 CHUNK = 256  # triangles evaluated together: their scratch memory stays in a core's first-level cache
@@ -33,7 +33,7 @@ _MIN_MEAN = np.float32(1e-9)
 _SHAPE, _BEND, _MAX_BEND = np.float32(0.08), np.float32(0.05), np.float32(0.5)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _spread(gamma, num, mean, half):  # type: ignore[no-untyped-def]
     """Return mean angles of triangles, and half widths of boxes with the same variance. gamma: (3, ≥ num)"""
     a, b, c = gamma[0], gamma[1], gamma[2]
@@ -45,7 +45,7 @@ def _spread(gamma, num, mean, half):  # type: ignore[no-untyped-def]
         half[n] = max(math.sqrt((ab * ab + bc * bc + ca * ca) * _THIRD), _MIN_HALF)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _compute_reach(kind, scale, wo, local, radius, half, num, reach):  # type: ignore[no-untyped-def]
     """Bound how far an angle varies within triangles, in bands.
 
@@ -67,7 +67,7 @@ def _compute_reach(kind, scale, wo, local, radius, half, num, reach):  # type: i
             reach[n] = max(half_reach, _CORNER * half[n])
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _ends(mean, half, last, num, low, high):  # type: ignore[no-untyped-def]
     """Return the ends of boxes, in bands. last: angle in the last band."""
     for n in range(num):
@@ -76,7 +76,7 @@ def _ends(mean, half, last, num, low, high):  # type: ignore[no-untyped-def]
         high[n] = max(min(mean[n] + half[n], last), low[n] + _MIN_HALF)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _compute_cosine_shift(gamma, mean, local, group_range, num, cosine_shift):  # type: ignore[no-untyped-def]
     """Compute how an angle varies with cos θi between the lights of groups: covariance over mean cosine.
 
@@ -95,7 +95,7 @@ def _compute_cosine_shift(gamma, mean, local, group_range, num, cosine_shift):  
         )
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _integrals(steps, low, high, cosine_shift, num, integral):  # type: ignore[no-untyped-def]
     """Integrate a curve times cos θi over boxes, relative to the mean cosine.
 
@@ -114,14 +114,14 @@ def _integrals(steps, low, high, cosine_shift, num, integral):  # type: ignore[n
         integral[n] = base + min(max(correction, -max_correction), max_correction)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _means(low, high, num, value):  # type: ignore[no-untyped-def]
     """Divide integrals over boxes by their widths."""
     for n in range(num):
         value[n] /= high[n] - low[n]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _variations(steps, mean, reach, last, num, variation):  # type: ignore[no-untyped-def]
     """Compute the variation of a curve within reach of mean angles.
 
@@ -133,7 +133,7 @@ def _variations(steps, mean, reach, last, num, variation):  # type: ignore[no-un
         variation[n] = steps[first, 2] - steps[final, 2]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _add_errors(mean, reach, variation, value, num, error):  # type: ignore[no-untyped-def]
     """Add the relative errors of a curve's averages over boxes.
 
@@ -148,13 +148,13 @@ def _add_errors(mean, reach, variation, value, num, error):  # type: ignore[no-u
         error[n] += (_SHAPE + bend) * variation[n] / max(value[n], np.float32(1e-30))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _multiply(factor, num, value):  # type: ignore[no-untyped-def]
     for n in range(num):
         value[n] *= factor[n]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def evaluate(curves, scale, wo, local, radius, group_range, num, scratch, value, error):  # type: ignore[no-untyped-def]
     """Multiply the averages of all curves over triangles.
 
@@ -194,7 +194,7 @@ def evaluate(curves, scale, wo, local, radius, group_range, num, scratch, value,
             _multiply(curve_mean, num, value[row])
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def load_nodes(nodes, node, light, begin, num, x, y, z):  # type: ignore[no-untyped-def]
     """Look up a node of listed lights [begin, begin + num).
 
@@ -207,7 +207,7 @@ def load_nodes(nodes, node, light, begin, num, x, y, z):  # type: ignore[no-unty
         x[k], y[k], z[k] = nodes[m, node, 0], nodes[m, node, 1], nodes[m, node, 2]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def load_midpoints(nodes, light, begin, num, local):  # type: ignore[no-untyped-def]
     """Look up the edge midpoints of listed lights [begin, begin + num).
 
@@ -224,7 +224,7 @@ def load_midpoints(nodes, light, begin, num, local):  # type: ignore[no-untyped-
         ca_x[k], ca_y[k], ca_z[k] = nodes[m, 5, 0], nodes[m, 5, 1], nodes[m, 5, 2]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def rotate_nodes(n, t, first_node, num, local):  # type: ignore[no-untyped-def]
     """Rotate nodes [first_node, 6) into the frame of normal n and tangent t. local: (3, 6, ≥ num)"""
     bx, by, bz = n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]
@@ -238,7 +238,7 @@ def rotate_nodes(n, t, first_node, num, local):  # type: ignore[no-untyped-def]
             c[k] = nx * x + ny * y + nz * z
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def load_weights(irradiance_radius, light, shading, begin, num, weight, reach):  # type: ignore[no-untyped-def]
     """Look up irradiance and radius of listed lights [begin, begin + num).
 
@@ -256,7 +256,7 @@ def load_weights(irradiance_radius, light, shading, begin, num, weight, reach): 
         reach[k] = irradiance_radius[m, 3]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def sum_up(value, weight, num, total):  # type: ignore[no-untyped-def]
     """Add weight (3, ≥ num) times value (1 or 3, ≥ num) to the total (3,)."""
     blue_row = value.shape[0] - 1

@@ -146,7 +146,7 @@ def cancel_bake(bake: Id, services: ServicesDep, delete_files: bool = False) -> 
     if delete_files:
         services.bakes.delete(bake)
         services.access.quotas.disown("bake", bake)
-    elif not services.bakes.cancel(bake) and (state := services.bakes.get(bake).state) != "cancelled":
+    elif not services.bakes.cancel(bake) and (state := services.bakes.get(bake).state) != "canceled":
         raise NotReadyError(f"the bake is {state}; nothing to cancel (?delete_files=true deletes it)")
     return Response(status_code=204)
 

@@ -138,7 +138,7 @@ class BatchProcess:
 
 
 def _answer(message: Mapping[str, Any]) -> Mapping[str, Any]:
-    if "cancelled" in message:
+    if "canceled" in message:
         raise CancelledError("the step was stopped")
     if "problem" in message:
         raise _ERRORS_BY_KIND.get(message.get("kind", ""), RelumeError)(message["problem"])

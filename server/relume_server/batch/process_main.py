@@ -4,7 +4,7 @@
 `relume_server.batch.process`; the last two as for `relume.image_io.ocio.active_config`.
 
 Reads one line of JSON per step, or `"stop"` to cancel it; writes lines with `share`, and at last one with `answer`,
-`problem` or `cancelled`. It yields to everything else on the machine, and ends when the server is gone.
+`problem` or `canceled`. It yields to everything else on the machine, and ends when the server is gone.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def _answer(context: Any, message: dict[str, Any], stop: threading.Event, out: A
     try:
         return {"answer": do_step(context, Step(**message), report, stop.is_set)}
     except CancelledError:
-        return {"cancelled": True}
+        return {"canceled": True}
     except Exception as error:
         if not isinstance(error, RelumeError | OSError):
             log.exception("a %s failed", message["kind"])

@@ -239,7 +239,7 @@ class BakeBody(Body):
     user: str
     created: str
     scene: str
-    state: Literal["queued", "running", "ready", "failed", "cancelled"]
+    state: Literal["queued", "running", "ready", "failed", "canceled"]
     progress: float
     phase: Phase | None
     phase_seconds: float | None

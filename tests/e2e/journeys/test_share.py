@@ -86,9 +86,9 @@ def test_a_link_in_a_fresh_profile_and_one_that_opens_nothing(editor: Editor, vi
 
 def wait_until_cancelled(server: Server, bake: str) -> None:
     deadline = time.monotonic() + WAIT_MS / 1e3
-    while (state := server.call(f"/api/bakes/{bake}")["state"]) != "cancelled":
+    while (state := server.call(f"/api/bakes/{bake}")["state"]) != "canceled":
         assert state == "running", f"the bake is {state}"
-        assert time.monotonic() < deadline, "nothing was cancelled"
+        assert time.monotonic() < deadline, "nothing was canceled"
         time.sleep(0.1)
 
 

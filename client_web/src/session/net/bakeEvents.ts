@@ -5,7 +5,7 @@ import { getBake } from "./api";
 const POLL_MS = 1500;
 
 function isFinished(bake: BakeBody): boolean {
-  return bake.state === "ready" || bake.state === "failed" || bake.state === "cancelled";
+  return bake.state === "ready" || bake.state === "failed" || bake.state === "canceled";
 }
 
 /** Call `onUpdate` with every state until the bake ends. Returns a function that stops this. */

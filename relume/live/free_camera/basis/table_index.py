@@ -8,13 +8,13 @@ from typing import Any
 import numba as nb
 import numpy as np
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.live.free_camera.basis.outgoing_coefficients import NUM_ROWS
 
 MIN_COSINE = np.float32(0.01)  # of θo; a visible pixel may interpolate probes that face away slightly
 
 
-@nb.njit(nogil=True, cache=True, forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, forceinline=True, **NO_REFCOUNT)
 def table_row(cosine):  # type: ignore[no-untyped-def]
     """Return the row of cos θo in tables, and the fraction toward the next row."""
     row_coordinate = math.sqrt(max(np.float32(1) - cosine, np.float32(0))) * np.float32(NUM_ROWS - 1)
@@ -22,7 +22,7 @@ def table_row(cosine):  # type: ignore[no-untyped-def]
     return row, np.float32(row_coordinate - row)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def view_direction_local(position, normal, tangent, camera_position):  # type: ignore[no-untyped-def]
     """Return table coordinates of a point's ωo: a row, the fraction toward the next, and cos φo, sin φo.
 

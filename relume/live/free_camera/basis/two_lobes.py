@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 
 F32 = NDArray[np.float32]
@@ -30,7 +30,7 @@ _INITIAL_OFFSET = 0.5  # of σ, initial distance of each lobe from the center
 _NARROWEST, _WIDEST = np.float32(1e-8), np.float32(1.0)  # σ²
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _responsibility(x):  # type: ignore[no-untyped-def]
     """Return 1 / (1 + e^x), to 1e-4, by Lambert's continued fraction of the hyperbolic tangent, which vectorizes."""
     h = min(max(np.float32(-0.5) * x, np.float32(-4.9)), np.float32(4.9))
@@ -40,7 +40,7 @@ def _responsibility(x):  # type: ignore[no-untyped-def]
     return np.float32(0.5) + np.float32(0.5) * numerator / denominator
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _squared_width(length):  # type: ignore[no-untyped-def]
     """Return σ² = 1 / κ from the length of the mean direction, R: κ ≈ R (3 − R²) / (1 − R²)."""
     r = min(max(length, np.float32(1e-3)), np.float32(1 - 1e-7))

@@ -12,7 +12,7 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.lights.sun_disks import NUM_TARGETS
 from relume.live.free_camera.antialiasing import is_edge
 from relume.raytrace.ray_packet import (
@@ -175,7 +175,7 @@ def _is_same_surface(rays, p, q):  # type: ignore[no-untyped-def]
     )
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def predict(rays, width, height, start, stop, num_visible, is_uncertain):  # type: ignore[no-untyped-def]
     """Predict untraced pixels in blocks of 2 × 2 pixels [start, stop); mark them uncertain if neighbors disagree.
 
@@ -199,7 +199,7 @@ def predict(rays, width, height, start, stop, num_visible, is_uncertain):  # typ
                     _predict_pixel(rays, width, height, x, y, num_visible, is_uncertain)
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _predict_pixel(rays, width, height, x, y, num_visible, is_uncertain):  # type: ignore[no-untyped-def]
     """Predict a pixel from traced neighbors on its surface."""
     p, num_neighbors, agree, value = y * width + x, 0, True, np.uint8(0)
@@ -215,7 +215,7 @@ def _predict_pixel(rays, width, height, x, y, num_visible, is_uncertain):  # typ
         num_visible[p] = value
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def needs_refinement(rays, width, height, refined_pixels, is_refined, num_visible, start, stop, is_uncertain):  # type: ignore[no-untyped-def]
     """Mark predicted pixels near refined_pixels[start:stop], on their surface, that differ from them.
 
@@ -233,7 +233,7 @@ def needs_refinement(rays, width, height, refined_pixels, is_refined, num_visibl
                     is_uncertain[q] = True
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def needs_refinement_at_edges(rays, owner, num_pixels, rays_per_pixel, num_visible, start, stop, is_uncertain):  # type: ignore[no-untyped-def]
     """Mark extra rays of edge pixels owner[rays_per_pixel · (start:stop)] that differ from others on a surface.
 
@@ -255,7 +255,7 @@ def needs_refinement_at_edges(rays, owner, num_pixels, rays_per_pixel, num_visib
                     is_uncertain[k] = _is_same_surface(rays, p, neighbor_ray)
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def smooth_visibility(rays, width, height, num_visible, start, stop, out):  # type: ignore[no-untyped-def]
     """Write visible fractions of pixels [start, stop): the mean of nine if all are in penumbra.
 

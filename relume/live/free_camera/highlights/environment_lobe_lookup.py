@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.live.free_camera.basis.table_index import MIN_COSINE, table_row
 from relume.live.free_camera.environment_lookup import EnvironmentLookup, add_environment, blur_level
 
@@ -36,7 +36,7 @@ class PrefilteredEnvironment(NamedTuple):
     gain: Shaped[F32, " 3"]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def evaluate_lobe(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
     """Evaluate the direction and width of a lobe.
 
@@ -53,7 +53,7 @@ def evaluate_lobe(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
     return row, fraction, _direction_at_cosine(cosine, tangential, n), sigma
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def evaluate_two_lobes(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
     """Evaluate the directions and widths of the two lobes of a highlight.
 
@@ -81,7 +81,7 @@ def evaluate_two_lobes(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
     )
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _lobe_frame(n, d):  # type: ignore[no-untyped-def]
     """Return the table row of θo, and the unit projection of d onto the surface."""
     facing = -(n[0] * d[0] + n[1] * d[1] + n[2] * d[2])
@@ -92,7 +92,7 @@ def _lobe_frame(n, d):  # type: ignore[no-untyped-def]
     return row, fraction, (inverse_length * x, inverse_length * y, inverse_length * z)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _direction_at_cosine(cosine, tangential, n):  # type: ignore[no-untyped-def]
     """Return the direction in the plane of n and `tangential` with a given cosine to n."""
     sine = math.sqrt(max(np.float32(1) - cosine * cosine, np.float32(0)))
@@ -103,7 +103,7 @@ def _direction_at_cosine(cosine, tangential, n):  # type: ignore[no-untyped-def]
     )
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def add_environment_in_lobe(environment, visibility, direction, sigma, gain, out):  # type: ignore[no-untyped-def]
     """Add the environment in a lobe, without the environment's gain.
 
@@ -134,7 +134,7 @@ def add_environment_in_lobe(environment, visibility, direction, sigma, gain, out
                 out[channel] += falloff * environment.bright_lights[bright_light, 3 + channel]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _decay(x):  # type: ignore[no-untyped-def]
     """Return e^−x, without a call if it is negligible."""
     return np.float32(math.exp(-x)) if x < _MAX_EXPONENT else np.float32(0)

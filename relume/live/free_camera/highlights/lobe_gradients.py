@@ -21,7 +21,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.color import LUMINANCE
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.basis.highlight_lobes import Lobes
 from relume.live.free_camera.basis.material_tables import Tables
@@ -38,7 +38,7 @@ _NON_ENVIRONMENT_COLUMN = 4  # column of `Tables.table_index` for other light in
 _MIN_SINE = np.float32(1e-3)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _sum_factors(tables, lobes, material, row, channel, factors, step):  # type: ignore[no-untyped-def]
     """Sum the tables and albedos of a material's terms with a highlight.
 
@@ -67,7 +67,7 @@ def _sum_factors(tables, lobes, material, row, channel, factors, step):  # type:
     return albedo, albedo_step
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _outgoing_with_derivatives(recurrence_table, incident, channel, factors, step, view_coordinates):  # type: ignore[no-untyped-def]
     """Sum the incident light of a probe with coefficients, and its derivatives.
 
@@ -95,7 +95,7 @@ def _outgoing_with_derivatives(recurrence_table, incident, channel, factors, ste
     return outgoing, row_derivative, azimuth_derivative
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _gradient(recurrence_table, n, t, o, view_coordinates, non_environment, tables, lobes, material, factors, step):  # type: ignore[no-untyped-def]
     """Return G of a probe, in world space.
 
@@ -134,7 +134,7 @@ def _gradient(recurrence_table, n, t, o, view_coordinates, non_environment, tabl
     )
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _gradient_rows(  # type: ignore[no-untyped-def]
     recurrence_table,
     probes,

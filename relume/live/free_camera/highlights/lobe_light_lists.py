@@ -22,7 +22,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.lights.sun_disks import MAX_SUN_DISKS
 from relume.live.free_camera.basis.highlight_lobes import Lobes
@@ -57,14 +57,14 @@ class LobeLightLists(NamedTuple):
     bright_light_weights: Shaped[F32, "bright_lights contributors"]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def width_index(sigma):  # type: ignore[no-untyped-def]
     """Return the index of the width nearest to σ."""
     step = np.float32(2) * math.log2(max(sigma, np.float32(1e-6)) * np.float32(1 / MIN_SIGMA))
     return min(max(np.int64(step + np.float32(0.5)), 0), NUM_WIDTHS - 1)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def bin_of(x, y, z):  # type: ignore[no-untyped-def]
     """Return the direction bin of the direction x, y, z."""
     per = np.float32(1) / (abs(x) + abs(y) + abs(z))
@@ -102,7 +102,7 @@ def _direction_bins() -> tuple[F64, F64]:
 _DIRECTION_BINS = _direction_bins()
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def light_weight(lights, light, x, y, z, variance):  # type: ignore[no-untyped-def]
     """Return w of a light.
 
@@ -114,7 +114,7 @@ def light_weight(lights, light, x, y, z, variance):  # type: ignore[no-untyped-d
     return _weight(one_minus_cosine, lights[light, 3], lights[light, 4], variance)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _weight(one_minus_cosine, spread, luminance, variance):  # type: ignore[no-untyped-def]
     """Return w from 1 − ω · ω_l, r² and E."""
     inverse_variance = np.float32(1) / (variance + spread)
@@ -149,7 +149,7 @@ def _list_lights(columns, centers, radius, variance, start, stop, out):  # type:
         out[bin_index, n:] = -1
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _selection_threshold(bits, max_count):  # type: ignore[no-untyped-def]
     """Return the smallest of the largest `max_count` numbers, ignoring zeros.
 

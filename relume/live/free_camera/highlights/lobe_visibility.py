@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.basis.highlight_lobes import Lobes
 from relume.live.free_camera.highlights.environment_lobe_lookup import evaluate_two_lobes
@@ -30,7 +30,7 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _mean_lobe(direction_1, direction_2, weight_1, sigma_1, sigma_2):  # type: ignore[no-untyped-def]
     """Return the mean direction of two lobes, three numbers, and their joint variance, σ²."""
     x = weight_1 * direction_1[0] + (np.float32(1) - weight_1) * direction_2[0]
@@ -47,7 +47,7 @@ def _mean_lobe(direction_1, direction_2, weight_1, sigma_1, sigma_2):  # type: i
     )
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _trace_lobe_visibility(  # type: ignore[no-untyped-def]
     probes, material, visibility_bits, lobe_lights, lobes, camera_position, rows, start, stop, out
 ):

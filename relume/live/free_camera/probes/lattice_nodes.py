@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.probes.interpolation_weights import (
     MATERIAL_SEPARATION,
@@ -158,7 +158,7 @@ def bounding_cube(surface_points: SurfacePoints) -> tuple[Shaped[F32, " 3"], flo
     return position.min(axis=0), max(float(np.ptp(position, axis=0).max()), 1e-30)
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _key_kernel(  # type: ignore[no-untyped-def]
     positions_normals, material, side, level, size, corner, normal_steps, start, stop, position_key, attribute_key
 ):

@@ -8,12 +8,12 @@ from typing import Any
 import numba as nb
 import numpy as np
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.raytrace.texture import two_texels
 
 
 # Inlined with its callees: calls would count references to arrays, which takes two thirds of the time of a lookup.
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _add_level(textures, texture, level, u, v, weight, out):  # type: ignore[no-untyped-def]
     """Add the weighted bilinear lookup of one mip level. out: (3,)"""
     row = textures.first[texture] + level
@@ -35,7 +35,7 @@ def _add_level(textures, texture, level, u, v, weight, out):  # type: ignore[no-
         )
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def sample_texture(textures, texture, u, v, footprint, out):  # type: ignore[no-untyped-def]
     """Look up a texture, trilinear.
 

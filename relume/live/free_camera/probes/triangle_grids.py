@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 
 I32 = NDArray[np.int32]
@@ -114,7 +114,7 @@ def surrounding_nodes(probe_grid, face, side, u, v):  # type: ignore[no-untyped-
     return first + node_index(rows, i + 1, j + 1), b, c, np.float32(fx + fy - 1), np.float32(1 - fy), np.float32(1 - fx)
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _surrounding_minimum(probe_grid, power, steps, start, stop, out):  # type: ignore[no-untyped-def]
     """Compute the minimum over the three nodes that surround each of the steps [start, stop)."""
     for k in range(start, stop):

@@ -18,7 +18,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.assets.btf.direction_rings import interpolation_weights_at
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.simd import prefetch
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.antialiasing import is_edge
@@ -100,7 +100,7 @@ def _list_rays(face, face_material, has_btf, reuses_center, lattice_node, first,
                 is_requested[lattice_node[ray, k]] = 1
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _subtract_center(  # type: ignore[no-untyped-def]
     owner, num_pixels, has_btf, face_material, face_normal, face, distance, directions, reuses_center, out
 ):
@@ -120,7 +120,7 @@ def _subtract_center(  # type: ignore[no-untyped-def]
                 out[ray, channel] -= out[p, channel]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _add_center(owner, num_pixels, reuses_center, out):  # type: ignore[no-untyped-def]
     """Add the shaded radiance of the pixel center to the rays that `_subtract_center` found."""
     for k in range(owner.shape[0]):
@@ -131,7 +131,7 @@ def _add_center(owner, num_pixels, reuses_center, out):  # type: ignore[no-untyp
 
 # Helpers are inlined and take arrays, not their owners: a call or an attribute access would count references to arrays
 # that threads share, which took three quarters of the kernel's time.
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _fetch_texels(levels, direction_grid, weights, columns, num_rays, ray_buffers, batch_buffers, counts):  # type: ignore[no-untyped-def]
     """Find the texels and view directions of each ray, and prefetch their coefficients while others are summed.
 
@@ -154,7 +154,7 @@ def _fetch_texels(levels, direction_grid, weights, columns, num_rays, ray_buffer
                 prefetch(weights, (view[k], texel[first + 1], NUM_COEFFICIENTS - 1))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _integrate_nodes(coefficients, axes, secondary_axes, tangents, vectors, nodes, weights, x, y, side):  # type: ignore[no-untyped-def]
     """Integrate a texel's coefficients with the light interpolated between three lattice nodes, per channel.
 

@@ -24,7 +24,7 @@ from relume.assets.btf.local_pca_btf import INT8_MAX, LocalPcaBtf
 from relume.brdf.registry import TERMS
 from relume.brdf.terms.btf import BtfRef
 from relume.core.cache import asset_cached, is_asset_cached
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges
 from relume.live.free_camera.texel_brdf.coefficient_packing import (
     COEFFICIENT_AXIS,
@@ -114,7 +114,7 @@ def find_btf_materials(
     return BtfMaterials(available, missing)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _texel_coefficients(factors, cluster, weight, view, texel, out):  # type: ignore[no-untyped-def]
     """Sum the coefficients of a texel for one view direction. factors: (K, 1 + C, 24) of that direction. out: (24,)"""
     cluster_index = cluster[view, texel]

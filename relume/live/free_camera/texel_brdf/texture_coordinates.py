@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.shade_pixels import texture_footprint
 from relume.math.fast_math import acos_clamped, azimuth_fraction
@@ -40,19 +40,19 @@ _FACE_COLUMNS = np.array([
 """Columns that the rows of `face_placements` are copied to."""
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def dot(a, b):  # type: ignore[no-untyped-def]
     """Inner product of tuples of three."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def cross(a, b):  # type: ignore[no-untyped-def]
     """Cross product of tuples of three."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def vector_row(array, k):  # type: ignore[no-untyped-def]
     """One of (n, 3) as a tuple, which is not counted as a reference."""
     return array[k, 0], array[k, 1], array[k, 2]
@@ -80,7 +80,7 @@ def face_placements(positions: Shaped[F32, "corners 3"], stored_scene: StoredSce
     return out
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _projected_axes(face_normal):  # type: ignore[no-untyped-def]
     """Return the texture axes of tri-planar projection along the world axis nearest to the face normal."""
     a, b, c = abs(face_normal[0]), abs(face_normal[1]), abs(face_normal[2])
@@ -97,7 +97,7 @@ def _projected_axes(face_normal):  # type: ignore[no-untyped-def]
     return across, cross(axis, across)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def gather_hits(placements, normals, face, uv, distance, directions, lattice_node, weight, rows, start, num, columns):  # type: ignore[no-untyped-def]
     """Gather the hits of rays rows[start:start + num] into columns; at most `BATCH_SIZE` rays.
 
@@ -118,25 +118,25 @@ def gather_hits(placements, normals, face, uv, distance, directions, lattice_nod
         columns[_UV + j], columns[_UV + BATCH_SIZE + j], columns[_DISTANCE + j] = uv[ray, 0], uv[ray, 1], distance[ray]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def get_vector(columns, first, j):  # type: ignore[no-untyped-def]
     """Return row j of the three columns that begin at `first`, as a tuple."""
     return columns[first + j], columns[first + BATCH_SIZE + j], columns[first + 2 * BATCH_SIZE + j]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _set_vector(columns, first, j, vector):  # type: ignore[no-untyped-def]
     """Write a tuple into row j of three columns."""
     columns[first + j], columns[first + BATCH_SIZE + j], columns[first + 2 * BATCH_SIZE + j] = vector
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _normalize(vector):  # type: ignore[no-untyped-def]
     scale = np.float32(1) / math.sqrt(max(dot(vector, vector), _EPSILON))
     return scale * vector[0], scale * vector[1], scale * vector[2]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _tangent_frames(columns):  # type: ignore[no-untyped-def]
     """Compute tangent frames about the shading normals, and texture coordinates of faces that have them."""
     for j in range(BATCH_SIZE):
@@ -157,7 +157,7 @@ def _tangent_frames(columns):  # type: ignore[no-untyped-def]
         _set_vector(columns, Y, j, (side * y[0], side * y[1], side * y[2]))
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _project_uv(columns, camera_position, num):  # type: ignore[no-untyped-def]
     """Compute axes and coordinates of faces without texture coordinates: tri-planar projection, one per meter."""
     for j in range(num):
@@ -177,7 +177,7 @@ def _project_uv(columns, camera_position, num):  # type: ignore[no-untyped-def]
         _set_vector(columns, Y, j, y)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _repeat_fraction(coordinate):  # type: ignore[no-untyped-def]
     """Return the fraction of a repeat; written out, because floor would be a call."""
     clamped: Any = min(max(coordinate, -_MAX_REPEATS), _MAX_REPEATS)
@@ -185,7 +185,7 @@ def _repeat_fraction(coordinate):  # type: ignore[no-untyped-def]
     return fraction + np.float32(1) if fraction < 0 else fraction
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def map_to_texture(columns, num, camera_position, pixel_angle, rotation, scale, finest):  # type: ignore[no-untyped-def]
     """Compute where gathered rays hit their texture, and its frame there.
 

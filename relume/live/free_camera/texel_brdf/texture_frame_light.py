@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.numba_options import UNCOUNTED
+from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.primary_visibility import mark_needed_probes
 from relume.live.free_camera.probes.stored_scene import StoredScene
@@ -43,7 +43,7 @@ class NodeLight(NamedTuple):
     vectors: Shaped[F32, "nodes lanes"]
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def rotation_from_vector(x, y):  # type: ignore[no-untyped-def]
     """Return cos δ and sin δ of the direction of a vector of any length; (0, 0) gives δ = 0."""
     squared_length = x * x + y * y
@@ -53,7 +53,7 @@ def rotation_from_vector(x, y):  # type: ignore[no-untyped-def]
     return np.float32(1), np.float32(0)
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _rotation_powers(x, y):  # type: ignore[no-untyped-def]
     """Return cos mδ and sin mδ for m = 1 to 4, δ as in `rotation_from_vector`."""
     c1, s1 = rotation_from_vector(x, y)
@@ -61,7 +61,7 @@ def _rotation_powers(x, y):  # type: ignore[no-untyped-def]
     return c1, s1, c2, s2, c2 * c1 - s2 * s1, s2 * c1 + c2 * s1, c2 * c2 - s2 * s2, np.float32(2) * c2 * s2
 
 
-@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def add_rotated(lanes, rotation, side, weight, is_added, out):  # type: ignore[no-untyped-def]
     """Add a rotated coefficient vector.
 
@@ -83,7 +83,7 @@ def add_rotated(lanes, rotation, side, weight, is_added, out):  # type: ignore[n
         out[PAIRS + i] = sine_sum + sine * a + cosine * b
 
 
-@nb.njit(nogil=True, cache=True, **UNCOUNTED)
+@nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
 def _fill_lanes(vectors, rows, start, stop, out):  # type: ignore[no-untyped-def]
     """Copy the coefficients of probes rows[start:stop] into lanes. out: (probes, 3 F)"""
     for p in rows[start:stop]:
