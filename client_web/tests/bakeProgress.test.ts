@@ -7,22 +7,22 @@ const running: BakeStatus = { id: "b", state: "running", progress: 0, phase: "tr
 
 describe("words of a bake", () => {
   test("what it does before it traces, and for how long", () => {
-    expect(bakeProgressText({ ...running, phase: "compiling" }, 12.7)).toBe("compiling kernels, once on this machine, 12 s");
-    expect(phaseText({ ...running, phase: "building" })).toBe("sorting its triangles");
+    expect(bakeProgressText({ ...running, phase: "compiling" }, 12.7)).toBe("compiling kernels (first run only), 12 s");
+    expect(phaseText({ ...running, phase: "building" })).toBe("building the BVH");
     expect(hasProgress({ ...running, phase: "starting" })).toBe(false);
   });
 
   test("no time left without evidence", () => {
-    expect(bakeProgressText({ ...running, progress: 0.034 }, 5)).toBe("baking, 3 %, estimating the time…");
+    expect(bakeProgressText({ ...running, progress: 0.034 }, 5)).toBe("baking, 3 %, estimating time…");
     expect(bakeProgressText({ ...running, progress: 0.5, seconds_left: 41.2 }, 5)).toBe("baking, 50 %, about 41 s left");
     expect(hasProgress(running)).toBe(true);
   });
 
   test("how many it waits for", () => {
     const queued: BakeStatus = { ...running, state: "queued", phase: null };
-    expect(bakeProgressText({ ...queued, queue_position: 2 }, 0)).toBe("waits for 2 bakes before it");
-    expect(bakeProgressText({ ...queued, queue_position: 1 }, 0)).toBe("waits for 1 bake before it");
-    expect(bakeProgressText(queued, 0)).toBe("waits for its turn");
+    expect(bakeProgressText({ ...queued, queue_position: 2 }, 0)).toBe("queued after 2 bakes");
+    expect(bakeProgressText({ ...queued, queue_position: 1 }, 0)).toBe("queued after 1 bake");
+    expect(bakeProgressText(queued, 0)).toBe("queued");
     expect(bakeProgressText({ ...queued, state: "failed" }, 0)).toBe("bake failed");
   });
 });

@@ -8,15 +8,15 @@ vi.hoisted(() => vi.stubGlobal("localStorage", { getItem: () => null, setItem: (
 
 const material = (name: string, is_projected: boolean) => ({ name, is_projected, terms: [], shadow_catcher: false, is_glass: false });
 
-test("an object without places in textures is said to take a projection, and a browser that draws to show the mean", async () => {
+test("notes about tri-planar mapping and about average texels in client rendering", async () => {
   const { coverText } = await import("../src/panels/inspector/ZernikeFit");
   const { isClientRendering } = await import("../src/session/clientRendering");
-  scene.value = { materials: [material("Bare", true), material("Dressed", false)] } as unknown as SceneBody;
-  expect(coverText("Bare")).toContain("no places in textures: it is projected");
-  expect(coverText("Dressed")).toBe(null);
+  scene.value = { materials: [material("Bare", true), material("Textured", false)] } as unknown as SceneBody;
+  expect(coverText("Bare")).toContain("no UVs: the texture is projected");
+  expect(coverText("Textured")).toBe(null);
   views.value = [{ name: "walk", camera_mode: "free" }] as unknown as typeof views.value;
   shownViews.value = ["walk"];
   isClientRendering.value = true;
-  expect(coverText("Dressed")).toBe("While the eye moves: the mean of all texels, as this browser draws.");
-  expect(coverText("Bare")).toMatch(/metre for each repeat\. While the eye moves/);
+  expect(coverText("Textured")).toBe("While the camera moves, this browser draws the average of all texels.");
+  expect(coverText("Bare")).toMatch(/1 m per repeat\)\. While the camera moves/);
 });

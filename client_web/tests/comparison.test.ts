@@ -6,51 +6,51 @@ const whole = { ...stats, error: 0.3271, standard_error: 0.0004 };
 const left = ["Light that surfaces reflect onto each other."];
 const body = { error_all_paths: whole, error_method_paths: stats, omitted_paths: left, unsupported_paths: [] };
 
-describe("how true a picture is, in words", () => {
-  it("tells both errors, against all paths and against the method's, each with its standard error", () => {
+describe("messages of the comparison", () => {
+  it("give the errors for all and for simulated light paths, with standard errors", () => {
     const [all, method] = errorSentences(body);
-    expect(all).toContain("all light paths: the frame errs by 32.71 ± 0.04 %");
-    expect(method).toContain("the method's light paths: the frame errs by 1.6 ± 0.2 %");
-    expect(omittedPathSentences(body)).toEqual(["The method leaves out: light that surfaces reflect onto each other."]);
+    expect(all).toContain("Error, all light paths: 32.71 ± 0.04 %");
+    expect(method).toContain("Error, simulated light paths: 1.6 ± 0.2 %");
+    expect(omittedPathSentences(body)).toEqual(["Not simulated here: light that surfaces reflect onto each other."]);
   });
 
-  it("tells one error where the method follows all paths", () => {
+  it("give one error if all light paths are simulated", () => {
     expect(errorSentences({ ...body, omitted_paths: [] })).toHaveLength(1);
-    expect(omittedPathSentences({ omitted_paths: [], unsupported_paths: ["Caustics."] })).toEqual(["Brute force leaves out, too: caustics."]);
+    expect(omittedPathSentences({ omitted_paths: [], unsupported_paths: ["Caustics."] })).toEqual(["Not in the reference either: caustics."]);
   });
 
-  it("never tells a number that is below the noise", () => {
+  it("give no error below the noise", () => {
     const [, method] = errorSentences({ ...body, error_method_paths: { ...stats, error: null, standard_error: null, significant_pixel_fraction: 0 } });
-    expect(method).toContain("the error is less than the noise, below 1.8 %");
-    expect(method).not.toContain("errs by");
+    expect(method).toContain("below the noise, under 1.8 %");
+    expect(method).not.toContain("±");
   });
 
-  it("says what the map shows, and how much is noise", () => {
+  it("summarize the error map and the noise", () => {
     expect(mapSentences(stats)[0]).toContain("3.2 % of the pixels differ");
     expect(mapSentences(stats)[1]).toContain("1.2 %");
-    expect(mapSentences({ ...stats, significant_pixel_fraction: 0 })[0]).toContain("no difference");
+    expect(mapSentences({ ...stats, significant_pixel_fraction: 0 })[0]).toContain("No visible difference");
   });
 
-  it("shows as many digits as are known", () => {
+  it("show only significant digits", () => {
     expect(formatPercentWithError(0.0016)).toBe("0.16 %");
     expect(formatPercentWithError(0.0016, 0.00004)).toBe("0.160 ± 0.004 %");
     expect(formatPercentWithError(0.31, 0.02)).toBe("31 ± 2 %");
     expect(formatPercentWithError(0)).toBe("0.00 %");
   });
 
-  it("counts the pass that is being made, and never beyond the last", () => {
+  it("count the current pass, at most the last", () => {
     const at = (completed: number, progress: number) =>
       comparisonProgressText({ state: "running", completed, total: 16, progress, problem: null, seconds_left: null }, 7.8);
-    expect(at(0, 0)).toBe("Preparing the picture, 7 s so far");
-    expect(at(0, 0.02)).toBe("Brute force: pass 1 of 16, 32 % of it, 7 s so far");
-    expect(at(16, 1)).toContain("pass 16 of 16, 0 % of it");
+    expect(at(0, 0)).toBe("Preparing the picture, 7 s elapsed");
+    expect(at(0, 0.02)).toBe("Reference: pass 1 of 16 (32 %), 7 s elapsed");
+    expect(at(16, 1)).toContain("pass 16 of 16 (0 %)");
     const failed = { state: "failed" as const, completed: 0, total: 16, progress: 0, problem: "The disk is full.", seconds_left: null };
     expect(comparisonProgressText(failed, 1)).toBe("The disk is full.");
   });
 
-  it("says how long it takes, before and on the way, and where it was stopped", () => {
-    expect(comparisonPlanText({ passes: 16, seconds: 90, is_measured: true })).toMatch(/16 passes .* about [^,]*\.$/);
-    expect(comparisonPlanText({ passes: 16, seconds: 90, is_measured: false })).toMatch(/about .*, judged by other pictures/);
+  it("give the estimated, remaining and completed work", () => {
+    expect(comparisonPlanText({ passes: 16, seconds: 90, is_measured: true })).toMatch(/^16 passes, about [^,]*\.$/);
+    expect(comparisonPlanText({ passes: 16, seconds: 90, is_measured: false })).toMatch(/about .*, estimated from other pictures/);
     const on = { state: "running" as const, completed: 4, total: 16, progress: 0.3, problem: null, seconds_left: 61 };
     expect(comparisonProgressText(on, 3)).toContain("left");
     expect(comparisonProgressText({ ...on, state: "stopped", seconds_left: null }, 3)).toBe("Stopped after 4 of 16 passes");

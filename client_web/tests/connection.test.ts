@@ -18,13 +18,13 @@ test("what was never baked waits for its bake, it does not connect", () => {
 test("a lost connection says that edits are kept and when it is tried again", () => {
   connection.value = "reconnecting";
   retryInMs.value = 4000;
-  expect(connectionMessage()).toBe("Connection lost. Edits are kept; trying again in 4 s");
+  expect(connectionMessage()).toBe("Connection lost. Your edits are safe; retrying in 4 s");
 });
 
 test("silence says that edits are kept, and whether the browser is offline", () => {
   connection.value = "silent";
-  expect(connectionMessage()).toBe("No answer from the server. Edits are kept");
+  expect(connectionMessage()).toBe("The server does not respond. Your edits are safe");
   isOffline.value = true;
-  expect(connectionMessage()).toBe("Offline. Edits are kept");
+  expect(connectionMessage()).toBe("Offline. Your edits are safe");
   isOffline.value = false;
 });

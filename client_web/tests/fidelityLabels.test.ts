@@ -20,12 +20,12 @@ const labels = () => fidelityMarks().map((mark) => mark.label);
 
 test("until the eye has rested it is what the bake has measured, with its standard error", () => {
   [bakedFreeCameraError.value, freeCameraError.value] = [null, null];
-  expect(labels()).toContain("Moving view, approximate");
+  expect(labels()).toContain("Approximate while moving");
   bakedFreeCameraError.value = { value: 0.0312, standard_error: 0.0021 };
-  expect(labels()).toContain("Moving view, about 3.1 % off");
+  expect(labels()).toContain("Approximate while moving (about 3.1 % error)");
   expect(fidelityMarks()[0]?.title).toContain("3.1 ± 0.2 %");
   freeCameraError.value = 0.217;
-  expect(labels()).toContain("Moving view, about 22 % off");
+  expect(labels()).toContain("Approximate while moving (about 22 % error)");
   expect(fidelityMarks()[0]?.title).toContain("3.1 ± 0.2 %");
 });
 
@@ -37,7 +37,7 @@ test("while a time line plays it is said to play, whichever way its frames come"
     expect(labels()).toEqual(["Playing"]);
   }
   isPlaying.value = false;
-  expect(labels()).toEqual(["Followed closely"]);
+  expect(labels()).toEqual(["Approximate while dragging"]);
 });
 
 test("a bake of direct light says that objects are not reflected, also where its picture is exact", () => {
@@ -45,7 +45,7 @@ test("a bake of direct light says that objects are not reflected, also where its
   isConverged.value = true;
   method.value = "direct";
   expect(labels()).toEqual(["Direct light only"]);
-  expect(fidelityMarks()[0]?.title).toContain("Objects are not reflected");
+  expect(fidelityMarks()[0]?.title).toContain("No bounce light");
   method.value = "gather";
   expect(labels()).toEqual([]);
 });

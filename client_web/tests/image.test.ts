@@ -129,7 +129,7 @@ describe("decodeIds", () => {
 
   test("what is no such image is refused", () => {
     expect(() => decodeIds(new ArrayBuffer(100))).toThrow("not a PNG");
-    expect(() => decodeIds(png(8))).toThrow("not 16-bit grey");
+    expect(() => decodeIds(png(8))).toThrow("not 16-bit gray");
     expect(() => decodeIds(png(16, 20))).toThrow();
     const damaged = png();
     new Uint8Array(damaged).set([1], damaged.byteLength - 20);

@@ -44,7 +44,7 @@ test("maps that are no colors are known by their names", () => {
   const named = ["oak_rough_2k.jpg", "Metal049A_1K-JPG_Metalness.jpg", "rust_arm_4k.png", "bricks-normalGL.png", "wall_AO.png"];
   const otherTerms = ["oak_nor_dx_2k.jpg", "oak_nor_gl_2k.jpg", "tiles_height.png", "lamp_emissive.png"];
   expect(named.map(detectMap)).toEqual(["roughness", "metal", "roughness and metal", "normals", "occlusion"]);
-  expect(otherTerms.map(detectMap)).toEqual(["normals for DirectX", "normals", "heights", "what shines"]);
+  expect(otherTerms.map(detectMap)).toEqual(["DirectX normals", "normals", "height", "emission"]);
   const colors = ["rough_plaster_diff_2k.jpg", "Metal049A_1K-JPG_Color.jpg", "armchair.webp", "rough.png", "IMG_1234.jpg"];
   expect(colors.map(detectMap)).toEqual(colors.map(() => null));
 });

@@ -133,7 +133,7 @@ describe("the inspector's fields", () => {
   const labels = (light: Light) => [...numbersFieldsOf(light), ...angleFieldsOf(light)].map(({ label }) => label);
 
   test("are those that the kind has", () => {
-    expect(labels(spot)).toEqual(["Position", "Direction", "Cone, full light", "Cone, edge"]);
+    expect(labels(spot)).toEqual(["Position", "Direction", "Inner cone", "Outer cone"]);
     expect(labels(sun)).toEqual(["Direction"]);
   });
 

@@ -157,11 +157,11 @@ describe("cameras that are kept", () => {
     expect(calls.splice(0)).toEqual(["GET cameras", "PUT C", "DELETE A"]);
     await saveCameraAs("s", "A", frame, "A");
     expect(calls.splice(0)).toEqual(["PUT A"]);
-    await expect(saveCameraAs("s", "B", frame, "A")).rejects.toThrow("There is a camera “B” already");
+    await expect(saveCameraAs("s", "B", frame, "A")).rejects.toThrow("A camera named “B” already exists");
     expect(calls.splice(0)).toEqual(["GET cameras"]);
-    await expect(saveCameraAs("s", "Own", frame, "A")).rejects.toThrow("the scene’s own cameras");
+    await expect(saveCameraAs("s", "Own", frame, "A")).rejects.toThrow("a camera of the scene file");
     expect(calls.splice(0)).toEqual(["GET cameras"]);
-    await expect(saveCameraAs("s", "a/b", frame, "A")).rejects.toThrow("no slashes");
+    await expect(saveCameraAs("s", "a/b", frame, "A")).rejects.toThrow("slashes");
     expect(calls.splice(0)).toEqual([]);
   });
 });

@@ -93,7 +93,7 @@ test("a look is called otherwise than those of other scenes, which are not shown
 
 test("a name that is taken is said to be, not that somebody changed it", async () => {
   vi.stubGlobal("fetch", () => Promise.resolve(new Response("{}", { status: 412 })));
-  await expect(exchangeSavedLook(old, { name: "Taken", look: LOOK })).rejects.toThrow("There is a look called “Taken” already");
+  await expect(exchangeSavedLook(old, { name: "Taken", look: LOOK })).rejects.toThrow("A look named “Taken” already exists");
   await expect(exchangeSavedLook(old, { ...old, look: { ...LOOK, lights: {} } })).rejects.toThrow("was changed elsewhere");
 });
 

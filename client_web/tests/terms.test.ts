@@ -41,10 +41,10 @@ test("a material that was no mirror when it was baked reflects softly once it is
   expect(isSoftMirror("Nothing", ggx(0.02))).toBe(false);
 });
 
-test("that more light is sent back than arrives is said, and nothing else", () => {
+test("a warning is shown only if a material reflects more light than it receives", () => {
   expect(albedoMessage({ mean: [0.5, 0.5, 0.5], max: 1.01, max_angle_degrees: 89 })).toBeNull();
   expect(albedoMessage({ mean: [0.7, 0.2, 0.4], max: 1.234, max_angle_degrees: 80.6 })).toBe(
-    "Sends back more light than meets it: 123 % of it 81° from the normal, 70 % on average. No real surface does.",
+    "Reflects more light than it receives (123 % at 81°, 70 % on average). Not physically possible.",
   );
 });
 

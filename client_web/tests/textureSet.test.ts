@@ -51,17 +51,17 @@ test("a preview beside the color is not used, and what cannot be read says how t
   const { slots, rejected } = planSet(["Marble006.png", "Marble006_1K_Color.jpg", "Marble006_Roughness.tga"].map(file), isTextureFile);
   expect([...slots.values()].map(({ name }) => name)).toEqual(["Marble006_1K_Color.jpg"]);
   expect(rejected).toEqual([
-    { name: "Marble006_Roughness.tga", reason: "save it as .png, .jpg, .webp or .exr" },
-    { name: "Marble006.png", reason: "another image is the base color" },
+    { name: "Marble006_Roughness.tga", reason: "save it as PNG, JPG, WebP or EXR" },
+    { name: "Marble006.png", reason: "another image is used as base color" },
   ]);
 });
 
 test("one message says what is used and what is not, and a step has the name that the files share", () => {
-  const refused = [{ name: "oak_ao.png", reason: "ambient occlusion; relume traces it" }];
+  const refused = [{ name: "oak_ao.png", reason: "ambient occlusion; it is ray-traced" }];
   expect(setMessage("Seat", ["base color", "roughness", "normals"], refused)).toBe(
-    "On “Seat”: base color, roughness and normals. Not used: oak_ao.png (ambient occlusion; relume traces it).",
+    "Applied to “Seat”: base color, roughness and normals. Not used: oak_ao.png (ambient occlusion; it is ray-traced).",
   );
-  expect(setMessage("Seat", ["normals"], [])).toBe("On “Seat”: normals.");
+  expect(setMessage("Seat", ["normals"], [])).toBe("Applied to “Seat”: normals.");
   expect(setName(["Metal007_1K_Color.jpg", "Metal007_1K_Normal.jpg"])).toBe("Metal007_1K");
   expect(setName(["oak rough.png", "oak.png"])).toBe("oak");
   expect(setName(["a.png", "b.png"])).toBe("2 images");
@@ -87,10 +87,10 @@ test("a material with a set has all of it at once", () => {
 test("what was dropped on the wrong place is named, with where it belongs", () => {
   const dropped = (path: string) => [{ path, file: file(path) }];
   for (const refusal of [editorRejection, startPageRejection]) {
-    expect(refusal(dropped("cayman.brdf"))).toMatch(/^cayman\.brdf: Measured materials go into the Library/);
-    expect(refusal(dropped("car.fbx"))).toMatch(/^car\.fbx: .*Export it as \.glb/);
+    expect(refusal(dropped("cayman.brdf"))).toMatch(/^Can't (use|open) cayman\.brdf.* drop measured materials on the Library/);
+    expect(refusal(dropped("car.fbx"))).toMatch(/^Can't (use|open) car\.fbx.*Export a GLB/);
   }
-  expect(editorRejection(dropped("car.glb"))).toMatch(/^car\.glb: Scenes are imported on the start page/);
-  expect(startPageRejection(dropped("gold.binary"))).toMatch(/^gold\.binary: Measured materials/);
+  expect(editorRejection(dropped("car.glb"))).toMatch(/^Can't use car\.glb here\. Import scenes on the start page/);
+  expect(startPageRejection(dropped("gold.binary"))).toMatch(/^Can't open gold\.binary\. .*measured materials/);
   expect(startPageRejection(dropped("car.glb"))).toBeNull();
 });

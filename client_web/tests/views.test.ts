@@ -36,10 +36,10 @@ describe("arrangement", () => {
   });
 });
 
-test("of several views the buttons of the eye say whose they are", () => {
+test("with several views the camera bar names the active one", () => {
   activeViewName.value = "left";
   shownViews.value = ["left"];
-  expect(cameraMessage.value).toBe("Eye");
+  expect(cameraMessage.value).toBe("Camera");
   shownViews.value = ["front", "left"];
-  expect(cameraMessage.value).toBe("Eye of left");
+  expect(cameraMessage.value).toBe("Camera of left");
 });

@@ -81,7 +81,7 @@ class Editor:
 
 def wait_until_drawn(page: Page) -> None:
     """Until the first picture of a moving view is there."""
-    page.locator(".eye-bar").wait_for(timeout=WAIT_MS)
+    page.locator(".camera-bar").wait_for(timeout=WAIT_MS)
     page.wait_for_function("() => document.querySelector('.zoom')?.textContent.includes('%')", timeout=WAIT_MS)
 
 

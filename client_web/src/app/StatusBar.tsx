@@ -66,11 +66,11 @@ export function StatusBar() {
       <span class={`exactness ${isConverged.value ? "is-exact" : ""}`}>{imageStatusText()}</span>
       <button 
         aria-pressed={shownPanels.value.includes("comparison")}
-        title="Compare with a path-traced reference"
+        title="Measure this picture’s error against path tracing"
         disabled={look.value === null}
         onClick={toggleComparison}
       >
-        Accuracy check…
+        Compare with reference
       </button>
       {freezeStatus.value !== null && <progress max={1} value={freezeStatus.value.progress} aria-label={imageStatusText()} />}
       <span class="spacer" />

@@ -34,7 +34,7 @@ function showRejected(problems: ReadonlyMap<string, string>, numSent: number): v
   showError(
     numSent === 1
       ? [...problems].map(([path, problem]) => `${path}: ${problem}`).join()
-      : `${numSent - problems.size} scenes imported, ${problems.size} failed. See the list above.`,
+      : `${numSent - problems.size} ${numSent - problems.size === 1 ? "scene" : "scenes"} imported, ${problems.size} failed. See the list above.`,
     "files",
   );
 }

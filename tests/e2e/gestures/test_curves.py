@@ -46,7 +46,7 @@ class CurvePage:
         """The curve over the half angle at these parameters, its points and their table shown."""
         for label, value in params.items():
             self.editor.slider(label).press("Enter")
-            number = self.page.get_by_label(f"{label}, as a number")
+            number = self.page.get_by_label(f"{label} value")
             number.fill(str(value))
             number.press("Enter")
         tab = self.page.get_by_role("button", name=HALF_ANGLE, exact=True)
@@ -55,7 +55,7 @@ class CurvePage:
         axis = self.page.get_by_role("button", name="log", exact=True)
         if (axis.get_attribute("aria-pressed") == "true") != log:
             axis.click()
-        table = self.page.get_by_role("button", name="Points as numbers")
+        table = self.page.get_by_role("button", name="Point table")
         if table.get_attribute("aria-pressed") != "true":
             table.click()
         self.points.first.wait_for(timeout=WAIT_MS)
@@ -216,7 +216,7 @@ def test_all_tools_change_what_they_touch_and_a_reload_keeps_the_points(curve: C
     unchanged(bands(), low, high)
     moved = curve.shown()
     assert [a == b for a, b in zip(moved, offered, strict=True)].count(False) == 1
-    page.get_by_role("button", name="Add a point in the widest gap").click()
+    page.get_by_role("button", name="Add point in the widest gap").click()
     unchanged(bands(), low, high)
     added = curve.shown()
     assert len(added) == len(offered) + 1

@@ -85,7 +85,7 @@ def compared(editor: Editor) -> None:
         editor.page.keyboard.press("w")
 
 
-WIPE = "Wipe between A and B, the live picture"
+WIPE = "Wipe between A and B (live)"
 DRAGGABLES = {
     "exposure": Draggable(slider("Exposure"), read=value_of("Exposure")),
     "roughness": Draggable(slider("Roughness σ"), read=value_of("Roughness σ"), prepare=ball(1)),
@@ -116,7 +116,7 @@ DRAGGABLES = {
     "material map": Draggable(
         lambda editor: editor.page.locator(".material-map svg"),
         (5, 3),
-        lambda editor, _: editor.page.locator(".material-map-words").inner_text(),
+        lambda editor, _: editor.page.locator(".material-map-text").inner_text(),
         open_map,
     ),
     "wipe": Draggable(lambda editor: editor.page.get_by_role("slider", name=WIPE), (9, 0), prepare=compared),

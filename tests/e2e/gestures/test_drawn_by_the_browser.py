@@ -64,10 +64,10 @@ def moving(server: Server, browser: Browser, moving_scene: str) -> Iterator[tupl
 
 def settled(editor: Editor) -> Pixels:
     """The picture once it has stopped changing."""
-    expect(editor.page.locator("footer.status")).to_contain_text("approximate until", timeout=WAIT_MS)
+    expect(editor.page.locator("footer.status")).to_contain_text("Approximate while the camera moves", timeout=WAIT_MS)
     editor.page.evaluate(WAIT_FOR_FRAMES)  # what was done has become an edit
     editor.page.wait_for_function("() => window.relumeStats.waiting.length === 0", timeout=DRAWN_MS)
-    whole = editor.page.get_by_text("Moving view, ")  # else it says that it previews
+    whole = editor.page.get_by_text("Approximate while moving")  # else it says that it previews
     before, alike = editor.read_pixels(), 0
     deadline = time.monotonic() + DRAWN_MS / 1e3
     while time.monotonic() < deadline:
@@ -85,7 +85,7 @@ def num_drawn(page: Page) -> int:
 
 
 def choose(page: Page, who: str) -> None:
-    page.get_by_label("Drawn by").select_option(who)
+    page.get_by_label("Renderer").select_option(who)
 
 
 def draw_here(page: Page) -> None:
@@ -197,7 +197,7 @@ def test_highlights_are_where_the_server_has_them(moving: tuple[Editor, list[int
     for name in ("Floor", "Tall block"):
         drawn = num_drawn(page)
         page.get_by_role("option", name=name).click()
-        page.get_by_label("Add a term").select_option(model)
+        page.get_by_label("Add a layer").select_option(model)
         page.wait_for_function("n => window.relumeStats.drawnHere > n", arg=drawn, timeout=DRAWN_MS)
     here = settled(editor)
     assert changed(dull, here) > 0.05

@@ -19,26 +19,26 @@ def test_a_typed_number_is_one_step(editor: Editor) -> None:
     expect(page.locator(".tile.step img")).to_have_count(1)  # taken when the hand has rested a while
     slider.focus()
     page.keyboard.type("0.35")
-    expect(page.get_by_role("textbox", name=f"{SIGMA}, as a number")).to_have_value("0.35")
+    expect(page.get_by_role("textbox", name=f"{SIGMA} value")).to_have_value("0.35")
     assert steps(editor) == []
     page.keyboard.press("Enter")
     expect(slider).to_have_attribute("aria-valuenow", "0.35")
     assert steps(editor) == [f"Ball · {SIGMA}"]
     expect(page.locator(".tile.step img")).to_have_count(2)
 
-    page.get_by_role("button", name=f"{SIGMA}: 0.350; type a number").click()
+    page.get_by_role("button", name=f"{SIGMA}: 0.350; type a value").click()
     page.keyboard.type("0.35")
     page.keyboard.press("Enter")
     assert steps(editor) == [f"Ball · {SIGMA}"]
 
-    red = page.get_by_role("textbox", name="Colour, red, linear")
+    red = page.get_by_role("textbox", name="Color, red, linear")
     red.click()
     page.keyboard.type("0.35")
     page.keyboard.press("Tab")
     page.keyboard.type("0.2")
     page.keyboard.press("Tab")
     page.keyboard.press("Enter")
-    assert steps(editor) == [f"Ball · {SIGMA}", "Ball · Colour", "Ball · Colour"]
+    assert steps(editor) == [f"Ball · {SIGMA}", "Ball · Color", "Ball · Color"]
 
 
 def test_a_swap_after_going_back_takes_no_step_away(editor: Editor) -> None:
@@ -55,7 +55,7 @@ def test_a_swap_after_going_back_takes_no_step_away(editor: Editor) -> None:
     page.keyboard.press("x")
     expect(slider).to_have_attribute("aria-valuenow", str(largest))
     assert steps(editor) == [*made, "Back to the start", "Swap A and B"]
-    expect(page.get_by_text("What you had undone is kept")).to_be_visible()
+    expect(page.get_by_text("Your redo steps are kept")).to_be_visible()
     page.keyboard.press("Control+z")
     expect(slider).to_have_attribute("aria-valuenow", str(opened))
     page.keyboard.press("Control+z")
@@ -69,7 +69,7 @@ def test_a_swap_after_going_back_takes_no_step_away(editor: Editor) -> None:
 def test_a_is_the_kept_picture_and_b_the_live_one(editor: Editor) -> None:
     page = editor.page
     page.keyboard.press("w")
-    wipe = page.get_by_role("slider", name="Wipe between A and B, the live picture")
+    wipe = page.get_by_role("slider", name="Wipe between A and B (live)")
     expect(wipe).to_be_visible()
     hold = page.get_by_role("button", name="Show A", exact=True)
     page.keyboard.down("b")
@@ -80,6 +80,6 @@ def test_a_is_the_kept_picture_and_b_the_live_one(editor: Editor) -> None:
     page.keyboard.up("c")
     expect(hold).to_have_attribute("aria-pressed", "false")
     page.keyboard.press("?")
-    compare = page.get_by_role("dialog", name="Keyboard map").locator("dl", has_text="Compare")
-    expect(compare).to_contain_text("Show A while heldC")
+    compare = page.get_by_role("dialog", name="Keyboard shortcuts").locator("dl", has_text="Compare")
+    expect(compare).to_contain_text("Hold to show AC")
     expect(compare).to_contain_text("Swap A and BX")

@@ -13,8 +13,8 @@ ON_THE_FLOOR = (0.5, 0.85)
 
 
 def start_adding(editor: Editor, kind: str) -> None:
-    editor.page.get_by_role("button", name="Add a light").click()
-    editor.page.get_by_role("group", name="Kind of light").get_by_role("button", name=kind).click()
+    editor.page.get_by_role("button", name="Add light").click()
+    editor.page.get_by_role("group", name="Light type").get_by_role("button", name=kind).click()
 
 
 def add_by_click(editor: Editor, kind: str) -> None:
@@ -60,14 +60,14 @@ def test_a_light_is_placed_by_keys_alone_and_by_none_where_escape_is_pressed(edi
     page = editor.page
     start_adding(editor, "Sun")
     page.keyboard.press("Escape")
-    expect(page.get_by_role("button", name="In the middle")).to_have_count(0)
+    expect(page.get_by_role("button", name="Place in center")).to_have_count(0)
     expect(page.locator(".light")).to_have_count(0)
-    page.get_by_role("button", name="Add a light").press("Enter")
-    page.get_by_role("group", name="Kind of light").get_by_role("button", name="Spot").press("Enter")
-    middle = page.get_by_role("button", name="In the middle")
+    page.get_by_role("button", name="Add light").press("Enter")
+    page.get_by_role("group", name="Light type").get_by_role("button", name="Spot").press("Enter")
+    middle = page.get_by_role("button", name="Place in center")
     expect(middle).to_be_focused()
     middle.press("Enter")
-    expect(page.get_by_role("combobox", name="Kind of light")).to_have_value("spot")
+    expect(page.get_by_role("combobox", name="Light type")).to_have_value("spot")
     expect(middle).to_have_count(0)
     expect(page.locator(".light .name", has_text="Spot")).to_be_focused()
 
@@ -137,24 +137,24 @@ def test_a_light_is_switched_off_and_seen_alone(editor: Editor) -> None:
     dark = editor.pixels()
     add_by_click(editor, "Point")
     lit = editor.pixels()
-    page.get_by_role("button", name="Point: switch off").click()
+    page.get_by_role("button", name="Turn off Point").click()
     assert changed(dark, editor.pixels()) < 0.01
-    page.get_by_role("button", name="Point: switch on").click()
+    page.get_by_role("button", name="Turn on Point").click()
     assert changed(lit, editor.pixels()) < 0.01
 
     steps = page.locator(".tile.step").count()
-    page.get_by_role("button", name="Point alone").click()
-    page.get_by_role("button", name="Only the light of Point").wait_for()
+    page.get_by_role("button", name="Solo Point").click()
+    page.get_by_role("button", name="Solo: Point").wait_for()
     alone = editor.pixels()
     assert changed(lit, alone) > 0.2
     with page.expect_request("**/api/renders") as asked:
         page.get_by_role("button", name="EXR", exact=True).click()
     (exported,) = asked.value.post_data_json["looks"]
     assert exported["environment"]["intensity"] == 0
-    expect(page.get_by_text("Rendering the EXR on the server: only the light of Point…")).to_be_visible()
-    page.get_by_role("button", name="Environment alone").click()
+    expect(page.get_by_text("Rendering EXR (solo: Point)…")).to_be_visible()
+    page.get_by_role("button", name="Solo environment").click()
     assert changed(dark, editor.pixels()) < 0.01
-    page.get_by_role("button", name="Only the light of the environment").click()
+    page.get_by_role("button", name="Solo: environment").click()
     assert changed(lit, editor.pixels()) < 0.01
     assert page.locator(".tile.step").count() == steps
 
@@ -163,7 +163,7 @@ def test_a_light_has_a_temperature_a_power_a_name_a_copy_and_an_aim_that_stays(e
     page = editor.page
     add_by_click(editor, "Spot")
     white = editor.pixels()
-    temperature = editor.slider("Temperature")
+    temperature = editor.slider("Color temperature")
     temperature.press("Home")
     warm = editor.pixels()
     lit = np.abs(white - warm).max(axis=2) > 2
@@ -178,15 +178,15 @@ def test_a_light_has_a_temperature_a_power_a_name_a_copy_and_an_aim_that_stays(e
     np.testing.assert_allclose(float(watts.input_value()) * 683, before / 2, rtol=5e-3)  # shown with three digits
     assert editor.pixels()[lit].mean() < warm[lit].mean()
 
-    page.get_by_role("button", name="Spot: rename").click()
+    page.get_by_role("button", name="Rename Spot").click()
     name = page.get_by_role("textbox", name="New name of Spot")
     name.fill("Key")
     name.press("Enter")
     expect(page.locator(".light .name")).to_have_text("Key")
-    page.get_by_role("button", name="Duplicate this light").click()
+    page.get_by_role("button", name="Duplicate light").click()
     expect(page.locator(".light .name")).to_have_text(["Key", "Key 2"])
 
-    page.get_by_role("checkbox", name="Keep the aim when it moves").check()
+    page.get_by_role("checkbox", name="Lock target").check()
     target = np.add(numbers(editor, "Position"), numbers(editor, "Direction"))
     pull(editor, page.get_by_role("button", name=re.compile("^Key 2, at")), 40, -10)
     np.testing.assert_allclose(np.add(numbers(editor, "Position"), numbers(editor, "Direction")), target, atol=2e-3)

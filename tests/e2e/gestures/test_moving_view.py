@@ -92,7 +92,7 @@ def test_every_gesture_moves_the_eye_twice(moving: Editor) -> None:
         "key turns": lambda: key("ArrowLeft"),
         "key slides": lambda: key("Shift+ArrowUp"),
         "key goes back": lambda: key("-"),
-        "button": lambda: page.get_by_role("button", name="Turn right").click(),
+        "button": lambda: page.get_by_role("button", name="Orbit right").click(),
         "one finger turns": lambda: fingers((0, 0, -50, 0)),
         "two fingers slide": lambda: fingers((-40, 0, 0, 20), (40, 0, 0, 20)),
         "two fingers spread": lambda: fingers((-40, 0, -10, 0), (40, 0, 10, 0)),
@@ -129,7 +129,7 @@ def test_a_material_is_chosen_by_a_click_and_edited_while_the_eye_is_elsewhere(m
     assert box is not None
     page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     expect(page.locator(".inspector .card").first).to_be_visible()
-    expect(page.locator(".in-motion").first).to_contain_text("While the eye moves: 36 terms, which miss less than 1 %")
+    expect(page.locator(".in-motion").first).to_contain_text("While the camera moves: error less than 1 % with 36 basis functions")
     page.get_by_role("slider", name="Brightness").focus()
     for _ in range(5):
         page.keyboard.press("PageUp")
@@ -139,33 +139,33 @@ def test_a_material_is_chosen_by_a_click_and_edited_while_the_eye_is_elsewhere(m
     differs(moving, edited)
     moving.canvas.focus()
     page.keyboard.press("ArrowRight")
-    expect(page.locator("footer.status")).to_contain_text(re.compile("approximate|the exact image of this camera"))
+    expect(page.locator("footer.status")).to_contain_text(re.compile("Approximate|exact image of this camera"))
     differs(moving, edited)
 
 
 def test_the_camera_has_an_angle_a_size_and_names(moving: Editor, server: Server, moving_scene: str) -> None:
     page, first = moving.page, moving.read_pixels()
-    page.get_by_role("button", name="Camera ▾").click()
-    menu = page.get_by_role("dialog", name="Camera")
-    menu.get_by_role("slider", name="Angle").focus()
+    page.get_by_role("button", name="Options ▾").click()
+    menu = page.get_by_role("dialog", name="Camera options")
+    menu.get_by_role("slider", name="Field of view").focus()
     page.keyboard.press("PageDown")
     differs(moving, first)
     for side, pixels in (("Width", "90"), ("Height", "160")):
-        menu.get_by_label(f"{side} of the picture, pixels").fill(pixels)
+        menu.get_by_label(f"{side}, pixels").fill(pixels)
         page.keyboard.press("Enter")
-    expect(page.get_by_role("button", name="90×160, moving")).to_be_visible()
+    expect(page.get_by_role("button", name="90×160, free camera")).to_be_visible()
     moving.wait_until_exact()
     there = moving.read_pixels()
-    menu.get_by_role("button", name="Keep this camera").click()
-    menu.get_by_role("button", name="View 1: rename").click()
+    menu.get_by_role("button", name="Save this camera").click()
+    menu.get_by_role("button", name="Rename View 1").click()
     page.keyboard.type("Near")
     page.keyboard.press("Enter")
-    expect(menu.get_by_role("button", name="Near: rename")).to_be_visible()
+    expect(menu.get_by_role("button", name="Rename Near")).to_be_visible()
     moving.canvas.focus()
     page.keyboard.press("ArrowLeft")
     differs(moving, there)
     aside = moving.read_pixels()
-    menu.get_by_role("button", name="Look from Near").click()
+    menu.get_by_role("button", name="Go to Near").click()
     differs(moving, aside)
     comes_back(moving, there, MENU_PX)
 
@@ -174,10 +174,10 @@ def test_the_camera_has_an_angle_a_size_and_names(moving: Editor, server: Server
 
     assert names() == ["Near"]
     menu.get_by_role("button", name="Delete Near").click()
-    expect(menu.get_by_role("button", name="Look from Near")).to_have_count(0)
+    expect(menu.get_by_role("button", name="Go to Near")).to_have_count(0)
     page.get_by_role("button", name="Undo", exact=True).last.click()
-    page.get_by_role("button", name="Camera ▾").click()
-    expect(menu.get_by_role("button", name="Look from Near")).to_be_visible()
+    page.get_by_role("button", name="Options ▾").click()
+    expect(menu.get_by_role("button", name="Go to Near")).to_be_visible()
     assert names() == ["Near"]
 
 
@@ -187,9 +187,9 @@ def test_a_turntable_from_where_the_eye_is_is_taken_away(moving: Editor, tmp_pat
     moving.canvas.focus()
     page.keyboard.press("ArrowUp")
     differs(moving, first)
-    page.get_by_role("button", name="More ways to export").click()
+    page.get_by_role("button", name="More export formats").click()
     with page.expect_download(timeout=WAIT_MS) as download:
-        page.get_by_role("button", name="Turntable, quick").click()
+        page.get_by_role("button", name="Turntable, fast").click()
     download.value.save_as(tmp_path / "round.zip")
     with zipfile.ZipFile(tmp_path / "round.zip") as archive:
         frames = [np.asarray(Image.open(archive.open(name)), np.float64) for name in sorted(archive.namelist())]

@@ -27,7 +27,7 @@ def page(server: Server, scene: str, browser: Browser) -> Iterator[Page]:
     with opened_page(browser) as page:
         page.goto(server.url)
         page.locator(".scene-card", has_text="Cornell box").get_by_role("button", name="Bake…").click()
-        page.get_by_role("button", name="Place a camera…").click()
+        page.get_by_role("button", name="New camera…").click()
         moved(page, "")
         yield page
 
@@ -36,7 +36,7 @@ def moved(page: Page, before: str) -> str:
     """Wait until the finder's picture is another one and rests; returns it."""
     page.wait_for_function(
         """before => {
-          const canvas = document.querySelector('.finder canvas');
+          const canvas = document.querySelector('.placement canvas');
           if (canvas?.width !== 960) return false;
           const { data } = canvas.getContext('2d').getImageData(480, 360, 1, 1);
           return data[3] === 255 && canvas.toDataURL() !== before;
@@ -44,7 +44,7 @@ def moved(page: Page, before: str) -> str:
         arg=before,
         timeout=WAIT_MS,
     )
-    return str(page.locator(".finder canvas").evaluate(SEEN))
+    return str(page.locator(".placement canvas").evaluate(SEEN))
 
 
 @pytest.mark.slow
@@ -68,10 +68,10 @@ def test_every_gesture_moves_the_camera_twice(page: Page) -> None:
         for key in ("ArrowLeft", "Shift+ArrowUp", "+"):
             canvas.press(key)
             seen = moved(page, seen)
-        for name in ("Turn right", "See everything"):
+        for name in ("Orbit right", "Show all"):
             dialog.get_by_role("button", name=name).click()
             seen = moved(page, seen)
-        Editor(page).drag(dialog.get_by_role("slider", name="Angle"), 0.6, 0.8)
+        Editor(page).drag(dialog.get_by_role("slider", name="Field of view"), 0.6, 0.8)
         seen = moved(page, seen)
 
 
@@ -80,12 +80,12 @@ def test_a_camera_is_kept_moved_deleted_and_baked(page: Page, server: Server, sc
     canvas, url = dialog.locator("canvas"), f"/api/scenes/{scene}/cameras"
     canvas.press("ArrowRight")
     dialog.get_by_label("Name").fill("front")
-    dialog.get_by_role("button", name="Keep camera").click()
-    expect(dialog.get_by_role("alert")).to_contain_text("camera of the scene's file")
+    dialog.get_by_role("button", name="Save camera").click()
+    expect(dialog.get_by_role("alert")).to_contain_text("camera of the scene file")
     seen = str(canvas.evaluate(SEEN))
     canvas.press("ArrowRight")
     moved(page, seen)  # a picture that comes after the refusal takes nothing of it away
-    expect(dialog.get_by_role("alert")).to_contain_text("camera of the scene's file")
+    expect(dialog.get_by_role("alert")).to_contain_text("camera of the scene file")
     dialog.get_by_label("Name").fill("Aside")
     dialog.get_by_label("Name").press("Enter")
     expect(dialog).to_be_hidden()
@@ -97,7 +97,7 @@ def test_a_camera_is_kept_moved_deleted_and_baked(page: Page, server: Server, sc
     canvas.press("ArrowUp")
     moved(page, seen)
     dialog.get_by_label("Name").fill("Beside")
-    dialog.get_by_role("button", name="Keep camera").click()
+    dialog.get_by_role("button", name="Save camera").click()
     expect(dialog).to_be_hidden()
     views.get_by_label("front", exact=True).uncheck()  # at once: what is chosen meanwhile stays chosen
     after = placed(server.call(url))

@@ -19,10 +19,10 @@ def test_looks_play_one_after_another_and_leave_the_look_as_it_was(editor: Edito
         return editor.slider(SIGMA).get_attribute("aria-valuenow")
 
     sigmas = [sigma()]
-    add = page.get_by_label("Add a look to the time line")
+    add = page.get_by_label("Add a look to the timeline")
     add.select_option("live")
-    expect(page.locator(".timeline-hint")).to_have_text("Add one more look, or choose what turns.")
-    moves = page.get_by_label("What moves meanwhile")
+    expect(page.locator(".timeline-hint")).to_have_text("Add another look, or choose what rotates.")
+    moves = page.get_by_label("Motion")
     moves.select_option("environment")
     time = page.get_by_role("slider", name="Time")
     expect(page.get_by_role("button", name="Play")).to_be_enabled()
@@ -56,7 +56,7 @@ def test_looks_play_one_after_another_and_leave_the_look_as_it_was(editor: Edito
     assert changed(shown[1], rough) < 0.005
     page.get_by_role("button", name="Key 1", exact=True).click()
     assert sigma() == sigmas[0]
-    page.get_by_label("Close the time line").click()
+    page.get_by_label("Close timeline").click()
     expect(page.locator(".timeline")).to_have_count(0)
     assert sigma() == sigmas[1]
     page.reload()
@@ -65,7 +65,7 @@ def test_looks_play_one_after_another_and_leave_the_look_as_it_was(editor: Edito
     expect(page.locator(".keyframe")).to_have_count(2)
     assert changed(editor.pixels(), rough) < 0.005
     page.get_by_role("button", name="Key 1", exact=True).click()
-    page.get_by_role("button", name="Keep this look").click()
+    page.get_by_role("button", name="Use this look").click()
     assert changed(editor.pixels(), shown[0]) < 0.005
     page.keyboard.press("Control+z")
     assert changed(editor.pixels(), rough) < 0.005

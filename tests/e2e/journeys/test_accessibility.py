@@ -101,13 +101,13 @@ def test_the_focus_comes_back_from_a_field_that_a_key_has_closed(editor: Editor)
     for key in ("Enter", "Escape"):
         slider.focus()
         page.keyboard.press("5")
-        page.get_by_role("textbox", name="Environment brightness, as a number").wait_for()
+        page.get_by_role("textbox", name="Environment brightness value").wait_for()
         page.keyboard.press(key)
         assert slider.evaluate("e => e === document.activeElement"), key
     page.get_by_role("button", name="Save look").click()
     page.get_by_role("textbox", name="New name of").wait_for()
     page.keyboard.press("Enter")
-    name = page.get_by_role("button", name="rename").first
+    name = page.get_by_role("button", name="Rename ").first
     for key in ("Enter", "Escape"):
         name.focus()
         page.keyboard.press("Enter")

@@ -56,7 +56,7 @@ def test_the_background_is_chosen_by_click_and_key_and_leaves_the_objects(
     (bake,) = server.call("/api/bakes")
     material = ids(server, bake["id"])
     group = page.get_by_role("radiogroup", name="Background")
-    expect(group.get_by_role("radio", name="Map")).to_be_checked()
+    expect(group.get_by_role("radio", name="HDRI")).to_be_checked()
     before = editor.pixels()
     outside, ball = shown_in(before, material == 65535), shown_in(before, material == 2)
     assert outside.sum() > 2000
@@ -67,8 +67,8 @@ def test_the_background_is_chosen_by_click_and_key_and_leaves_the_objects(
     assert np.abs(blurred - before)[outside].max() > 5
     assert np.abs(blurred - before)[ball].max() <= 1
     group.get_by_role("radio", name="Blurred").press("ArrowRight")
-    expect(group.get_by_role("radio", name="Colour")).to_be_focused()
-    page.get_by_label("Background colour, red, linear").fill("2")
+    expect(group.get_by_role("radio", name="Color")).to_be_focused()
+    page.get_by_label("Background color, red, linear").fill("2")
     page.keyboard.press("Enter")
     red = editor.pixels()
     assert red[outside].std(axis=0).max() < 1
@@ -76,14 +76,14 @@ def test_the_background_is_chosen_by_click_and_key_and_leaves_the_objects(
     for _ in range(4):
         page.get_by_role("button", name="Undo", exact=False).first.click()
     assert changed(before, editor.pixels()) == 0
-    group.get_by_role("radio", name="None").click()
+    group.get_by_role("radio", name="Transparent").click()
     none = editor.pixels()
     assert set(np.unique(none[outside])) <= SQUARES
     page.reload()
-    expect(group.get_by_role("radio", name="None")).to_be_checked()
+    expect(group.get_by_role("radio", name="Transparent")).to_be_checked()
     assert changed(none, editor.pixels()) == 0
     page.keyboard.press("a")  # beside another background, what was kept has none still
-    group.get_by_role("radio", name="Colour").click()
+    group.get_by_role("radio", name="Color").click()
     editor.wait_until_exact()
     page.keyboard.down("c")
     assert changed(none, editor.pixels()) == 0
@@ -107,12 +107,12 @@ def grounded(server: Server, browser: Browser) -> Iterator[Editor]:
     (scene,) = server.call("/api/scenes")
     page = browser.new_context(viewport={"width": 1280, "height": 800}, accept_downloads=True).new_page()
     page.goto(server.url)
-    page.get_by_role("button", name=f"Put {scene['name']} on a ground").click()
+    page.get_by_role("button", name=f"Add ground plane to {scene['name']}").click()
     expect(page.get_by_role("button", name=f"Open {scene['name']} on a ground")).to_be_visible()
     made = next(each for each in server.call("/api/scenes") if each["id"] != scene["id"])
     try:
         assert [material["shadow_catcher"] for material in made["materials"]] == [False, False, False, True]
-        expect(page.get_by_role("button", name=f"Put {made['name']} on a ground")).to_have_count(0)
+        expect(page.get_by_role("button", name=f"Add ground plane to {made['name']}")).to_have_count(0)
         bake = server.call("/api/bakes", {"scene": made["id"], "views": ["front"], "size": SIZE, "lights": 200})
         while bake["state"] in ("queued", "running"):
             time.sleep(0.1)
@@ -133,7 +133,7 @@ def test_a_ground_shows_shadows_alone_or_itself(grounded: Editor, server: Server
     material = ids(server, bake)
     caught = grounded.pixels()
     page.get_by_role("option", name="Ground").click()
-    only = page.get_by_role("checkbox", name="Shadows only")
+    only = page.get_by_role("checkbox", name="Shadow catcher")
     expect(only).to_be_checked()
     expect(page.locator(".card")).to_have_count(0)
     only.press("Space")
@@ -145,7 +145,7 @@ def test_a_ground_shows_shadows_alone_or_itself(grounded: Editor, server: Server
     assert np.abs(plain - caught)[ball].max() <= 1
     page.get_by_role("button", name="Undo", exact=False).first.click()
     assert changed(caught, grounded.pixels()) == 0
-    page.get_by_role("radiogroup", name="Background").get_by_role("radio", name="None").click()
+    page.get_by_role("radiogroup", name="Background").get_by_role("radio", name="Transparent").click()
     grounded.wait_until_exact()
     with Image.open(downloaded(grounded, "PNG", tmp_path / "a.png")) as image:
         pixels = np.asarray(image)[material == 3]

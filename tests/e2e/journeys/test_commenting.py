@@ -35,7 +35,7 @@ def test_a_comment_is_pinned_written_resolved_and_deleted_without_a_pointer(edit
     expect(entry).to_have_count(0)
     panel.get_by_role("checkbox").press(" ")
     expect(entry).to_contain_text("Resolved by somebody")
-    panel.get_by_role("button", name="Open again").press("Enter")
+    panel.get_by_role("button", name="Reopen").press("Enter")
     expect(page.locator(".pin")).to_have_count(1)
 
     panel.get_by_role("button", name="Delete comment 1").press("Enter")
@@ -44,7 +44,7 @@ def test_a_comment_is_pinned_written_resolved_and_deleted_without_a_pointer(edit
     expect(page.locator(".pin")).to_have_count(1)
     expect(entry.locator("img")).to_be_visible()
     panel.get_by_role("button", name="Delete comment 1").press("Enter")
-    expect(panel).to_contain_text("Nobody has written any yet.")
+    expect(panel).to_contain_text("No comments yet.")
 
 
 def test_words_go_on_after_a_click_that_pins_them_elsewhere(editor: Editor) -> None:
@@ -61,7 +61,7 @@ def test_who_shares_a_look_has_one_name_everywhere(editor: Editor) -> None:
     """In the list of people, and as the author of a comment: where nobody logs in, the server names them."""
     page = editor.page
     page.locator(".together > button").press("Enter")
-    page.get_by_role("button", name="Share this look live").click()
+    page.get_by_role("button", name="Start live session").click()
     name = page.locator(".people .who").inner_text()
     page.keyboard.press("Escape")
     page.keyboard.press("n")

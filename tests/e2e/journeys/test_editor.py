@@ -80,7 +80,7 @@ def test_panels_do_not_scroll_sideways_and_keys_are_the_pages_again_after_a_numb
     number.fill("0.3")
     number.press("Enter")
     assert editor.page.evaluate(focused) == "BODY"
-    tone_map = editor.page.get_by_role("combobox", name="Tone map")
+    tone_map = editor.page.get_by_role("combobox", name="Tone mapping")
     tone_map.click()
     tone_map.select_option(index=1)
     assert editor.page.evaluate(focused) == "BODY"
@@ -148,7 +148,7 @@ def test_a_saved_look_survives_a_reload(editor: Editor) -> None:
     editor.page.keyboard.press("Control+s")
     saved = editor.page.locator(".tiles.saved .tile-picture")
     expect(saved).to_have_count(1)
-    editor.page.get_by_role("button", name="Reset this material").click()
+    editor.page.get_by_role("button", name="Reset material").click()
     assert changed(plain, editor.pixels()) == 0
     editor.page.reload()
     editor.wait_until_exact()
@@ -205,7 +205,7 @@ def test_a_lost_server_is_said_and_edits_catch_up(editor: Editor, server: Server
 
 
 def test_views_of_a_colour_config_are_shown_and_downloaded(editor: Editor, tmp_path: Path) -> None:
-    page, tone_map = editor.page, editor.page.get_by_role("combobox", name="Tone map")
+    page, tone_map = editor.page, editor.page.get_by_role("combobox", name="Tone mapping")
     page.get_by_role("button", name="1:1").click()
     tone_map.select_option("None")
     plain, shown = editor.pixels(), {}

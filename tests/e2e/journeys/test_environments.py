@@ -29,20 +29,20 @@ def dusk_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_another_environment_is_chosen_by_click_and_by_key_and_undone(editor: Editor) -> None:
     page = editor.page
     group = page.get_by_role("radiogroup", name="Environment")
-    expect(group.get_by_role("radio", name="Own")).to_be_checked()
+    expect(group.get_by_role("radio", name="Original")).to_be_checked()
     before = editor.pixels()
     group.get_by_role("radio", name="Clear sky").click()
     clear = editor.pixels()
     assert changed(before, clear) > 0.5
-    expect(page.get_by_text("those of small lamps are approximate")).to_be_visible()
+    expect(page.get_by_text("shadows of small light sources are approximate")).to_be_visible()
     group.get_by_role("radio", name="Clear sky").press("ArrowRight")
     expect(group.get_by_role("radio", name="Sunset")).to_be_checked()
     expect(group.get_by_role("radio", name="Sunset")).to_be_focused()
     assert changed(clear, editor.pixels()) > 0.3
     page.keyboard.press("Control+z")
     page.keyboard.press("Control+z")
-    expect(group.get_by_role("radio", name="Own")).to_be_checked()
-    expect(page.get_by_text("those of small lamps are approximate")).to_have_count(0)
+    expect(group.get_by_role("radio", name="Original")).to_be_checked()
+    expect(page.get_by_text("shadows of small light sources are approximate")).to_have_count(0)
     assert changed(before, editor.pixels()) < 0.01
 
 
@@ -62,10 +62,10 @@ def test_a_dropped_file_lights_the_scene_and_others_are_refused_in_words(editor:
     page = editor.page
     before = editor.pixels()
     page.evaluate(DROP, ["teapot.glb", ""])
-    expect(page.get_by_text("Scenes are imported on the start page")).to_be_visible()
+    expect(page.get_by_text("Import scenes on the start page")).to_be_visible()
     page.evaluate(DROP, ["broken.hdr", base64.b64encode(b"broken").decode()])
     expect(page.get_by_text("neither Radiance .hdr nor OpenEXR")).to_be_visible()
-    expect(page.get_by_role("radio", name="Own")).to_be_checked()
+    expect(page.get_by_role("radio", name="Original")).to_be_checked()
     page.evaluate(DROP, ["dusk.exr", base64.b64encode(dusk_file.read_bytes()).decode()])
     expect(page.get_by_role("radio", name="dusk")).to_be_checked()
     assert changed(before, editor.pixels()) > 0.5
@@ -77,7 +77,7 @@ def test_an_imported_environment_is_deleted_after_a_question(editor: Editor, dus
     page.get_by_label("Environment file").set_input_files(dusk_file)
     chosen = page.get_by_role("radio", name="dusk")
     expect(chosen).to_be_checked()
-    page.get_by_role("button", name="Delete the environment dusk").click()
+    page.get_by_role("button", name="Delete HDRI dusk").click()
     expect(chosen).to_be_checked()
     page.get_by_role("button", name="Delete", exact=True).click()
     expect(chosen).to_have_count(0)

@@ -15,9 +15,9 @@ from playwright.sync_api import expect
 @pytest.mark.slow
 def test_exr_is_called_like_the_png_has_layers_and_can_be_stopped(editor: Editor, tmp_path: Path) -> None:
     page = editor.page
-    page.get_by_role("button", name="Add a light", exact=True).first.click()
+    page.get_by_role("button", name="Add light", exact=True).first.click()
     page.get_by_role("button", name="Point", exact=True).click()
-    page.get_by_role("button", name="In the middle").click()
+    page.get_by_role("button", name="Place in center").click()
     editor.wait_until_exact()
     exr, bar = page.get_by_role("button", name="EXR", exact=True), page.get_by_role("progressbar", name="EXR")
     with page.expect_download(timeout=WAIT_MS) as download:
@@ -35,16 +35,16 @@ def test_exr_is_called_like_the_png_has_layers_and_can_be_stopped(editor: Editor
     assert red[f"{lamp}.R"].max() > 0.01
     expect(bar).to_have_count(0)
 
-    page.get_by_role("button", name="More ways to export").press("Enter")
+    page.get_by_role("button", name="More export formats").press("Enter")
     with page.expect_download(timeout=WAIT_MS) as download:
         page.get_by_role("button", name="EXR with light groups").press("Enter")
     download.value.save_as(path)
     layers = {name.partition(".")[0] for name in OpenImageIO.ImageBuf(str(path)).spec().channelnames}
     assert layers == {"R", "G", "B", "light_environment_direct", f"{lamp}_direct"}
 
-    page.get_by_role("button", name="More ways to export").press("Enter")
+    page.get_by_role("button", name="More export formats").press("Enter")
     with page.expect_download(timeout=WAIT_MS) as download:
-        page.get_by_role("button", name="EXR, the picture alone").press("Enter")
+        page.get_by_role("button", name="EXR, beauty only").press("Enter")
     download.value.save_as(path)
     assert OpenImageIO.ImageBuf(str(path)).spec().channelnames == ("R", "G", "B")
 

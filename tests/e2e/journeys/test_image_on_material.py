@@ -34,13 +34,13 @@ def bumps(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_an_image_is_put_on_by_a_button_and_by_a_drop(editor: Editor, stripes: Path) -> None:
     page = editor.page
-    chosen = page.get_by_label("Image of the base colour")
+    chosen = page.get_by_label("Base color texture")
     editor.choose("Floor", 0)
-    page.get_by_label("File of an image").set_input_files(stripes)
+    page.get_by_label("Load texture…").set_input_files(stripes)
     expect(chosen.locator("option:checked")).to_have_text("stripes")
     editor.wait_until_exact()
     chosen.select_option("")  # by keys alone: a list and a button
-    expect(chosen.locator("option:checked")).to_have_text("The scene’s own image")
+    expect(chosen.locator("option:checked")).to_have_text("Original texture")
     page.get_by_role("button", name="Undo", exact=True).click()
     expect(chosen.locator("option:checked")).to_have_text("stripes")
     page.get_by_role("button", name="Undo", exact=True).click()
@@ -61,14 +61,14 @@ def test_an_image_named_like_a_map_of_roughness_and_metal_becomes_both(editor: E
     page.get_by_role("button", name="Undo", exact=True).click()
     for each in (chosen, metal):
         expect(each.locator("option:checked")).not_to_have_text("tiles_orm")
-    page.get_by_label("File of a map of roughness").set_input_files(stripes)  # by keys: a button asks for it
+    page.get_by_label("Load roughness map…").set_input_files(stripes)  # by keys: a button asks for it
     expect(chosen.locator("option:checked")).to_have_text("stripes")
     chosen.select_option("")
     expect(chosen.locator("option:checked")).not_to_have_text("stripes")
     metal.select_option(label="stripes")
-    expect(page.get_by_label("Delete the image stripes")).to_be_visible()
+    expect(page.get_by_label("Delete stripes")).to_be_visible()
     metal.select_option("")
-    expect(page.get_by_label("Delete the image stripes")).to_have_count(0)
+    expect(page.get_by_label("Delete stripes")).to_have_count(0)
     editor.wait_until_exact()
 
 
@@ -76,12 +76,12 @@ def test_an_image_of_normals_bends_the_surface(editor: Editor, bumps: Path) -> N
     """By a button, a list, a drop and keys; taken off and undone, all twice; a reload brings it back."""
     page = editor.page
     editor.choose("Ball", 0)
-    chosen, strength = page.get_by_label("Normal map", exact=True), editor.slider("Strength of the normal map")
+    chosen, strength = page.get_by_label("Normal map", exact=True), editor.slider("Normal map strength")
     plain = editor.pixels()
     expect(strength).to_have_count(0)
-    page.get_by_label("File of a normal map").set_input_files(bumps)
+    page.get_by_label("Load normal map…").set_input_files(bumps)
     expect(chosen.locator("option:checked")).to_have_text("bumps")
-    expect(page.get_by_text("stays as it was baked")).to_have_count(0)  # which is said of mirrors alone
+    expect(page.get_by_text("stay as baked")).to_have_count(0)  # which is said of mirrors alone
     bumpy = editor.pixels()
     assert np.abs(bumpy - plain).max() > 20
     for _ in range(2):
@@ -105,7 +105,7 @@ def test_an_image_of_normals_bends_the_surface(editor: Editor, bumps: Path) -> N
         assert drop_on_the_middle(editor, {name: bumps}) == "Ball"
         expect(chosen.locator("option:checked")).to_have_text(name.removesuffix(".png"))
     drop_on_the_middle(editor, {"tiles_nor_dx_1k.png": bumps})
-    expect(page.get_by_text("drop the one for OpenGL")).to_be_visible()
+    expect(page.get_by_text("use the OpenGL version")).to_be_visible()
 
 
 def test_images_that_are_dropped_together_are_one_step(
@@ -116,7 +116,7 @@ def test_images_that_are_dropped_together_are_one_step(
     editor.choose("Ball", 1)
     page.get_by_label("Model").last.select_option("ggx")
     names = ["tiles_Color", "tiles_Normal", "tiles_Roughness", "tiles_Displacement"]
-    labels = ["Image of the base colour", "Normal map", "Roughness map"]
+    labels = ["Base color texture", "Normal map", "Roughness map"]
     files = {f"{name}.png": tmp_path / f"{name}.png" for name in names}  # of the same content the newest name counts
     for gray, path in enumerate(files.values()):
         Image.new("L", (8, 8), 100 + gray).save(path)
@@ -125,7 +125,7 @@ def test_images_that_are_dropped_together_are_one_step(
     expect(steps).to_have_count(2)
     for _ in range(2):
         assert drop_on_the_middle(editor, files) == "Ball"
-        message = page.locator(".toast", has_text="On “Ball”: base color, roughness and normals.")
+        message = page.locator(".toast", has_text="Applied to “Ball”: base color, roughness and normals.")
         expect(message).to_contain_text("Not used: tiles_Displacement.png")
         for label, name in zip(labels, names, strict=False):
             expect(page.get_by_label(label, exact=True).locator("option:checked")).to_have_text(name)
@@ -134,12 +134,12 @@ def test_images_that_are_dropped_together_are_one_step(
         expect(steps).to_have_count(2)
         for label, name in zip(labels, names, strict=False):
             expect(page.get_by_label(label, exact=True).locator("option:checked")).not_to_have_text(name)
-        message.get_by_role("button", name="Close this message").click()
+        message.get_by_role("button", name="Dismiss").click()
 
 
 def test_what_cannot_be_taken_is_named_until_the_next_drop(editor: Editor, stripes: Path) -> None:
     page = editor.page
-    for name, words in (("cayman.brdf", "Measured materials go into the Library"), ("car.glb", "on the start page")):
+    for name, words in (("cayman.brdf", "drop measured materials on the Library"), ("car.glb", "on the start page")):
         drop_on_the_middle(editor, {name: stripes}, "")
         expect(page.locator(".toast.error")).to_have_count(1)  # that before is gone
         expect(page.locator(".toast.error")).to_contain_text(name)

@@ -8,9 +8,9 @@ from playwright.sync_api import Page, expect
 
 
 def add_light(page: Page, kind: str) -> None:
-    page.get_by_role("button", name="Add a light").press("Enter")
-    page.get_by_role("group", name="Kind of light").get_by_role("button", name=kind).press("Enter")
-    page.get_by_role("button", name="In the middle").press("Enter")
+    page.get_by_role("button", name="Add light").press("Enter")
+    page.get_by_role("group", name="Light type").get_by_role("button", name=kind).press("Enter")
+    page.get_by_role("button", name="Place in center").press("Enter")
     expect(page.locator(".light.selected .name", has_text=kind)).to_be_focused()
 
 
@@ -59,7 +59,7 @@ def test_what_closes_gives_the_focus_back(editor: Editor) -> None:
         page.get_by_role("complementary", name="Comments").get_by_role("button", name="Close").press("Enter")
         expect(comments).to_be_focused()
         page.keyboard.press("?")
-        expect(page.get_by_role("dialog", name="Keyboard map")).to_be_focused()
+        expect(page.get_by_role("dialog", name="Keyboard shortcuts")).to_be_focused()
         page.keyboard.press("Escape")
         expect(comments).to_be_focused()
 

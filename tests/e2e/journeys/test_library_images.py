@@ -59,7 +59,7 @@ def test_a_material_replaces_images_however_it_comes(editor: Editor, measured: s
     assert textures(page) == ["diffuse", ""]
     page.get_by_role("button", name="Library").click()
     first_ball(page).wait_for()
-    expect(page.locator(".library-help").first).to_contain_text("without the object's images")
+    expect(page.locator(".library-help").first).to_contain_text("Textures aren’t kept")
 
     def drop(ball: Locator) -> None:
         x, y = place_of(editor, "Floor")
@@ -83,7 +83,7 @@ def test_a_material_replaces_images_however_it_comes(editor: Editor, measured: s
             undo.click()
             undo.click()
             assert textures(page) == ["diffuse", ""], (kind, way)
-    page.get_by_role("application", name="Map of materials").press("ArrowRight")
+    page.get_by_role("application", name="Material map").press("ArrowRight")
     expect(undo).to_be_enabled()
     assert textures(page) == ["", ""]
     editor.wait_until_exact()

@@ -35,7 +35,7 @@ def asking(server: Server) -> Iterator[Server]:
 
 
 def log_in(page: Page, token: str) -> Editor:
-    page.get_by_label("Token").fill(token)
+    page.get_by_label("Access token").fill(token)
     page.get_by_role("button", name="Log in").click()
     editor = Editor(page)
     editor.wait_until_exact()
@@ -49,12 +49,12 @@ def test_people_log_in_and_roles_say_what_they_may_do(
     url = f"{asking.url}/?scene={scene['id']}"
     with opened_page(browser) as page:
         page.goto(url)
-        page.get_by_label("Token").fill("relume_000000000000_x")
+        page.get_by_label("Access token").fill("relume_000000000000_x")
         page.get_by_role("button", name="Log in").click()
         expect(page.get_by_role("alert")).to_contain_text("this token is not valid")
         log_in(page, access.tokens.add("Vera", "view"))
         page.get_by_role("option", name="Ball").click()
-        expect(page.get_by_role("note")).to_contain_text("Vera may look, but not edit")
+        expect(page.get_by_role("note")).to_contain_text("View-only access")
         expect(page.locator("aside [inert]")).to_be_attached()
         expect(page.locator(".readout")).to_contain_text("Click to add a point")  # it is there
         viewer = Editor(page)
@@ -62,9 +62,9 @@ def test_people_log_in_and_roles_say_what_they_may_do(
         page.get_by_role("slider", name="Exposure").press("ArrowRight")
         assert changed(viewer.pixels(), before) > 0.01
         page.keyboard.press("n")
-        expect(page.get_by_role("status").filter(has_text="Who only looks reads comments")).to_be_visible()
+        expect(page.get_by_role("status").filter(has_text="You have view-only access")).to_be_visible()
         page.get_by_role("button", name="Log out").click()
-        expect(page.get_by_label("Token")).to_be_visible()
+        expect(page.get_by_label("Access token")).to_be_visible()
         editor = log_in(page, access.tokens.add("Ann", "edit"))
         expect(page.locator(".account")).to_contain_text("Ann")
         expect(page.get_by_role("note")).to_have_count(0)
@@ -89,7 +89,7 @@ def test_who_may_only_look_chooses_light_paths_and_hears_no_objection(
     server.bake({"scene": scene, "method": "gather", "size": (96, 96), "lights": 100})
     with opened_page(browser) as page:
         page.goto(asking.url)
-        page.get_by_label("Token").fill(access.tokens.add("Vito", "view"))
+        page.get_by_label("Access token").fill(access.tokens.add("Vito", "view"))
         page.get_by_role("button", name="Log in").click()
         expect(page.locator(".account")).to_contain_text("Vito")
         page.goto(f"{asking.url}/?scene={scene}")
@@ -101,6 +101,6 @@ def test_who_may_only_look_chooses_light_paths_and_hears_no_objection(
         assert changed(viewer.pixels(), before) > 0.01
         page.get_by_role("slider", name="Bounces").press("ArrowLeft")
         viewer.wait_until_exact()
-        expect(page.get_by_text("may look, but not edit")).to_have_count(1)  # the line that is always there
+        expect(page.get_by_text("View-only access")).to_have_count(1)  # the line that is always there
         expect(page.get_by_role("alert")).to_have_count(0)
     server.delete(f"/api/scenes/{scene}")

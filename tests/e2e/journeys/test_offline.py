@@ -17,7 +17,7 @@ def test_offline_is_said_and_edits_are_kept(editor: Editor, request: pytest.Fixt
     for key in ("Home", "End"):
         before = editor.pixels()
         page.context.set_offline(True)
-        expect(state).to_contain_text("Offline. Edits are kept")
+        expect(state).to_contain_text("Offline. Your edits are safe")
         roughness.press(key)
         value = roughness.get_attribute("aria-valuenow")
         np.testing.assert_array_equal(editor.read_pixels(), before)  # the last picture stays

@@ -32,9 +32,9 @@ def expect_looks(page: Page, names: list[str]) -> None:
 
 
 def add_light(editor: Editor, kind: str) -> None:
-    editor.page.get_by_role("button", name="Add a light").click()
-    editor.page.get_by_role("group", name="Kind of light").get_by_role("button", name=kind).click()
-    editor.page.get_by_role("button", name="In the middle").click()
+    editor.page.get_by_role("button", name="Add light").click()
+    editor.page.get_by_role("group", name="Light type").get_by_role("button", name=kind).click()
+    editor.page.get_by_role("button", name="Place in center").click()
     expect(editor.page.locator(".light .name", has_text=kind)).to_have_attribute("aria-pressed", "true")
 
 
@@ -63,7 +63,7 @@ def test_looks_and_lights_keep_their_order_and_thumbnails_are_for_everybody(
     expect(page.locator(".tiles.saved .tile-picture img")).to_have_count(4)
     expect_looks(page, order)
     # renamed, then deleted and brought back, it stands where it stood, with its picture
-    page.get_by_role("button", name="Studio: rename").click()
+    page.get_by_role("button", name="Rename Studio").click()
     rename(page, page.get_by_role("textbox", name="New name of Studio"), "Noon")
     expect(page.get_by_role("button", name="Show Studio", exact=True)).to_have_count(0)
     delete(page, "Night")
@@ -90,8 +90,8 @@ def test_a_link_keeps_the_order_of_lights(editor: Editor, browser: Browser) -> N
         add_light(editor, kind)
     editor.wait_until_exact()
     page.evaluate("() => { navigator.clipboard.writeText = () => Promise.reject(new Error('not allowed')); }")
-    page.get_by_role("button", name="Share: copy a link to this picture").click()
-    link = page.get_by_role("dialog", name="Link to this picture").get_by_role("textbox").input_value()
+    page.get_by_role("button", name="Share: copy a link to this look").click()
+    link = page.get_by_role("dialog", name="Link to this look").get_by_role("textbox").input_value()
     with opened_page(browser) as guest:
         guest.goto(link)
         Editor(guest).wait_until_exact()
@@ -105,6 +105,6 @@ def test_a_step_that_is_left_at_once_has_a_picture(editor: Editor) -> None:
     expect(pictures).to_have_count(1)
     for key in ("End", "Home", "PageUp"):
         editor.slider(SIGMA).press(key)
-        page.get_by_role("button", name="Reset this material").click()
+        page.get_by_role("button", name="Reset material").click()
     expect(page.locator(".tile.step")).to_have_count(7)
     expect(pictures).to_have_count(7)

@@ -37,16 +37,16 @@ def test_reflected_light_is_baked_by_the_dialogue_and_seen_by_paths(start_page: 
     page, editor = start_page, Editor(start_page)
     page.get_by_role("button", name="Bake…").click()
     plan = page.locator(".presets .plan").first
-    expect(plan).to_contain_text("rays", timeout=WAIT_MS)
+    expect(plan).to_contain_text("memory", timeout=WAIT_MS)
     of_all_light = plan.inner_text()
     page.get_by_role("radio", name=re.compile("^Direct light")).check()
     expect(plan).not_to_have_text(of_all_light)
-    page.get_by_role("radio", name=re.compile("^With reflected light")).check()
-    expect(plan).to_have_text(re.compile("rays"))
+    page.get_by_role("radio", name=re.compile("^Global illumination")).check()
+    expect(plan).to_have_text(re.compile("memory"))
     page.get_by_role("checkbox", name="left").uncheck()
     page.get_by_role("button", name="Open and bake").first.click()
     editor.wait_until_exact()
-    expect(page.get_by_role("button", name="reflected ▾")).to_be_visible()
+    expect(page.get_by_role("button", name="global illumination ▾")).to_be_visible()
 
     steps = page.locator(".tile.step")
     editor.choose("Ball", 1)
@@ -54,11 +54,11 @@ def test_reflected_light_is_baked_by_the_dialogue_and_seen_by_paths(start_page: 
     expect(steps).to_have_count(2)
     everything = editor.pixels()
     paths = page.get_by_role("radiogroup", name="Light paths")
-    paths.get_by_role("radio", name="First").click()
+    paths.get_by_role("radio", name="1st bounce").click()
     assert changed(everything, editor.pixels()) > 0.5
-    paths.get_by_role("radio", name="First").press("ArrowLeft")
+    paths.get_by_role("radio", name="1st bounce").press("ArrowLeft")
     assert changed(everything, editor.pixels()) > 0.5
-    paths.get_by_role("radio", name="Reflected").press("ArrowLeft")
+    paths.get_by_role("radio", name="Indirect").press("ArrowLeft")
     expect(paths.get_by_role("radio", name="Direct")).to_be_checked()
     direct_alone = editor.pixels()
     assert direct_alone.mean() < everything.mean()
@@ -70,7 +70,7 @@ def test_reflected_light_is_baked_by_the_dialogue_and_seen_by_paths(start_page: 
     page.keyboard.press("Control+z")
     expect(paths.get_by_role("radio", name="Direct")).to_be_checked()
     page.keyboard.press("Control+Shift+z")
-    page.get_by_role("button", name="Only direct light").click()
+    page.get_by_role("button", name="Direct light only").click()
     assert changed(everything, editor.pixels()) == 0
 
     bounces = page.get_by_role("slider", name="Bounces")

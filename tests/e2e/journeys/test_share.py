@@ -29,8 +29,8 @@ def test_a_link_opens_what_was_shared_and_stays_what_it_was(editor: Editor, visi
     editor.drag(editor.slider("Roughness σ"), 0.3, 0.8)
     shared = editor.pixels()
     page.evaluate(REFUSE_COPY)
-    page.get_by_role("button", name="Share: copy a link to this picture").click()
-    field = page.get_by_role("dialog", name="Link to this picture").get_by_role("textbox")
+    page.get_by_role("button", name="Share: copy a link to this look").click()
+    field = page.get_by_role("dialog", name="Link to this look").get_by_role("textbox")
     expect(field).to_be_focused()
     link = field.input_value()
     assert link.startswith(f"{server.url}/?share=")
@@ -42,8 +42,8 @@ def test_a_link_opens_what_was_shared_and_stays_what_it_was(editor: Editor, visi
     assert changed(shared, editor.pixels()) > 0.01
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     page.evaluate("() => { delete navigator.clipboard.writeText; }")
-    page.get_by_role("button", name="Share: copy a link to this picture").click()
-    expect(page.locator(".toast.note").last).to_contain_text("The link is copied")
+    page.get_by_role("button", name="Share: copy a link to this look").click()
+    expect(page.locator(".toast.note").last).to_contain_text("Link copied")
     assert page.evaluate("navigator.clipboard.readText()") != link
 
     # a visitor who has a look of their own

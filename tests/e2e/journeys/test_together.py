@@ -21,7 +21,7 @@ def link(editor: Editor, kind: str) -> str:
     """The link into the room, as it stands where the browser does not let pages copy."""
     page = editor.page
     page.evaluate("() => { navigator.clipboard.writeText = () => Promise.reject(new Error('no')); }")
-    page.get_by_role("button", name=f"Copy link: {kind}").click()
+    page.get_by_role("button", name=f"Copy {kind} link").click()
     field = page.get_by_role("dialog", name="Work together").locator("input[readonly]")
     expect(field).to_be_focused()
     found = field.input_value()
@@ -36,12 +36,12 @@ def people(page: Page) -> None:
 def test_two_edit_one_look_and_a_third_watches(editor: Editor, others: tuple[Page, Page], server: Server) -> None:
     ann, (bob_page, vera_page) = editor, others
     people(ann.page)
-    ann.page.get_by_role("button", name="Share this look live").click()
+    ann.page.get_by_role("button", name="Start live session").click()
     ann.page.get_by_label("Your name").fill("Ann")
     ann.page.keyboard.press("Enter")
-    together = link(ann, "work together")
+    together = link(ann, "edit")
     people(ann.page)
-    watch = link(ann, "watch only")
+    watch = link(ann, "view-only")
     assert ann.page.evaluate("new URLSearchParams(location.hash.slice(1)).get('room')") not in watch
 
     bob, vera = Editor(bob_page), Editor(vera_page)
@@ -79,7 +79,7 @@ def test_two_edit_one_look_and_a_third_watches(editor: Editor, others: tuple[Pag
     assert changed(bob.pixels(), undone) == 0
 
     # each has their own exposure; Vera is told that she watches
-    expect(vera_page.locator(".read-only")).to_contain_text("You watch this look")
+    expect(vera_page.locator(".read-only")).to_contain_text("View-only link")
     ann.page.get_by_role("slider", name="Exposure").press("ArrowRight")
     assert changed(ann.pixels(), undone) > 0.01
     assert changed(bob.pixels(), undone) == 0

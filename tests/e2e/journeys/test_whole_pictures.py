@@ -57,9 +57,9 @@ def test_exchanged_light_comes_to_background_and_objects_at_once(editor: Editor,
         page.get_by_label("Environment file").set_input_files(write_map(tmp_path / f"{name}.exr", white * tint))
         expect(page.get_by_role("radio", name=name, exact=True)).to_be_checked()
         editor.wait_until_exact()
-    mark, words = page.locator(".limits p", has_text="Baked for other light"), page.locator(".exactness")
+    mark, words = page.locator(".limits p", has_text="Baked for a different environment"), page.locator(".exactness")
     expect(mark).to_be_visible()
-    expect(words).to_have_text("exact for this bake ✓")
+    expect(words).to_have_text("Exact (this bake) ✓")
     page.evaluate(RECORD)
     for name in ("red", "blue"):
         page.get_by_role("radio", name=name, exact=True).click()
@@ -68,7 +68,7 @@ def test_exchanged_light_comes_to_background_and_objects_at_once(editor: Editor,
     drawn = draws(page)
     assert len(drawn) >= 2  # both are known already, and come back without a preview
     assert max(min(each["red"], each["blue"]) for each in drawn) < 0.01, "a picture of two lights"
-    page.get_by_role("radio", name="Own").click()
+    page.get_by_role("radio", name="Original").click()
     editor.wait_until_exact()
     expect(mark).to_have_count(0)
     expect(page.locator(".limits p")).to_have_text("Direct light only")  # which is exact for this bake as well
@@ -126,10 +126,10 @@ def test_the_bake_that_an_address_names_stays_where_finer_ones_are_ready(
             pass
         editor.wait_until_exact()
         assert f"bake={named}" in page.url
-        expect(page.get_by_text("The new bake is in place.")).to_have_count(0)
+        expect(page.get_by_text("New bake loaded.")).to_have_count(0)
         with page.expect_websocket() as opened:
             bake(server, scene, (140, 105))
-        page.get_by_text("The new bake is in place.").wait_for(timeout=WAIT_MS)
+        page.get_by_text("New bake loaded.").wait_for(timeout=WAIT_MS)
     finally:
         page.close()
 
@@ -143,7 +143,7 @@ def test_finer_bake_and_other_view_come_when_they_are_whole(coarse: tuple[Server
         editor.wait_until_exact()
         page.evaluate(RECORD)
         bake(server, scene, (480, 360))
-        page.get_by_text("The new bake is in place.").wait_for(timeout=WAIT_MS)
+        page.get_by_text("New bake loaded.").wait_for(timeout=WAIT_MS)
         editor.wait_until_exact()
         drawn = draws(page)
         assert len(drawn) >= 1

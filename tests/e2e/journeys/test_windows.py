@@ -32,7 +32,7 @@ CUT_OFF = """() => {
     .map((e) => e.outerHTML.slice(0, 160));
   return document.documentElement.scrollWidth > innerWidth ? [...cut, "the page scrolls sideways"] : cut;
 }"""
-SHARE = "Share: copy a link to this picture"
+SHARE = "Share: copy a link to this look"
 TOP_BAR = ["All scenes", "Undo", "Redo", "front", "left", "Swap", "PNG", "EXR", SHARE, "Inspector"]
 
 
@@ -75,19 +75,19 @@ def test_everything_in_the_editor_can_be_reached(editor: Editor, size: tuple[int
     page.locator(".library").get_by_role("button", name="Close").click()
     expect(page.locator(".inspector")).to_be_visible()  # it comes back where it had made room
 
-    ask = page.get_by_role("button", name="How true is this?")
+    ask = page.get_by_role("button", name="Compare with reference")
     ask.click()
-    expect(page.get_by_role("complementary", name="How true is this picture?")).to_be_visible()
+    expect(page.get_by_role("complementary", name="Compare with reference")).to_be_visible()
     assert_nothing_is_cut_off(page, "the comparison with brute force")
     ask.click()
 
     page.keyboard.press("?")
-    keys = page.get_by_role("dialog", name="Keyboard map")
-    keys.get_by_text("One of several views").scroll_into_view_if_needed()
+    keys = page.get_by_role("dialog", name="Keyboard shortcuts")
+    keys.get_by_text("Side-by-side view").scroll_into_view_if_needed()
     assert_nothing_is_cut_off(page, "the keyboard map")
     page.keyboard.press("Escape")
     page.locator(".top-bar .menu > button").click()
-    expect(page.locator(".presets .plan").first).to_contain_text("rays", timeout=WAIT_MS)
+    expect(page.locator(".presets .plan").first).to_contain_text("memory", timeout=WAIT_MS)
     assert_nothing_is_cut_off(page, "the bake menu")
     page.keyboard.press("Escape")
     page.keyboard.press("e")
@@ -106,7 +106,7 @@ def test_everything_on_the_start_page_can_be_reached(server: Server, browser: Br
     page = browser.new_page()
     page.goto(server.url)
     page.get_by_role("button", name="Bake…").first.click()
-    expect(page.locator(".presets .plan").first).to_contain_text("rays", timeout=WAIT_MS)
+    expect(page.locator(".presets .plan").first).to_contain_text("memory", timeout=WAIT_MS)
     for width, height in SIZES:
         page.set_viewport_size({"width": width, "height": height})
         assert_nothing_is_cut_off(page, "the start page")

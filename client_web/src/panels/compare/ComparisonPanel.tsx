@@ -1,4 +1,4 @@
-/** The accuracy check: an error map beside the image, and its statistics. */
+/** The comparison with a reference: an error map beside the image, and its statistics. */
 import { useRef, useState } from "preact/hooks";
 import { comparisonImageUrl } from "../../session/net/api";
 import type { ComparisonBody } from "../../protocol";
@@ -43,7 +43,7 @@ function ComparisonButtons({ isOld: isOutdated }: { isOld: boolean }) {
     <div class="group" role="group" aria-label="Comparison">
       {isInProgress(body) && <button onClick={() => void haltComparison()}>Stop</button>}
       {body.state === "stopped" && <button onClick={() => void continueComparison()}>Resume</button>}
-      <button onClick={() => void beginComparison()}>{isOutdated ? "Check this picture" : "Restart"}</button>
+      <button onClick={() => void beginComparison()}>{isOutdated ? "Compare this picture" : "Restart"}</button>
     </div>
   );
 }
@@ -96,9 +96,9 @@ export function ComparisonPanel() {
   const elapsed = activeComparison.value === null ? 0 : (Date.now() - activeComparison.value.since) / 1000; // polled every second
   const isOld = activeComparison.value !== null && activeComparison.value.look !== comparedState();
   return (
-    <aside ref={panel} class="comparison beside-picture" aria-label="Accuracy check">
+    <aside ref={panel} class="comparison beside-picture" aria-label="Compare with reference">
       <header class="panel-head">
-        <h2>Accuracy check</h2>
+        <h2>Compare with reference</h2>
         <IconButton icon="close" label="Close" onClick={toggleComparison} />
       </header>
       {body === undefined && (
@@ -117,7 +117,7 @@ export function ComparisonPanel() {
           {body.error_all_paths === null && body.progress > 0 && <FirstPass body={body} />}
         </>
       )}
-      {isOld && <p class="comparison-outdated">The picture has changed since this check.</p>}
+      {isOld && <p class="comparison-outdated">The picture has changed since this comparison.</p>}
       <ComparisonButtons isOld={isOld} />
     </aside>
   );

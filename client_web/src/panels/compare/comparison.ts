@@ -1,4 +1,4 @@
-/** The accuracy check: one comparison of the image with a reference, polled while its panel is open, over page reloads
+/** One comparison of the image with a reference, polled while its panel is open, over page reloads
  * and server restarts. */
 import { effect, signal } from "@preact/signals";
 import { currentPose, currentSize } from "../looks/exportImage";

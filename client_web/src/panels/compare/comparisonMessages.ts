@@ -1,4 +1,4 @@
-/** Messages of the accuracy check. */
+/** Messages of the comparison with a reference. */
 import type { ComparisonBody, ComparisonPlanBody } from "../../protocol";
 import { formatEstimatedTime, formatSeconds } from "../../ui/scale";
 

@@ -43,8 +43,8 @@ export const activeFilters = computed<ActiveFilter[]>(() => {
   return [...lightFilters.value, materialFilter];
 });
 
-/** Text such as ": direct light only" if a light filter is active. */
+/** Text such as " (direct light only)" if a light filter is active. */
 export function lightFilterText(): string {
   const text = lightFilters.value.map((limit) => limit.label).join(", ");
-  return text === "" ? "" : `: ${text.charAt(0).toLowerCase()}${text.slice(1)}`;
+  return text === "" ? "" : ` (${text.charAt(0).toLowerCase()}${text.slice(1)})`;
 }

@@ -16,7 +16,7 @@ interface Props {
 export function NormalImage({ material, materialLook, mirrors }: Props) {
   const map = materialLook.normal_map ?? null;
   return (
-    <section class="normal-image" aria-label="Normal map">
+    <section class="normal-image" aria-label="Normals">
       <MapImageField
         label="Normal map"
         title="Tangent-space normals, OpenGL convention (green up)."
