@@ -65,7 +65,7 @@ def measure(tiny: bool) -> list[Figure]:
     ]  # fmt: skip
 
 
-class _Drag(NamedTuple):
+class _LightDrag(NamedTuple):
     """frames_s: seconds of each frame. prepared_s: one-time work: transport rows for a move, the light's image for
     dimming. error: of the last frame, relative RMSE against the exact image.
     """
@@ -75,7 +75,7 @@ class _Drag(NamedTuple):
     error: float
 
 
-def _measure_drag(transfer: FixedViewTransfer, picture: Picture, point_lights: Sequence[dict[str, Any]]) -> _Drag:
+def _measure_drag(transfer: FixedViewTransfer, picture: Picture, point_lights: Sequence[dict[str, Any]]) -> _LightDrag:
     """The first two frames are excluded: one is converged, the other requests the light's image, and compiles."""
     frames_s, prepared_s = [], 0.0
     for k, point_light in enumerate(point_lights):
@@ -95,7 +95,7 @@ def _measure_drag(transfer: FixedViewTransfer, picture: Picture, point_lights: S
     run_until_exact(picture)
     exact = picture.image().astype(np.float64)
     error = float(np.sqrt(np.mean((incremental - exact) ** 2) / np.mean(exact**2)))
-    return _Drag(frames_s[2:], prepared_s, error)
+    return _LightDrag(frames_s[2:], prepared_s, error)
 
 
 def _embreex_s(scene: Scene, size: tuple[int, int], position: Sequence[float]) -> float:

@@ -37,7 +37,7 @@ def measure(tiny: bool) -> list[Figure]:
     ):
         client.send_message(type="prepare", curve="/materials/Teapot/terms/1/curves/theta_h")
         client.exact(0)
-        slider_client = _SliderClient(client)
+        slider_client = _SigmaClient(client)
         slider_client.drag(seconds)  # one-time work is done first
         unloaded_ms: list[float] = []
         loaded_ms: list[float] = []
@@ -63,7 +63,7 @@ def measure(tiny: bool) -> list[Figure]:
     return [Figure(_NAME, context["with_renders_fps"] / context["alone_fps"], "ratio", context)]  # type: ignore[operator]
 
 
-class _SliderClient:
+class _SigmaClient:
     """Drags σ back and forth."""
 
     def __init__(self, client: SessionClient) -> None:

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any, Literal, get_args
 
 Severity = Literal["unsupported", "approximated", "ignored"]
 SEVERITIES: tuple[Severity, ...] = get_args(Severity)
+
+UNREADABLE = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def quote(name: str) -> str:
+    """Quote a name from a file for a message, without unreadable characters."""
+    return f"“{UNREADABLE.sub('', name[:80])}”"
 
 
 class ImporterWarning(str):

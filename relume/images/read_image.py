@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported
 from relume.image_io.decode import Decoder
 from relume.image_io.read_linear import EXR_MAGIC, read_pixels
 from relume.scene.model import Texture, TextureEncoding
-from relume.scene.unique_names import quote
 
 MAX_FILE_BYTES = 100_000_000
 MAX_SIDE = 4_096

@@ -57,7 +57,10 @@ class Photons:
 
     @staticmethod
     def from_lobe(hits: Hits, directions: Shaped[F32, "n 3"], exponent: float) -> Photons:
-        """Create photons from rays with density ∝ cos^e; width is the root mean square of the sine, √(2 / (e + 3))."""
+        """Create photons from the hits of rays with density ∝ cos^exponent.
+
+        Their width is the root mean square of the sine between `directions` and the lobe, √(2 / (exponent + 3)).
+        """
         return Photons(hits, directions, np.full(len(directions), math.sqrt(2 / (exponent + 3)), np.float32))
 
     def rows(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Photons:

@@ -10,10 +10,10 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated, ignored
+from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote
 from relume.scene.emission import normalize_emission
 from relume.scene.model import Light, Material, Mesh
-from relume.scene.unique_names import quote, unique_name
+from relume.scene.unique_names import unique_name
 from relume.scene.validate import MAX_EMISSION, MAX_LIGHTS
 
 F64 = NDArray[np.float64]

@@ -93,7 +93,7 @@ def rougher(ratio: Shaped[F32, " n"], length: Shaped[F32, " n"], base: float) ->
 
 
 def smoother(ratio: Shaped[F32, " n"], length: Shaped[F32, " n"], base: float) -> Shaped[F32, " n"]:
-    """Roughness relative to `base` without the widening by normals: the inverse of `rougher`, with its arguments."""
+    """Roughness `ratio` of `base` without the widening by normals of mean `length`: the inverse of `rougher`."""
     return np.asarray(np.maximum((base * ratio) ** 4 - 2 * _variance(length), 0) ** 0.25 / base, np.float32)
 
 

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-import re
-
-UNREADABLE = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+from relume.core.import_warnings import UNREADABLE
 
 
 def unique_name(preferred: str, used_names: dict[str, int]) -> str:
     """Return a unique name of at most 80 characters, without characters special to JSON pointers or terminals."""
     plain = UNREADABLE.sub("", preferred[:1000]).replace("/", "-").replace("~", "-").strip()[:68].strip()
     return append_number(plain or "unnamed", " ", used_names)
-
-
-def quote(name: str) -> str:
-    """Quote a name from a file for a message, without unreadable characters."""
-    return f"“{UNREADABLE.sub('', name[:80])}”"
 
 
 def append_number(plain: str, separator: str, used_names: dict[str, int]) -> str:

@@ -39,7 +39,7 @@ class Tile(NamedTuple):
         faces: Shaped[I64, "triangles 3"],
         terms: Terms,
     ) -> Self:
-        """Make a tile with one material for all faces."""
+        """Make a tile from `positions` and `normals` of vertices, with one material of `terms` for all faces."""
         return cls(positions, normals, faces, np.zeros(len(faces), np.int64), (terms,))
 
 

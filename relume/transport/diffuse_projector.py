@@ -23,7 +23,7 @@ _ZERO = np.float32(0)
 
 
 def diffuse_quotients(term: Term, receivers: ShadingPoints, start: int, stop: int) -> Shaped[F32, " m"]:
-    """Evaluate the quotients of a Lambertian term at points [start, stop); they depend only on the side of ωo."""
+    """Quotients of a Lambertian term at points [start, stop) of `receivers`; they depend only on the side of ωo."""
     cos_theta_o = np.einsum("nc,nc->n", receivers.normal[start:stop], receivers.wo[start:stop])
     zeros = np.zeros_like(cos_theta_o)
     return np.asarray(term.quotients(zeros, zeros, zeros + 1, zeros, zeros, cos_theta_o)[0])

@@ -105,7 +105,7 @@ def incident_coefficients(
 def ray_incident_coefficients(
     points: SurfacePoints, rays: Sequence[RayList], degree: int = DEGREE
 ) -> Shaped[F32, "n 3 K"]:
-    """Compute the incident radiance coefficients of points from rays alone; see `incident_coefficients`."""
+    """Incident radiance coefficients of points up to a degree from rays alone. See `incident_coefficients`."""
     out = np.zeros((points.num_points, 3, num_functions(degree)), np.float32)
     _add_rays(points, rays, degree, out)
     return out

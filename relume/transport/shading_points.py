@@ -54,7 +54,7 @@ class RayList(Protocol):
 
 
 def build_ray_lists(rays: RayList, receivers: ShadingPoints, start: int, stop: int) -> ReceiverList:
-    """List rays in newly allocated memory; see `RayList.list_into`."""
+    """List rays in newly allocated memory. See `RayList.list_into`."""
     max_rays = (stop - start) * rays.max_rays_per_point
     receiver_list = ReceiverList(
         np.empty(stop - start + 1, np.int64), *(np.empty((3, max_rays), np.float32) for _ in range(3))

@@ -10,7 +10,7 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
-from relume_bench.soak.server import Sample, Server
+from relume_bench.soak.server import Sample, SoakServer
 from relume_bench.soak.users import Users
 from relume_bench.soak.verdict import trends
 
@@ -24,7 +24,7 @@ def main() -> int:
     parser.add_argument("--samples", type=Path, help="file for the measurements, JSON lines")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="relume-soak-") as folder:
-        server = Server(Path(folder))
+        server = SoakServer(Path(folder))
         try:
             users, samples = _soak(server, 60 * asked.minutes)
         finally:
@@ -43,7 +43,7 @@ def main() -> int:
     return 0 if has_stopped and not users.failures and traces == 0 and all(each.is_flat for each in trend_lines) else 1
 
 
-def _soak(server: Server, seconds: float) -> tuple[Users, list[Sample]]:
+def _soak(server: SoakServer, seconds: float) -> tuple[Users, list[Sample]]:
     users, start_s = Users(server, SEED), time.monotonic()
     samples: list[Sample] = []
     users.start()

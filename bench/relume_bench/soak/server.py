@@ -46,7 +46,7 @@ class Sample:
     disk: int
 
 
-class Server:
+class SoakServer:
     """`relume serve` on a folder of its own."""
 
     def __init__(self, data: Path) -> None:
@@ -80,7 +80,7 @@ class Server:
         return self._process.poll() is None
 
     def call(self, path: str, body: Any = None, method: str | None = None) -> Any:
-        """Call REST and return the JSON, by default with GET, or POST with a body.
+        """Call REST at `path` and return the JSON; the default `method` is GET, or POST with a body.
 
         Raises:
             OSError: the call is refused.

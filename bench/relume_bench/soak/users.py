@@ -17,7 +17,7 @@ from typing import Any
 from websockets import Subprotocol
 from websockets.sync.client import ClientConnection, connect
 
-from relume_bench.soak.server import Server
+from relume_bench.soak.server import SoakServer
 
 EDITS = 15
 SPEAKS = Subprotocol("relume.v2")
@@ -31,7 +31,7 @@ class Users:
         counts: number of each action. failures: errors while no process had been killed.
     """
 
-    def __init__(self, server: Server, seed: int) -> None:
+    def __init__(self, server: SoakServer, seed: int) -> None:
         self._server, self._seed = server, seed
         self.counts, self.failures = Counter[str](), list[str]()
         self._killed_s = -1e9

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 from relume.assets.environments.environment import Environment
 from relume.assets.environments.hdr_header import read_header
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported
 from relume.image_io.downsample import downsample
 from relume.image_io.primaries import convert
 from relume.image_io.read_linear import EXR_MAGIC, check_claim, read_strips
-from relume.scene.unique_names import quote
 
 F32 = NDArray[np.float32]
 

@@ -220,7 +220,7 @@ class Picture:
         return probe(self._images, self._radiance, self._gain, self._prepared_pointer, x, y)
 
     def highlight_pixels(self, pointer: str, from_deg: float, to_deg: float) -> Shaped[F32, "height width"]:
-        """Return the pixels lit by a range of a curve; see `relume.live.fixed_camera.pixel_probe.highlight_pixels`."""
+        """Return the pixels lit by a range of a curve. See `relume.live.fixed_camera.pixel_probe.highlight_pixels`."""
         return highlight_pixels(self._images, self._radiance, parse_curve(pointer), from_deg, to_deg)
 
     def _active_control(self) -> ActiveControl:

@@ -178,9 +178,7 @@ class ViewImages:
         return self.cache.get_value(key, read)
 
     def is_default(self, material: MaterialImage, live: LiveTerm, light: Illumination) -> bool:
-        """Return whether a term in some light belongs to the scene's own look, whose images are cached next to the
-        store.
-        """
+        """True if `live`, a term of `material`, in `light` is of the scene's own look, cached next to the store."""
         name = self.transfer.material_names[material.index]
         is_without_overrides = not any(self.view.maps[material.index : material.index + 1])
         return (
@@ -238,7 +236,7 @@ class ViewImages:
         *,
         is_merged_light: bool = False,
     ) -> tuple[Hashable, ...]:
-        """Cache key of a term's operator along a basis.
+        """Cache key of the operator of `live`, a term of `material`, along a basis.
 
         Args:
             bands: of the term's curves, (3, J) each; those of the basis are free. is_merged_light: it is from merged
@@ -251,11 +249,11 @@ class ViewImages:
         )
 
     def image_key(self, material: MaterialImage, live: LiveTerm, light: Illumination) -> tuple[Hashable, ...]:
-        """Cache key of the image of a term's target in some light."""
+        """Cache key of the image of the target of `live`, a term of `material`, in `light`."""
         return *self._sample_key(material), live.image_key(light)
 
     def image_in(self, material: MaterialImage, live: LiveTerm, light: Illumination) -> ShadedTerm | None:
-        """Return the cached image of a term's target in some light, or None."""
+        """Return the cached image of the target of `live`, a term of `material`, in `light`, or None."""
         return self.cache.get_cached(self.image_key(material, live, light), ShadedTerm)
 
     def is_cached(self, material: MaterialImage, live: LiveTerm) -> bool:

@@ -16,7 +16,7 @@ from urllib.parse import unquote_to_bytes
 from pydantic import ValidationError
 
 from relume.core.errors import SceneError
-from relume.scene.unique_names import UNREADABLE
+from relume.core.import_warnings import UNREADABLE
 from relume.scene_io.gltf.compression import DRACO, MESHOPT, is_fallback
 from relume.scene_io.gltf.document import Buffer, Document
 from relume.scene_io.gltf.material_extensions import MATERIAL_EXTENSIONS

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from relume.assets.environments.environment import Environment
 from relume.assets.environments.studio import studio
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated, ignored, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote, unsupported
 from relume.scene.collect_lights import LightCollector
 from relume.scene.finalize import finalize
 from relume.scene.merge_meshes import merge_by_material
 from relume.scene.model import F32, Camera, Mesh, Scene
-from relume.scene.unique_names import quote, unique_name
+from relume.scene.unique_names import unique_name
 from relume.scene.validate import MAX_TRIANGLES
 from relume.scene.vertex_colors import MAX_COLORED, draw_color_image, is_uniform
 from relume.scene_io.gltf.accessors import AccessorReader

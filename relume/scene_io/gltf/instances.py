@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, unsupported
-from relume.scene.unique_names import quote
+from relume.core.import_warnings import ImporterWarning, quote, unsupported
 from relume.scene_io.gltf.accessors import AccessorReader
 from relume.scene_io.gltf.document import Index, Node
 from relume.scene_io.gltf.nodes import rotations

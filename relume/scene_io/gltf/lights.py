@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, quote, unsupported
 from relume.scene.collect_lights import LightCollector
-from relume.scene.unique_names import quote
 from relume.scene.validate import MAX_METERS
 from relume.scene_io.gltf.document import Document, Factor, Index, Name, Node, Number
 

@@ -11,8 +11,7 @@ from typing import Annotated, TypeVar
 
 from pydantic import BaseModel, Field, ValidationError
 
-from relume.core.import_warnings import ImporterWarning, unsupported
-from relume.scene.unique_names import quote
+from relume.core.import_warnings import ImporterWarning, quote, unsupported
 from relume.scene_io.gltf.document import Extensions, Factor, Number, TextureInfo
 
 Weight = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1e6)]

@@ -15,11 +15,11 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated, ignored, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote, unsupported
 from relume.scene.model import Glass, Material, Opacity, Texture, TextureEncoding
 from relume.scene.opacity import make_opacity
 from relume.scene.texture_encoding import mean_value
-from relume.scene.unique_names import quote, unique_name
+from relume.scene.unique_names import unique_name
 from relume.scene.validate import MAX_IOR
 from relume.scene.vertex_colors import WRAP
 from relume.scene_io.gltf.blend import MetallicBlend, lerp

@@ -12,8 +12,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, unsupported
-from relume.scene.unique_names import quote
+from relume.core.import_warnings import ImporterWarning, quote, unsupported
 from relume.scene_io.gltf.document import Document, Node
 
 F64 = NDArray[np.float64]

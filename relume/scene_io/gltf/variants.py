@@ -14,10 +14,10 @@ from pydantic import BaseModel, Field, ValidationError
 
 from relume.brdf.term_validation import complete_term
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated
+from relume.core.import_warnings import ImporterWarning, approximated, quote
 from relume.scene.model import F32, Texture
 from relume.scene.texture_encoding import F64, decode_rows, mean_value
-from relume.scene.unique_names import quote, unique_name
+from relume.scene.unique_names import unique_name
 from relume.scene_io.gltf.document import Document, Index, Name, Primitive
 from relume.scene_io.gltf.materials import ReadMaterial
 

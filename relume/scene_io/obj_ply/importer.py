@@ -11,11 +11,11 @@ import numpy as np
 from relume.assets.environments.environment import Environment
 from relume.assets.environments.studio import studio
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated, ignored, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote, unsupported
 from relume.scene.collect_lights import F64, LightCollector
 from relume.scene.finalize import finalize
 from relume.scene.model import F32, Light, Material, Mesh, Scene, Texture, TextureEncoding
-from relume.scene.unique_names import quote, unique_name
+from relume.scene.unique_names import unique_name
 from relume.scene.vertex_colors import MAX_COLORED, WRAP, draw_color_image, is_uniform
 from relume.scene_io.gltf.cameras import framing_camera
 from relume.scene_io.obj_ply.mtl import MaterialMaker, read_library

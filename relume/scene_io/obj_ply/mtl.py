@@ -13,11 +13,11 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import SceneError
-from relume.core.import_warnings import ImporterWarning, approximated, ignored, unsupported
+from relume.core.import_warnings import ImporterWarning, approximated, ignored, quote, unsupported
 from relume.image_io.decode import U8, Decoder
 from relume.scene.model import Material, Opacity, Texture, TextureEncoding
 from relume.scene.opacity import make_opacity
-from relume.scene.unique_names import quote, unique_name
+from relume.scene.unique_names import unique_name
 from relume.scene_io.gltf.texture_resampling import NOISE
 from relume.scene_io.obj_ply.mtl_dialects import Gloss, MtlMaterial, detect_dialect, gray_terms, make_mtl_terms
 from relume.scene_io.referenced_files import Companions

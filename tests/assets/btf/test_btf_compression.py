@@ -160,5 +160,5 @@ def test_too_many_texels_for_the_memory_limit_are_rejected_before_reading():
         grid, size = make_direction_grid([(0.0, 1), (40.0, 199), (70.0, 200)]), (300, 300)
 
     assert max_texels(81) > 300 * 300
-    with pytest.raises(MaterialError, match="in 400 directions at most 83,886 can be compressed, scale it down"):
+    with pytest.raises(MaterialError, match="the limit for 400 directions is 83,886; scale it down"):
         compressed(Large())

@@ -161,7 +161,7 @@ class SparsePreview:
 
     @classmethod
     def for_targets(cls, images: ViewImages, targets: Iterable[TermTarget], label: str) -> SparsePreview:
-        """Return the preview of some terms in the current look. label: text for the user."""
+        """Return the preview of `targets` in the current look of `images`. label: text for the user."""
         targets = list(targets)
         snapshots = [_TermSnapshot(target, target.live.term, target.live.target_bands) for target in targets]
         image_keys = (images.image_key(target.material, target.live, images.light) for target in targets)

@@ -88,7 +88,7 @@ def first_nodes(rows: NDArray[np.integer]) -> NDArray[np.uint32]:
 
 @nb.njit(nogil=True, cache=True, inline="always")
 def node_index(rows, i, j):  # type: ignore[no-untyped-def]
-    """Index of a node in a grid: i steps toward the second corner, j toward the third."""
+    """Index of a node in a grid of `rows` rows: i steps toward the second corner, j toward the third."""
     return i * (rows + 1) - (i * (i - 1)) // 2 + j
 
 
