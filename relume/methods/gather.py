@@ -1,4 +1,4 @@
-"""Method `gather`: environment light with any number of bounces, fixed views (after Nguyen 2010).
+"""Method `gather`: final gathering to surface patches, any number of bounces, fixed views (Nguyen 2010).
 
 Besides the arrays of `relume.methods.view_stages`: surface patches, the lights visible from them, and gather rays from
 patches and view samples. Only the patch that each ray hits is stored; directions are generated again from a seed.

@@ -1,4 +1,4 @@
-"""Surface patches and the hits of gather rays on them (Nguyen et al. 2010).
+"""Surface patches, and the gather rays that hit them: final gathering (Nguyen et al. 2010).
 
 Read first: `patches`, `patch_kdtree`.
 """

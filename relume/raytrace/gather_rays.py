@@ -1,4 +1,4 @@
-"""Directions and weights of gather rays, recomputed wherever they are needed, never stored.
+"""Directions and weights of gather rays (final gathering), recomputed wherever they are needed, never stored.
 
 A point has `num_cosine` rays of density cos θi / π and `num_glossy` rays around its mirror direction, whose half
 vectors have the density
