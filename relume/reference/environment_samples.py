@@ -47,7 +47,9 @@ class EnvironmentSamples:
     def scaled(self, gain: tuple[float, float, float]) -> EnvironmentSamples:
         """Multiply the channels by a gain; no texels remain if it is zero."""
         if not any(gain):
-            return replace(self, direction=self.direction[:0], power=self.power[:0], cdf=self.cdf[:0])
+            return replace(
+                self, direction=self.direction[:0], power=self.power[:0], cdf=self.cdf[:0], index=self.index[:0]
+            )
         return replace(self, power=self.power * np.array(gain), gain=gain)
 
     def sample_directions(self, num_samples: int, rng: np.random.Generator) -> Shaped[F64, "num 3"]:

@@ -145,7 +145,7 @@ def test_a_store_deleted_under_a_reader_is_deleted_not_damaged(tmp_path: Path) -
     opened.read(SPEC.path, 0, 32)
     shutil.rmtree(store)
     for reader in (opened, fresh):
-        with pytest.raises(StoreDeletedError, match="deleted while it was shown"):
+        with pytest.raises(StoreDeletedError, match="deleted while it was open"):
             reader.read(SPEC.path)
 
 

@@ -96,7 +96,7 @@ class LocalPcaBtf:
             error=self.error[: num_components + 1],
         )
 
-    def tables(self) -> Shaped[F32, "V K 1+C 3 L"]:
+    def tables(self) -> Shaped[F32, "V K mean_and_components 3 L"]:
         """Means and components for sums over light directions."""
         components = self.eigen.astype(np.float32) * self.step[..., None, None]
         mean_and_components = np.concatenate([self.mean[:, :, None].astype(np.float32), components], axis=2)
