@@ -46,7 +46,7 @@ def test_reflected_light_is_baked_by_the_dialogue_and_seen_by_paths(start_page: 
     page.get_by_role("checkbox", name="left").uncheck()
     page.get_by_role("button", name="Open and bake").first.click()
     editor.wait_until_exact()
-    expect(page.get_by_role("button", name="global illumination ▾")).to_be_visible()
+    expect(page.get_by_role("button", name="GI ▾")).to_be_visible()
 
     steps = page.locator(".tile.step")
     editor.choose("Ball", 1)
