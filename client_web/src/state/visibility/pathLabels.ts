@@ -27,7 +27,7 @@ export const LIGHT_PATHS: readonly PathLabels[] = [
   },
   {
     value: "further_bounces",
-    label: "2+ bounces",
+    label: "2+",
     title: "Light after two or more bounces",
     only: "2+ bounces only",
   },
