@@ -54,9 +54,9 @@ def test_reflected_light_is_baked_by_the_dialogue_and_seen_by_paths(start_page: 
     expect(steps).to_have_count(2)
     everything = editor.pixels()
     paths = page.get_by_role("radiogroup", name="Light paths")
-    paths.get_by_role("radio", name="1st bounce").click()
+    paths.get_by_role("radio", name="1 bounce").click()
     assert changed(everything, editor.pixels()) > 0.5
-    paths.get_by_role("radio", name="1st bounce").press("ArrowLeft")
+    paths.get_by_role("radio", name="1 bounce").press("ArrowLeft")
     assert changed(everything, editor.pixels()) > 0.5
     paths.get_by_role("radio", name="Indirect").press("ArrowLeft")
     expect(paths.get_by_role("radio", name="Direct")).to_be_checked()

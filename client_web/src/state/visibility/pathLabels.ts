@@ -21,7 +21,7 @@ export const LIGHT_PATHS: readonly PathLabels[] = [
   },
   {
     value: "first_bounce",
-    label: "1st bounce",
+    label: "1 bounce",
     title: "Light after exactly one bounce",
     only: "1st bounce only",
   },
