@@ -41,7 +41,7 @@ def bake(client: TestClient, scene: dict[str, Any]) -> str:
     request = {"scene": scene["id"], "method": "probes", "size": SIZE, "lights": 100, "probes": 2000}
     done = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
     assert done["state"] == "ready", done["problem"]
-    assert done["recipe"]["points"] == 2000
+    assert done["recipe"]["probes"] == 2000
     return str(done["id"])
 
 
