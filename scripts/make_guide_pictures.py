@@ -193,7 +193,7 @@ def place_camera(setup: Setup) -> None:
         return
     with new_page(setup.browser) as page:
         page.goto(f"{setup.url}/?scene={setup.free_camera}")
-        bar = page.locator(".eye-bar, .camera-bar")
+        bar = page.locator(".camera-bar")
         bar.wait_for()
         wait_until_exact(page)
         bar.locator(".menu > button").click()
@@ -228,7 +228,7 @@ def draw_curve(setup: Setup) -> None:
 def light_scene(setup: Setup) -> None:
     """A panel light with its handles."""
     with open_editor(setup) as page:
-        page.get_by_role("button", name=re.compile("^Add a light", re.I)).first.click()
+        page.get_by_role("button", name="Add light").first.click()
         page.locator(".light-kinds button").nth(2).click()
         page.mouse.click(*canvas_point(page, 0.5, 0.8))
         page.locator(".light-handle").first.wait_for()

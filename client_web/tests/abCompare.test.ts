@@ -21,7 +21,7 @@ beforeEach(() => {
   activeViewName.value = "front";
 });
 
-test("a swap exchanges where A and the live picture are seen from, too, and twice is as it was", () => {
+test("a swap also exchanges the cameras, and a second swap restores everything", () => {
   const freeCamera = freeCameraOf("front") as NonNullable<ReturnType<typeof freeCameraOf>>;
   const before = currentCameras();
   sideA.value = { look: LOOK, label: "kept", cameras: before };

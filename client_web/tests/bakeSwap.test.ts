@@ -76,7 +76,7 @@ beforeEach(() => {
   activeViewName.value = "front";
 });
 
-test("a new bake is seen at once from where a hand has put the eye", async () => {
+test("a new bake is shown from the placed camera", async () => {
   const camera = { to_world: [1], yfov: 0.5 };
   storeCamera("front", { camera, size: [8, 6] });
   VIEWS[0] = { ...VIEWS[0], camera_mode: "free" } as never;
@@ -86,7 +86,7 @@ test("a new bake is seen at once from where a hand has put the eye", async () =>
   storeCamera("front", null);
 });
 
-test("a new bake takes over when the view in hand is whole", async () => {
+test("a new bake replaces the old one when the active view is complete", async () => {
   const session = await newBake();
   await session.handlers.frame(frame("left"));
   await session.handlers.frame(frame("front", false));
@@ -95,14 +95,14 @@ test("a new bake takes over when the view in hand is whole", async () => {
   expect(bake.value).toBe("new");
 });
 
-test("a new bake takes over when the hand comes to a view that is whole", async () => {
+test("a new bake replaces the old one when a complete view becomes active", async () => {
   const session = await newBake();
   await session.handlers.frame(frame("left"));
   activeViewName.value = "left";
   expect(bake.value).toBe("new");
 });
 
-test("a new bake takes over when a view that is whole is shown alone", async () => {
+test("a new bake replaces the old one when a complete view is shown alone", async () => {
   const session = await newBake();
   activeViewName.value = "left";
   await session.handlers.frame(frame("left", false));
@@ -113,7 +113,7 @@ test("a new bake takes over when a view that is whole is shown alone", async () 
   expect(bake.value).toBe("new");
 });
 
-test("a visitor without a look of their own is shown what a link brought with the first one", () => {
+test("a link's look is applied with the first look of a new user", () => {
   look.value = null;
   const brought = { ...LOOK, display: { ...LOOK.display, exposure: 1 } };
   const stop = look.subscribe((first) => first?.display.exposure === 0 && replaceLook("Shared look", brought));
@@ -122,7 +122,7 @@ test("a visitor without a look of their own is shown what a link brought with th
   expect(session.target).toEqual(brought);
 });
 
-test("what is shown is outdated from the edit on until every shown view has a picture of after it", async () => {
+test("the image is outdated from an edit until every shown view has a newer one", async () => {
   const session = greet("old");
   for (const view of shownViews.value) await session.handlers.frame(frame(view));
   expect(isOutdated.value).toBe(false);

@@ -51,13 +51,13 @@ it("makes no second texture of a kind while one is made", () => {
 describe("textures in the making", () => {
   it("are followed until they are ready, and what is ready is taken from the list", async () => {
     const requests = serve([work("a"), work("b", { state: "queued" })], [work("a", { state: "ready" }), work("b")], []);
-    const arrived = vi.fn(() => Promise.resolve());
-    const followed = trackJobs(arrived);
+    const finished = vi.fn(() => Promise.resolve());
+    const followed = trackJobs(finished);
     await vi.advanceTimersByTimeAsync(0);
     expect(btfJobs.value.map(({ id }) => id)).toEqual(["a", "b"]);
-    expect(arrived).not.toHaveBeenCalled();
+    expect(finished).not.toHaveBeenCalled();
     await vi.advanceTimersByTimeAsync(1000);
-    expect(arrived).toHaveBeenCalledOnce();
+    expect(finished).toHaveBeenCalledOnce();
     expect(btfJobs.value.map(({ id }) => id)).toEqual(["b"]);
     expect(requests).toContain("DELETE /api/materials/btf/jobs/a?delete_files=true");
     await vi.advanceTimersByTimeAsync(1000);

@@ -92,7 +92,7 @@ describe("a shared look", () => {
     expect(bob.look).toEqual(ann.look);
   });
 
-  test("of one place the last that came to the server is what both have, whoever was told when", () => {
+  test("of edits of one value, the last one received by the server wins for both", () => {
     for (const [first, last, value] of [
       [ann, bob, 0.4],
       [bob, ann, 0.6],

@@ -31,7 +31,7 @@ async function requestOf(view: string): Promise<ComparisonRequest | null> {
   return request;
 }
 
-test("a view whose eye moves is compared from where the eye is, any other as it was baked", async () => {
+test("a free-camera view is compared from its current camera, others as baked", async () => {
   freeCameraOf("front")?.resize([60, 90]);
   const { camera, size } = (await requestOf("front")) as ComparisonRequest;
   expect(camera?.to_world).toEqual(FROM.to_world);
@@ -40,7 +40,7 @@ test("a view whose eye moves is compared from where the eye is, any other as it 
   expect(await requestOf("left")).toMatchObject({ camera: null, size: null });
 });
 
-test("a comparison is of another picture once the eye has moved on, or the picture is of another size", () => {
+test("a comparison is outdated when the camera moves or the image size changes", () => {
   activeViewName.value = "front";
   const compared = comparedState();
   freeCameraOf("front")?.change((orbit) => rotateOrbit(orbit, 0.3, 0));

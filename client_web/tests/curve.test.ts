@@ -167,7 +167,7 @@ describe("points", () => {
     expect(addPoint(POINTS, 0.1, 7, BAND).points[0]).toEqual([0, 7]);
   });
 
-  test("are stopped by their neighbours and by the plot", () => {
+  test("are stopped by their neighbors and by the plot", () => {
     const moved = movePoint(POINTS, 2, 60, -3, BAND);
     expectValid(moved);
     expect(moved[2]?.[0]).toBeCloseTo(13 - 0.9 * BAND, 3);

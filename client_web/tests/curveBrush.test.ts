@@ -8,7 +8,7 @@ vi.mock("../src/render/renderStage", () => ({ stage: { clearBrush: () => undefin
 vi.mock("../src/state/selection", () => ({ curvePath: { peek: () => "/materials/A/terms/0/curves/theta_h" } }));
 vi.mock("../src/state/views", () => ({ hasFreeCamera: { peek: () => true } }));
 
-test("a stretch is asked about when the eye rests, and not at all where the pointer has left", async () => {
+test("an interval is requested when the camera stops, unless the pointer has left", async () => {
   vi.useFakeTimers();
   const [{ requestBrush, clearBrush }, { fidelity }] = [await import("../src/curve/curveBrush"), await import("../src/state/fidelity")];
   fidelity.value = "approximate";
@@ -24,7 +24,7 @@ test("a stretch is asked about when the eye rests, and not at all where the poin
   expect(send.mock.calls).toEqual([[{ type: "highlight_curve_range", curve: "/materials/A/terms/0/curves/theta_h", from: 3, to: 7 }]]);
 });
 
-test("a stretch of a curve that is being frozen is asked about when it is there", async () => {
+test("an interval is requested when its curve's operator is precomputed", async () => {
   const [{ requestBrush, clearBrush }, { fidelity }] = [await import("../src/curve/curveBrush"), await import("../src/state/fidelity")];
   const { freezeStatus } = await import("../src/state/connection");
   send.mockClear();

@@ -67,7 +67,7 @@ describe.each(Object.entries(CURVES))("the points of %s", (_, generated) => {
       expect(pointsOf(modelOf(generated, held), 0, LINEAR)).toEqual(points);
     });
 
-    test("a nudge moves nothing by more than its share, and nothing beyond its neighbours", () => {
+    test("a nudge moves nothing by more than its share, and nothing beyond its neighbors", () => {
       points.forEach(([x, y], i) => {
         const after = movePoint(points, i, x, y * 1.001, BAND);
         const curve = modelOf(generated, bendCurve(model, 0, points, after)).curves[0] as number[];

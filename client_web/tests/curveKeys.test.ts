@@ -17,6 +17,6 @@ test("a point at zero comes off it upwards, and what is next to nothing is zero"
   expect(steppedValue(3e-7, 1 / 25, 3000)).toBe(0);
 });
 
-test("keys are written alike in tooltips and in the keyboard map", () => {
+test("tooltips and the shortcut list format keys alike", () => {
   expect(["p", "Ctrl+z", "Ctrl+Shift+z", "+", "\\", "1", "Enter"].map(keyName)).toEqual(["P", "Ctrl+Z", "Ctrl+Shift+Z", "+", "\\", "1", "Enter"]);
 });

@@ -3,9 +3,9 @@ import { expect, it, vi } from "vitest";
 import type { ImageCanvas } from "../src/render/canvas";
 
 const put = vi.hoisted(() => vi.fn());
-const state = vi.hoisted(() => ({ here: null as string | null, there: "Cone" as string | null, eye: {} as unknown }));
+const state = vi.hoisted(() => ({ here: null as string | null, there: "Cone" as string | null, camera: {} as unknown }));
 vi.mock("../src/panels/library/libraryItems", () => ({ DRAG_TYPE: "material", applyEntry: put }));
-vi.mock("../src/viewport/cameras/freeCamera", () => ({ freeCameraOf: () => state.eye }));
+vi.mock("../src/viewport/cameras/freeCamera", () => ({ freeCameraOf: () => state.camera }));
 vi.mock("../src/render/materialPicking", () => ({ pickMaterial: () => ({ px: 3, py: 4, material: state.here }) }));
 vi.mock("../src/session/pixelProbe", () => ({ requestPixelProbe: () => Promise.resolve({ material: state.there }) }));
 
@@ -23,7 +23,7 @@ async function dropped(): Promise<boolean> {
   return over.defaultPrevented;
 }
 
-it("puts it on what the server says is there, twice, and on nothing in the background", async () => {
+it("applies it to the material that the server picks, and to none on the background", async () => {
   for (let k = 0; k < 2; k++) {
     expect(await dropped()).toBe(true);
     expect(put.mock.calls).toEqual([["Cone", "cloth"]]);
@@ -33,8 +33,8 @@ it("puts it on what the server says is there, twice, and on nothing in the backg
   expect(put).not.toHaveBeenCalled();
 });
 
-it("asks nobody where the eye stays", async () => {
-  [state.eye, state.here] = [null, "Floor"];
+it("sends no request with a fixed camera", async () => {
+  [state.camera, state.here] = [null, "Floor"];
   expect(await dropped()).toBe(true);
   expect(put.mock.calls).toEqual([["Floor", "cloth"]]);
   state.here = null;

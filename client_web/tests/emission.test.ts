@@ -64,7 +64,7 @@ describe("the temperature of a light", () => {
     expect(kelvinOf([0, 1, 0]).isColored).toBe(true);
   });
 
-  test("changes the colour of a light, not how bright it is", () => {
+  test("changes the color of a light, not how bright it is", () => {
     const warm = withKelvin([5, 5, 5], 2700);
     expect(luminance(warm)).toBeCloseTo(5, 4);
     expect(warm[0]).toBeGreaterThan(2 * warm[2]);

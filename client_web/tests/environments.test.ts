@@ -6,7 +6,7 @@ import { LOOK } from "./exampleLook";
 const file = (name: string) => new File([], name);
 
 describe("an environment among dropped files", () => {
-  it("is told by its name", () => {
+  it("is recognized by its name", () => {
     expect(environmentOf([file("notes.txt"), file("Sunset.HDR")])?.name).toBe("Sunset.HDR");
     expect(environmentOf([file("sky.exr"), file("other.hdr")])?.name).toBe("sky.exr");
   });

@@ -22,7 +22,7 @@ test("long names are cut between characters, far below what the server takes", (
   expect(called(`x${"𠀀".repeat(200)}`, "front")).toBe(`x${"𠀀".repeat(119)}`);
 });
 
-test("what is no single picture is told from it", () => {
+test("sequences have different file names from single images", () => {
   called("still life", "front");
   expect(fileStem("light groups", "ACEScg")).toBe("still-life-front-light-groups-ACEScg");
 });

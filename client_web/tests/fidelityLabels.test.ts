@@ -18,7 +18,7 @@ beforeEach(() => {
 
 const labels = () => fidelityMarks().map((mark) => mark.label);
 
-test("until the eye has rested it is what the bake has measured, with its standard error", () => {
+test("before the first camera stop, the error is the one measured in the bake", () => {
   [bakedFreeCameraError.value, freeCameraError.value] = [null, null];
   expect(labels()).toContain("Approximate while moving");
   bakedFreeCameraError.value = { value: 0.0312, standard_error: 0.0021 };
@@ -29,7 +29,7 @@ test("until the eye has rested it is what the bake has measured, with its standa
   expect(fidelityMarks()[0]?.title).toContain("3.1 ± 0.2 %");
 });
 
-test("while a time line plays it is said to play, whichever way its frames come", () => {
+test("the label says that the timeline plays", () => {
   isPlaying.value = true;
   for (const rough of ["preview", "approximate", "incremental"] as const) {
     fidelity.value = rough;
@@ -40,7 +40,7 @@ test("while a time line plays it is said to play, whichever way its frames come"
   expect(labels()).toEqual(["Approximate while dragging"]);
 });
 
-test("a bake of direct light says that objects are not reflected, also where its picture is exact", () => {
+test("a direct light bake is labeled even if its image is exact", () => {
   fidelity.value = "exact";
   isConverged.value = true;
   method.value = "direct";
@@ -50,7 +50,7 @@ test("a bake of direct light says that objects are not reflected, also where its
   expect(labels()).toEqual([]);
 });
 
-test("a picture of before the newest edit says so until one of after it is there", () => {
+test("an image older than the newest edit is labeled until a newer one is shown", () => {
   fidelity.value = "exact";
   [isConverged.value, isConverged.value] = [false, true];
   views.value = [{ name: "front", camera_mode: "fixed" } as never];

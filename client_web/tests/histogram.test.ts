@@ -46,7 +46,7 @@ describe("histogram", () => {
     expect((channels[0][binIndex(1)] as number) / samples).toBeCloseTo(0.5, 2);
   });
 
-  test("percentiles are stops about middle grey", () => {
+  test("percentiles are stops about middle gray", () => {
     const encoded = Uint32Array.from({ length: 100 }, (_, i) => encodeRgb9e5(...gray(i < 50 ? MIDDLE_GRAY : 4 * MIDDLE_GRAY)));
     const histogram = computeHistogram(encoded, 0.01);
     expect(percentile(histogram, 0.25)).toBeCloseTo(0, 0);

@@ -50,7 +50,7 @@ describe("transform", () => {
     expect([x, y].map(Math.round)).toEqual([343, 217]);
   });
 
-  test("what is on the screen is told in pixels, and all of it by saying nothing", () => {
+  test("the visible region is in pixels, and omitted if everything is visible", () => {
     expect(visibleRegion(FIT, canvas, 1920, 1440)).toBe(null);
     const zoomed = zoomAt(FIT, canvas, 4, 400, 300);
     const [x, y, width, height] = visibleRegion(zoomed, canvas, 1920, 1440) as number[] as [number, number, number, number];

@@ -11,7 +11,7 @@ models.value = [
 ] as unknown as ModelBody[];
 const term = (model: string, texture: string | null, color: Term["color"] = [0.5, 0.2, 0.1]): Term => ({ model, texture, color });
 
-test("an image takes the place of the diffuse colour; a colour that stood alone becomes white", () => {
+test("an image takes the place of the diffuse color; a color that stood alone becomes white", () => {
   const made = withBaseImage([term("lambert", null), term("ggx", "specular")], IMAGE);
   expect(made).toEqual([term("lambert", IMAGE, [1, 1, 1]), term("ggx", "specular")]);
   expect(baseTexture(made)).toBe(IMAGE);
@@ -42,7 +42,7 @@ test("terms that share a channel change their texture together; others stay", ()
 
 test("maps that are no colors are known by their names", () => {
   const named = ["oak_rough_2k.jpg", "Metal049A_1K-JPG_Metalness.jpg", "rust_arm_4k.png", "bricks-normalGL.png", "wall_AO.png"];
-  const otherTerms = ["oak_nor_dx_2k.jpg", "oak_nor_gl_2k.jpg", "tiles_height.png", "lamp_emissive.png"];
+  const otherTerms = ["oak_nor_dx_2k.jpg", "oak_nor_gl_2k.jpg", "tiles_height.png", "light_emissive.png"];
   expect(named.map(detectMap)).toEqual(["roughness", "metal", "roughness and metal", "normals", "occlusion"]);
   expect(otherTerms.map(detectMap)).toEqual(["DirectX normals", "normals", "height", "emission"]);
   const colors = ["rough_plaster_diff_2k.jpg", "Metal049A_1K-JPG_Color.jpg", "armchair.webp", "rough.png", "IMG_1234.jpg"];

@@ -53,7 +53,7 @@ describe("the search in the library", () => {
 describe("what is found elsewhere", () => {
   const fitted = (id: string, name: string, model: string, group: string) => ({ id, name, source: "", model, group, terms: [] }) as never;
 
-  it("is told where nothing that is shown is called so, and shown whole", () => {
+  it("is offered if no listed entry matches", () => {
     library.value = [fitted("a", "Gold", "ward", "metal"), fitted("b", "Felt", "cook_torrance", "fabric")];
     [query.value, group.value] = ["felt", "all"];
     expect(otherGroupMatches.value).toEqual([]);

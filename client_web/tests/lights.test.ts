@@ -176,7 +176,7 @@ describe("one light alone", () => {
     expect(visibleLookOf(lit)).toBe(lit);
   });
 
-  test("is seen by some light paths, which the look does not take up", () => {
+  test("works with a light-path filter, which is not part of the look", () => {
     pathOverride.value = { show: "direct", bounces: 3 };
     const visibleLook = withVisiblePaths(lit);
     expect(visibleLook.transport).toEqual({ show: "direct", bounces: 3 });
@@ -187,5 +187,5 @@ describe("one light alone", () => {
 });
 
 test("a light's step names the light", () => {
-  expect(stepLabel("/lights/Desk ~1 lamp/position", "Move", LOOK, [])).toBe("Desk / lamp · Move");
+  expect(stepLabel("/lights/Desk ~1 light/position", "Move", LOOK, [])).toBe("Desk / light · Move");
 });

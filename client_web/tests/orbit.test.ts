@@ -65,7 +65,7 @@ describe("a camera that goes round a place", () => {
     const [x, y, z] = [0, 1, 2].map((k) => column(next, k)) as [number[], number[], number[]];
     const towards = orbit.target.map((at, k) => at - (positionOf(next)[k] as number));
     const height = 2 * 4 * Math.tan((20 * Math.PI) / 180);
-    expect(dot(towards, x) / height).toBeCloseTo(0.25, 9); // it is seen that much farther right
+    expect(dot(towards, x) / height).toBeCloseTo(0.25, 9); // it appears that much farther right
     expect(-dot(towards, y) / height).toBeCloseTo(0.1, 9); // and farther down
     expect(-dot(towards, z)).toBeCloseTo(4, 9);
   });

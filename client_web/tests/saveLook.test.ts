@@ -32,7 +32,7 @@ test("a look that is saved has the picture on the screen", async () => {
 });
 
 test("one light alone is no picture of a look: it keeps the one it had, or waits for one", async () => {
-  soloLight.value = "Lamp";
+  soloLight.value = "Key";
   await saveLook();
   expect(sent).toEqual([]);
   storeThumbnail(look.value as typeof LOOK, "data:look");

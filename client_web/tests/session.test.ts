@@ -185,7 +185,7 @@ test("who may only look sends no edits and takes hold of nothing", () => {
   expect(handlers.readOnly).toHaveBeenCalledTimes(1);
   expect(session.hasPendingEdits).toBe(false);
   expect(session.send({ type: "prepare", parameter: SIGMA })).toBe(false);
-  expect(session.send({ type: "prepare", curve: "/materials/A/terms/0/curves/theta_h" })).toBe(true); // to be told its values
+  expect(session.send({ type: "prepare", curve: "/materials/A/terms/0/curves/theta_h" })).toBe(true); // to receive its values
   session.setTarget({ look, activeControl: null, solo: ["environment"], inputTime: 0 });
   expect(session.send({ type: "inspect", x: 1, y: 2 })).toBe(true);
   animate();

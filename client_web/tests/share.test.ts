@@ -9,8 +9,8 @@ import { shownViews, activeViewName, views } from "../src/state/views";
 import { LOOK } from "./exampleLook";
 
 vi.mock("../src/session/scene/openScene", () => ({
-  openScene: (_scene: string, _place: unknown, _choice: unknown, arrived: () => void) => {
-    arrived();
+  openScene: (_scene: string, _place: unknown, _choice: unknown, onOpen: () => void) => {
+    onOpen();
     return Promise.resolve();
   },
 }));
@@ -50,7 +50,7 @@ test("a link carries what is looked at, and a visitor's own gives way to it", as
   }
 });
 
-test("a link carries from where a view is seen whose eye moves", async () => {
+test("a link carries the cameras of free-camera views", async () => {
   const turned = { to_world: [0, 0, 1, 4, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 0, 1], yfov: Math.PI / 6 };
   const info = { name: "front", width: 4, height: 3, camera: turned };
   views.value = [{ ...info, camera_mode: "free" }, { ...info, name: "left", camera_mode: "fixed" }] as unknown as typeof views.value;

@@ -58,10 +58,10 @@ test("a preview beside the color is not used, and what cannot be read says how t
 
 test("one message says what is used and what is not, and a step has the name that the files share", () => {
   const refused = [{ name: "oak_ao.png", reason: "ambient occlusion; it is ray-traced" }];
-  expect(setMessage("Seat", ["base color", "roughness", "normals"], refused)).toBe(
-    "Applied to “Seat”: base color, roughness and normals. Not used: oak_ao.png (ambient occlusion; it is ray-traced).",
+  expect(setMessage("Chair", ["base color", "roughness", "normals"], refused)).toBe(
+    "Applied to “Chair”: base color, roughness and normals. Not used: oak_ao.png (ambient occlusion; it is ray-traced).",
   );
-  expect(setMessage("Seat", ["normals"], [])).toBe("Applied to “Seat”: normals.");
+  expect(setMessage("Chair", ["normals"], [])).toBe("Applied to “Chair”: normals.");
   expect(setName(["Metal007_1K_Color.jpg", "Metal007_1K_Normal.jpg"])).toBe("Metal007_1K");
   expect(setName(["oak rough.png", "oak.png"])).toBe("oak");
   expect(setName(["a.png", "b.png"])).toBe("2 images");

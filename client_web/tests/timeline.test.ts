@@ -52,7 +52,7 @@ async function press(key: () => void): Promise<void> {
   await vi.waitFor(() => expect(history.targetCursor).toBe(history.cursor.value));
 }
 
-/** A time line from dark to bright whose frames the server has told, and from where they are seen. */
+/** A timeline from dark to bright with the frames' looks and cameras from the server. */
 async function prepared(cameras: { to_world: number[]; yfov: number }[] | null = null): Promise<void> {
   const looks = Array.from({ length: numFrames.value }, (_, k) => lookWith(LOOK, EXPOSURE, -2 + (4 * k) / (numFrames.value - 1)));
   vi.stubGlobal("fetch", async () => new Response(JSON.stringify({ looks, cameras })));
@@ -138,7 +138,7 @@ test("keyframes are put on, moved and taken off in steps that can be undone and 
   expect(stored?.steps).toEqual(history.steps.value);
 });
 
-test("keyframes without a name are told apart", () => {
+test("unnamed keyframes get different names", () => {
   addKeyframe({ name: nextKeyframeName(), look: LOOK });
   addKeyframe({ name: nextKeyframeName(), look: LOOK });
   removeKeyframe(0);
@@ -183,7 +183,7 @@ test("a pause and a play within one frame do not play twice as fast", async () =
   expect(due.length).toBe(1);
 });
 
-test("the eye goes from where one key is seen to where the other is, and rests where the playing ends", async () => {
+test("the camera moves from keyframe to keyframe and stays where playback ends", async () => {
   const at = (x: number, yfov = 40) => ({ to_world: [1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, 4, 0, 0, 0, 1], yfov });
   const bounds = [[-1, -1, -1], [1, 1, 1]];
   views.value = [{ name: "front", width: 4, height: 3, camera_mode: "free", bounds, camera: at(0, 0.5) } as never];

@@ -1,4 +1,4 @@
-/** Errors go when what they say is mended. */
+/** Errors disappear when they are resolved. */
 import { beforeEach, expect, test } from "vitest";
 import { ApiError, UnreachableError } from "../src/session/net/api";
 import { reportErrors, clearErrors, visibleTexts, showError } from "../src/ui/toasts";
@@ -16,7 +16,7 @@ test("an error goes with the next success in its topic, and others stay", () => 
   expect(visibleTexts()).toEqual([]);
 });
 
-test("a request that nobody answered is mended by one that somebody does", async () => {
+test("a successful request resolves the error of an unanswered one", async () => {
   await reportErrors(() => Promise.reject(new UnreachableError()));
   await reportErrors(() => Promise.reject(new ApiError("There is no such scene.", 404)), "files");
   expect(visibleTexts()).toEqual([new UnreachableError().message, "There is no such scene."]);

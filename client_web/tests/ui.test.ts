@@ -75,14 +75,14 @@ describe("numbers", () => {
   });
 });
 
-describe("colours", () => {
+describe("colors", () => {
   test("the picker shows the hue of a quantity, however small, and keeps its size", () => {
     expect(toHex([0.02, 0.01, 0], 0)).toBe(toHex([1, 0.5, 0]));
     expect(fromHex("#ffffff", [0.02, 0.01, 0], 0)).toEqual([0.02, 0.02, 0.02]);
     expect(toHex([0, 0, 0], 0)).toBe("#000000");
   });
 
-  test("the picker keeps a colour's strength", () => {
+  test("the picker keeps a color's strength", () => {
     const strong: Rgb = [4, 2, 1];
     expect(peakValue(strong)).toBe(4);
     fromHex(toHex(strong), strong).forEach((v, c) => expect(v).toBeCloseTo(strong[c] as number, 1));
@@ -125,7 +125,7 @@ describe("terms", () => {
     expect(withModel(term, "flat", models)).not.toHaveProperty("roughness_map");
   });
 
-  test("a new model keeps colour, texture and parameters of the same name", () => {
+  test("a new model keeps color, texture and parameters of the same name", () => {
     const term = {
       ...defaultTerm(models[0] as ModelBody),
       color: [1, 2, 3] as Rgb,
@@ -164,7 +164,7 @@ test("a place survives the URL", () => {
     material: "a/b~c",
     term: 2,
     curve: "theta_h",
-    light: "Desk lamp",
+    light: "Desk light",
     room: "a1",
     watch: null,
     share: null,

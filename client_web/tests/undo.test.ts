@@ -70,7 +70,7 @@ test("what the hand is on is where it edits, and nothing while it undoes", async
   expect(activeControl.value).toBeNull();
 });
 
-test("the hand is on curves, parameters, colours, lights that there are, and fields of the environment", () => {
+test("the hand is on curves, parameters, colors, lights that there are, and fields of the environment", () => {
   const lit = lookWith(LOOK, "/lights/a~1b", { kind: "point" });
   const held = (path: string) => activePath(path, lit);
   expect(held("/materials/a~1b/terms/0/curves/theta_h")).toBe("/materials/a~1b/terms/0/curves/theta_h");

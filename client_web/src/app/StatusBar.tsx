@@ -56,7 +56,7 @@ export function StatusBar() {
   return (
     <footer class="status">
       <span class={`state ${connection.value}`}>
-        <i class="light" aria-hidden="true" />
+        <i class="indicator" aria-hidden="true" />
         {connectionMessage()}
         {canTryNow && <button onClick={reconnectNow}>Retry now</button>}
       </span>

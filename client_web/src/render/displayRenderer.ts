@@ -6,7 +6,7 @@ import { allocate, makeTexture, makeVolume, Program } from "./webgl";
 import type { PixelBuffer } from "./pixels";
 import { fragmentShader, VERTEX, type DisplayFeatures } from "./displayShaders";
 
-const UNITS = ["uPicture", "uReference", "uDisplay", "uBrush", "uAlpha", "uReferenceAlpha", "uIds"] as const;
+const UNITS = ["uImage", "uReference", "uDisplay", "uBrush", "uAlpha", "uReferenceAlpha", "uIds"] as const;
 type TextureUnit = (typeof UNITS)[number];
 /** Screen pixels per image pixel from which on pixels are drawn without filtering. */
 const NEAREST_FROM = 6;
@@ -55,7 +55,7 @@ export class DisplayRenderer {
       UNITS.map((unit) => [unit, makeTexture(gl, unit === "uIds" ? gl.NEAREST : gl.LINEAR)]),
     ) as Record<TextureUnit, WebGLTexture>;
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    for (const unit of ["uPicture", "uReference"] as const) allocate(gl, this.textures[unit], 1, 1, new Uint32Array(1));
+    for (const unit of ["uImage", "uReference"] as const) allocate(gl, this.textures[unit], 1, 1, new Uint32Array(1));
     this.setBrush(1, 1, new Uint8Array(1));
     this.setAlpha(1, 1, new Uint8Array(1));
     this.setReferenceAlpha(1, 1, new Uint8Array(1));
@@ -84,7 +84,7 @@ export class DisplayRenderer {
 
   setImage(pixels: PixelBuffer): void {
     this.size = [pixels.width, pixels.height];
-    allocate(this.gl, this.textures.uPicture, pixels.width, pixels.height, pixels.encoded);
+    allocate(this.gl, this.textures.uImage, pixels.width, pixels.height, pixels.encoded);
   }
 
   /** Upload all pixels of the image again. */
@@ -98,7 +98,7 @@ export class DisplayRenderer {
 
   uploadTiles(tiles: { tile: Tile; encoded: Uint32Array }[]): void {
     const { gl } = this;
-    gl.bindTexture(gl.TEXTURE_2D, this.textures.uPicture);
+    gl.bindTexture(gl.TEXTURE_2D, this.textures.uImage);
     for (const { tile, encoded } of tiles) {
       const [x, y, w, h] = tile;
       gl.texSubImage2D(gl.TEXTURE_2D, 0, x, y, w, h, gl.RGB, gl.UNSIGNED_INT_5_9_9_9_REV, encoded);
@@ -154,7 +154,7 @@ export class DisplayRenderer {
     this.bindTextures(state.transform[2] / this.size[0] >= NEAREST_FROM);
     if (typeof state.toneMap !== "string") this.bindTable(state.toneMap);
     gl.uniform2f(program.uniform("uCanvas"), canvas.width, canvas.height);
-    gl.uniform4f(program.uniform("uPlace"), ...state.transform);
+    gl.uniform4f(program.uniform("uImageRect"), ...state.transform);
     gl.uniform2f(program.uniform("uSize"), ...this.size);
     gl.uniform1f(program.uniform("uGain"), 2 ** state.exposure);
     gl.uniform1f(program.uniform("uWipe"), state.wipe);
@@ -178,7 +178,7 @@ export class DisplayRenderer {
     UNITS.forEach((unit, index) => {
       gl.activeTexture(gl.TEXTURE0 + index);
       gl.bindTexture(gl.TEXTURE_2D, this.textures[unit]);
-      if (unit === "uPicture" || unit === "uReference" || unit === "uAlpha" || unit === "uReferenceAlpha") {
+      if (unit === "uImage" || unit === "uReference" || unit === "uAlpha" || unit === "uReferenceAlpha") {
         gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, magnified ? gl.NEAREST : gl.LINEAR);
       }
     });

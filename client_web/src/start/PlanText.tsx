@@ -11,9 +11,7 @@ export function PlanText({ plan }: { plan: BakePlan }) {
   const time = plan.plan.seconds === null ? "time unknown" : formatEstimatedTime(plan.plan.seconds);
   return (
     <span class="plan" title={`${formatCount(plan.recipe.lights)} environment triangles, up to ${formatCount(plan.plan.rays)} rays`}>
-    {width}×{height}
-      <br />
-      {time} · {formatBytes(plan.plan.store_bytes)} memory
+      {width}×{height} · {time} · {formatBytes(plan.plan.store_bytes)} memory
     </span>
   );
 }

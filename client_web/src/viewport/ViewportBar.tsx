@@ -62,10 +62,10 @@ export function ViewportBar() {
       </button>
       <button
         aria-pressed={falseColor.value}
-        title="Luminance in stops, false color (E)"
+        title="Exposure heat map: luminance in stops (E)"
         onClick={() => (falseColor.value = !falseColor.value)}
       >
-        Exposure heat map
+        Heat map
       </button>
       <button class="icon" aria-label="Zoom out" title="Zoom out (−)" onClick={() => zoomBy(1 / 1.25)}>
         −

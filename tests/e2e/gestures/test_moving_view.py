@@ -129,9 +129,8 @@ def test_a_material_is_chosen_by_a_click_and_edited_while_the_eye_is_elsewhere(m
     assert box is not None
     page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     expect(page.locator(".inspector .card").first).to_be_visible()
-    expect(page.locator(".in-motion").first).to_contain_text(
-        "While the camera moves: error less than 1 % with 36 basis functions"
-    )
+    fit = "While the camera moves: error less than 1 % with 36 basis functions"
+    expect(page.locator(".in-motion").first).to_contain_text(fit)
     page.get_by_role("slider", name="Brightness").focus()
     for _ in range(5):
         page.keyboard.press("PageUp")

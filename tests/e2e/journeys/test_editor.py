@@ -148,7 +148,7 @@ def test_a_saved_look_survives_a_reload(editor: Editor) -> None:
     editor.page.keyboard.press("Control+s")
     saved = editor.page.locator(".tiles.saved .tile-picture")
     expect(saved).to_have_count(1)
-    editor.page.get_by_role("button", name="Reset material").click()
+    editor.page.get_by_role("button", name="Reset material", exact=True).click()
     assert changed(plain, editor.pixels()) == 0
     editor.page.reload()
     editor.wait_until_exact()

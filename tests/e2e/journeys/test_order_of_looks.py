@@ -105,6 +105,6 @@ def test_a_step_that_is_left_at_once_has_a_picture(editor: Editor) -> None:
     expect(pictures).to_have_count(1)
     for key in ("End", "Home", "PageUp"):
         editor.slider(SIGMA).press(key)
-        page.get_by_role("button", name="Reset material").click()
+        page.get_by_role("button", name="Reset material", exact=True).click()
     expect(page.locator(".tile.step")).to_have_count(7)
     expect(pictures).to_have_count(7)

@@ -46,7 +46,7 @@ def test_reflected_light_is_baked_by_the_dialogue_and_seen_by_paths(start_page: 
     page.get_by_role("checkbox", name="left").uncheck()
     page.get_by_role("button", name="Open and bake").first.click()
     editor.wait_until_exact()
-    expect(page.get_by_role("button", name="global illumination ▾")).to_be_visible()
+    expect(page.get_by_role("button", name="GI ▾")).to_be_visible()
 
     steps = page.locator(".tile.step")
     editor.choose("Ball", 1)
@@ -54,9 +54,9 @@ def test_reflected_light_is_baked_by_the_dialogue_and_seen_by_paths(start_page: 
     expect(steps).to_have_count(2)
     everything = editor.pixels()
     paths = page.get_by_role("radiogroup", name="Light paths")
-    paths.get_by_role("radio", name="1st bounce").click()
+    paths.get_by_role("radio", name="1 bounce").click()
     assert changed(everything, editor.pixels()) > 0.5
-    paths.get_by_role("radio", name="1st bounce").press("ArrowLeft")
+    paths.get_by_role("radio", name="1 bounce").press("ArrowLeft")
     assert changed(everything, editor.pixels()) > 0.5
     paths.get_by_role("radio", name="Indirect").press("ArrowLeft")
     expect(paths.get_by_role("radio", name="Direct")).to_be_checked()

@@ -24,7 +24,7 @@ import {
   visibleEntries,
 } from "./libraryItems";
 
-const UNFITTED: Record<string, string> = { [MEASURED]: "Imported measurements", [BTFS]: "Measured textures (BTF)" };
+const UNFITTED: Record<string, string> = { [MEASURED]: "Measurements", [BTFS]: "BTF textures" };
 
 const label = (name: string) => UNFITTED[name] ?? models.value.find((info) => info.model === name)?.label ?? name;
 

@@ -22,7 +22,7 @@ export const BAKE_METHODS: readonly MethodLabels[] = [
   {
     name: "gather",
     label: "Global illumination",
-    short: "global illumination",
+    short: "GI",
     help: "Adds bounce light and color bleeding. Slower, needs more memory.",
   },
   {

@@ -21,13 +21,13 @@ export const LIGHT_PATHS: readonly PathLabels[] = [
   },
   {
     value: "first_bounce",
-    label: "1st bounce",
+    label: "1 bounce",
     title: "Light after exactly one bounce",
     only: "1st bounce only",
   },
   {
     value: "further_bounces",
-    label: "2+ bounces",
+    label: "2+",
     title: "Light after two or more bounces",
     only: "2+ bounces only",
   },
