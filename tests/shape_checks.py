@@ -16,6 +16,7 @@ import typing
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
 from jaxtyping import AbstractArray, jaxtyped
 
 UNCHECKED = {
@@ -32,7 +33,7 @@ class ShapeError(TypeError):
 def _matches(value: object, hint: Any) -> bool:
     """True if a value has the shapes of a hint; values other than arrays have none."""
     if isinstance(hint, type) and issubclass(hint, AbstractArray):
-        return isinstance(value, hint)
+        return isinstance(np.asarray(value) if isinstance(value, np.generic) else value, hint)
     alternatives = typing.get_args(hint)
     if isinstance(hint, types.UnionType) or typing.get_origin(hint) is typing.Union:
         return value is None or any(_matches(value, alternative) for alternative in alternatives)

@@ -24,7 +24,7 @@ def test_referenced_files_are_bounded_and_their_names_are_not_paths(client: Test
     assert parse_problem(rejected)["type"] == "urn:relume:problem:parameter"
     climbing = [("scene", ("a/b/c.obj", obj)), ("companions", ("../../../../tmp/x", b"newmtl Red\n"))]
     taken = client.post("/api/scenes", files=climbing).json()
-    assert ["relume.db” (" in warning["text"] for warning in taken["warnings"]] == [True]
+    assert ["relume.db”: import it together" in warning["text"] for warning in taken["warnings"]] == [True]
     client.delete(f"/api/scenes/{taken['id']}")
     assert list(settings.data.glob("upload-*")) == []
 

@@ -100,7 +100,7 @@ def test_terms_of_one_channel_share_it(corner, named):
 def test_a_missing_image_is_no_texture(corner, texture):
     document = copy.deepcopy(default_look(corner.materials))
     document["materials"]["Floor"]["terms"][0]["texture"] = texture
-    with pytest.raises(ParameterError, match=r"terms/0/texture.*image that was sent"):
+    with pytest.raises(ParameterError, match=r"terms/0/texture.*image that was uploaded"):
         validate(document, default_look(corner.materials))
 
 

@@ -149,7 +149,7 @@ def test_terms_of_a_material_share_one_map(plain, named):
 
 @pytest.mark.parametrize("follows", ["image:0000000000000000", "image:../x", "map", 3, True])
 def test_a_missing_image_is_no_roughness_map(plain, follows):
-    with pytest.raises(ParameterError, match=r"terms/1/roughness_map.*image that was sent"):
+    with pytest.raises(ParameterError, match=r"terms/1/roughness_map.*image that was uploaded"):
         rough(plain, follows, 0.4)
 
 

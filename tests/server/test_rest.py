@@ -53,7 +53,7 @@ def test_scenes_of_other_formats_are_told_apart_by_content_and_files_come_with_t
     assert body["warnings"] == [{"text": body["warnings"][0]["text"], "severity": "unsupported"}]
     refused = client.post("/api/scenes", files={"scene": ("evil.obj", obj.replace(b"gone.mtl", b"../environment.hdr"))})
     assert refused.status_code == 422
-    assert "outside the folder" in refused.json()["detail"]
+    assert "outside the scene" in refused.json()["detail"]
 
 
 def test_built_in_scenes_are_listed_and_taken_by_name(client: TestClient) -> None:
