@@ -7,7 +7,7 @@ what is refused or undone leaves no trace.
 import numpy as np
 import pytest
 from exact_pictures import exact_image
-from looks_of_pictures import (
+from look_edits import (
     EDITS,
     EXPONENT,
     LIGHTS,

@@ -13,7 +13,7 @@ from fastapi.testclient import TestClient
 from PIL import Image
 from shared_bakes import unmeasured
 from test_end_to_end import wait_until_done
-from test_moving_eyes import SIZE, bake, client, eye, scene
+from test_free_camera_sessions import SIZE, bake, client, eye, scene
 
 from relume.core.errors import RelumeError
 from relume_server.io.video import write_video

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from looks_of_pictures import EDITS, LOBE, add_lights, draw_curve, edit_light, edit_transport, set_floor_color
+from look_edits import EDITS, LOBE, add_lights, draw_curve, edit_light, edit_transport, set_floor_color
 from session_edits import make_look, relative_rmse, run_next_job
 
 from relume.core.cache import Cache

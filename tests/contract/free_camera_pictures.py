@@ -1,6 +1,6 @@
 """Pictures whose eyes move, made as tests of them want them."""
 
-from looks_of_pictures import add_lights
+from look_edits import add_lights
 from session_edits import make_look
 
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture

@@ -2,7 +2,7 @@
 
 import pytest
 from exact_pictures import open_copy, render_uncached
-from looks_of_pictures import EDITS, MARKED_EDITS, add_lights
+from look_edits import EDITS, MARKED_EDITS, add_lights
 from session_edits import BUDGET, make_look, relative_rmse, run_until_exact
 
 import relume.operators.shade

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from looks_of_pictures import (
+from free_camera_pictures import finish_refinement, make_picture, make_watched_picture, run_job
+from look_edits import (
     EDITS,
     LOBE,
     add_lights,
@@ -15,7 +16,6 @@ from looks_of_pictures import (
     set_exponent,
     set_floor_color,
 )
-from moving_pictures import finish_refinement, make_picture, make_watched_picture, run_job
 from session_edits import make_look, relative_rmse
 
 from relume.core.errors import NotFoundError, ParameterError

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from looks_of_pictures import (
+from free_camera_pictures import finish_lighting, finish_refinement, make_picture, make_watched_picture, run_job
+from look_edits import (
     EDITS,
     LOBE,
     add_lights,
@@ -13,7 +14,6 @@ from looks_of_pictures import (
     set_exponent,
     set_floor_color,
 )
-from moving_pictures import finish_lighting, finish_refinement, make_picture, make_watched_picture, run_job
 from session_edits import make_look, relative_rmse
 
 from relume.core.cache import Cache
