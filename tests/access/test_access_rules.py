@@ -16,14 +16,14 @@ from relume_server.settings import Settings
 def operations() -> set[tuple[str, str]]:
     """What the document says that there is, and live sessions, which it does not tell of."""
     paths = create_app(Settings()).openapi()["paths"]
-    told = {(method.upper(), path) for path, each in paths.items() for method in each}
+    documented = {(method.upper(), path) for path, each in paths.items() for method in each}
     routes = [route for group in ROUTE_GROUPS for route in group.router.routes]
     assert all(isinstance(route, APIRoute | APIWebSocketRoute) for route in routes), "a kind of route without roles"
     hidden = {
         (method, route.path) for route in routes if isinstance(route, APIRoute) for method in route.methods
-    } - told
+    } - documented
     assert hidden == set(), "routes that the document hides"
-    return told | {(SOCKET, route.path) for route in routes if isinstance(route, APIWebSocketRoute)}
+    return documented | {(SOCKET, route.path) for route in routes if isinstance(route, APIWebSocketRoute)}
 
 
 def test_every_route_has_a_role_and_every_role_a_route() -> None:

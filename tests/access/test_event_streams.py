@@ -63,14 +63,14 @@ def test_streams_of_a_caller_are_bounded_and_those_of_others_are_not_in_their_wa
         check_bound(access.quotas, caller)
 
 
-def check_bound(found: Quotas, caller: Caller) -> None:
-    held = [found.stream(caller) for _ in range(quotas.MAX_STREAMS_EACH)]
+def check_bound(user_quotas: Quotas, caller: Caller) -> None:
+    held = [user_quotas.stream(caller) for _ in range(quotas.MAX_STREAMS_EACH)]
     for each in held:
         each.__enter__()
-    with pytest.raises(QuotaError, match="limit of 32 event streams"), found.stream(caller):
+    with pytest.raises(QuotaError, match="limit of 32 event streams"), user_quotas.stream(caller):
         pass
     held[0].__exit__(None, None, None)
-    with found.stream(caller):
+    with user_quotas.stream(caller):
         pass
 
 

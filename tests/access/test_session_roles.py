@@ -19,7 +19,7 @@ from relume_server.collaboration.room import Room
 from relume_server.session.audit_edits import AuditWriter
 from relume_server.settings import Settings
 
-SEEN = {"op": "replace", "path": "/display/exposure", "value": 2.0}
+EXPOSURE_EDIT = {"op": "replace", "path": "/display/exposure", "value": 2.0}
 Bearer = Callable[..., dict[str, str]]
 
 
@@ -44,7 +44,7 @@ def test_editors_edit_and_the_audit_says_what(
         hello = session.text("hello")
         assert hello["role"] == "edit"
         session.edit(1, SIGMA, 0.3)
-        session.edit(2, SEEN["path"], 2.0)
+        session.edit(2, EXPOSURE_EDIT["path"], 2.0)
         session.exact(2)
         assert access.audit.list() == []
     (line,) = lines_of(access, 1)  # it is written when the session has ended
@@ -96,13 +96,17 @@ def test_viewers_watch_and_are_told_why_they_do_not_edit(client: TestClient, bak
     with open_session(client, baked.bake, headers=bearer("view", "Vera")) as session:
         assert session.text("hello")["role"] == "view"
         before = session.exact(0)
-        session.send_message(type="edit", revision=1, patch=[SEEN, {"op": "replace", "path": SIGMA, "value": 0.3}])
-        told = session.text("problem")
-        assert (told["revision"], told["problem"]["status"]) == (1, 403)
-        assert told["problem"]["detail"].startswith("Vera has view-only access; ask an admin")
+        session.send_message(
+            type="edit", revision=1, patch=[EXPOSURE_EDIT, {"op": "replace", "path": SIGMA, "value": 0.3}]
+        )
+        problem = session.text("problem")
+        assert (problem["revision"], problem["problem"]["status"]) == (1, 403)
+        assert problem["problem"]["detail"].startswith("Vera has view-only access; ask an admin")
         session.send_message(type="prepare", parameter=SIGMA)
         assert session.text("problem")["problem"]["status"] == 403
-        session.send_message(type="edit", revision=1, patch=[SEEN], active_control=SIGMA)  # which would prepare it
+        session.send_message(
+            type="edit", revision=1, patch=[EXPOSURE_EDIT], active_control=SIGMA
+        )  # which would prepare it
         assert session.text("problem")["problem"]["status"] == 403
         session.send_message(type="prepare", curve=THETA_H)
         shape = session.text("curve")
@@ -112,7 +116,7 @@ def test_viewers_watch_and_are_told_why_they_do_not_edit(client: TestClient, bak
         assert again.payload == before.payload
         session.send_message(type="edit", revision=2, patch=[], solo=["environment"])
         session.exact(2)
-        session.send_message(type="edit", revision=3, patch=[SEEN])
+        session.send_message(type="edit", revision=3, patch=[EXPOSURE_EDIT])
         session.exact(3)
         session.send_message(type="inspect", x=3, y=4)
         assert session.text("inspect")["material"] == "Paper"
@@ -125,7 +129,7 @@ def test_how_viewers_look_is_their_own_and_no_edit(
     with open_session(client, baked.bake, opening=ROOM_FIELDS, headers=ann) as editor:
         editor.text("hello")
         with open_session(client, baked.bake, opening=ROOM_FIELDS, headers=vera) as viewer:
-            viewer.send_message(type="edit", revision=1, patch=[SEEN])
+            viewer.send_message(type="edit", revision=1, patch=[EXPOSURE_EDIT])
             viewer.exact(1)
             with open_session(client, baked.bake, opening=ROOM_FIELDS, headers=bearer("edit", "Bob")) as late:
                 assert late.text("hello")["look"]["display"]["exposure"] == 0.0
@@ -134,11 +138,11 @@ def test_how_viewers_look_is_their_own_and_no_edit(
 
 def test_the_place_of_somebody_is_nobody_elses(client: TestClient, baked: Baked, bearer: Bearer) -> None:
     with open_session(client, baked.bake, opening=ROOM_FIELDS, headers=bearer("edit", "Ann")) as ann:
-        seat = ann.text("hello")["room"]["participant_token"]
-        opening = {**ROOM_FIELDS, "participant_token": seat}
+        participant_token = ann.text("hello")["room"]["participant_token"]
+        opening = {**ROOM_FIELDS, "participant_token": participant_token}
         with open_session(client, baked.bake, opening=opening, headers=bearer("view", "Vera")) as vera:
-            found = vera.text("hello")["room"]
-            assert [(each["name"], each["role"]) for each in found["people"]] == [("Ann", "edit"), ("Vera", "view")]
+            room = vera.text("hello")["room"]
+            assert [(each["name"], each["role"]) for each in room["people"]] == [("Ann", "edit"), ("Vera", "view")]
 
 
 def test_whom_a_proxy_names_comes_back_to_the_own_place_and_to_nobody_elses() -> None:

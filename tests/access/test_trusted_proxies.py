@@ -86,14 +86,14 @@ class TestNames:
 
 
 def test_a_name_is_looked_up_again_when_its_proxy_calls_from_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
-    now_s, place = 0.0, "10.9.9.9"
-    asked: list[str] = []
+    now_s, address = 0.0, "10.9.9.9"
+    lookups: list[str] = []
 
     async def found(_: Any, name: str, *args: object, **more: object) -> list[Any]:
-        asked.append(name)
-        if not place:
+        lookups.append(name)
+        if not address:
             raise socket.gaierror("no such name")
-        return [(socket.AF_INET, socket.SOCK_STREAM, 0, "", (place, 0))]
+        return [(socket.AF_INET, socket.SOCK_STREAM, 0, "", (address, 0))]
 
     proxies = Proxies(["relight-proxy.relume.svc", "192.0.2.1"], lambda: now_s)
     monkeypatch.setattr(asyncio.BaseEventLoop, "getaddrinfo", found)
@@ -103,16 +103,16 @@ def test_a_name_is_looked_up_again_when_its_proxy_calls_from_elsewhere(monkeypat
         return proxies.has(peer)
 
     assert run_in_thread(trusts("192.0.2.1"))
-    assert asked == []  # it is known without
+    assert lookups == []  # it is known without
     assert run_in_thread(trusts("10.9.9.9"))
-    place = "10.9.9.8"
+    address = "10.9.9.8"
     assert not run_in_thread(trusts("10.9.9.8"))  # asked too lately
     now_s = RESOLVE_INTERVAL_S
     assert run_in_thread(trusts("10.9.9.8"))
     assert not proxies.has("10.9.9.9")
-    now_s, place = 2 * RESOLVE_INTERVAL_S, ""
+    now_s, address = 2 * RESOLVE_INTERVAL_S, ""
     assert not run_in_thread(trusts("10.9.9.7"))
-    assert asked == ["relight-proxy.relume.svc"] * 3
+    assert lookups == ["relight-proxy.relume.svc"] * 3
 
 
 class TestStart:

@@ -146,15 +146,15 @@ class TestBytes:
         failed = client.post(works, files={"images": ("no.zip", b"none")}, headers=ann).headers["location"]
         while client.get(failed, headers=ann).json()["state"] != "failed":
             time.sleep(0.02)
-        kept = sum(file.stat().st_size for file in (settings.data / "btfs" / body["material"]).iterdir())
-        assert kept > 0
-        while access.quotas.used_bytes("Ann") != kept:  # what has failed lets go when its row has said so
+        stored_bytes = sum(file.stat().st_size for file in (settings.data / "btfs" / body["material"]).iterdir())
+        assert stored_bytes > 0
+        while access.quotas.used_bytes("Ann") != stored_bytes:  # what has failed lets go when its row has said so
             time.sleep(0.02)
-        settings.max_bytes_per_user = kept
+        settings.max_bytes_per_user = stored_bytes
         refused = client.post(f"{works}/synthetic", json={"geometry": "weave", "size": 8}, headers=ann)
         assert refused.status_code == 429
         assert client.delete(f"{url}?delete_files=true", headers=ann).status_code == 204
-        assert access.quotas.used_bytes("Ann") == kept
+        assert access.quotas.used_bytes("Ann") == stored_bytes
         assert client.delete(f"/api/materials/btf/{body['material']}", headers=ann).status_code == 204
         assert access.quotas.used_bytes("Ann") == 0
 
@@ -274,8 +274,8 @@ def test_each_change_is_a_line_and_each_refusal(client: TestClient, bearer: Bear
     client.put("/api/looks/Red", json={}, headers=viewer)  # refused
     client.get("/api/looks", headers=ann)
     client.post("/api/bakes", json={"scene": baked.scene, "dry_run": True}, headers=ann)
-    seen = {"bake": baked.bake, "view": "front", "views": ["front"], "look": {}}
-    share = client.post("/api/shares", json=seen, headers=ann).json()["id"]
+    request = {"bake": baked.bake, "view": "front", "views": ["front"], "look": {}}
+    share = client.post("/api/shares", json=request, headers=ann).json()["id"]
     client.delete("/api/looks/Red", headers={**ann, "If-Match": "*"})
     lines = client.get("/api/audit", headers=root).json()
     (refused,) = [line for line in lines if line["status"] == 403]
@@ -306,6 +306,8 @@ def test_the_audit_is_bounded(client: TestClient, monkeypatch: pytest.MonkeyPatc
 
 def test_request_ids_are_given_or_taken(client: TestClient) -> None:
     assert client.get("/livez", headers={"X-Request-ID": "from.proxy-7"}).headers["x-request-id"] == "from.proxy-7"
-    one, other = (client.get("/livez", headers={"X-Request-ID": "ev il\n"}).headers["x-request-id"] for _ in range(2))
-    assert len(one) == 16
-    assert one != other
+    first_id, second_id = (
+        client.get("/livez", headers={"X-Request-ID": "ev il\n"}).headers["x-request-id"] for _ in range(2)
+    )
+    assert len(first_id) == 16
+    assert first_id != second_id

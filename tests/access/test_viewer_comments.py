@@ -29,8 +29,8 @@ def test_viewers_write_under_their_name_and_change_nothing_else(
     made = client.post(path, json={**pin, "author": "Ann"}, headers=vera)
     assert (made.status_code, made.json()["author"]) == (201, "Vera")
     assert client.post(path, json=pin).status_code == 401
-    one = f"{path}/{made.json()['id']}"
-    assert client.patch(one, json={"resolved": True}, headers=vera).status_code == 403
-    assert client.delete(one, headers=vera).status_code == 403
+    comment_url = f"{path}/{made.json()['id']}"
+    assert client.patch(comment_url, json={"resolved": True}, headers=vera).status_code == 403
+    assert client.delete(comment_url, headers=vera).status_code == 403
     changes = [(line.who, line.what) for line in access.audit.list() if line.status < 300]
     assert changes == [("Vera", f"POST {path}")]

@@ -86,10 +86,10 @@ def test_what_is_kept_is_for_its_own_user_alone(tmp_path: Path) -> None:
     finally:
         os.umask(before)
     folders = [data, backups, tmp_path / "new"]
-    kept = [*data.glob("relume.db*"), *backups.rglob("*"), *(tmp_path / "new").rglob("*")]
+    files = [*data.glob("relume.db*"), *backups.rglob("*"), *(tmp_path / "new").rglob("*")]
     assert {stat.S_IMODE(path.stat().st_mode) for path in folders} == {0o700}
-    assert kept
-    assert {stat.S_IMODE(path.stat().st_mode) & 0o077 for path in kept} == {0}
+    assert files
+    assert {stat.S_IMODE(path.stat().st_mode) & 0o077 for path in files} == {0}
 
 
 def test_backups_are_told_as_json(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

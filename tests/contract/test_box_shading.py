@@ -37,9 +37,9 @@ def test_an_edited_picture_is_the_shaded_one_to_a_thousandth(by_boxes, transfer,
         picture = shown(fresh, touched=pointer)
         picture.set_look(make_look(fresh, add_lights(change)))
         picture.advance(8)
-        found = run_until_exact(picture).image()
+        actual = run_until_exact(picture).image()
     expected = render_uncached(transfer, make_look(transfer, add_lights(change)))
-    assert relative_rmse(found, expected) < A_THOUSANDTH
+    assert relative_rmse(actual, expected) < A_THOUSANDTH
 
 
 def test_boxes_are_not_leaves(by_boxes, transfer, monkeypatch):

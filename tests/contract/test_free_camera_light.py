@@ -55,9 +55,9 @@ def test_light_that_moves_is_rough_at_first_and_at_rest_as_if_nobody_had_watched
 def test_bakes_that_know_no_harmonics_follow_light_too(baked, moving, monkeypatch):
     turned = edit_environment(rotation=203.0)
 
-    def rough(of):
-        picture = FreeCameraPicture(of, "front", is_watched=True)
-        picture.set_look(make_look(of, add_lights(turned)))
+    def rough(transfer):
+        picture = FreeCameraPicture(transfer, "front", is_watched=True)
+        picture.set_look(make_look(transfer, add_lights(turned)))
         assert picture.advance(None).fidelity == "preview"
         return picture.image()
 
@@ -74,8 +74,8 @@ def test_harmonics_that_do_not_fit_the_points_are_refused(baked, moving):
         attributes, shape = store.attributes, store.shape
 
         def read(self, path, start=0, stop=None):
-            found = store.read(path, start, stop)
-            return found[:-1] if path == "sh/weight" else found
+            rows = store.read(path, start, stop)
+            return rows[:-1] if path == "sh/weight" else rows
 
     with pytest.raises(ChunkDamagedError, match="sh is damaged"):
         read_harmonic_light(Damaged(), read_patches(store))
@@ -119,9 +119,9 @@ def test_light_that_surfaces_send_follows_a_hand(moving, edit, solo):
     assert not job.is_refinement
     picture.install(job, run_job(job))
     assert picture.advance(None).fidelity == "preview"
-    seen = picture.image()
+    image = picture.image()
     finish_lighting(picture)
-    assert np.linalg.norm(seen - picture.image()) < 0.1 * np.linalg.norm(stale - picture.image())
+    assert np.linalg.norm(image - picture.image()) < 0.1 * np.linalg.norm(stale - picture.image())
     finish_refinement(picture)
     exact = picture.image()
     alone = FreeCameraPicture(moving, "front")
@@ -172,12 +172,12 @@ def test_what_surfaces_send_is_behind_a_light_that_turns_and_catches_up(moving):
     picture.install(job, run_job(job))
     assert picture.advance(None).fidelity == "preview"
     assert picture.next_job().is_refinement
-    caught_up = picture.image()
+    final_image = picture.image()
     at_once = FreeCameraPicture(moving, "front", is_watched=True)
     at_once.set_look(turns[2])
     at_once.advance(None)
-    np.testing.assert_allclose(caught_up, at_once.image(), rtol=ROUNDED, atol=ROUNDED)
-    assert relative_rmse(behind, caught_up) > 1e-3
+    np.testing.assert_allclose(final_image, at_once.image(), rtol=ROUNDED, atol=ROUNDED)
+    assert relative_rmse(behind, final_image) > 1e-3
     finish_refinement(picture)
     np.testing.assert_array_equal(picture.image(), make_picture(moving, edit_environment(rotation=326.0)).image())
 
@@ -207,14 +207,14 @@ def test_a_shader_gets_what_follows(moving):
         return make_look(moving, add_lights(edit_environment(rotation=171.0), *changes))
 
     def sent(picture):
-        found = {}
-        for name, part in picture.array_blocks()[0].items():
+        arrays = {}
+        for name, block in picture.array_blocks()[0].items():
             if name.startswith("vectors/"):
-                light = part.make()
+                light = block.make()
                 scale, num = light[f"{name}/scale"][0]
                 numbers = light[name].astype(np.float32).reshape(-1, -(-3 * int(num) // 4) * 4)
-                found[name, int(num)] = scale * numbers[:, : 3 * int(num)]
-        return found
+                arrays[name, int(num)] = scale * numbers[:, : 3 * int(num)]
+        return arrays
 
     picture = FreeCameraPicture(moving, "front", is_watched=True)
     picture.renders_pixels = False

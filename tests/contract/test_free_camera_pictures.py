@@ -41,7 +41,7 @@ def test_an_edited_picture_is_that_of_the_look_from_nothing_and_leaves_no_trace(
 @pytest.mark.parametrize(
     "change",
     [draw_curve, set_exponent(60.0), set_floor_color, remove_glossy_term, replace_terms],
-    ids=lambda one: one.__name__,
+    ids=lambda function: function.__name__,
 )
 def test_an_edited_material_alone_is_evaluated_anew(moving, change, monkeypatch):
     """While eye and light stay: the picture, and what is sent of it, are those of the look from nothing."""
@@ -75,8 +75,8 @@ def test_highlights_are_found_finely_once_eye_and_light_rest(moving, aside, monk
         assert picture.next_job() is None
         np.testing.assert_array_equal(picture.image(), make_picture(moving, direct, set_exponent(value)).image())
     picture.set_look(make_look(moving, add_lights(direct)))
-    for eye in (aside, moving.views["front"].camera):
-        picture.set_camera(eye, (48, 36))
+    for camera in (aside, moving.views["front"].camera):
+        picture.set_camera(camera, (48, 36))
         picture.advance(None)
     np.testing.assert_array_equal(picture.image(), at_first)
     picture.install(job, run_job(job))  # of a frame that is gone
@@ -153,11 +153,11 @@ def test_an_environment_that_is_not_here_is_refused_and_changes_nothing(moving):
 
 def test_a_pixel_says_what_it_shows(moving):
     picture = make_picture(moving)
-    found = picture.inspect(24, 33)
-    assert found["material"] == "Floor"
-    assert abs(found["position"][1]) < 1e-3
-    np.testing.assert_allclose(found["normal"], [0, 1, 0], atol=1e-5)
-    np.testing.assert_array_equal(found["radiance"], picture.image()[33, 24])
+    inspection = picture.inspect(24, 33)
+    assert inspection["material"] == "Floor"
+    assert abs(inspection["position"][1]) < 1e-3
+    np.testing.assert_allclose(inspection["normal"], [0, 1, 0], atol=1e-5)
+    np.testing.assert_array_equal(inspection["radiance"], picture.image()[33, 24])
     with pytest.raises(ParameterError):
         picture.inspect(48, 0)
 
@@ -176,11 +176,11 @@ def test_diffuse_light_from_elsewhere_is_that_of_brute_force(scene, moving, asid
     passes = [
         reference_image(_with(scene, aside), "front", look, (48, 36), 64, pass_index=k, reflects=True) for k in range(4)
     ]
-    truth, noise = np.mean(passes, axis=0), np.std(passes, axis=0).mean() / 2
-    found = make_picture(moving, *changes, camera=aside).image()
+    reference, noise = np.mean(passes, axis=0), np.std(passes, axis=0).mean() / 2
+    actual = make_picture(moving, *changes, camera=aside).image()
     inner = ~_edges(make_picture(moving, *changes, camera=aside))
-    assert relative_rmse(found[inner], truth[inner]) < 0.05
-    assert abs(found[inner].mean() / truth[inner].mean() - 1) < 0.01 + 4 * noise / truth.mean()
+    assert relative_rmse(actual[inner], reference[inner]) < 0.05
+    assert abs(actual[inner].mean() / reference[inner].mean() - 1) < 0.01 + 4 * noise / reference.mean()
 
 
 def _with(scene, camera):

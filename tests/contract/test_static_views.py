@@ -39,14 +39,14 @@ def fixed(method, moving, scene, tmp_path_factory):
 def picture(baked, scene, aside):
     """From `aside`, under the look of these tests; nothing of it has been made."""
     moving = open_bake(baked, Cache(1 << 30))
-    found = ProgressivePicture(
+    new_picture = ProgressivePicture(
         FreeCameraPicture(moving, "front"),
         StaticViewBuilder(moving.light_transport, scene).make_static_view,
         moving.cache,
     )
-    found.set_look(make_look(moving, add_lights()))
-    found.set_camera(aside, SIZE)
-    return found
+    new_picture.set_look(make_look(moving, add_lights()))
+    new_picture.set_camera(aside, SIZE)
+    return new_picture
 
 
 def rested(picture):
@@ -179,9 +179,9 @@ def test_with_too_little_memory_the_moving_picture_stays(baked, scene, aside):
 def few_at_once(picture, aside, monkeypatch):
     """The same, darker than it should be, with exact samples at every fourth pixel: found, shaded, and shown."""
 
-    def darkened(transfer, wanted, seen, camera, size, shares):
-        frame = render_frame(transfer, wanted, seen, camera, size, shares)
-        is_hit = seen.hits.face[: size[0] * size[1]].reshape(size[1], size[0], 1) >= 0
+    def darkened(transfer, wanted, visible, camera, size, shares):
+        frame = render_frame(transfer, wanted, visible, camera, size, shares)
+        is_hit = visible.hits.face[: size[0] * size[1]].reshape(size[1], size[0], 1) >= 0
         return frame._replace(image=np.where(is_hit, np.float32(0.8) * frame.image, frame.image))
 
     for user in ("free_camera_picture", "refine_job"):
@@ -225,15 +225,15 @@ def test_what_a_few_samples_said_is_of_one_look_and_one_eye(few_at_once, moving,
     picture, _ = few_at_once
     assert picture.advance(None).changed
     alone = FreeCameraPicture(moving, "front")
-    look, eye = make_look(moving, add_lights(draw_curve)), (moving.views["front"].camera, (160, 100))
+    look, camera_and_size = make_look(moving, add_lights(draw_curve)), (moving.views["front"].camera, (160, 100))
     if is_edit:
         picture.set_look(look, active_pointer=LOBE)
         alone.set_look(look)
         alone.set_camera(*picture._free_camera_picture.sized_camera)
     else:
-        picture.set_camera(*eye)
+        picture.set_camera(*camera_and_size)
         alone.set_look(make_look(moving, add_lights()))
-        alone.set_camera(*eye)
+        alone.set_camera(*camera_and_size)
     assert picture.advance(None).changed
     alone.advance(None)
     np.testing.assert_array_equal(picture.image(), alone.image())

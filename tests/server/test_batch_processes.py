@@ -59,9 +59,9 @@ def always() -> bool:
 @pytest.fixture
 def pool(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ProcessPool]:
     monkeypatch.setattr(processes, "COMMAND", ["-c", STAND_IN])
-    found = ProcessPool(tmp_path, 1, 1 << 20, 1, 0, idle_s=0.0)
-    yield found
-    found.close()
+    new_pool = ProcessPool(tmp_path, 1, 1 << 20, 1, 0, idle_s=0.0)
+    yield new_pool
+    new_pool.close()
 
 
 def test_a_process_is_kept_between_steps_and_ends_when_nobody_needs_it(pool: ProcessPool) -> None:
@@ -112,15 +112,15 @@ def test_a_step_that_does_not_listen_is_ended_with_its_process(
     pool: ProcessPool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(processes, "_STOP_S", 0.05)
-    running, seen = threading.Event(), []
+    running, reports = threading.Event(), []
 
     def tell(share: float) -> None:
-        seen.extend([share, *pool.pids()])
+        reports.extend([share, *pool.pids()])
         running.set()
 
     with pytest.raises(CancelledError):
         pool.run(Step("hang"), tell, lambda: not running.is_set())
-    share, pid = seen
+    share, pid = reports
     assert share == 0.5
     assert resident_bytes(pid) == 0
     assert pool.run(Step("work"), ignore, always)["pid"] != pid
@@ -170,9 +170,9 @@ def wait_for(is_reached: Callable[[], bool]) -> None:
 
 
 def following(turns: FairShare, waiting: Sequence[WaitingBake]) -> WaitingBake:
-    chosen = turns.sort(waiting)[0]
-    turns.pick_next(chosen.client)
-    return chosen
+    first = turns.sort(waiting)[0]
+    turns.pick_next(first.client)
+    return first
 
 
 def test_clients_have_their_turns_one_after_another_and_small_work_goes_first() -> None:

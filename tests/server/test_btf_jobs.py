@@ -92,9 +92,9 @@ SQUARE = "v 0 0 0\nv 2 0 0\nv 2 0.1 -2\nv 0 0 -2\nf 1 2 3 4\n"
 def test_a_mesh_that_is_sent_is_rendered_with_its_period(
     client: TestClient, settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def render(shelf: Path, wanted: Any, name: str, *others: Any) -> Any:
+    def render(asset_store: Path, wanted: Any, name: str, *others: Any) -> Any:
         made.append((wanted.geometry, wanted.size, wanted.file.read_text(), wanted.period, name))
-        return import_btf(shelf, zipped(tmp_path / "b.zip"), name, 0.05, lambda share: None, lambda: False)
+        return import_btf(asset_store, zipped(tmp_path / "b.zip"), name, 0.05, lambda share: None, lambda: False)
 
     made: list[Any] = []
     monkeypatch.setattr("relume_server.batch.btf_steps.synthesize_btf", render)
@@ -147,11 +147,11 @@ def test_what_cannot_be_made_is_refused(client: TestClient, wanted: dict[str, An
 def test_what_is_stopped_keeps_what_it_has_found_and_goes_on(
     client: TestClient, control: Control, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    has_begun, has_ended, found = threading.Event(), threading.Event(), []
+    has_begun, has_ended, had_partial_data = threading.Event(), threading.Event(), []
 
     def slow(folder: Path, file: Path, name: str, bound: float, tell: Callable[[float], object],
              is_canceled: Callable[[], bool], making: Path, images: ViewArrays) -> Any:  # fmt: skip
-        found.append(making.exists())
+        had_partial_data.append(making.exists())
         if not has_begun.is_set():
             making.mkdir()
             tell(0.5)
@@ -171,7 +171,7 @@ def test_what_is_stopped_keeps_what_it_has_found_and_goes_on(
     assert has_ended.wait(WAIT_S)
     assert client.post(f"{url}/resume").status_code == 202
     assert wait_for(client, url, "ready", "failed")["state"] == "ready"
-    assert found == [False, True]
+    assert had_partial_data == [False, True]
 
 
 def test_one_is_made_in_turns_and_images_do_not_wait_for_geometry(
@@ -180,13 +180,15 @@ def test_one_is_made_in_turns_and_images_do_not_wait_for_geometry(
     monkeypatch.setattr("relume_server.batch.btf_steps.SLICE_S", 0.0)
     done: list[float] = []
 
-    def render(shelf: Path, wanted: Any, name: str, tell: Callable[[float], object],
+    def render(asset_store: Path, wanted: Any, name: str, tell: Callable[[float], object],
                is_canceled: Callable[[], bool], making: Path) -> Any:  # fmt: skip
         while not is_canceled():
             tell(0.1 * len(done))
             done.append(0.1 * len(done))
             if len(done) == 7:
-                return import_btf(shelf, zipped(tmp_path / "b.zip"), name, 0.05, lambda share: None, lambda: False)
+                return import_btf(
+                    asset_store, zipped(tmp_path / "b.zip"), name, 0.05, lambda share: None, lambda: False
+                )
             if len(done) == 3:
                 images.append(send(client, zipped(tmp_path / "a.zip")))
         raise CancelledError("for now")

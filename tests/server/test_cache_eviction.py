@@ -58,18 +58,18 @@ def go_round(client: TestClient) -> None:
 
 def bake_scenes(client: TestClient, num_scenes: int = NUM_SCENES) -> list[str]:
     """Bakes of scenes that differ in the colour of the ball."""
-    bakes, base, found = client.app.state.services.bakes, still_life(), []
+    bakes, base, bake_ids = client.app.state.services.bakes, still_life(), []
     for number in range(num_scenes):
         ball = base.materials[2]
         diffuse = {"model": "lambert", "color": [0.1 * number, 0.05, 0.05]}
         materials = [*base.materials[:2], replace(ball, terms=(diffuse, *ball.terms[1:]))]
         scene = make_scene(f"still life {number}", base.meshes, materials, base.cameras, base.environment)
         register_scene(bakes.data_dir, bakes.ledger, scene)
-        found.append(bakes.submit(scene.id, Recipe("direct", ("front",), (48, 32), 60)))
-    for bake in found:
+        bake_ids.append(bakes.submit(scene.id, Recipe("direct", ("front",), (48, 32), 60)))
+    for bake in bake_ids:
         with bakes.subscribe(bake) as changes:
             assert list(changes)[-1].state == "ready"
-    return found
+    return bake_ids
 
 
 def look_at(client: TestClient, bake: str) -> bytes:
@@ -100,10 +100,10 @@ def test_metrics_tell_who_holds_what(real: TestClient) -> None:
     bakes = bake_scenes(real, 2)
     for bake in bakes:
         look_at(real, bake)
-    found = held(real)
-    assert {(kind, bake) for kind in ("linear operator", "shaded term") for bake in bakes} <= set(found)
-    assert all(num_bytes > 0 for num_bytes in found.values())
-    assert sum(found.values()) == gauges(real)["cache"]
+    entries = held(real)
+    assert {(kind, bake) for kind in ("linear operator", "shaded term") for bake in bakes} <= set(entries)
+    assert all(num_bytes > 0 for num_bytes in entries.values())
+    assert sum(entries.values()) == gauges(real)["cache"]
 
 
 def test_a_thumbnail_of_other_code_is_painted_again(
@@ -124,9 +124,9 @@ def test_bakes_that_nobody_looks_at_are_let_go(real: TestClient, clock: Clock) -
     bakes = bake_scenes(real)
     pictures = [look_at(real, bake) for bake in bakes]
     go_round(real)
-    kept = [weakref.ref(transfer) for transfer in pool.open_bakes]
+    references = [weakref.ref(transfer) for transfer in pool.open_bakes]
     before = gauges(real)
-    assert kept
+    assert references
     assert before["open_bakes"] > 0
     assert before["cache"] == before["relume_frozen_cache_bytes"] > FLOOR_BYTES
     assert before["process_resident_memory_bytes"] > before["open_bakes"]
@@ -134,7 +134,7 @@ def test_bakes_that_nobody_looks_at_are_let_go(real: TestClient, clock: Clock) -
     clock.now += IDLE_S + 1
     go_round(real)
     gc.collect()
-    assert [ref() for ref in kept] == [None] * len(kept)
+    assert [ref() for ref in references] == [None] * len(references)
     after = gauges(real)
     assert after["open_bakes"] == 0
     assert 0 < after["cache"] <= FLOOR_BYTES
@@ -149,7 +149,9 @@ def test_what_is_looked_at_is_kept_however_long(real: TestClient, clock: Clock) 
         session.send_message(type="prepare", curve=CURVE)
         session.edit(1, "/materials/Ball/terms/1/params/sigma", 0.3)
         session.exact(1)
-        (transfer,) = [one for one in real.app.state.services.transfers.open_bakes if shown in one.key]
+        (transfer,) = [
+            open_bake for open_bake in real.app.state.services.transfers.open_bakes if shown in open_bake.key
+        ]
         clock.now += 100 * IDLE_S
         go_round(real)
         assert real.app.state.services.transfers.open_bakes == [transfer]
@@ -164,10 +166,10 @@ def test_what_is_looked_at_is_kept_however_long(real: TestClient, clock: Clock) 
 @pytest.mark.slow
 def test_comparisons_and_renders_go_on_while_their_bake_is_let_go(real: TestClient, clock: Clock) -> None:
     bake = bake_scenes(real)[0]
-    truth = real.post("/api/comparisons", json={"bake": bake, "view": "front", "passes": 2}).headers["location"]
+    comparison = real.post("/api/comparisons", json={"bake": bake, "view": "front", "passes": 2}).headers["location"]
     request = {"bake": bake, "view": "front", "format": "png", "looks": [{"display": {"exposure": 1.0}}] * 2}
     render = real.post("/api/renders", json=request).headers["location"]
-    works = [truth, render]
+    works = [comparison, render]
     for _ in range(6000):
         clock.now += IDLE_S + 1
         go_round(real)
@@ -189,9 +191,9 @@ def test_a_bake_that_is_opened_while_others_are_let_go_is_kept() -> None:
         return opened[-1]
 
     async def use(pool: TransferPool, may_leave: asyncio.Event) -> Any:
-        async with pool.acquire("one", Path("one")) as found:
+        async with pool.acquire("one", Path("one")) as transfer:
             await may_leave.wait()
-            return found
+            return transfer
 
     async def run() -> None:
         with ThreadPoolExecutor(2) as executor:

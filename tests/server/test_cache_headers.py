@@ -21,10 +21,10 @@ def settings(settings: Settings) -> Settings:
 
 
 def test_no_answer_that_needs_a_role_is_public(client: TestClient, baked: Baked) -> None:
-    known = {"scene": baked.scene, "bake": baked.bake, "view": "front", "environment": "studio"}
+    parameters = {"scene": baked.scene, "bake": baked.bake, "view": "front", "environment": "studio"}
     answers = []
     for path, roles in RULES.items():
-        filled = re.sub(r"\{(\w+)\}", lambda found: known.get(found[1], "0123456789abcdef"), path)
+        filled = re.sub(r"\{(\w+)\}", lambda match: parameters.get(match[1], "0123456789abcdef"), path)
         if path in ("/livez", "/readyz") or path.endswith("/events"):
             continue
         answers += [client.request(method, filled) for method in roles if method not in (SOCKET, "DELETE")]

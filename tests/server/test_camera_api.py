@@ -35,8 +35,8 @@ def test_a_camera_is_kept_listed_baked_and_deleted(real: TestClient, scene: str)
     assert (front["name"], front["is_placed"]) == ("front", False)
     frame = {"to_world": front["to_world"], "yfov": front["yfov"] / 2}
     assert [real.put(f"{url}/Close up", json=frame).status_code for _ in range(2)] == [201, 204]
-    kept = real.get(f"{url}/Close up").json()
-    assert kept == {**frame, "name": "Close up", "is_placed": True}
+    saved = real.get(f"{url}/Close up").json()
+    assert saved == {**frame, "name": "Close up", "is_placed": True}
     views = real.get(f"/api/scenes/{scene}").json()["views"]
     assert [view["name"] for view in views if view["is_placed"]] == ["Close up"]
     assert real.get("/api/scenes").json()[0]["views"] == views
@@ -66,10 +66,10 @@ def test_a_view_of_a_placed_camera_is_compared_with_truth_from_there(real: TestC
     asked = real.post("/api/comparisons", json={"bake": bake, "view": "Aside", "look": {}, "passes": 4})
     assert asked.status_code in (200, 202), asked.text
     url = asked.headers["location"]
-    while (truth := real.get(url).json())["state"] not in ("ready", "failed"):
+    while (comparison := real.get(url).json())["state"] not in ("ready", "failed"):
         time.sleep(0.05)
-    assert truth["state"] == "ready", truth["problem"]
-    assert truth["error_method_paths"]["rmse"] < 0.2
+    assert comparison["state"] == "ready", comparison["problem"]
+    assert comparison["error_method_paths"]["rmse"] < 0.2
 
 
 @pytest.mark.parametrize(
@@ -113,16 +113,16 @@ def ready(client: TestClient, url: str) -> str:
 
 def test_a_scene_is_shown_from_anywhere_before_it_is_baked(real: TestClient, scene: str) -> None:
     url = f"/api/scenes/{scene}/viewport"
-    found = real.get(url).json()
-    assert all(low < high for low, high in zip(found["bounds_min"], found["bounds_max"], strict=True))
-    answer = real.post(url, json={**found["default_camera"], "size": [80, 60]})
+    body = real.get(url).json()
+    assert all(low < high for low, high in zip(body["bounds_min"], body["bounds_max"], strict=True))
+    answer = real.post(url, json={**body["default_camera"], "size": [80, 60]})
     assert answer.headers["content-type"] == "image/jpeg"
     assert Image.open(io.BytesIO(answer.content)).size == (80, 60)
-    pixel = {**found["default_camera"], "size": [80, 60], "x": 40, "y": 30}
+    pixel = {**body["default_camera"], "size": [80, 60], "x": 40, "y": 30}
     assert len(real.post(f"{url}/pick", json=pixel).json()["position"]) == 3
-    away = [*found["default_camera"]["to_world"]]
+    away = [*body["default_camera"]["to_world"]]
     away[3], away[7], away[11] = 1e5, 1e5, 1e5
     assert real.post(f"{url}/pick", json=pixel | {"to_world": away, "x": 1, "y": 1}).json() == {"position": None}
     for wrong in ({"size": [1, 60]}, {"size": [80, 100_000]}, {"yfov": 0}, {"to_world": [0.0] * 16}):
-        assert real.post(url, json={**found["default_camera"], "size": [80, 60]} | wrong).status_code == 422
+        assert real.post(url, json={**body["default_camera"], "size": [80, 60]} | wrong).status_code == 422
     assert real.get(f"/api/scenes/{'0' * 16}/viewport").status_code == 404

@@ -33,9 +33,9 @@ def test_what_a_client_has_is_not_sent_again(client: TestClient, urls: list[str]
         first = client.get(url)
         assert first.status_code == 200, url
         etag = first.headers["etag"]
-        for known in (etag, f'"other", {etag}', f"W/{etag}", "*"):
-            again = client.get(url, headers={"If-None-Match": known})
-            assert (again.status_code, again.content) == (304, b""), (url, known)
+        for etags in (etag, f'"other", {etag}', f"W/{etag}", "*"):
+            again = client.get(url, headers={"If-None-Match": etags})
+            assert (again.status_code, again.content) == (304, b""), (url, etags)
             assert again.headers["etag"] == etag
             assert "content-length" not in again.headers
             assert all(name in again.headers for name in SAFE)
@@ -75,5 +75,5 @@ def test_head_of_what_never_ends_ends(client: TestClient, control: Control, bake
 
 def test_a_part_of_a_file_is_still_a_part(client: TestClient, rendered: str) -> None:
     whole = client.get(f"{rendered}/frames/0").content
-    part: Any = client.get(f"{rendered}/frames/0", headers={"Range": "bytes=2-5"})
-    assert (part.status_code, part.content) == (206, whole[2:6])
+    response: Any = client.get(f"{rendered}/frames/0", headers={"Range": "bytes=2-5"})
+    assert (response.status_code, response.content) == (206, whole[2:6])

@@ -35,8 +35,8 @@ def answer_to(running: Running, *sent: bytes, ends: bool = True) -> bytes:
         try:
             for each in sent:
                 asking.sendall(each)
-            while part := asking.recv(1 << 16):
-                answer += part
+            while chunk := asking.recv(1 << 16):
+                answer += chunk
                 if not ends and b"\r\n\r\n" in answer:
                     break
         except (ConnectionResetError, BrokenPipeError):  # it was closed while more was sent
@@ -131,14 +131,14 @@ def test_one_connection_too_many_is_told_so(running: Running, monkeypatch: pytes
 
 
 @pytest.mark.parametrize(
-    ("path", "most"),
+    ("path", "max_bytes"),
     [("/api/login", MAX_LOGIN_BYTES), ("/api/logout", MAX_LOGIN_BYTES), ("/api/bakes", MAX_JSON_BYTES)],
 )
-def test_bodies_are_as_large_as_they_have_to_be(client: TestClient, path: str, most: int) -> None:
+def test_bodies_are_as_large_as_they_have_to_be(client: TestClient, path: str, max_bytes: int) -> None:
     text = {"content-type": "application/json"}
-    beyond = b'{"token": "a", "x": "' + b"1" * most + b'"}'
+    beyond = b'{"token": "a", "x": "' + b"1" * max_bytes + b'"}'
     assert client.post(path, content=beyond, headers=text).status_code == 413
     if path != "/api/logout":  # which reads none
         assert client.post(path, content=iter([beyond]), headers=text).status_code == 413
-    within = b'{"token": "a", "x": "' + b"1" * (most - 100) + b'"}'
+    within = b'{"token": "a", "x": "' + b"1" * (max_bytes - 100) + b'"}'
     assert client.post(path, content=within, headers=text).status_code != 413

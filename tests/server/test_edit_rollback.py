@@ -107,8 +107,8 @@ def rooms_look(client: TestClient, baked: Baked) -> dict[str, Any]:
 
 
 def params(look: dict[str, Any]) -> dict[str, float]:
-    found: dict[str, float] = look["materials"]["Paper"]["terms"][1]["params"]
-    return found
+    values: dict[str, float] = look["materials"]["Paper"]["terms"][1]["params"]
+    return values
 
 
 def in_a_view_that_cannot_follow(session: Session, control: Control) -> None:
@@ -166,10 +166,10 @@ def test_an_editor_whose_bake_cannot_follow_another_goes_on_editing(
 
 
 def test_of_a_moment_only_what_failed_is_taken_back_and_every_client_knows(client: TestClient, baked: Baked) -> None:
-    with joined(client, baked) as one, joined(client, baked) as other:
-        ann, bob = Client(one), Client(other)
-        one.exact(0)
-        other.exact(0)
+    with joined(client, baked) as first, joined(client, baked) as second:
+        ann, bob = Client(first), Client(second)
+        first.exact(0)
+        second.exact(0)
         with waiting(client):
             bob.edit(SIGMA, 0.31)
             bob.asks()
@@ -186,13 +186,13 @@ def test_of_a_moment_only_what_failed_is_taken_back_and_every_client_knows(clien
 
 
 def test_what_others_have_put_on_top_goes_where_there_is_nothing_under_it(client: TestClient, baked: Baked) -> None:
-    lamp = {"kind": "point", "position": [0.0, 1.0, 0.0]}
-    with joined(client, baked) as one, joined(client, baked) as other:
-        ann, bob = Client(one), Client(other)
-        one.exact(0)
-        other.exact(0)
+    light = {"kind": "point", "position": [0.0, 1.0, 0.0]}
+    with joined(client, baked) as first, joined(client, baked) as second:
+        ann, bob = Client(first), Client(second)
+        first.exact(0)
+        second.exact(0)
         with waiting(client):
-            bob.edit("/lights/Lamp", lamp, op="add")
+            bob.edit("/lights/Lamp", light, op="add")
             bob.edit(ROTATION, 30.0)
             bob.asks()
             ann.hear("room_update")

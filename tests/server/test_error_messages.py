@@ -57,9 +57,9 @@ def test_bodies(client: TestClient, url: str, body: Any, said: str) -> None:
     whole = {"bake": SCENE, "view": "front", "format": "png", "looks": [{}], **body} if url == RENDERS else body
     problem = refused(client, url, json=whole)
     assert problem["detail"] == said
-    (place,) = problem["errors"]
-    assert place["detail"] == said
-    assert said.startswith(place["pointer"] or "the body")
+    (error,) = problem["errors"]
+    assert error["detail"] == said
+    assert said.startswith(error["pointer"] or "the body")
 
 
 def test_bodies_that_are_none(client: TestClient) -> None:
@@ -78,7 +78,7 @@ def test_forms(client: TestClient) -> None:
     sent = {"geometry": ("a.obj", b"v 0 0 0")}
     problem = refused(client, "/api/materials/btf/jobs/geometry", files=sent, data={"size": "10000", "period": "x"})
     assert problem["detail"] == "/period is 'x'; give a number; /size is '10000'; give at most 256"
-    assert [place["pointer"] for place in problem["errors"]] == ["/period", "/size"]
+    assert [error["pointer"] for error in problem["errors"]] == ["/period", "/size"]
 
 
 def test_what_is_refused_later_is_said_alike(client: TestClient, baked: Baked) -> None:

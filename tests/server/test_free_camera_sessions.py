@@ -32,8 +32,8 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
 def scene(client: TestClient) -> dict[str, Any]:
     ball = trimesh.creation.icosphere(subdivisions=3)
     file = trimesh.Scene(ball).export(file_type="glb")
-    found: dict[str, Any] = client.post("/api/scenes", files={"scene": ("ball.glb", file)}).json()
-    return found
+    imported: dict[str, Any] = client.post("/api/scenes", files={"scene": ("ball.glb", file)}).json()
+    return imported
 
 
 @pytest.fixture(scope="module")
@@ -108,12 +108,12 @@ def of_eye(session: Session, number: int) -> Frame:
 
 
 def test_hello_says_that_the_eye_is_free_and_where_there_is_something(session: Session) -> None:
-    found = hello(session)
-    (view,) = found["views"]
-    assert (view["camera_mode"], found["method"], "camera" in found["axes"]) == ("free", "probes", True)
+    first_view = hello(session)
+    (view,) = first_view["views"]
+    assert (view["camera_mode"], first_view["method"], "camera" in first_view["axes"]) == ("free", "probes", True)
     lowest, highest = np.array(view["bounds"])
     np.testing.assert_allclose([lowest, highest], [[-1] * 3, [1] * 3], atol=0.05)
-    assert 0 < found["free_camera_error"]["standard_error"] < found["free_camera_error"]["value"] < 0.5
+    assert 0 < first_view["free_camera_error"]["standard_error"] < first_view["free_camera_error"]["value"] < 0.5
 
 
 def test_frames_follow_the_eye_twice_and_say_which_they_show(session: Session) -> None:
@@ -143,8 +143,8 @@ def exact_of(session: Session, number: int, revision: int) -> Frame:
 def test_where_the_eye_rests_the_exact_picture_follows_and_edits_go_on_in_it_twice(
     session: Session, client: TestClient, scene: dict[str, Any], tmp_path: Any
 ) -> None:
-    found = hello(session)
-    (view,), material = found["views"], found["materials"][0]
+    first_view = hello(session)
+    (view,), material = first_view["views"], first_view["materials"][0]
     for number, aside in ((5, 0.4), (6, -0.3)):
         placed = eye(view, number, aside)
         session.send_message(**placed)
@@ -174,8 +174,8 @@ def test_an_older_eye_says_nothing_and_the_size_is_the_eyes(session: Session) ->
 
 
 def test_an_edit_a_light_and_an_eye_in_one_burst_are_all_shown(session: Session, client: TestClient, bake: str) -> None:
-    found = hello(session)
-    (view,), material = found["views"], found["materials"][0]
+    first_view = hello(session)
+    (view,), material = first_view["views"], first_view["materials"][0]
     session.frame()
     terms = [{"model": "lambert", "color": [0.1, 0.5, 0.2]}]
     session.edit(1, f"/materials/{material}/terms", terms)
@@ -236,9 +236,9 @@ def test_bad_eyes_are_refused_in_words_and_nothing_is_lost(session: Session, bad
 def test_an_eye_inside_a_solid_and_one_that_sees_nothing_are_seen_through(session: Session) -> None:
     (view,) = hello(session)["views"]
     session.frame()
-    for number, place in ((1, [0, 0, 0]), (2, [0, 0, 1e5])):
+    for number, position in ((1, [0, 0, 0]), (2, [0, 0, 1e5])):
         to_world = LEVEL.copy()
-        to_world[:3, 3] = place
+        to_world[:3, 3] = position
         session.send_message(**(eye(view, number, 0.0) | {"to_world": to_world.ravel().tolist()}))
         assert np.isfinite(shown(of_eye(session, number))).all()
 
@@ -280,13 +280,13 @@ def test_a_scene_deleted_under_a_moving_view_leaves_what_moves(client: TestClien
 
 
 def test_a_probe_says_what_the_eye_sees(session: Session) -> None:
-    found = hello(session)
-    (view,) = found["views"]
+    first_view = hello(session)
+    (view,) = first_view["views"]
     session.send_message(**eye(view, 4, 0.0))
     of_eye(session, 4)
     session.send_message(type="inspect", view=view["name"], x=SIZE[0] // 2, y=SIZE[1] // 2)
     answer = session.text("inspect")
-    assert answer["material"] == found["materials"][0]
+    assert answer["material"] == first_view["materials"][0]
     assert np.linalg.norm(answer["position"]) == pytest.approx(1.0, abs=0.02)
     session.send_message(
         type="highlight_curve_range",
@@ -298,13 +298,13 @@ def test_a_probe_says_what_the_eye_sees(session: Session) -> None:
 
 def arrays_in(frame: Frame) -> dict[str, np.ndarray]:
     """The arrays of a frame of kind "scene_update"."""
-    found, at = {}, 0
+    arrays, offset = {}, 0
     for info in frame.header["scene_update"]["arrays"]:
         dtype, size = np.dtype(info["dtype"]), math.prod(info["shape"])
-        found[info["name"]] = np.frombuffer(frame.payload, dtype, size, at).reshape(info["shape"])
-        at += size * dtype.itemsize
-    assert at == len(frame.payload)
-    return found
+        arrays[info["name"]] = np.frombuffer(frame.payload, dtype, size, offset).reshape(info["shape"])
+        offset += size * dtype.itemsize
+    assert offset == len(frame.payload)
+    return arrays
 
 
 def tables_of(session: Session) -> Frame:
@@ -320,8 +320,8 @@ def until_fine(session: Session, revision: int) -> None:
 
 
 def test_a_browser_that_draws_itself_gets_what_has_changed_and_no_frame_for_an_eye(session: Session) -> None:
-    found = hello(session)
-    (view,), material = found["views"], found["materials"][0]
+    first_view = hello(session)
+    (view,), material = first_view["views"], first_view["materials"][0]
     session.frame()
     session.send_message(**eye(view, 1, 0.2), refine="none")
     of_eye(session, 1)
@@ -342,9 +342,11 @@ def test_a_browser_that_draws_itself_gets_what_has_changed_and_no_frame_for_an_e
 def test_what_a_shader_keeps_is_there_once_for_all(client: TestClient, bake: str) -> None:
     answer = client.get(f"/api/bakes/{bake}/probes")
     assert "immutable" in answer.headers["cache-control"]
-    found = answer.json()
-    assert found["num_basis"] == len(found["recurrence"]["order"]) + sum(m > 0 for m in found["recurrence"]["order"])
-    arrays = {name: client.get(f"/api/bakes/{bake}/probes/{name}") for name in found["arrays"]}
+    description = answer.json()
+    assert description["num_basis"] == len(description["recurrence"]["order"]) + sum(
+        m > 0 for m in description["recurrence"]["order"]
+    )
+    arrays = {name: client.get(f"/api/bakes/{bake}/probes/{name}") for name in description["arrays"]}
     assert all("immutable" in each.headers["cache-control"] for each in arrays.values())
     num_points = len(arrays["probe_positions"].content) // 16
     assert len(arrays["visible_lights"].content) == num_points * 16  # bits of at most 128 lights
@@ -352,7 +354,7 @@ def test_what_a_shader_keeps_is_there_once_for_all(client: TestClient, bake: str
     assert corners[:, :3].max() < len(arrays["positions"].content) // 16
     sides = np.frombuffer(arrays["sides"].content, np.uint32).reshape(-1, 4)
     assert (len(sides), sides[:, :3].max() < len(arrays["normals"].content) // 8) == (2 * len(corners), True)
-    first = found["first_probes"]
+    first = description["first_probes"]
     assert (first[0], first[-1], first == sorted(first)) == (0, num_points, True)
 
 
@@ -389,8 +391,8 @@ def test_where_the_link_is_too_slow_for_tables_a_hand_gets_pictures_twice(
 ) -> None:
     """And tables when it rests; what is small comes as tables all the while, and an eye costs nothing."""
     monkeypatch.setattr(FrameWindow, "is_slow_for", lambda self, num_bytes, *, was_slow: num_bytes > 100_000)
-    found = hello(session)
-    (view,), color = found["views"], f"/materials/{found['materials'][0]}/terms/0/color"
+    first_view = hello(session)
+    (view,), color = first_view["views"], f"/materials/{first_view['materials'][0]}/terms/0/color"
     session.send_message(**eye(view, 1, 0.05), refine="none")
     of_eye(session, 1)
     session.edit(1, "/transport/show", "direct")  # colours would bring other light to all points

@@ -40,27 +40,27 @@ class Gone(Told):
         raise ProtocolError("nothing was read; reload the page", 4408)
 
 
-def run(scenario: Any, told: Told | None = None) -> tuple[list[str], list[str]]:
+def run(scenario: Any, recorder: Told | None = None) -> tuple[list[str], list[str]]:
     """Run a scenario (freezer, control, news) in a loop of its own; what was told, and what nobody retrieved."""
-    complaints: list[str] = []
-    told = told or Told()
+    unhandled_errors: list[str] = []
+    recorder = recorder or Told()
 
     async def main() -> None:
-        asyncio.get_running_loop().set_exception_handler(lambda _, context: complaints.append(context["message"]))
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: unhandled_errors.append(context["message"]))
         threads, news = Threads(), asyncio.Event()
         try:
-            await scenario(Precomputer(told, threads, Metrics(), None, news), Control(), news)  # type: ignore[arg-type]
+            await scenario(Precomputer(recorder, threads, Metrics(), None, news), Control(), news)  # type: ignore[arg-type]
         finally:
             threads.close()
         gc.collect()
 
     run_in_thread(main())
-    return told.states, complaints
+    return recorder.states, unhandled_errors
 
 
 @pytest.mark.parametrize("state", ["precomputing", "shading"])
 def test_freeze_is_told_by_its_own_word_and_is_ready_once_handed_over(state: str) -> None:
-    told = Told()
+    recorder = Told()
 
     async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
@@ -74,12 +74,12 @@ def test_freeze_is_told_by_its_own_word_and_is_ready_once_handed_over(state: str
         assert taken is not None
         assert (taken[0], taken[2]) == (view, "/curves/theta_d")
         assert freezer.running is None
-        assert set(told.states) == {state}
+        assert set(recorder.states) == {state}
         await freezer.send_ready(taken[0], taken[1])
 
-    states, complaints = run(scenario, told)
+    states, unhandled_errors = run(scenario, recorder)
     assert states[-1] == "ready"
-    assert complaints == []
+    assert unhandled_errors == []
 
 
 def test_cancelled_freeze_gives_nothing() -> None:

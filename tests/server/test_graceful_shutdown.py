@@ -133,7 +133,7 @@ def test_what_stops_in_time_is_left_alone() -> None:
 
 
 def test_it_is_told_once_that_the_server_answers() -> None:
-    told: list[bool] = []
+    notifications: list[bool] = []
 
     async def app(scope: Any, receive: Any, send: Any) -> None:
         await receive()
@@ -146,11 +146,11 @@ def test_it_is_told_once_that_the_server_answers() -> None:
     limits = {"drain_seconds": 5.0, "stop_seconds": 60.0}
 
     def tell() -> None:
-        told.append(process.started)
+        notifications.append(process.started)
         process.should_exit = True
 
     process = ServerProcess(config, drain=DrainState(), num_sessions=lambda: 0, on_started=tell, **limits)
     thread = threading.Thread(target=process.run)  # browser tests of the same process may have a loop in this one
     thread.start()
     thread.join(timeout=30)
-    assert told == [True]
+    assert notifications == [True]

@@ -93,8 +93,8 @@ def asked(name: str, seconds: int = 60) -> ImportRequest:
 @pytest.fixture
 def waiting(monkeypatch: pytest.MonkeyPatch) -> Iterator[Importers]:
     monkeypatch.setattr(import_processes, "_COMMAND", [sys.executable, "-c", STAND_IN])
-    with closing(Importers()) as found:
-        yield found
+    with closing(Importers()) as importers:
+        yield importers
 
 
 def parent_of(waiting: Importers) -> int:
@@ -223,7 +223,7 @@ def test_a_machine_that_cannot_confine_says_so_once(
 ) -> None:
     monkeypatch.setattr(import_processes, "_COMMAND", [sys.executable, "-c", STAND_IN])
     monkeypatch.setattr(import_processes, "missing_features", lambda: ("Landlock",))
-    with closing(Importers()) as found:
-        found.start()
-        found.start()
+    with closing(Importers()) as importers:
+        importers.start()
+        importers.start()
     assert len([line for line in caplog.messages if "this machine has no Landlock" in line]) == 1

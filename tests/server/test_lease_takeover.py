@@ -68,8 +68,8 @@ class Server:
 @pytest.fixture
 def ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Ledger]:
     monkeypatch.setattr("relume_worker.lease.HEARTBEAT_S", 2 * WAIT_S)  # who stands still renews nothing
-    with closing(Ledger(open_database(f"sqlite:///{tmp_path / 'a.db'}"))) as found:
-        yield found
+    with closing(Ledger(open_database(f"sqlite:///{tmp_path / 'a.db'}"))) as opened:
+        yield opened
 
 
 @pytest.mark.parametrize("outcome", [fails, breaks, notices, finishes])
@@ -98,8 +98,8 @@ def test_the_files_quota_and_state_of_a_work_that_was_taken_over_stay(
     assert f"BTF {work} was taken over by another process" in caplog.text
     assert (folder / UPLOAD_FILE).read_bytes() == b"sent"
     assert first.quotas == []
-    found = second.queue.get(work)
-    assert (found.state, found.problem) == ("running", None)
+    job = second.queue.get(work)
+    assert (job.state, job.problem) == ("running", None)
     assert second.is_wanted()
 
     second.may_go_on.set()
@@ -120,19 +120,19 @@ def wait_until(is_reached: Callable[[], bool]) -> None:
 
 def test_a_step_whose_files_another_server_has_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("relume_server.batch.step_claim._CHECK_INTERVAL_S", 0.0)
-    seen: list[bool] = []
+    canceled: list[bool] = []
 
     def work(shop: Any, tell: Any, is_canceled: Callable[[], bool]) -> Mapping[str, Any]:
-        seen.append(is_canceled())
+        canceled.append(is_canceled())
         claim(tmp_path, "the second")
-        seen.append(is_canceled())
+        canceled.append(is_canceled())
         return {}
 
     monkeypatch.setattr(step_registry, "STEPS", {"work": work})
     step = Step("work", claim=(str(tmp_path), "the first"))
     claim(tmp_path, "the first")
     step_registry.do_step(SimpleNamespace(), step, lambda share: None, lambda: False)
-    assert seen == [False, True]
+    assert canceled == [False, True]
     with pytest.raises(CancelledError):
         step_registry.do_step(SimpleNamespace(), step, lambda share: None, lambda: False)
-    assert seen == [False, True]
+    assert canceled == [False, True]

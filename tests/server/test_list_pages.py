@@ -44,22 +44,22 @@ def filled(client: TestClient, baked: Baked) -> Baked:
         assert client.post("/api/shares", json=shared).status_code == 201
         render = {"bake": baked.bake, "view": "front", "format": "png", "looks": [{}], "name": name}
         wait_until(client, client.post("/api/renders", json=render).headers["location"], is_done)
-        truth = {"bake": baked.bake, "view": "front", "passes": 2}
-        stopped = client.post("/api/comparisons", json=truth).headers["location"]
+        comparison = {"bake": baked.bake, "view": "front", "passes": 2}
+        stopped = client.post("/api/comparisons", json=comparison).headers["location"]
         assert client.delete(stopped).status_code == 204
     return baked
 
 
 def in_parts(client: TestClient, url: str, limit: int) -> list[Any]:
-    found: list[Any] = []
+    entries: list[Any] = []
     following: str | None = f"{url}?limit={limit}"
     while following is not None:
         answer = client.get(following)
         assert answer.status_code == 200, answer.text
         assert 0 < len(answer.json()) <= limit
-        found += answer.json()
+        entries += answer.json()
         following = answer.links["next"]["url"] if "next" in answer.links else None
-    return found
+    return entries
 
 
 def test_every_list_is_read_in_parts_that_are_all_of_it(client: TestClient, filled: Baked) -> None:
@@ -112,9 +112,9 @@ def test_works_say_whose_they_are_and_when(client: TestClient, filled: Baked) ->
     render = client.get("/api/renders?name=a").json()[0]
     assert (render["user"], render["name"], render["state"]) == ("", "a", "ready")
     assert render["created"] <= render["started"] <= render["ended"]
-    truth = client.get("/api/comparisons").json()[0]
-    assert truth["state"] == "stopped"
-    assert truth["ended"] is not None
+    comparison = client.get("/api/comparisons").json()[0]
+    assert comparison["state"] == "stopped"
+    assert comparison["ended"] is not None
     assert all(bake["created"] and bake["user"] == "" for bake in client.get("/api/bakes").json())
 
 

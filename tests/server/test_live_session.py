@@ -376,9 +376,9 @@ def test_whole_look_can_be_replaced(client: TestClient, baked: Baked) -> None:
 
 
 def test_sessions_share_one_opened_store(client: TestClient, baked: Baked, control: Control) -> None:
-    with open_session(client, baked.bake) as one, open_session(client, baked.bake) as other:
-        one.exact(0)
-        other.exact(0)
+    with open_session(client, baked.bake) as first, open_session(client, baked.bake) as second:
+        first.exact(0)
+        second.exact(0)
     assert control.num_opened == 1
 
 

@@ -31,9 +31,9 @@ class Painting:
 
 @pytest.fixture
 def painting(monkeypatch: pytest.MonkeyPatch) -> Painting:
-    found = Painting()
-    monkeypatch.setattr("relume_server.batch.frames.write_image", found.write)
-    return found
+    new_painting = Painting()
+    monkeypatch.setattr("relume_server.batch.frames.write_image", new_painting.write)
+    return new_painting
 
 
 @pytest.fixture

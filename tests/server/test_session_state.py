@@ -137,9 +137,9 @@ def test_resume_is_bounded_in_number_and_time_and_belongs_to_its_bake() -> None:
         store.close(token, now_s=0.0)
     assert store.take(tokens[4], "bake", 1.0) is None
     assert store.take(tokens[5], "other", 1.0) is None
-    kept = store.take(tokens[5], "bake", 1.0)
-    assert kept is not None
-    assert (kept.revision, kept.document) == (5, {"k": 5})
+    resumed = store.take(tokens[5], "bake", 1.0)
+    assert resumed is not None
+    assert (resumed.revision, resumed.document) == (5, {"k": 5})
     assert store.take(tokens[5], "bake", 1.0) is None
     assert store.take(tokens[6], "bake", 601.0) is None
 
@@ -147,9 +147,9 @@ def test_resume_is_bounded_in_number_and_time_and_belongs_to_its_bake() -> None:
 def test_session_that_the_server_believes_alive_can_be_resumed_once() -> None:
     store = ResumeStore(resume_seconds=600)
     token = store.open("bake", LookState({}, {"k": 1}, 3), ALONE)
-    kept = store.take(token, "bake", 0.0)
-    assert kept is not None
-    assert kept.revision == 3
+    resumed = store.take(token, "bake", 0.0)
+    assert resumed is not None
+    assert resumed.revision == 3
     store.close(token, 1.0)
     assert store.take(token, "bake", 2.0) is None
 
@@ -206,8 +206,11 @@ def test_transfers_are_opened_once_kept_while_used_and_tried_again_after_a_failu
             with pytest.raises(StoreError):
                 async with pool.acquire("broken", Path("broken")):
                     pass
-            async with pool.acquire("broken", Path("broken")) as found, pool.acquire("broken", Path("broken")) as again:
-                assert found is again
+            async with (
+                pool.acquire("broken", Path("broken")) as transfer,
+                pool.acquire("broken", Path("broken")) as again,
+            ):
+                assert transfer is again
                 for k in range(MAX_IDLE + 2):
                     async with pool.acquire(f"b{k}", Path(f"b{k}")):
                         pass

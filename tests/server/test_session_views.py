@@ -12,11 +12,11 @@ from session_client import IOR, SIGMA, THETA_D, THETA_H, Baked, Frame, Session, 
 
 def exact_of_all(session: Session, revision: int, num_views: int = 2) -> list[Frame]:
     """Read until every view has an exact frame of a revision; those frames in the order of their coming."""
-    found: dict[str, Frame] = {}
-    while len(found) < num_views:
+    frame_by_view: dict[str, Frame] = {}
+    while len(frame_by_view) < num_views:
         frame = session.exact(revision)
-        found[frame.header["view"]] = frame
-    return list(found.values())
+        frame_by_view[frame.header["view"]] = frame
+    return list(frame_by_view.values())
 
 
 def show_both(session: Session, focus: str = "left") -> None:

@@ -29,8 +29,8 @@ class TestAnswers:
     @pytest.fixture
     def answers(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
         monkeypatch.setattr(answers_module, "PIECE_BYTES", 1_000)
-        with closing(Answers(tmp_path)) as found:
-            yield found
+        with closing(Answers(tmp_path)) as new_answers:
+            yield new_answers
 
     def test_those_who_read_slowly_share_one_file_that_goes_with_them(self, answers: Answers, tmp_path: Path) -> None:
         made: list[int] = []
@@ -100,9 +100,9 @@ class TestOnce:
                 await asyncio.sleep(0)
             first.cancel()
             may_end.set()
-            found = await second
+            result = await second
             once.close()
-            return found
+            return result
 
         assert (run_in_thread(scenario()), made) == (7, [1])
 
@@ -168,8 +168,8 @@ class TestThumbnails:
             may_end.set()
 
 
-async def _enter(keeper: Any) -> bool:
-    async with keeper.hold("a room"):
+async def _enter(rooms: Any) -> bool:
+    async with rooms.hold("a room"):
         return True
 
 
@@ -190,8 +190,8 @@ def test_what_is_larger_than_the_memory_is_made_once_for_those_who_wait_for_it_t
             pass
         threading.Event().wait(0.2)  # all have come to the lock; where one is late it makes it again, as it may
         may_end.set()
-        found = {id(each.result()) for each in asking}
-    assert len(found) == 1
+        identities = {id(each.result()) for each in asking}
+    assert len(identities) == 1
     assert made == [1]
     memory.get_value(("scene", "finder"), make)
     assert made == [1, 1]  # it was not kept

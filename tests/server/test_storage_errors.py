@@ -65,9 +65,9 @@ def test_a_disk_that_is_nearly_full_is_not_ready_and_said_once(
 @pytest.mark.parametrize("error", [DiskFullError("a.webp"), OSError(errno.ENOSPC, "No space left on device")])
 def test_a_disk_that_a_step_finds_full_is_no_failure_of_its_process(error: Exception) -> None:
     problem = make_problem(error)
-    with pytest.raises(DiskFullError, match=r"disk is full; free some space") as found:
+    with pytest.raises(DiskFullError, match=r"disk is full; free some space") as raised:
         _answer({"problem": problem.detail, "kind": problem.type.rpartition(":")[2]})
-    assert make_problem(found.value) == problem.model_copy(update={"title": "Disk is full"})
+    assert make_problem(raised.value) == problem.model_copy(update={"title": "Disk is full"})
 
 
 def test_probes_of_a_server_that_is_stopped_are_no_lines(client: TestClient, caplog: pytest.LogCaptureFixture) -> None:

@@ -51,7 +51,13 @@ def settings(
 
 
 def spans_of(sent: list[ExportTraceServiceRequest]) -> list[Any]:
-    return [span for one in sent for of in one.resource_spans for scope in of.scope_spans for span in scope.spans]
+    return [
+        span
+        for request in sent
+        for resource_spans in request.resource_spans
+        for scope in resource_spans.scope_spans
+        for span in scope.spans
+    ]
 
 
 def about(span: Any) -> dict[str, Any]:
@@ -74,19 +80,25 @@ def test_an_edit_is_traced_from_the_socket_to_the_frame(
         session.text("problem")
     traces = client.app.state.services.live.traces  # type: ignore[attr-defined]
     traces.close()
-    assert {value.value.string_value for one in sent for value in one.resource_spans[0].resource.attributes} >= {
-        "relume"
-    }
+    assert {
+        value.value.string_value for request in sent for value in request.resource_spans[0].resource.attributes
+    } >= {"relume"}
     spans = spans_of(sent)
     (root,) = (span for span in spans if span.name == "edit" and not span.status.code)
-    told = about(root)
-    assert told["relume.session"] == hello["session"]
-    assert (told["relume.request"], told["relume.bake"]) == ("r-1", baked.bake)
-    assert (told["relume.revision"], told["relume.view"], told["relume.active_control"]) == (1, "front", SIGMA)
-    assert told["relume.frame"] <= frame.header["frame"]
-    parts = [span for span in spans if span.parent_span_id == root.span_id]
-    assert [part.name for part in parts] == [f"edit.{name}" for name in ("apply", "wait", "update", "encode", "send")]
-    times = [time for part in parts for time in (part.start_time_unix_nano, part.end_time_unix_nano)]
+    attributes = about(root)
+    assert attributes["relume.session"] == hello["session"]
+    assert (attributes["relume.request"], attributes["relume.bake"]) == ("r-1", baked.bake)
+    assert (attributes["relume.revision"], attributes["relume.view"], attributes["relume.active_control"]) == (
+        1,
+        "front",
+        SIGMA,
+    )
+    assert attributes["relume.frame"] <= frame.header["frame"]
+    children = [span for span in spans if span.parent_span_id == root.span_id]
+    assert [child.name for child in children] == [
+        f"edit.{name}" for name in ("apply", "wait", "update", "encode", "send")
+    ]
+    times = [time for child in children for time in (child.start_time_unix_nano, child.end_time_unix_nano)]
     assert all(early <= late for early, late in pairwise(times))
     assert (times[0], times[-1]) == (root.start_time_unix_nano, root.end_time_unix_nano)
     (refused,) = (span for span in spans if span.name == "edit" and span.status.code)
@@ -98,13 +110,13 @@ def test_a_collector_that_is_away_is_said_once_and_that_it_is_back(
     settings: Settings, sent: list[ExportTraceServiceRequest], caplog: pytest.LogCaptureFixture
 ) -> None:
     exporter = OTLPSpanExporter(timeout=1)
-    there, away = exporter._client._endpoint, "http://127.0.0.1:9/v1/traces"
+    reachable, unreachable = exporter._client._endpoint, "http://127.0.0.1:9/v1/traces"
     collector = TraceExporter(exporter)
-    for endpoint in (there, away, away, there):
+    for endpoint in (reachable, unreachable, unreachable, reachable):
         exporter._client._endpoint = endpoint
         collector.export(())
     collector.shutdown()
-    (lost, found) = caplog.records
-    assert (lost.levelname, found.levelname) == ("ERROR", "WARNING")
+    (lost, recovered) = caplog.records
+    assert (lost.levelname, recovered.levelname) == ("ERROR", "WARNING")
     assert "the trace collector does not answer" in lost.getMessage()
     assert len(sent) == 2

@@ -40,15 +40,15 @@ def test_phases_of_a_bake(tmp_path: Path, entered: list[str], num_rays: int) -> 
     with BakeService(tmp_path, num_workers=1, methods={"fake": FakeMethod(num_rays=num_rays)}) as service:
         register_scene(service.data_dir, service.ledger, tiny_scene())
         with service.subscribe(service.submit(tiny_scene().id, RECIPE)) as changes:
-            seen = list(changes)
-    assert seen[-1].state == "ready"
+            statuses = list(changes)
+    assert statuses[-1].state == "ready"
     assert (entered[0] == "starting") == (num_rays == LARGE)
     order = ["starting", "reading", "loading", "sampling", "tracing", "publishing"]
-    known = [phase for phase in entered if phase in order]
-    assert known == sorted(known, key=order.index)
-    assert {"reading", "sampling", "tracing", "publishing"} <= set(known)
-    assert all((status.phase is None) == (status.phase_since is None) for status in seen)
-    assert seen[-1].phase is None
+    known_phases = [phase for phase in entered if phase in order]
+    assert known_phases == sorted(known_phases, key=order.index)
+    assert {"reading", "sampling", "tracing", "publishing"} <= set(known_phases)
+    assert all((status.phase is None) == (status.phase_since is None) for status in statuses)
+    assert statuses[-1].phase is None
     assert not list((tmp_path / "bakes" / "staging").iterdir())
 
 
@@ -57,7 +57,7 @@ def test_how_many_wait_before_a_bake(tmp_path: Path) -> None:
     register_scene(service.data_dir, service.ledger, tiny_scene())
     recipes = [replace(RECIPE, num_lights=lights) for lights in (8, 16, 24, 32)]
     plans = [Plan(1, rays, 1, 1) for rays in (LARGE, 1000, LARGE, LARGE)]  # the tiny one has a lane of its own
-    ids = [service.ledger.submit(tiny_scene().id, *one) for one in zip(recipes, plans, strict=True)]
+    ids = [service.ledger.submit(tiny_scene().id, *arguments) for arguments in zip(recipes, plans, strict=True)]
     assert [service.get(identity).queue_position for identity in ids] == [0, 0, 1, 2]
     assert {status.id: status.queue_position for status in service.bakes()} == dict(zip(ids, [0, 0, 1, 2], strict=True))
     service.ledger.claim(ids[0], "host/1/nonce/1")
@@ -70,8 +70,8 @@ def test_kernels_that_are_compiled_are_noted(tmp_path: Path, monkeypatch: pytest
     written: list[str] = []
     write = TaskNotes._write
 
-    def noted(self: TaskNotes, what: Any) -> None:
-        write(self, what)
+    def noted(self: TaskNotes, note: Any) -> None:
+        write(self, note)
         written.append(read_note(tmp_path / "one.zarr") or "")
 
     monkeypatch.setattr(TaskNotes, "_write", noted)
@@ -117,7 +117,7 @@ def test_stages_are_known_from_bakes_of_the_same_scene_where_there_are_any(tmp_p
         for task in (Task(0, 0, "front", 0, 1), Task(1, 0, "front", 0, 1), Task(1, 1, "front", 1, 2)):
             service.ledger.finish_task(identity, "host/1/nonce/1", task, TaskCost(1, seconds, seconds), 1)
         service.ledger.finish(identity, "host/1/nonce/1", "ready")
-    known = [service.ledger.stage_seconds(scene.id, "fake", 2, 8) for scene in scenes]
-    assert known == [{0: 3.0, 1: 3.0}, {0: 5.0, 1: 5.0}, {0: 8.0, 1: 8.0}]
+    stage_seconds = [service.ledger.stage_seconds(scene.id, "fake", 2, 8) for scene in scenes]
+    assert stage_seconds == [{0: 3.0, 1: 3.0}, {0: 5.0, 1: 5.0}, {0: 8.0, 1: 8.0}]
     assert service.ledger.stage_seconds(scenes[0].id, "other", 2, 8) == {}
     service.close()

@@ -30,13 +30,13 @@ def run(seconds: float, done_before: int = 0) -> list[dict[str, float | None]]:
     progress.begin_stage(TASKS, last=True)
     for task in TASKS[:done_before]:
         progress.add(task, TaskCost(1000, 1, 1), is_local=False)
-    seen = []
+    fields = []
     for task in TASKS[done_before:]:
         for _ in range(int(seconds)):
-            seen.append(progress.fields())
+            fields.append(progress.fields())
             clock.now += 1
         progress.add(task, TaskCost(1000, 1, 1), is_local=True)
-    return [*seen, progress.fields()]
+    return [*fields, progress.fields()]
 
 
 def test_progress_never_falls_and_ends_at_one() -> None:
@@ -49,10 +49,10 @@ def test_progress_never_falls_and_ends_at_one() -> None:
 
 @pytest.mark.parametrize("done_before", [0, 5])
 def test_time_left_comes_true(done_before: int) -> None:
-    seen = run(4, done_before)
-    assert [fields["seconds_left"] for fields in seen[:4]] == [None] * 4
-    for elapsed, fields in enumerate(seen[4:], start=4):
-        assert fields["seconds_left"] == pytest.approx(len(seen) - 1 - elapsed, abs=1e-6)
+    samples = run(4, done_before)
+    assert [fields["seconds_left"] for fields in samples[:4]] == [None] * 4
+    for elapsed, fields in enumerate(samples[4:], start=4):
+        assert fields["seconds_left"] == pytest.approx(len(samples) - 1 - elapsed, abs=1e-6)
         assert fields["rays_per_second"] == pytest.approx(250, rel=0.01)
 
 
@@ -74,7 +74,7 @@ def lefts_of(true_s: float, prior_s: float | None, parallel: int = 1, num_tasks:
     progress.begin_stage([Task(0, 0, "front", 0, 0)], last=False)
     assert progress.fields()["seconds_left"] is None
     progress.begin_work()
-    began, seen = clock.now, []
+    began, estimates = clock.now, []
     clock.now += 0.1 * true_s
     progress.add(Task(0, 0, "front", 0, 0), TaskCost(1000, 1, 0.1 * true_s * parallel), is_local=True)
     tasks = [Task(1, i, "front", i * 10, i * 10 + 10) for i in range(num_tasks)]
@@ -89,17 +89,17 @@ def lefts_of(true_s: float, prior_s: float | None, parallel: int = 1, num_tasks:
         clock.now = now
         progress.add(task, TaskCost(1000, 1, seconds), is_local=True)
         left = progress.fields()["seconds_left"]
-        seen.append((0.1 + 0.9 * done / num_tasks, left, max(free) - now))
+        estimates.append((0.1 + 0.9 * done / num_tasks, left, max(free) - now))
     assert max(free) - began == pytest.approx(true_s, rel=0.1)
-    return seen
+    return estimates
 
 
 @pytest.mark.parametrize("slower", [0.1, 0.3, 1.0, 3.0, 10.0])
 @pytest.mark.parametrize("parallel", [1, 2, 8])
 @pytest.mark.parametrize("is_foretold", [True, False])
 def test_a_tenth_of_the_work_tells_the_rest(slower: float, parallel: int, is_foretold: bool) -> None:
-    seen = lefts_of(100.0 * slower, 100.0 if is_foretold else None, parallel)
-    for done, said, true in seen:
+    estimates = lefts_of(100.0 * slower, 100.0 if is_foretold else None, parallel)
+    for done, said, true in estimates:
         if 0.1 < done < 0.95:
             assert said == pytest.approx(true, rel=0.25), done
 

@@ -70,7 +70,7 @@ def test_a_bake_of_other_code_stays_usable_and_says_so(tmp_path: Path, running: 
         new = service.submit(SCENE.id, RECIPE)
         assert new != old
         follow(service, new)
-        assert [(service.get(one).code, service.get(one).is_current) for one in (old, new)] == [
+        assert [(service.get(bake_id).code, service.get(bake_id).is_current) for bake_id in (old, new)] == [
             (OLD, False),
             (NEW, True),
         ]
@@ -102,11 +102,11 @@ def test_a_bake_that_other_code_has_begun_starts_again_and_says_why(
         assert not staging_path(tmp_path, identity).exists()
         service.ledger.requeue(identity, ("cancelled",))
     with service.subscribe(identity) as changes, service:
-        seen = list(changes)
-        assert [seen[-1].state, seen[-1].problem, seen[-1].code] == ["ready", None, NEW]
+        statuses = list(changes)
+        assert [statuses[-1].state, statuses[-1].problem, statuses[-1].code] == ["ready", None, NEW]
         assert read_code(service.store_path(identity)) == NEW
         assert open_store(service.store_path(identity)).attributes["code"] == NEW
-    assert how == "cancelled" or CODE_CHANGED_MESSAGE in {status.problem for status in seen}
+    assert how == "cancelled" or CODE_CHANGED_MESSAGE in {status.problem for status in statuses}
     assert len(log.read_text().split()) == num_old + NUM_TASKS
 
 

@@ -71,14 +71,14 @@ def test_calls_that_overlap_a_change_say_nothing_new(caplog: pytest.LogCaptureFi
 
 
 def test_a_loop_says_each_fault_once_and_that_it_is_over(caplog: pytest.LogCaptureFixture) -> None:
-    complaint = DatabaseError(logging.getLogger("loop"), "it cannot be read")
+    error = DatabaseError(logging.getLogger("loop"), "it cannot be read")
     with caplog.at_level(logging.WARNING, "loop"):
         for _ in range(3):
-            complaint.report_failure(OperationalError("SELECT 1", {}, Exception("away")))
-        complaint.report_failure(DiskFullError("the database"))
+            error.report_failure(OperationalError("SELECT 1", {}, Exception("away")))
+        error.report_failure(DiskFullError("the database"))
         for _ in range(2):
-            complaint.report_recovered()
-        complaint.report_failure(ZeroDivisionError("nobody foresaw it"))
+            error.report_recovered()
+        error.report_failure(ZeroDivisionError("nobody foresaw it"))
     assert [record.getMessage().split(" (")[0] for record in caplog.records] == [
         "it cannot be read",
         "it cannot be read",

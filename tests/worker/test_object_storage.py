@@ -60,9 +60,9 @@ def storage(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.
         boto3.client("s3", endpoint_url=keys["AWS_ENDPOINT_URL"], region_name="us-east-1").create_bucket(Bucket=bucket)
         url = f"s3://{bucket}/team"
     monkeypatch.setenv("RELUME_STORAGE", url)
-    found = get_storage()
-    assert found is not None
-    return found
+    configured = get_storage()
+    assert configured is not None
+    return configured
 
 
 @pytest.fixture
@@ -150,8 +150,8 @@ def test_what_is_stored_is_a_zarr_store_that_others_can_open(
     with machine(tmp_path, "one", ledger_of_all) as service:
         register_scene(service.data_dir, service.ledger, SCENE)
         path = bake(service)
-    there = ObjectStore(storage._store, read_only=True)
-    opened = zarr.open_array(there, path=f"bakes/{path.name}/views/0/visibility", mode="r")
+    object_store = ObjectStore(storage._store, read_only=True)
+    opened = zarr.open_array(object_store, path=f"bakes/{path.name}/views/0/visibility", mode="r")
     assert (opened[:] == open_store(path).read("views/0/visibility")).all()
 
 

@@ -86,13 +86,13 @@ def test_revisions_make_the_tables_of_the_code(ledger_url: str) -> None:
 def test_a_ledger_from_before_revisions_becomes_a_new_one_with_its_rows(old: Path) -> None:
     before = connect(f"sqlite:///{old}")
     assert revision(before) is None
-    found = rows(before)
+    old_rows = rows(before)
     before.dispose()
     with closing(Ledger(engine := open_database(f"sqlite:///{old}"))) as ledger:
         assert (revision(engine), differences(engine)) == (latest_revision(), [])
-        assert all(found.values())
+        assert all(old_rows.values())
         now = rows(engine)
-        assert [row[: len(old)] for row, old in pairs(now, found)] == [old for _, old in pairs(now, found)]
+        assert [row[: len(old)] for row, old in pairs(now, old_rows)] == [old for _, old in pairs(now, old_rows)]
         (scene,), (bake,) = list_scenes(ledger), ledger.bakes()
         assert (bake.scene, bake.state, len(ledger.finished_tasks(bake.id))) == (scene.id, "ready", 20)
         assert [camera.name for camera in list_cameras(ledger, scene.id)] == ["kept"]
@@ -178,7 +178,7 @@ def test_what_adds_is_made_at_start_and_what_does_not_waits_for_a_word(
         open_database(ledger_url)
     engine = connect(ledger_url)
     assert "note" in {column["name"] for column in inspect(engine).get_columns("looks")}
-    assert [what for _, what in upgrade(engine, is_requested=True)] == ["Tests"]
+    assert [name for _, name in upgrade(engine, is_requested=True)] == ["Tests"]
     assert upgrade(engine, is_requested=True) == []
     engine.dispose()
     open_database(ledger_url).dispose()
