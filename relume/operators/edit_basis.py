@@ -47,7 +47,7 @@ class EditBasis(Protocol):
         """Return True if the curves of a term document of the same kind lie in the basis."""
         ...
 
-    def coefficients(self, bands: Mapping[str, F64]) -> Shaped[F64, "3 columns"]:
+    def coefficients(self, bands: Mapping[str, F64]) -> Shaped[F64, "*batch 3 columns"]:
         """Return the coefficients c of a term's curves, (3, J) each."""
         ...
 
@@ -90,7 +90,7 @@ class CurveBasis:
         """Return True: the basis represents any shape."""
         return True
 
-    def coefficients(self, bands: Mapping[str, F64]) -> Shaped[F64, "3 columns"]:
+    def coefficients(self, bands: Mapping[str, F64]) -> Shaped[F64, "*batch 3 columns"]:
         """Return the wavelet coefficients."""
         return analysis(bands[self.name])
 

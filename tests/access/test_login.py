@@ -24,18 +24,18 @@ Bearer = Callable[..., dict[str, str]]
 
 def calls(at_least: Role) -> list[tuple[str, str]]:
     """Calls that need so much, their ids filled in."""
-    found = []
+    calls_of_role = []
     for path, roles in RULES.items():
         filled = re.sub(r"\{\w+\}", "0123456789abcdef", path)
-        found += [(method, filled) for method, role in roles.items() if role >= at_least and method != SOCKET]
-    return found
+        calls_of_role += [(method, filled) for method, role in roles.items() if role >= at_least and method != SOCKET]
+    return calls_of_role
 
 
 def me(client: TestClient) -> dict[str, Any]:
     """Who the server thinks it is, without what it says of itself."""
-    found: dict[str, Any] = client.get("/api/me").json()
-    assert found.pop("allow_viewer_comments") is False
-    return found
+    identity: dict[str, Any] = client.get("/api/me").json()
+    assert identity.pop("allow_viewer_comments") is False
+    return identity
 
 
 def test_nobody_gets_in_anywhere(client: TestClient) -> None:
@@ -96,9 +96,9 @@ def test_the_secret_counts_not_the_id(client: TestClient, bearer: Bearer) -> Non
 
 def test_secrets_are_not_kept(access: AuthServices, settings: Settings) -> None:
     secret = access.tokens.add("Ann", "edit").split("_", 2)[2]
-    kept = b"".join(path.read_bytes() for path in settings.data.glob("relume.db*"))
-    assert b"Ann" in kept
-    assert secret.encode() not in kept
+    database_bytes = b"".join(path.read_bytes() for path in settings.data.glob("relume.db*"))
+    assert b"Ann" in database_bytes
+    assert secret.encode() not in database_bytes
 
 
 def test_tokens_run_out_and_are_revoked(
@@ -183,35 +183,35 @@ class TestProxy:
     def test_it_writes_names_in_utf_8(self, client: TestClient, settings: Settings) -> None:
         settings.proxy_roles["Zoë"] = "edit"
         for sent in ("Zoë".encode(), "Zoë".encode("latin-1")):
-            told = self.at(client, "10.1.2.3").get("/api/me", headers={b"X-Forwarded-User": sent}).json()
-            assert (told["name"], told["role"]) == ("Zoë", "edit")
+            identity = self.at(client, "10.1.2.3").get("/api/me", headers={b"X-Forwarded-User": sent}).json()
+            assert (identity["name"], identity["role"]) == ("Zoë", "edit")
 
     def test_nobody_elses_word_counts(self, client: TestClient) -> None:
         for address in ("192.168.0.1", "testclient", ""):
             other = self.at(client, address)
             assert other.get("/api/scenes", headers={"X-Forwarded-User": "Ann"}).status_code == 401
-            told = {"X-Forwarded-User": "Ann", "X-Forwarded-For": "10.1.2.3"}
-            assert other.get("/api/scenes", headers=told).status_code == 401
+            headers = {"X-Forwarded-User": "Ann", "X-Forwarded-For": "10.1.2.3"}
+            assert other.get("/api/scenes", headers=headers).status_code == 401
 
     def test_addresses_are_those_that_it_saw(self, client: TestClient, bearer: Bearer, access: AuthServices) -> None:
-        told = {"X-Forwarded-For": "1.2.3.4, 192.0.2.7"}  # of which the client may have made up the first
+        headers = {"X-Forwarded-For": "1.2.3.4, 192.0.2.7"}  # of which the client may have made up the first
         for each, name in ((self.at(client, "10.1.2.3"), "Red"), (client, "Blue")):
-            each.put(f"/api/looks/{name}", json={}, headers={**told, **bearer("edit", name)})
+            each.put(f"/api/looks/{name}", json={}, headers={**headers, **bearer("edit", name)})
         assert [line.address for line in access.audit.list()] == ["testclient", "192.0.2.7"]
 
     def test_tls_that_it_ends_makes_cookies_secure(self, client: TestClient, access: AuthServices) -> None:
         token = {"token": access.tokens.add("Ann", "edit")}
-        told = {"X-Forwarded-Proto": "https"}
+        headers = {"X-Forwarded-Proto": "https"}
         behind, direct = (
-            each.post("/api/login", json=token, headers=told).headers["set-cookie"].lower()
+            each.post("/api/login", json=token, headers=headers).headers["set-cookie"].lower()
             for each in (self.at(client, "10.1.2.3"), client)
         )
         assert "secure" in behind
         assert "secure" not in direct
 
     def test_a_token_goes_before_it(self, client: TestClient, bearer: Bearer) -> None:
-        told = {"X-Forwarded-User": "Ann", **bearer("admin", "Root")}
-        assert self.at(client, "10.1.2.3").get("/api/me", headers=told).json()["name"] == "Root"
+        headers = {"X-Forwarded-User": "Ann", **bearer("admin", "Root")}
+        assert self.at(client, "10.1.2.3").get("/api/me", headers=headers).json()["name"] == "Root"
 
 
 def test_names_of_tokens_are_unique_while_they_open(access: AuthServices) -> None:

@@ -130,11 +130,11 @@ class TestBodies:
         assert access.quotas.used_bytes("Ann") == 0
 
     def test_of_one_user_so_many_are_read_at_once(self, access: AuthServices) -> None:
-        now, most = [0], [0]
+        now, peak = [0], [0]
 
         async def slow(scope: Scope, receive: Receive, send: Send) -> None:
             now[0] += 1
-            most[0] = max(most[0], now[0])
+            peak[0] = max(peak[0], now[0])
             await asyncio.sleep(0.01)
             now[0] -= 1
             await taken(scope, receive, send)
@@ -144,7 +144,7 @@ class TestBodies:
             return list(await asyncio.gather(*(Body(whole, [b"x"], length=1)() for _ in range(6))))
 
         assert run_in_thread(all_at_once()) == [201] * 6
-        assert most == [2]
+        assert peak == [2]
 
     def test_who_goes_away_takes_nothing_any_more(self, access: AuthServices) -> None:
         async def gone(scope: Scope, receive: Receive, send: Send) -> None:
@@ -167,14 +167,14 @@ class TestUnpacking:
             return client.post("/api/scenes", files=SCENE, data={"name": f"n{number}"}, headers=ann).status_code
 
         assert send(0) == 201
-        one = access.quotas.used_bytes("Ann")
-        settings.max_bytes_per_user = int(3.5 * one) + 1_000
+        scene_bytes = access.quotas.used_bytes("Ann")
+        settings.max_bytes_per_user = int(3.5 * scene_bytes) + 1_000
         with ThreadPoolExecutor(10) as threads:
             answers = [*threads.map(send, range(1, 11))]
         assert sorted({*answers}) == [201, 429]
-        kept = folder_bytes(settings.data / "scenes")
-        assert one < kept <= settings.max_bytes_per_user
-        assert access.quotas.used_bytes("Ann") == kept
+        stored_bytes = folder_bytes(settings.data / "scenes")
+        assert scene_bytes < stored_bytes <= settings.max_bytes_per_user
+        assert access.quotas.used_bytes("Ann") == stored_bytes
         assert not list(settings.data.glob("upload-*"))
 
     def test_what_unpacks_to_more_than_there_is_left_is_stopped_there(

@@ -130,15 +130,15 @@ def test_failure_is_a_figure_and_the_others_go_on(
 def test_merge_keeps_figures_that_were_not_measured() -> None:
     text = f"before\n{table.BEGIN}\n{table.END}\nafter\n"
     details = {"size": [640, 480], "measured_on": "2026-11-28, schema 8"}
-    one = {"name": "bake.nothing_s", "value": 12.345, "unit": "s", "context": details}
-    two = {"name": "accuracy.lambert", "value": 0.00412, "unit": "relative RMSE", "context": {}}
-    both = table.merge([one], [two])
-    assert both == [two, one]
-    assert table.merge(both, [two]) == both
-    page = table.filled(text, both)
+    first_figure = {"name": "bake.nothing_s", "value": 12.345, "unit": "s", "context": details}
+    second_figure = {"name": "accuracy.lambert", "value": 0.00412, "unit": "relative RMSE", "context": {}}
+    merged = table.merge([first_figure], [second_figure])
+    assert merged == [second_figure, first_figure]
+    assert table.merge(merged, [second_figure]) == merged
+    page = table.filled(text, merged)
     assert "| `bake.nothing_s` | 12.3 s |  |  | 2026-11-28 |" in page.splitlines()
     assert "| `accuracy.lambert` | 0.41 % | ≤ 0.5 % | reference, every texel |  |" in page.splitlines()
-    assert table.filled(page, both) == page
+    assert table.filled(page, merged) == page
     assert page.startswith("before\n")
     assert page.endswith("\nafter\n")
 

@@ -13,12 +13,14 @@ from relume_bench.indirect import ignore_glossy_reflection
 
 def light_in(materials: list[Material]) -> Illumination:
     document = default_look(materials)
-    return illumination_from_look(validate(document, document), [one.name for one in materials], has_bounces=True)
+    return illumination_from_look(
+        validate(document, document), [material.name for material in materials], has_bounces=True
+    )
 
 
 def test_highlights_send_nothing_inside_and_what_they_do_after():
     glossy = cornell_box(is_floor_glossy=True).materials
-    diffuse = [replace(one, terms=tuple(filter(scatters_diffusely, one.terms))) for one in glossy]
+    diffuse = [replace(material, terms=tuple(filter(scatters_diffusely, material.terms))) for material in glossy]
     before = light_in(glossy)
     with ignore_glossy_reflection():
         assert light_in(glossy) == light_in(diffuse)

@@ -15,15 +15,15 @@ def samples(memory: Callable[[float], float], handles: Callable[[float], float],
 
 
 def test_what_warms_up_and_goes_up_and_down_is_flat() -> None:
-    found = samples(lambda s: 2e8 * min(1.0, 0.2 + s / 60) + 1e7 * (s % 20 > 10), lambda s: 40 + s % 3)
-    assert [one.name for one in trends(found) if not one.is_flat] == []
+    measured = samples(lambda s: 2e8 * min(1.0, 0.2 + s / 60) + 1e7 * (s % 20 > 10), lambda s: 40 + s % 3)
+    assert [trend.name for trend in trends(measured) if not trend.is_flat] == []
 
 
 def test_what_leaks_is_told() -> None:
-    found = {one.name: one for one in trends(samples(lambda s: 2e8 + 5e5 * s, lambda s: 40 + s / 4))}
-    assert [name for name, one in found.items() if not one.is_flat] == ["memory MB", "handles"]
-    assert found["memory MB"].slope_per_hour == pytest.approx(0.5 * 3600)
-    assert "GROWS" in found["handles"].line()
+    trends_by_name = {trend.name: trend for trend in trends(samples(lambda s: 2e8 + 5e5 * s, lambda s: 40 + s / 4))}
+    assert [name for name, trend in trends_by_name.items() if not trend.is_flat] == ["memory MB", "handles"]
+    assert trends_by_name["memory MB"].slope_per_hour == pytest.approx(0.5 * 3600)
+    assert "GROWS" in trends_by_name["handles"].line()
 
 
 def test_a_look_is_too_short_to_tell() -> None:

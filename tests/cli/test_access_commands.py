@@ -23,11 +23,11 @@ def test_a_token_is_told_once_listed_revoked_and_written_down(
 ) -> None:
     code, text, _ = run(capsys, tmp_path, "token", "add", "Ann", "--role", "edit", "--days", "30")
     assert code == 0
-    found = open_access(tmp_path).tokens.authenticate(text.strip())
-    assert found is not None
-    assert (found.name, found.role) == ("Ann", Role.EDIT)
+    identity = open_access(tmp_path).tokens.authenticate(text.strip())
+    assert identity is not None
+    assert (identity.name, identity.role) == ("Ann", Role.EDIT)
     _, listed, _ = run(capsys, tmp_path, "token", "list")
-    assert listed.split()[:3] == [found.id, "edit", "valid"]
+    assert listed.split()[:3] == [identity.id, "edit", "valid"]
     assert "until 20" in listed
     assert text.strip().split("_", 2)[2] not in listed
     assert run(capsys, tmp_path, "token", "revoke", "Ann")[0] == 0
@@ -45,14 +45,14 @@ def test_a_token_is_told_once_listed_revoked_and_written_down(
 
 def test_tokens_are_told_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = json.loads(run(capsys, tmp_path, "token", "add", "Ann", "--role", "edit", "--json")[1])
-    found = open_access(tmp_path).tokens.authenticate(made["token"])
-    assert found is not None
+    identity = open_access(tmp_path).tokens.authenticate(made["token"])
+    assert identity is not None
     assert json.loads(run(capsys, tmp_path, "token", "list", "--json")[1]) == {
-        "id": found.id,
+        "id": identity.id,
         "name": "Ann",
         "role": "edit",
         "state": "valid",
-        "created": datetime.fromtimestamp(found.created, UTC).isoformat(),
+        "created": datetime.fromtimestamp(identity.created, UTC).isoformat(),
         "expires": None,
     }
 

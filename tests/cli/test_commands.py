@@ -250,9 +250,9 @@ def test_render_writes_layers_and_says_what_cannot_have_them(
     assert str(spec.format) == "half"
     assert json.loads(spec.get_string_attribute("relume:sceneName")) == "quad"
     assert main(["render", "quad", "--look", str(look), "--light-groups", "--output", str(output)]) == 0
-    found = OpenImageIO.ImageBuf(str(output))
-    assert set(found.spec().channelnames) == {"R", "G", "B", *(f"{n}_direct.{c}" for n in layers for c in "RGB")}
-    red = dict(zip(found.spec().channelnames, np.moveaxis(found.get_pixels(OpenImageIO.FLOAT), 2, 0), strict=True))
+    image = OpenImageIO.ImageBuf(str(output))
+    assert set(image.spec().channelnames) == {"R", "G", "B", *(f"{n}_direct.{c}" for n in layers for c in "RGB")}
+    red = dict(zip(image.spec().channelnames, np.moveaxis(image.get_pixels(OpenImageIO.FLOAT), 2, 0), strict=True))
     np.testing.assert_allclose(sum(red[f"{name}_direct.R"] for name in layers), red["R"], rtol=2e-3)
     assert main(["render", "quad", "--layers", "--light-groups", "--output", str(output)]) == 1
     assert "--light-groups" in capsys.readouterr().err

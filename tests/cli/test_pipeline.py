@@ -204,7 +204,7 @@ def test_a_resumed_batch_leaves_out_what_is_written(run: Any, tmp_path: Path) ->
     words = ["--look", "Blue", "--look", "Red night", "--output", str(tmp_path / "{look}.png"), "--json"]
     code, text, _ = run("render", "quad one", *words, "--resume")
     assert code == 0
-    assert [one["look"] for one in parsed(text)] == ["Blue", "Red night"]
+    assert [picture["look"] for picture in parsed(text)] == ["Blue", "Red night"]
     assert (tmp_path / "Blue.png").read_bytes() == b"there already"
     assert mean_of(tmp_path / "Red-night.png")[0] > 0
 

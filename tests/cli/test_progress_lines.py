@@ -48,13 +48,13 @@ def test_work_that_begins_anew_is_followed_again() -> None:
 
 
 def test_parts_of_work_are_shares_of_all() -> None:
-    told: list[tuple[float, str]] = []
+    reports: list[tuple[float, str]] = []
 
     def tell(share: float, detail: str = "") -> None:
-        told.append((share, detail))
+        reports.append((share, detail))
 
     report_part(tell, 1, 4, "sun")(0.5)
-    assert told == [(0.375, "sun")]
+    assert reports == [(0.375, "sun")]
 
 
 @pytest.fixture

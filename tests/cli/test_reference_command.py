@@ -60,12 +60,12 @@ def test_a_bake_is_compared_with_both_kinds_of_paths(
     output = str(tmp_path / "truth.exr")
     assert main([*ASKED, str(look), "--spp", "512", "--output", output, "--compare"]) == 0
     against_all, against_method, left_out = capsys.readouterr().out.splitlines()
-    found = re.fullmatch(
+    match = re.fullmatch(
         r"against all light paths: error ([\d.]+) ± ([\d.]+) % \(relative RMSE\); noise .*", against_all
     )
-    assert found is not None
-    assert float(found[1]) > 5
-    assert 0 < float(found[2]) < 2
+    assert match is not None
+    assert float(match[1]) > 5
+    assert 0 < float(match[2]) < 2
     of_method = re.fullmatch(r"against the light paths of its method: .*(?:error|below) ([\d.]+) .*", against_method)
     assert of_method is not None
     assert float(of_method[1]) < 5
@@ -73,7 +73,7 @@ def test_a_bake_is_compared_with_both_kinds_of_paths(
     assert main([*ASKED, str(look), "--spp", "256", "--output", output, "--compare", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert (document["path"], document["size"]) == (output, [32, 24])
-    assert document["error_all_paths"]["error"] == pytest.approx(float(found[1]) / 100, rel=0.2)
+    assert document["error_all_paths"]["error"] == pytest.approx(float(match[1]) / 100, rel=0.2)
     assert document["error_method_paths"]["rmse"] < document["error_all_paths"]["rmse"]
     assert main([*ASKED, str(look), "--spp", "4", "--output", output, "--compare", "--size", "8x6"]) == 1
     assert "the bake has its own" in capsys.readouterr().err

@@ -88,7 +88,7 @@ def watched(method: TransferMethod, scene: Scene, recipe: Recipe, tmp_path_facto
     done: list[Done] = []
     store = tmp_path_factory.mktemp("contract") / "store.zarr"
     bake_in_process(
-        method, scene, recipe, store, lambda task, of: done.append(Done(task, tuple(of.arrays), of.num_rays))
+        method, scene, recipe, store, lambda task, rows: done.append(Done(task, tuple(rows.arrays), rows.num_rays))
     )
     return Bake(store, done)
 

@@ -7,7 +7,7 @@ what is refused or undone leaves no trace.
 import numpy as np
 import pytest
 from exact_pictures import exact_image
-from looks_of_pictures import (
+from look_edits import (
     EDITS,
     EXPONENT,
     LIGHTS,
@@ -74,8 +74,8 @@ def test_an_edit_undone_leaves_no_trace(transfer, edit):
 
 def test_a_watched_picture_comes_to_rest_like_any_other(transfer):
     look = make_look(transfer, add_lights(edit_environment(rotation=77.0)))
-    found = live(transfer, edit_environment(rotation=77.0), is_watched=True)
-    np.testing.assert_array_equal(found.image(), exact_image(transfer, look))
+    picture = live(transfer, edit_environment(rotation=77.0), is_watched=True)
+    np.testing.assert_array_equal(picture.image(), exact_image(transfer, look))
 
 
 def test_no_light_is_black(transfer):
@@ -170,8 +170,8 @@ def test_where_no_operator_fits_a_picture_is_shaded(transfer, pointer):
     views, index = transfer.views["front"], transfer.material_names.index("Wall")
     rows = views.rows(index)
     picture = live(transfer, cache=Cache(operator_bytes(rows.stop - rows.start, 64)))
-    found = edited(picture, transfer, pointer, draw_curve).image()
-    assert relative_rmse(found, exact_image(transfer, make_look(transfer, add_lights(draw_curve)))) < ROUNDED
+    actual = edited(picture, transfer, pointer, draw_curve).image()
+    assert relative_rmse(actual, exact_image(transfer, make_look(transfer, add_lights(draw_curve)))) < ROUNDED
 
 
 def test_an_environment_that_is_not_here_is_refused_and_changes_nothing(transfer):
@@ -195,8 +195,8 @@ def test_straight_light_is_that_of_brute_force(scene, transfer, recipe):
     """Every texel at exact angles; a hundred triangles for the environment, and curves in bands, are two per cent."""
     brute_force_knows(transfer)
     look = make_look(transfer, add_lights(edit_light("Panel", enabled=False), edit_transport(show="direct")))
-    truth = reference_image(scene, "front", look, recipe.size, 0)
-    assert relative_rmse(exact_image(transfer, look), truth) < 0.03
+    reference = reference_image(scene, "front", look, recipe.size, 0)
+    assert relative_rmse(exact_image(transfer, look), reference) < 0.03
 
 
 OFF = pytest.mark.parametrize(
@@ -222,11 +222,11 @@ def test_light_between_matt_surfaces_is_that_of_brute_force(scene, transfer, rec
         transfer,
         add_lights(edit_light("Panel", enabled=False), off, remove_glossy_term, edit_transport(show="first_bounce")),
     )
-    found = exact_image(transfer, look).mean(axis=(0, 1))
-    assert np.all((found > 0) == has_bounces(transfer))
+    actual = exact_image(transfer, look).mean(axis=(0, 1))
+    assert np.all((actual > 0) == has_bounces(transfer))
     expected, deviation = followed(scene, look, recipe, has_bounces(transfer))
     assert np.all(deviation <= 0.05 * expected)
-    assert np.all(np.abs(found - expected) <= 4 * deviation + 0.01 * expected)
+    assert np.all(np.abs(actual - expected) <= 4 * deviation + 0.01 * expected)
 
 
 @OFF
@@ -241,6 +241,6 @@ def test_light_that_highlights_send_is_about_as_much_as_by_brute_force(scene, tr
         followed(scene, each, recipe, True, 4)
         for each in (look, make_look(transfer, add_lights(*lights, remove_glossy_term)))
     )
-    found = exact_image(transfer, look).mean(axis=(0, 1))
+    actual = exact_image(transfer, look).mean(axis=(0, 1))
     assert np.all(sent_by_matt < 0.67 * expected)
-    assert np.all(np.abs(found - expected) <= 4 * deviation + 0.15 * expected)
+    assert np.all(np.abs(actual - expected) <= 4 * deviation + 0.15 * expected)

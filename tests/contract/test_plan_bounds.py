@@ -84,8 +84,8 @@ def test_what_a_scene_brings_is_planned(make: object) -> None:
 def test_a_picture_of_3840_pixels_fits_where_one_process_samples_it(name: str, blades: Scene) -> None:
     views = [replace(blades.cameras[0], name=view) for view in ("front", "again")]
     plans = [
-        METHODS[name].plan(replace(blades, cameras=views), Recipe(name, of, (3840, 2160), 1000))
-        for of in (("front",), ("front", "again"))
+        METHODS[name].plan(replace(blades, cameras=views), Recipe(name, view_names, (3840, 2160), 1000))
+        for view_names in (("front",), ("front", "again"))
     ]
     assert plans[0].peak_bytes < 9e9
     assert plans[0].peak_bytes - plans[0].lone_bytes < 2e9

@@ -34,10 +34,10 @@ def test_variables_are_settings() -> None:
 def test_values_that_templates_take_are_there() -> None:
     values = yaml.safe_load((CHART / "values.yaml").read_text())
     for path in re.findall(r"\.Values\.([A-Za-z.]+)", "".join(TEMPLATES.values())):
-        found = values
-        for part in path.split("."):
-            assert part in found, path
-            found = found[part]
+        value = values
+        for key in path.split("."):
+            assert key in value, path
+            value = value[key]
 
 
 def test_nginx_is_the_one_that_is_tried() -> None:
@@ -49,7 +49,7 @@ def test_nginx_is_the_one_that_is_tried() -> None:
 def test_servers_believe_the_proxys_pods_and_hear_nobody_else() -> None:
     server, policy, proxy = (TEMPLATES[name] for name in ("server.yaml", "policy.yaml", "proxy.yaml"))
     assert re.search(r'RELUME_TRUSTED_PROXIES\n +value: {{ list \(printf "%s-proxy.%s.svc"', server)
-    (headless,) = [part for part in proxy.split("\n---\n") if "clusterIP: None" in part]
+    (headless,) = [document for document in proxy.split("\n---\n") if "clusterIP: None" in document]
     assert "name: {{ $name }}-proxy" in headless  # so that the name has the addresses of the pods
     assert "kind: NetworkPolicy" in policy
     assert "app.kubernetes.io/component: proxy" in policy
@@ -59,8 +59,8 @@ def test_servers_believe_the_proxys_pods_and_hear_nobody_else() -> None:
 
 
 def test_addresses_of_clients_come_through_the_ingress() -> None:
-    (place,) = re.findall(r'replace "([^"]+)"', TEMPLATES["proxy.yaml"])
-    assert (CHART / "nginx.conf").read_text().count(place) == 1
+    (marker,) = re.findall(r'replace "([^"]+)"', TEMPLATES["proxy.yaml"])
+    assert (CHART / "nginx.conf").read_text().count(marker) == 1
 
 
 @pytest.mark.parametrize("options", [SECRET, FULL])
@@ -69,9 +69,9 @@ def test_helm_has_nothing_to_say(options: list[str]) -> None:
     if helm is None:
         pytest.skip("helm is not installed")
     subprocess.run([helm, "lint", "--strict", str(CHART), *options], check=True)
-    told = subprocess.run([helm, "template", str(CHART), *options], check=True, capture_output=True, text=True).stdout
-    kinds = [document["kind"] for document in yaml.safe_load_all(told) if document]
+    output = subprocess.run([helm, "template", str(CHART), *options], check=True, capture_output=True, text=True).stdout
+    kinds = [document["kind"] for document in yaml.safe_load_all(output) if document]
     assert {"StatefulSet", "Deployment", "ConfigMap", "Service", "NetworkPolicy"} <= set(kinds)
     is_full = options == FULL
-    assert ("set_real_ip_from 10.0.0.0/8;" in told) == is_full
-    assert ("RELUME_HTTPS_ONLY" in told) == is_full
+    assert ("set_real_ip_from 10.0.0.0/8;" in output) == is_full
+    assert ("RELUME_HTTPS_ONLY" in output) == is_full

@@ -20,7 +20,7 @@ def shown() -> list[list[str]]:
     """The words of every command in a block of the page."""
     blocks = re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL)
     lines = [line for block in blocks for line in block.splitlines()]
-    return [shlex.split(part, comments=True)[1:] for line in lines for part in re.findall(r"relume [^\n]*", line)]
+    return [shlex.split(command, comments=True)[1:] for line in lines for command in re.findall(r"relume [^\n]*", line)]
 
 
 @pytest.mark.parametrize("words", shown(), ids=" ".join)

@@ -25,8 +25,8 @@ Loader.add_constructor("!reset", lambda loader, node: None)
 
 
 def read(name: str) -> dict[str, Any]:
-    found: dict[str, Any] = yaml.load((DOCKER / name).read_text(), Loader)
-    return found
+    configuration: dict[str, Any] = yaml.load((DOCKER / name).read_text(), Loader)
+    return configuration
 
 
 def networks(service: dict[str, Any]) -> set[str]:

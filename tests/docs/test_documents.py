@@ -122,9 +122,9 @@ def test_lists_of_files_name_what_is_there(document: Path) -> None:
 
 def test_folder_map_of_the_readme_matches_ls() -> None:
     section = _read("README.md").split("## Folders")[1]
-    told = set(re.findall(r"^(\w+)/", section.split("```")[1], flags=re.MULTILINE))
-    there = {path.name for path in ROOT.iterdir() if path.is_dir() and not path.name.startswith((".", "_"))}
-    assert told == {name for name in there - IGNORED_FOLDERS if not name.endswith(".egg-info")}
+    documented = set(re.findall(r"^(\w+)/", section.split("```")[1], flags=re.MULTILINE))
+    actual = {path.name for path in ROOT.iterdir() if path.is_dir() and not path.name.startswith((".", "_"))}
+    assert documented == {name for name in actual - IGNORED_FOLDERS if not name.endswith(".egg-info")}
 
 
 def test_method_lists_every_term_and_its_curves() -> None:
@@ -137,9 +137,9 @@ def test_method_lists_every_term_and_its_curves() -> None:
 
 
 def test_operations_lists_every_setting_and_no_other() -> None:
-    told = set(re.findall(r"RELUME_[A-Z_]+", _read("docs/operations.md")))
+    documented = set(re.findall(r"RELUME_[A-Z_]+", _read("docs/operations.md")))
     from_environment = {"RELUME_THREADS", "RELUME_SHARED_DATA", "RELUME_STORAGE", "RELUME_STORAGE_CACHE_BYTES"}
-    assert told == {f"RELUME_{name.upper()}" for name in Settings.model_fields} | from_environment
+    assert documented == {f"RELUME_{name.upper()}" for name in Settings.model_fields} | from_environment
 
 
 def test_every_decision_is_in_the_index() -> None:

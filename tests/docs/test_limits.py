@@ -83,9 +83,9 @@ ROWS = {
 
 def test_the_table_of_limits_says_what_the_code_checks() -> None:
     section = OPERATIONS.read_text(encoding="utf-8").split("## Limits")[1].split("\n## ")[0]
-    told = dict(re.findall(r"^\| (?!what)(.+?) \| (.+?) \|$", section, re.MULTILINE))
-    assert {what: at_most for what, at_most in told.items() if what in ROWS} == ROWS
-    assert set(told) - set(ROWS) == {"cached images of edited looks beside a bake"}
+    documented = dict(re.findall(r"^\| (?!what)(.+?) \| (.+?) \|$", section, re.MULTILINE))
+    assert {limit: at_most for limit, at_most in documented.items() if limit in ROWS} == ROWS
+    assert set(documented) - set(ROWS) == {"cached images of edited looks beside a bake"}
 
 
 def test_what_is_said_of_plans_is_what_plans_count() -> None:

@@ -38,20 +38,20 @@ def registry(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CollectorRegi
 @pytest.fixture(scope="module")
 def names(registry: CollectorRegistry) -> set[str]:
     """Of all samples that the server may give."""
-    found = {family.name + suffix for family in registry.collect() for suffix in SUFFIXES[family.type]}
-    assert "relume_edit_to_socket_seconds_bucket" in found
-    return found | OF_PROMETHEUS
+    sample_names = {family.name + suffix for family in registry.collect() for suffix in SUFFIXES[family.type]}
+    assert "relume_edit_to_socket_seconds_bucket" in sample_names
+    return sample_names | OF_PROMETHEUS
 
 
 def expressions() -> dict[str, str]:
     """PromQL by the name of its rule or panel."""
     rules = yaml.safe_load((MONITORING / "alerts.yml").read_text())["groups"][0]["rules"]
     board = json.loads((MONITORING / "dashboard.json").read_text())
-    found = {rule["alert"]: rule["expr"] for rule in rules}
+    expression_by_name = {rule["alert"]: rule["expr"] for rule in rules}
     for panel in board["panels"]:
-        found |= {f"{panel['title']} {target['refId']}": target["expr"] for target in panel["targets"]}
-    found["instances"] = board["templating"]["list"][1]["query"]["query"]
-    return found
+        expression_by_name |= {f"{panel['title']} {target['refId']}": target["expr"] for target in panel["targets"]}
+    expression_by_name["instances"] = board["templating"]["list"][1]["query"]["query"]
+    return expression_by_name
 
 
 @pytest.mark.parametrize("name", expressions())
@@ -63,14 +63,14 @@ def test_what_is_asked_for_is_there(name: str, names: set[str]) -> None:
 
 
 def test_labels_that_rules_match_are_there(registry: CollectorRegistry) -> None:
-    known = {"instance", "job"}
+    labels = {"instance", "job"}
     for collector in set(registry._collector_to_names):
-        known |= set(getattr(collector, "_labelnames", ()))
-    known |= {label for family in registry.collect() for sample in family.samples for label in sample.labels}
+        labels |= set(getattr(collector, "_labelnames", ()))
+    labels |= {label for family in registry.collect() for sample in family.samples for label in sample.labels}
     for text in expressions().values():
         matched = {label for group in re.findall(r"\{([^}]*)\}", text) for label in re.findall(r"(\w+)\s*[!=]", group)}
         grouped = {label for group in re.findall(r"by \(([^)]*)\)", text) for label in re.findall(r"\w+", group)}
-        assert matched | grouped <= known, text
+        assert matched | grouped <= labels, text
 
 
 def test_of_the_ledger_that_servers_share_none_is_counted_twice() -> None:

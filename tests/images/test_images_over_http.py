@@ -201,7 +201,7 @@ def test_a_session_equals_a_render_and_undo_restores_it(client, uploaded):
         for revision, texture in enumerate((uploaded["texture"], "image:0000000000000000", "diffuse"), 1):
             session.edit(revision, path, texture)
             if revision == 2:
-                assert "image that was sent" in session.text("problem")["problem"]["detail"]
+                assert "image that was uploaded" in session.text("problem")["problem"]["detail"]
             else:
                 pictures.append(session.exact(revision))
     before, painted, after = (picture.payload for picture in pictures)

@@ -13,7 +13,7 @@ from fastapi.testclient import TestClient
 from PIL import Image
 from shared_bakes import unmeasured
 from test_end_to_end import wait_until_done
-from test_moving_eyes import SIZE, bake, client, eye, scene
+from test_free_camera_sessions import SIZE, bake, client, eye, scene
 
 from relume.core.errors import RelumeError
 from relume_server.io.video import write_video
@@ -37,20 +37,20 @@ def frames_of(client: TestClient, request: dict[str, Any], folder: Path) -> list
     url = answer.headers["location"]
     done = wait_until_done(client, url)
     assert done["state"] == "ready", done["problem"]
-    found = []
+    frames = []
     for index in range(done["total"]):
         file = folder / f"{index}.exr"
         file.write_bytes(client.get(f"{url}/frames/{index}").content)
-        found.append(OpenImageIO.ImageBuf(str(file)).get_pixels(OpenImageIO.FLOAT)[..., :3])
-    return found
+        frames.append(OpenImageIO.ImageBuf(str(file)).get_pixels(OpenImageIO.FLOAT)[..., :3])
+    return frames
 
 
 @pytest.fixture(scope="module")
 def view(client: TestClient, bake: str) -> dict[str, Any]:
     with client.websocket_connect(f"/api/bakes/{bake}/session", subprotocols=["relume.v2"]) as session:
         session.send_json({"type": "open"})
-        found: dict[str, Any] = session.receive_json()["views"][0]
-    return found
+        first_view: dict[str, Any] = session.receive_json()["views"][0]
+    return first_view
 
 
 def test_a_turntable_goes_once_around_exactly_or_quickly(
@@ -70,14 +70,17 @@ def test_a_turntable_goes_once_around_exactly_or_quickly(
 def test_an_object_turns_under_light_that_stays_and_the_light_alone(
     client: TestClient, scene: dict[str, Any], bake: str, view: dict[str, Any], tmp_path: Path
 ) -> None:
-    lamp = {"kind": "point", "position": [2.0, 1.0, 2.0], "emission": [60.0, 30.0, 0.0]}
-    asked = {"bake": bake, "view": view["name"], "quality": "interactive", "looks": [{"lights": {"Lamp": lamp}}]}
-    found = {
+    light = {"kind": "point", "position": [2.0, 1.0, 2.0], "emission": [60.0, 30.0, 0.0]}
+    asked = {"bake": bake, "view": view["name"], "quality": "interactive", "looks": [{"lights": {"Lamp": light}}]}
+    frames_by_motion = {
         turns: frames_of(client, asked | {"path": {"turntable": 5, "rotate": turns}}, tmp_path)
         for turns in ("camera", "object", "environment")
     }
-    first = found["camera"][0]
-    of_frame = {turns: [np.sqrt(np.mean((frame - first) ** 2)) for frame in frames] for turns, frames in found.items()}
+    first = frames_by_motion["camera"][0]
+    of_frame = {
+        turns: [np.sqrt(np.mean((frame - first) ** 2)) for frame in frames]
+        for turns, frames in frames_by_motion.items()
+    }
     assert max(frames[0] for frames in of_frame.values()) == 0
     assert max(of_frame["object"]) < 0.3 * min(
         of_frame["camera"][1:]
@@ -89,39 +92,39 @@ def test_an_object_turns_under_light_that_stays_and_the_light_alone(
     look = {"environment": {"rotation": 120}}
     (expected,) = frames_of(client, of_fixed | {"looks": [look]}, tmp_path)
     np.testing.assert_array_equal(turned[1], expected)
-    told = client.post(
+    response = client.post(
         "/api/renders/looks", json=of_fixed | {"looks": [{}], "path": {"turntable": 3, "rotate": "environment"}}
     )
-    assert [frame["environment"]["rotation"] for frame in told.json()["looks"]] == [0, 120, -120]
-    assert told.json()["cameras"] is None
+    assert [frame["environment"]["rotation"] for frame in response.json()["looks"]] == [0, 120, -120]
+    assert response.json()["cameras"] is None
 
 
 def test_a_way_from_camera_to_camera_with_looks_between_looks(
     client: TestClient, bake: str, view: dict[str, Any], material: str, tmp_path: Path
 ) -> None:
-    eyes = []
+    cameras = []
     for aside in (0.0, 0.4):
         placed = eye(view, 1, aside)
-        eyes.append({"to_world": placed["to_world"], "yfov": math.degrees(placed["yfov"])})
+        cameras.append({"to_world": placed["to_world"], "yfov": math.degrees(placed["yfov"])})
     looks = [of(material, [0.8, 0.0, 0.0]), of(material, [0.0, 0.0, 0.8])]
     request = {
         "bake": bake,
         "view": view["name"],
-        "path": {"cameras": eyes},
+        "path": {"cameras": cameras},
         "looks": looks,
         "frames": 3,
         "quality": "interactive",
     }
-    found = frames_of(client, request, tmp_path)
-    assert len(found) == 3
-    middle = [frame[SIZE[1] // 2, SIZE[0] // 2] for frame in found]
+    frames = frames_of(client, request, tmp_path)
+    assert len(frames) == 3
+    middle = [frame[SIZE[1] // 2, SIZE[0] // 2] for frame in frames]
     assert middle[0][0] > 0.01
     assert middle[0][2] < 1e-6
     assert middle[2][2] > 0.01
     assert middle[2][0] < 1e-6
     assert min(middle[1][0], middle[1][2]) > 0.003  # half red and half blue
-    last = frames_of(client, request | {"path": {"cameras": eyes[1:]}, "looks": looks[1:], "frames": None}, tmp_path)
-    np.testing.assert_array_equal(found[2], last[0])
+    last = frames_of(client, request | {"path": {"cameras": cameras[1:]}, "looks": looks[1:], "frames": None}, tmp_path)
+    np.testing.assert_array_equal(frames[2], last[0])
 
 
 @pytest.mark.parametrize(
@@ -165,8 +168,8 @@ def test_a_fixed_view_follows_looks_but_no_path(
     assert refused.status_code == 422
     assert "probes" in refused.json()["detail"]
     looks = [of(material, [0.8, 0.4, 0.0]), of(material, [0.0, 0.4, 0.8])]
-    found = frames_of(client, {"bake": fixed["id"], "view": name, "looks": looks, "frames": 3}, tmp_path)
-    np.testing.assert_allclose(found[1], (found[0] + found[2]) / 2, rtol=2e-3, atol=2e-3)
+    frames = frames_of(client, {"bake": fixed["id"], "view": name, "looks": looks, "frames": 3}, tmp_path)
+    np.testing.assert_allclose(frames[1], (frames[0] + frames[2]) / 2, rtol=2e-3, atol=2e-3)
 
 
 def test_a_video_is_made_where_there_is_an_encoder(
@@ -204,8 +207,8 @@ def test_a_video_shows_the_colours_of_its_frames_and_says_by_which_matrix(tmp_pa
     ]
     done = subprocess.run([*read, *matrix, str(tmp_path / "seen.png")], capture_output=True, text=True, check=True)
     assert "yuv420p(tv, bt709/bt709/iec61966-2-1" in done.stderr
-    seen = np.asarray(Image.open(tmp_path / "seen.png"))[16, 16::33][: len(colours)]
-    assert np.abs(seen.astype(int) - colours).max() <= 4
+    decoded = np.asarray(Image.open(tmp_path / "seen.png"))[16, 16::33][: len(colours)]
+    assert np.abs(decoded.astype(int) - colours).max() <= 4
 
 
 @pytest.mark.parametrize(
@@ -234,25 +237,25 @@ def test_looks_of_frames_are_told_as_they_will_be_rendered(
     colors = [look["materials"][material]["terms"][0]["color"] for look in looks]
     np.testing.assert_allclose(colors, [[0.8 - 0.2 * k, 0, 0.2 * k] for k in range(5)], atol=1e-9)
     small = {"view": view["name"], "size": [20, 15], "quality": "interactive"}
-    told = frames_of(client, {"bake": bake, "looks": looks, **small}, tmp_path)
+    listed = frames_of(client, {"bake": bake, "looks": looks, **small}, tmp_path)
     rendered = frames_of(client, {**keys, **small}, tmp_path)
-    for one, other in zip(told, rendered, strict=True):
-        np.testing.assert_array_equal(one, other)
+    for actual, expected in zip(listed, rendered, strict=True):
+        np.testing.assert_array_equal(actual, expected)
 
 
 def test_places_of_frames_are_told_as_they_will_be_rendered(
     client: TestClient, bake: str, view: dict[str, Any], tmp_path: Path
 ) -> None:
-    eyes = [{"to_world": placed["to_world"], "yfov": 40.0} for placed in (eye(view, 1, 0.0), eye(view, 1, 0.4))]
+    cameras = [{"to_world": placed["to_world"], "yfov": 40.0} for placed in (eye(view, 1, 0.0), eye(view, 1, 0.4))]
     keys = {"bake": bake, "looks": [{}, {}], "frames": 3, "view": view["name"]}
-    for path in ({"cameras": eyes}, {"turntable": 3, "start_camera": eyes[1]}):
+    for path in ({"cameras": cameras}, {"turntable": 3, "start_camera": cameras[1]}):
         answer = client.post("/api/renders/looks", json={**keys, "path": path})
         assert answer.status_code == 200, answer.text
-        told = answer.json()["cameras"]
-        assert len(told) == 3
+        listed = answer.json()["cameras"]
+        assert len(listed) == 3
         small = {"bake": bake, "view": view["name"], "size": [20, 15], "quality": "interactive"}
         rendered = frames_of(client, {**small, "looks": [{}], "path": path, "frames": 3}, tmp_path)
-        alone = frames_of(client, {**small, "looks": [{}, {}, {}], "path": {"cameras": told}}, tmp_path)
+        alone = frames_of(client, {**small, "looks": [{}, {}, {}], "path": {"cameras": listed}}, tmp_path)
         np.testing.assert_allclose(alone, rendered, atol=1e-5)
         assert np.abs(rendered[1] - rendered[0]).max() > 0.01
 

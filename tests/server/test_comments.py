@@ -51,19 +51,19 @@ def test_a_comment_is_kept_listed_settled_opened_and_deleted(
     assert (second["text"], second["author"], second["picture"]) == ("And here", "Guest", None)
     picture = client.get(made["picture"])
     assert picture.headers["content-type"] == "image/webp"
-    with Image.open(io.BytesIO(picture.content)) as kept:
-        assert (kept.format, kept.size) == ("WEBP", (320, 192))
+    with Image.open(io.BytesIO(picture.content)) as stored_image:
+        assert (stored_image.format, stored_image.size) == ("WEBP", (320, 192))
 
-    one = f"{path}/{made['id']}"
-    assert client.patch(one, json={"resolved": True}).status_code == 204
+    comment_url = f"{path}/{made['id']}"
+    assert client.patch(comment_url, json={"resolved": True}).status_code == 204
     settled = client.get(path).json()[0]
     assert (settled["resolved"], settled["resolved_by"]) == (True, "somebody")
-    client.patch(one, json={"resolved": False})
+    client.patch(comment_url, json={"resolved": False})
     assert not client.get(path).json()[0]["resolved"]
-    assert client.delete(one).status_code == 204
+    assert client.delete(comment_url).status_code == 204
     assert [each["text"] for each in client.get(path).json()] == ["And here"]
-    assert parse_problem(client.delete(one))["status"] == 404
-    assert parse_problem(client.patch(one, json={"resolved": True}))["status"] == 404
+    assert parse_problem(client.delete(comment_url))["status"] == 404
+    assert parse_problem(client.patch(comment_url, json={"resolved": True}))["status"] == 404
     assert parse_problem(client.get(made["picture"]))["status"] == 404
 
 
@@ -129,8 +129,8 @@ def test_rooms_are_told_of_what_another_server_took(
 
     # the server's own looks once at most
     monkeypatch.setattr("relume_server.collaboration.comment_sync.POLL_INTERVAL_S", 1e9)
-    told: list[str] = []
-    monkeypatch.setattr(services.live.rooms, "notify_comment", told.append)
+    notified: list[str] = []
+    monkeypatch.setattr(services.live.rooms, "notify_comment", notified.append)
     with open_session(client, baked.bake, opening=ROOM_FIELDS) as ann:
         ann.text("hello")
         look()
@@ -138,7 +138,7 @@ def test_rooms_are_told_of_what_another_server_took(
         made = other.add(baked.scene, pin, "There", "Bob", None)
         look()
         look()
-        assert told == [baked.scene]
+        assert notified == [baked.scene]
         other.resolve(baked.scene, made.id, "Bob")
         look()
         other.resolve(baked.scene, made.id, None)
@@ -146,4 +146,4 @@ def test_rooms_are_told_of_what_another_server_took(
         other.delete(baked.scene, made.id)
         look()
         look()
-        assert told == [baked.scene] * 4
+        assert notified == [baked.scene] * 4

@@ -51,12 +51,12 @@ def test_comparison_finds_the_error_and_shows_it(client: TestClient, control: Co
     # the stand-in's truth is the frame's pixel over 1.1, its noise a fiftieth; by all paths it is three quarters
     assert (body["paths"], body["omitted_paths"], body["unsupported_paths"]) == ("all", ["What surfaces reflect."], [])
     assert body["error_all_paths"]["error"] == pytest.approx(1 / 3, rel=0.02)
-    found = body["error_method_paths"]
-    assert found["error"] == pytest.approx(0.1, rel=0.02)
-    assert 0 < found["standard_error"] < 0.001
-    assert found["error"] < found["error_upper_bound"] < 0.11
-    assert found["noise"] == pytest.approx(0.02 / np.sqrt(6), rel=0.05)
-    assert found["significant_pixel_fraction"] > 0.99
+    method_error = body["error_method_paths"]
+    assert method_error["error"] == pytest.approx(0.1, rel=0.02)
+    assert 0 < method_error["standard_error"] < 0.001
+    assert method_error["error"] < method_error["error_upper_bound"] < 0.11
+    assert method_error["noise"] == pytest.approx(0.02 / np.sqrt(6), rel=0.05)
+    assert method_error["significant_pixel_fraction"] > 0.99
     for prefix in ("", "method-"):
         error = np.asarray(Image.open(io.BytesIO(client.get(f"{url}/{prefix}error.png").content)), int)
         assert error.shape == (SIZE[1], SIZE[0], 3)
@@ -209,11 +209,11 @@ def test_a_moving_view_is_compared_from_where_its_eye_is(
     url = submit(client, baked, 2, camera=camera, size=[40, 24])
     assert wait_until(client, url, is_done)["state"] == "ready"
     assert Image.open(io.BytesIO(client.get(f"{url}/error.png").content)).size == (40, 24)
-    (frame_from,) = [eye for eye in control.frame_cameras if eye is not None]
-    for seen_from, size in (frame_from, *control.pass_cameras):
+    (frame_from,) = [pose for pose in control.frame_cameras if pose is not None]
+    for pose_of_pass, size in (frame_from, *control.pass_cameras):
         assert size == (40, 24)  # smaller ones are made of larger pictures first
-        assert np.array_equal(seen_from.to_world, to_world)
-        assert seen_from.yfov == pytest.approx(np.radians(40))
+        assert np.array_equal(pose_of_pass.to_world, to_world)
+        assert pose_of_pass.yfov == pytest.approx(np.radians(40))
     request = {"bake": baked.bake, "view": "front", "camera": camera}
     for change in (
         {"size": [16384, 16384]},

@@ -32,15 +32,19 @@ def settings(settings: Settings) -> Settings:
 
 
 def test_its_views_are_listed_tabled_and_rendered(client: TestClient, baked: Baked, tmp_path: Path) -> None:
-    told, config = client.get("/api/color").json(), Config(CONFIG)
-    assert {each["name"]: tuple(each["views"]) for each in told["displays"]} == config.displays
-    assert (told["default"], told["working"], tuple(told["spaces"])) == (VIEW, config.working, config.spaces)
-    table = client.get(f"/api/color/{told['id']}/lut", params=VIEW)
+    color_settings, config = client.get("/api/color").json(), Config(CONFIG)
+    assert {each["name"]: tuple(each["views"]) for each in color_settings["displays"]} == config.displays
+    assert (color_settings["default"], color_settings["working"], tuple(color_settings["spaces"])) == (
+        VIEW,
+        config.working,
+        config.spaces,
+    )
+    table = client.get(f"/api/color/{color_settings['id']}/lut", params=VIEW)
     assert table.content == config.table(OcioView(**VIEW)).tobytes()
     assert len(table.content) == 2 * 3 * SIZE**3
     assert "immutable" in table.headers["cache-control"]
     assert client.get(f"/api/color/{'0' * 16}/lut", params=VIEW).status_code == 404
-    assert client.get(f"/api/color/{told['id']}/lut", params=VIEW | {"view": "Raw?"}).status_code == 422
+    assert client.get(f"/api/color/{color_settings['id']}/lut", params=VIEW | {"view": "Raw?"}).status_code == 422
 
     display = {"exposure": 1.0, "tone_map": VIEW}
     request = {"bake": baked.bake, "view": "front", "looks": [{"display": display}], "precision": "float"}
@@ -53,9 +57,9 @@ def test_its_views_are_listed_tabled_and_rendered(client: TestClient, baked: Bak
     pictures = {}
     for name in (None, "lin_ap1"):
         (tmp_path / "a.exr").write_bytes(rendered(format="exr", color_space=name))
-        found = OpenImageIO.ImageBuf(str(tmp_path / "a.exr"))
-        pictures[name] = found.get_pixels(OpenImageIO.FLOAT)
-    assert found.spec().getattribute("chromaticities") == pytest.approx(INTEROP_SPACES["lin_ap1_scene"])
+        exr_image = OpenImageIO.ImageBuf(str(tmp_path / "a.exr"))
+        pictures[name] = exr_image.get_pixels(OpenImageIO.FLOAT)
+    assert exr_image.spec().getattribute("chromaticities") == pytest.approx(INTEROP_SPACES["lin_ap1_scene"])
     light = np.ascontiguousarray(pictures[None]).reshape(-1, 3)
     converted = light.copy()
     config.convert(converted, "ACEScg")
@@ -80,8 +84,8 @@ def test_what_it_does_not_have_is_refused_before_anything_is_rendered(client: Te
         asked = json.dumps(request | {"looks": [{}], "format": "exr", "color_space": name})
         headers = {"Content-Type": "application/json"}
         assert client.post("/api/renders", content=asked, headers=headers).status_code == 422
-    truth = {"bake": baked.bake, "view": "front", "look": request["looks"][1]}
-    assert client.post("/api/comparisons", json=truth).json()["parameter"] == "/look/display/tone_map"
+    comparison = {"bake": baked.bake, "view": "front", "look": request["looks"][1]}
+    assert client.post("/api/comparisons", json=comparison).json()["parameter"] == "/look/display/tone_map"
 
 
 def test_processes_that_render_are_told_the_config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -92,7 +96,7 @@ def test_processes_that_render_are_told_the_config(tmp_path: Path, monkeypatch: 
         return SimpleNamespace(stdin=io.StringIO(), stdout=io.StringIO(), pid=0, poll=lambda: 0)
 
     monkeypatch.setattr("subprocess.Popen", start)
-    for told in ((CONFIG, "ACEScg"), (CONFIG, None), (None,)):
-        with using_config(*told):
+    for arguments in ((CONFIG, "ACEScg"), (CONFIG, None), (None,)):
+        with using_config(*arguments):
             BatchProcess(tmp_path, 1, 2, 3)
     assert [command[-2:] for command in started] == [[CONFIG, "ACEScg"], ["3", CONFIG], ["2", "3"]]

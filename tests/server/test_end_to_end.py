@@ -113,10 +113,10 @@ def test_frame_is_true(real: TestClient) -> None:
     bake_request: dict[str, Any] = {"scene": scene["id"], "size": [32, 24], "lights": 1000}
     bake = wait_until_done(real, real.post("/api/bakes", json=bake_request).headers["location"])
     request = {"bake": bake["id"], "view": scene["views"][0]["name"], "passes": 8}
-    truth = wait_until_done(real, real.post("/api/comparisons", json=request).headers["location"])
-    assert truth["state"] == "ready", truth["problem"]
-    assert truth["error_all_paths"]["noise"] > 0
-    assert truth["error_all_paths"]["error_upper_bound"] < 0.03  # of the error, which may lie below the noise
+    comparison = wait_until_done(real, real.post("/api/comparisons", json=request).headers["location"])
+    assert comparison["state"] == "ready", comparison["problem"]
+    assert comparison["error_all_paths"]["noise"] > 0
+    assert comparison["error_all_paths"]["error_upper_bound"] < 0.03  # of the error, which may lie below the noise
 
 
 def test_one_drag_changes_two_views_and_both_end_exact(real: TestClient, tmp_path: Path) -> None:

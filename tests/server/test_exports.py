@@ -37,8 +37,8 @@ def test_exr_has_layers_tells_how_far_it_is_and_can_be_stopped(
     control.render_gate.clear()
     assert client.post("/api/renders", json=request | {"layers": "all"}).status_code == 422
     stopped, url, groups = (
-        client.post("/api/renders", json=request | {"layers": of, "precision": "float"}).headers["location"]
-        for of in (True, True, "light_groups")
+        client.post("/api/renders", json=request | {"layers": light, "precision": "float"}).headers["location"]
+        for light in (True, True, "light_groups")
     )
     while client.get(stopped).json()["progress"] != 0.5 / 4:
         time.sleep(0.02)
@@ -56,5 +56,5 @@ def test_exr_has_layers_tells_how_far_it_is_and_can_be_stopped(
     assert wait_until(client, groups, is_done)["state"] == "ready"
     (tmp_path / "a.exr").write_bytes(client.get(f"{groups}/frames/0").content)
     names = {name.partition(".")[0] for name in OpenImageIO.ImageBuf(str(tmp_path / "a.exr")).spec().channelnames}
-    assert names == {"R", "G", "B", *(f"light_{of}_direct" for of in ("environment", "Key", "key_2"))}
+    assert names == {"R", "G", "B", *(f"light_{light}_direct" for light in ("environment", "Key", "key_2"))}
     assert len(list((client.app.state.services.settings.data / "renders").iterdir())) == 2

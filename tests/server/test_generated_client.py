@@ -65,8 +65,8 @@ def test_it_imports_a_scene_bakes_it_and_downloads_a_frame(generated: ModuleType
     bake = call("bakes.submit_bake", client=api, body=asked).parsed
     assert wait_until(client, f"/api/bakes/{bake.id}", lambda body: body["state"] == "ready")
     view = scene.views[0].name
-    of = {"bake": bake.id, "view": view, "format_": model("RenderRequestFormat").PNG}
-    asked = model("RenderRequest")(looks=[model("Look")()], **of)
+    arguments = {"bake": bake.id, "view": view, "format_": model("RenderRequestFormat").PNG}
+    asked = model("RenderRequest")(looks=[model("Look")()], **arguments)
     render = call("renders.submit_render", client=api, body=asked).parsed
     assert wait_until(client, f"/api/renders/{render.id}", lambda body: body["state"] == "ready")
     frame = call("renders.get_frame", client=api, render=render.id, index=0).parsed

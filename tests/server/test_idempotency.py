@@ -102,10 +102,10 @@ def test_a_call_that_is_not_answered_yet_is_not_made_twice(
     renders, is_at_it, may_go_on = client.app.state.services.renders, threading.Event(), threading.Event()
     submit = renders.submit
 
-    def slow(*told: Any, **named: Any) -> str:
+    def slow(*arguments: Any, **keywords: Any) -> str:
         is_at_it.set()
         assert may_go_on.wait(30)
-        return str(submit(*told, **named))
+        return str(submit(*arguments, **keywords))
 
     monkeypatch.setattr(renders, "submit", slow)
     answers: list[Any] = []
@@ -126,8 +126,8 @@ def test_a_call_that_is_not_answered_yet_is_not_made_twice(
 
 @pytest.fixture
 def store(client: TestClient) -> IdempotencyStore:
-    found: IdempotencyStore = client.app.state.services.idempotency
-    return found
+    idempotency_store: IdempotencyStore = client.app.state.services.idempotency
+    return idempotency_store
 
 
 ANSWER = Answer(201, "/api/scenes/0", "application/json", b"{}")
@@ -148,8 +148,8 @@ def test_keys_are_each_clients_own_and_run_out(client: TestClient, store: Idempo
 def test_a_call_whose_server_has_died_is_made_again(client: TestClient, store: IdempotencyStore) -> None:
     assert store.claim("ann", "one", "a") is None
     with client.app.state.services.bakes.ledger.sessions.begin() as session:
-        place, _, nonce, number = session.scalars(select(IdempotencyRow.owner)).one().split("/")
-        session.execute(update(IdempotencyRow).values(owner=f"{place}/{2**22 + 1}/{nonce}/{number}"))
+        host_id, _, nonce, number = session.scalars(select(IdempotencyRow.owner)).one().split("/")
+        session.execute(update(IdempotencyRow).values(owner=f"{host_id}/{2**22 + 1}/{nonce}/{number}"))
     assert store.claim("ann", "one", "a") is None
     with client.app.state.services.bakes.ledger.sessions.begin() as session:
         session.execute(update(IdempotencyRow).values(created=epoch_s() - idempotency.ABANDONED_S - 1))
@@ -174,10 +174,10 @@ def test_of_too_many_answers_the_oldest_go_and_large_ones_become_the_way_to_what
 
 def test_a_forms_digest_is_the_same_however_its_bytes_come() -> None:
     def digest(boundary: bytes, *parts: bytes) -> str:
-        found = _Digest(boundary)
-        for part in parts:
-            found.add(part)
-        return found.hex()
+        new_digest = _Digest(boundary)
+        for chunk in parts:
+            new_digest.add(chunk)
+        return new_digest.hex()
 
     def body(boundary: bytes, text: bytes = b"text") -> bytes:
         return b"--" + boundary + b"\r\na\r\n--" + boundary + text + b"\r\n--" + boundary + b"--"

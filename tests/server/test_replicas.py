@@ -43,8 +43,8 @@ class _server:  # noqa: N801  (a context)
                 return connection.respond(self._refusal, self._number)
             if "Upgrade" in headers:
                 return None
-            told = " ".join((self._number, headers["Host"], headers["X-Request-ID"], headers["X-Forwarded-For"]))
-            return connection.respond(200, told)
+            answer_text = " ".join((self._number, headers["Host"], headers["X-Request-ID"], headers["X-Forwarded-For"]))
+            return connection.respond(200, answer_text)
 
         self._server = serve(lambda each: each.send(self._number), *self._at, process_request=answer)  # type: ignore[arg-type]
         Thread(target=self._server.serve_forever, daemon=True).start()
@@ -64,9 +64,9 @@ def test_all_of_a_room_come_to_one_server_whatever_their_bakes(proxy: int) -> No
     servers = {}
     for k, room in enumerate(rooms):
         queries = [f"?room_prefix={name[:ROOM_PREFIX]}" for name in (room, derive_view_token(room))]
-        found = {session(proxy, f"{k:015d}{j}", query) for j, query in enumerate(queries)}
-        assert len(found) == 1, room
-        servers[room] = found.pop()
+        answering = {session(proxy, f"{k:015d}{j}", query) for j, query in enumerate(queries)}
+        assert len(answering) == 1, room
+        servers[room] = answering.pop()
     assert len(set(servers.values())) > 1
 
 
@@ -79,20 +79,20 @@ def test_all_of_a_room_come_to_one_server_where_one_name_means_all_of_them(tmp_p
         named = stack.enter_context(proxy_to_shared_name(tmp_path, addresses, port))
         rooms = [secrets.token_hex(16) for _ in range(12)]
         queries = [f"?room_prefix={room[:ROOM_PREFIX]}" for room in rooms]
-        found = [{session(named, f"{k:016x}", query) for _ in range(3)} for k, query in enumerate(queries)]
-    assert all(len(servers) == 1 for servers in found)
-    assert len(set.union(*found)) > 1
+        answering = [{session(named, f"{k:016x}", query) for _ in range(3)} for k, query in enumerate(queries)]
+    assert all(len(servers) == 1 for servers in answering)
+    assert len(set.union(*answering)) > 1
 
 
 def test_all_on_a_bake_come_to_one_server(proxy: int) -> None:
     bakes = [f"{k:016x}" for k in range(12)]
-    found = {}
+    server_of_bake = {}
     for bake in bakes:
         first, again = (session(proxy, bake, query) for query in ("", "?other=abc"))
-        told = _get(f"http://127.0.0.1:{proxy}/api/bakes/{bake}/probes/points")
-        assert first == again == told.split()[0]
-        found[bake] = first
-    assert len(set(found.values())) > 1
+        answer = _get(f"http://127.0.0.1:{proxy}/api/bakes/{bake}/probes/points")
+        assert first == again == answer.split()[0]
+        server_of_bake[bake] = first
+    assert len(set(server_of_bake.values())) > 1
 
 
 def test_whom_a_leaving_server_refuses_another_has_at_once(tmp_path: Path) -> None:
@@ -119,21 +119,21 @@ def test_a_call_that_is_refused_is_not_made_again_elsewhere(tmp_path: Path) -> N
 
 
 def test_other_calls_go_to_any_server_and_say_where_they_come_from(proxy: int) -> None:
-    told = [_get(f"http://127.0.0.1:{proxy}/api/scenes").split() for _ in range(12)]
-    assert len({number for number, *_ in told}) > 1
-    assert len({request for _, _, request, _ in told}) == 12
-    assert {(host, address) for _, host, _, address in told} == {(f"127.0.0.1:{proxy}", "127.0.0.1")}
+    answers = [_get(f"http://127.0.0.1:{proxy}/api/scenes").split() for _ in range(12)]
+    assert len({number for number, *_ in answers}) > 1
+    assert len({request for _, _, request, _ in answers}) == 12
+    assert {(host, address) for _, host, _, address in answers} == {(f"127.0.0.1:{proxy}", "127.0.0.1")}
 
 
 def _answers(port: int) -> set[str]:
     """Of many calls that go to any server: its number, or the status that it refuses them with."""
-    found = set()
+    answers = set()
     for _ in range(40):
         try:
-            found.add(_get(f"http://127.0.0.1:{port}/api/scenes").split()[0])
+            answers.add(_get(f"http://127.0.0.1:{port}/api/scenes").split()[0])
         except HTTPError as refused:
-            found.add(str(refused.code))
-    return found
+            answers.add(str(refused.code))
+    return answers
 
 
 def _get(url: str) -> str:

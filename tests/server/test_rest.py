@@ -200,20 +200,20 @@ def test_what_moving_views_make_of_terms_is_told(client: TestClient) -> None:
 
 def test_what_a_material_sends_back_is_told(client: TestClient) -> None:
     grey = {"model": "lambert", "color": [0.2, 0.5, 0.3]}
-    told = client.post("/api/models/albedo", json={"terms": [grey]}).json()
-    assert told["mean"] == pytest.approx(grey["color"], rel=1e-3)
-    assert told["max"] == pytest.approx(0.5, rel=0.01)
+    albedo = client.post("/api/models/albedo", json={"terms": [grey]}).json()
+    assert albedo["mean"] == pytest.approx(grey["color"], rel=1e-3)
+    assert albedo["max"] == pytest.approx(0.5, rel=0.01)
     bright = {"model": "blinn_phong", "color": [0.5, 0.5, 0.5], "params": {"exponent": 20.0}}
-    told = client.post("/api/models/albedo", json={"terms": [grey, bright]}).json()
-    assert told["max"] > 1
-    assert 0 <= told["max_angle_degrees"] < 90
+    albedo = client.post("/api/models/albedo", json={"terms": [grey, bright]}).json()
+    assert albedo["max"] > 1
+    assert 0 <= albedo["max_angle_degrees"] < 90
     for bad in ([], [{"model": "nothing"}], [grey] * 99):
         assert client.post("/api/models/albedo", json={"terms": bad}).status_code == 422
 
 
 def test_a_server_without_a_colour_config_has_no_views(client: TestClient, baked: Baked) -> None:
-    told = client.get("/api/color").json()
-    assert not any(told.values())
+    color_settings = client.get("/api/color").json()
+    assert not any(color_settings.values())
     assert client.get(f"/api/color/{'0' * 16}/lut", params={"display": "a", "view": "b"}).status_code == 404
     look = {"display": {"tone_map": {"display": "a", "view": "b"}}}
     refused = client.post("/api/renders", json={"bake": baked.bake, "view": "front", "looks": [look], "format": "png"})

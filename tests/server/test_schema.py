@@ -21,17 +21,17 @@ SCHEMA = schemathesis.openapi.from_dict(create_app(Settings()).openapi())
 # importing a scene starts a process each time, and forms of files are streamed: tests/hostile tries these by hand
 UPLOADS = ["/api/scenes", "/api/materials/measured", "/api/environments", "/api/images"]
 UPLOADS += ["/api/materials/btf/jobs", "/api/materials/btf/jobs/geometry"]
-OPERATIONS = [found.ok() for found in SCHEMA.exclude(path=UPLOADS, method="POST").get_all_operations()]
+OPERATIONS = [result.ok() for result in SCHEMA.exclude(path=UPLOADS, method="POST").get_all_operations()]
 
 
 def send(client: TestClient, case: Any) -> Any:
-    told = case.as_transport_kwargs(base_url="http://testserver")
-    told.pop("cookies")
-    body = told.pop("data", None)
+    arguments = case.as_transport_kwargs(base_url="http://testserver")
+    arguments.pop("cookies")
+    body = arguments.pop("data", None)
     if isinstance(body, str | bytes):
-        told["content"] = body
-    headers = {name: value for name, value in told.pop("headers").items() if value is not None}
-    return client.request(**told, headers=headers)
+        arguments["content"] = body
+    headers = {name: value for name, value in arguments.pop("headers").items() if value is not None}
+    return client.request(**arguments, headers=headers)
 
 
 @pytest.mark.parametrize("operation", OPERATIONS, ids=lambda operation: f"{operation.method} {operation.path}")

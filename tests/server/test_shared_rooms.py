@@ -43,9 +43,9 @@ def told(session: Session, path: str) -> dict[str, Any]:
 
 def people(session: Session, done: Any) -> list[dict[str, Any]]:
     """Wait until who is here is as it should be."""
-    while not done(found := session.text("room")["people"]):
+    while not done(participants := session.text("room")["people"]):
         pass
-    return found
+    return participants
 
 
 def picture(session: Session, revision: int, value: int) -> int:
@@ -144,17 +144,17 @@ def test_who_is_here_is_told(client: TestClient, baked: Baked) -> None:
             room = bob.text("hello")["room"]
             assert (room["self_id"], [each["name"] for each in room["people"]]) == (2, ["Ann", "Guest 2"])
             bob.send_message(type="presence", name="Bob", material="Paper")
-            found = people(ann, lambda them: them[-1]["name"] == "Bob")
-            assert found[1]["material"] == "Paper"
-            assert found[1]["color"] != found[0]["color"]
+            participants = people(ann, lambda them: them[-1]["name"] == "Bob")
+            assert participants[1]["material"] == "Paper"
+            assert participants[1]["color"] != participants[0]["color"]
             bob.send_message(type="presence", material="Nothing")
             assert "one of Paper" in bob.text("problem")["problem"]["detail"]
             bob.send_message(type="presence", name="\u202e\n")
             assert "printable" in bob.text("problem")["problem"]["detail"]
             bob.websocket.close(LOST)
         # both may be told at once
-        found = people(ann, lambda them: len(them) == 1 or not them[1]["online"])
-        assert len(found) == 1 or len(people(ann, lambda them: len(them) == 1)) == 1
+        participants = people(ann, lambda them: len(them) == 1 or not them[1]["online"])
+        assert len(participants) == 1 or len(people(ann, lambda them: len(them) == 1)) == 1
 
 
 def test_who_comes_is_told_while_frames_wait(client: TestClient, baked: Baked) -> None:
@@ -174,16 +174,18 @@ def test_who_says_goodbye_leaves_at_once(client: TestClient, baked: Baked) -> No
     with joined(client, baked) as ann:
         ann.text("hello")
         with joined(client, baked) as bob:
-            seat = bob.text("hello")["room"]["participant_token"]
-            with open_session(client, baked.bake, opening={**ROOM_FIELDS, "participant_token": seat}) as finer:
+            participant_token = bob.text("hello")["room"]["participant_token"]
+            with open_session(
+                client, baked.bake, opening={**ROOM_FIELDS, "participant_token": participant_token}
+            ) as finer:
                 assert finer.text("hello")["room"]["self_id"] == 2
                 bob.websocket.close(1000)
                 finer.send_message(type="presence", name="Bob")
-                found = people(ann, lambda them: them[-1]["name"] == "Bob")
-                assert [each["online"] for each in found] == [True, True]
+                participants = people(ann, lambda them: them[-1]["name"] == "Bob")
+                assert [each["online"] for each in participants] == [True, True]
                 finer.websocket.close(1000)
-                while len(found := ann.text("room")["people"]) == 2:
-                    assert found[1]["online"]
+                while len(participants := ann.text("room")["people"]) == 2:
+                    assert participants[1]["online"]
 
 
 def test_presence_is_of_no_use_to_one_alone(client: TestClient, baked: Baked) -> None:
@@ -200,12 +202,12 @@ class TestComingBack:
 
     def test_a_place_is_kept_and_the_room_with_it(self, client: TestClient, baked: Baked) -> None:
         with joined(client, baked) as ann:
-            seat = ann.text("hello")["room"]["participant_token"]
+            participant_token = ann.text("hello")["room"]["participant_token"]
             ann.send_message(type="presence", name="Ann")
             ann.edit(1, SIGMA, 0.31)
             ann.exact(1)
             ann.websocket.close(LOST)
-        with open_session(client, baked.bake, opening={**ROOM_FIELDS, "participant_token": seat}) as again:
+        with open_session(client, baked.bake, opening={**ROOM_FIELDS, "participant_token": participant_token}) as again:
             hello = again.text("hello")
             assert (hello["room"]["self_id"], hello["room"]["is_new"], hello["revision"]) == (1, False, 0)
             assert [each["name"] for each in hello["room"]["people"]] == ["Ann"]

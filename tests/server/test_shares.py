@@ -28,38 +28,38 @@ def test_a_link_shows_what_was_shared(client: TestClient, baked: Baked) -> None:
     assert re.fullmatch("[a-z2-7]{10}", entry["id"])
     assert entry["url"] == f"/?share={entry['id']}"
     assert made.headers["location"] == f"/api/shares/{entry['id']}"
-    found = client.get(made.headers["location"]).json()
-    assert found["look"]["materials"]["Paper"]["terms"][0]["color"] == [0.1, 0.2, 0.3]
-    assert set(found["look"]) == set(default_look(tiny_scene().materials))  # complete
-    assert (found["scene"], found["bake"], found["view"], found["views"]) == (
+    shared = client.get(made.headers["location"]).json()
+    assert shared["look"]["materials"]["Paper"]["terms"][0]["color"] == [0.1, 0.2, 0.3]
+    assert set(shared["look"]) == set(default_look(tiny_scene().materials))  # complete
+    assert (shared["scene"], shared["bake"], shared["view"], shared["views"]) == (
         baked.scene, baked.bake, "left", ["front", "left"],
     )  # fmt: skip
-    assert (found["solo"], found["solo_light"], found["paths"], found["missing"]) == ("Paper", "", PATHS, [])
-    assert found["look"]["transport"]["show"] == "all"
-    assert found["cameras"] == {}
+    assert (shared["solo"], shared["solo_light"], shared["paths"], shared["missing"]) == ("Paper", "", PATHS, [])
+    assert shared["look"]["transport"]["show"] == "all"
+    assert shared["cameras"] == {}
     plain = client.get(client.post("/api/shares", json=body(baked)).headers["location"]).json()
     assert (plain["solo"], plain["solo_light"], plain["paths"]) == (None, None, None)
 
 
 def test_a_link_keeps_the_order_in_which_lights_were_added(client: TestClient, baked: Baked) -> None:
-    lamp = {"kind": "point", "position": [0.0, 1.0, 0.0], "emission": [1.0, 1.0, 1.0]}
+    light = {"kind": "point", "position": [0.0, 1.0, 0.0], "emission": [1.0, 1.0, 1.0]}
     for names in (["Key", "Softbox", "Back"], ["Softbox", "Back", "Key"]):
-        made = client.post("/api/shares", json=body(baked, look={"lights": dict.fromkeys(names, lamp)}))
-        found = client.get(made.headers["location"])
-        assert list(found.json()["look"]["lights"]) == names
+        made = client.post("/api/shares", json=body(baked, look={"lights": dict.fromkeys(names, light)}))
+        response = client.get(made.headers["location"])
+        assert list(response.json()["look"]["lights"]) == names
 
 
 def test_a_link_keeps_where_eyes_are(client: TestClient, baked: Baked) -> None:
-    eyes = {"left": {"to_world": [1.0, 0, 0, 2, 0, 1, 0, 3, 0, 0, 1, 4, 0, 0, 0, 1], "yfov": 40.0}}
-    made = client.post("/api/shares", json=body(baked, cameras=eyes, sizes={"left": [90, 60]}))
-    found = client.get(made.headers["location"]).json()
-    assert (found["cameras"], found["sizes"]) == (eyes, {"left": [90, 60]})
-    mirrored = [-1.0, *eyes["left"]["to_world"][1:]]
+    cameras = {"left": {"to_world": [1.0, 0, 0, 2, 0, 1, 0, 3, 0, 0, 1, 4, 0, 0, 0, 1], "yfov": 40.0}}
+    made = client.post("/api/shares", json=body(baked, cameras=cameras, sizes={"left": [90, 60]}))
+    shared = client.get(made.headers["location"]).json()
+    assert (shared["cameras"], shared["sizes"]) == (cameras, {"left": [90, 60]})
+    mirrored = [-1.0, *cameras["left"]["to_world"][1:]]
     for refused in (
         {"cameras": {"left": {"to_world": [], "yfov": 1}}},
-        {"cameras": {"left": eyes["left"] | {"yfov": 180.0}}},
-        {"cameras": {"left": eyes["left"] | {"to_world": mirrored}}},
-        {"cameras": {"nobody": eyes["left"]}},
+        {"cameras": {"left": cameras["left"] | {"yfov": 180.0}}},
+        {"cameras": {"left": cameras["left"] | {"to_world": mirrored}}},
+        {"cameras": {"nobody": cameras["left"]}},
         {"sizes": {"left": [10**6, 1]}},
         {"sizes": {"left": [16384, 16384]}},
         {"sizes": {"nobody": [90, 60]}},
@@ -114,7 +114,7 @@ def test_what_does_not_fit_is_refused(client: TestClient, baked: Baked, wrong: d
 
 
 def test_links_are_bounded(client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch) -> None:
-    kept = client.post("/api/shares", json=body(baked)).json()["id"]
+    latest_id = client.post("/api/shares", json=body(baked)).json()["id"]
     another = body(baked, look={"display": {"exposure": 2.0}})
     for limit, value, status in (("MAX_SHARES", 1, 503), ("MAX_BYTES", 100, 503), ("MAX_SHARE_BYTES", 100, 413)):
         with monkeypatch.context() as context:
@@ -123,8 +123,8 @@ def test_links_are_bounded(client: TestClient, baked: Baked, monkeypatch: pytest
             assert answer.status_code == status
             parse_problem(answer)
     monkeypatch.setattr(share_store, "MAX_SHARES", 1)
-    assert client.delete(f"/api/shares/{kept}").status_code == 204
-    assert client.get(f"/api/shares/{kept}").status_code == 404
+    assert client.delete(f"/api/shares/{latest_id}").status_code == 204
+    assert client.get(f"/api/shares/{latest_id}").status_code == 404
     assert client.post("/api/shares", json=another).status_code == 201
 
 
@@ -132,7 +132,7 @@ def test_a_link_says_what_is_gone(client: TestClient, baked: Baked) -> None:
     made = client.post("/api/shares", json=body(baked)).json()["id"]
     bakes = client.app.state.services.bakes
     delete_scene(bakes.data_dir, bakes.ledger, baked.scene)
-    (lacking,) = client.get(f"/api/shares/{made}").json()["missing"]
-    assert "scene" in lacking
+    (missing,) = client.get(f"/api/shares/{made}").json()["missing"]
+    assert "scene" in missing
     for unknown in ("aaaaaaaaaa", "a" * 33, "ABC", "..%2f"):
         assert client.get(f"/api/shares/{unknown}").status_code in (404, 422)

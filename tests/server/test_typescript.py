@@ -56,10 +56,10 @@ def every(start: Any, number: float) -> Any:
     return [number] * len(start) if isinstance(start, list) else number
 
 
-def check_ends(given: Callable[[Any], dict[str, Any]], start: Any, least: float, most: float) -> None:
-    for field in (first(start, least), every(start, most)):
+def check_ends(given: Callable[[Any], dict[str, Any]], start: Any, minimum: float, maximum: float) -> None:
+    for field in (first(start, minimum), every(start, maximum)):
         complete(given(field), DEFAULT)
-    for field in (first(start, least - 1), every(start, most + 1)):
+    for field in (first(start, minimum - 1), every(start, maximum + 1)):
         with pytest.raises(ParameterError):
             complete(given(field), DEFAULT)
 

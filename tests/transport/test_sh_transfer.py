@@ -172,5 +172,5 @@ def test_shared_directions_equal_listed_rays():
 
 
 def test_glossy_rays_have_no_shared_directions():
-    with pytest.raises(ValueError, match="elsewhere"):
+    with pytest.raises(ValueError, match="another direction"):
         weighted_basis(make_pattern(64, 8, 11), 0, DEGREE)

@@ -123,8 +123,8 @@ def test_all_comes_back_into_either_database(
         assert len(open_store(bake_path(elsewhere, status.id)).shape("views/0/visibility")) == 2
         assert load_scene(scene_path(elsewhere, SCENE.id)).id == SCENE.id
     assert (elsewhere / "renders" / "one" / "0000.png").read_bytes() == b"a picture"
-    found = {path.relative_to(elsewhere).parts[0] for path in elsewhere.rglob("*") if b"not worth" in read(path)}
-    assert found == set()
+    folders = {path.relative_to(elsewhere).parts[0] for path in elsewhere.rglob("*") if b"not worth" in read(path)}
+    assert folders == set()
     assert not list(elsewhere.rglob(".unfinished-*"))
 
 
@@ -139,10 +139,10 @@ def test_the_second_backup_copies_only_what_is_new(data: Path, ledger_url: str, 
         register_scene(data, service.ledger, other := tiny_scene("another"))
     second = take(data, ledger_url, shelf)
     after = {path: path.stat().st_mtime_ns for path in (shelf.folder / "files").rglob("*") if path.is_file()}
-    new = {kept.sha256 for kept in shelf.read(second).all} - {kept.sha256 for kept in shelf.read(first).all}
+    new = {file.sha256 for file in shelf.read(second).all} - {file.sha256 for file in shelf.read(first).all}
     assert {path.name for path in set(after) - set(before)} == new
     assert before.items() <= after.items()
-    paths = {kept.path for kept in shelf.read(second).files} - {kept.path for kept in shelf.read(first).files}
+    paths = {file.path for file in shelf.read(second).files} - {file.path for file in shelf.read(first).files}
     assert paths == {f"scenes/{other.id}/scene.json", f"scenes/{other.id}/arrays.npz"}
 
 
@@ -198,9 +198,9 @@ else:
 """
 
 
-def kill(what: str, data: Path, url: str, shelf: BackupRepository) -> None:
+def kill(action: str, data: Path, url: str, shelf: BackupRepository) -> None:
     """Run it in a process of its own that is killed in the middle of a file."""
-    done = subprocess.run([sys.executable, "-c", KILLED, what, str(data), url, str(shelf.folder)], check=False)
+    done = subprocess.run([sys.executable, "-c", KILLED, action, str(data), url, str(shelf.folder)], check=False)
     assert done.returncode == -signal.SIGKILL
 
 
@@ -217,8 +217,8 @@ def test_a_backup_that_is_killed_is_none_and_the_next_goes_on(
     take(data, ledger_url, shelf)
     snapshot = shelf.read()
     assert list(shelf.find_damaged(snapshot, lambda done: None)) == []
-    kept = copied & {one.sha256 for one in snapshot.files}
-    assert len(kept) == len(copied) - 1  # all but the ledger's copy of before
+    reused = copied & {file.sha256 for file in snapshot.files}
+    assert len(reused) == len(copied) - 1  # all but the ledger's copy of before
     assert not [path for path in shelf.folder.rglob("*") if path.name.startswith(".")]
 
 
@@ -250,16 +250,16 @@ def test_what_is_damaged_is_left_out_and_said(data: Path, ledger_url: str, shelf
     with closing(Ledger(engine := open_database(ledger_url))):
         snapshot = create_backup(data, engine, shelf)
     assert f"bakes/{store.name} is damaged; delete it, and bake or import it again" in snapshot.left_out
-    assert not any("bakes/" in kept.path for kept in snapshot.files)
-    assert any("scenes/" in kept.path for kept in snapshot.files)
+    assert not any("bakes/" in file.path for file in snapshot.files)
+    assert any("scenes/" in file.path for file in snapshot.files)
 
 
 def test_a_damaged_backup_is_found_and_the_next_is_whole(data: Path, ledger_url: str, shelf: BackupRepository) -> None:
     take(data, ledger_url, shelf)
-    kept = next(kept for kept in shelf.read().files if kept.path.startswith("scenes/"))
-    shelf.content_path(kept.sha256).write_bytes(bytes(kept.num_bytes))
-    assert list(shelf.find_damaged(shelf.read(), lambda done: None)) == [kept]
-    shelf.quarantine(kept)
+    file = next(file for file in shelf.read().files if file.path.startswith("scenes/"))
+    shelf.content_path(file.sha256).write_bytes(bytes(file.num_bytes))
+    assert list(shelf.find_damaged(shelf.read(), lambda done: None)) == [file]
+    shelf.quarantine(file)
     take(data, ledger_url, shelf)
     assert list(shelf.find_damaged(shelf.read(), lambda done: None)) == []
 
@@ -268,12 +268,12 @@ def test_a_damaged_bake_costs_no_other_of_a_backup(
     data: Path, ledger_url: str, shelf: BackupRepository, tmp_path: Path
 ) -> None:
     take(data, ledger_url, shelf)
-    kept = next(kept for kept in shelf.read().files if "/visibility/c/" in kept.path)
-    shelf.content_path(kept.sha256).write_bytes(bytes(kept.num_bytes))
+    file = next(file for file in shelf.read().files if "/visibility/c/" in file.path)
+    shelf.content_path(file.sha256).write_bytes(bytes(file.num_bytes))
     elsewhere, url = tmp_path / "elsewhere", f"sqlite:///{tmp_path / 'elsewhere.db'}"
     _, damaged = restore(shelf, None, elsewhere, url)
-    assert damaged == [f"{kept.content_key} is damaged in the backup: bake or import it again"]
-    assert not (elsewhere / kept.content_key).exists()
+    assert damaged == [f"{file.content_key} is damaged in the backup: bake or import it again"]
+    assert not (elsewhere / file.content_key).exists()
     assert load_scene(scene_path(elsewhere, SCENE.id)).id == SCENE.id
     with closing(open_service(elsewhere, url)) as service:
         (status,) = service.bakes()

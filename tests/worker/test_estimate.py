@@ -46,10 +46,10 @@ def test_the_same_bake_again_takes_as_long_whatever_share_of_its_plan_was_traced
 
 
 def test_a_bake_is_judged_by_its_like_and_by_others_where_there_is_none():
-    both = [CompletedBake(LARGE, 40.0), CompletedBake(SMALL, 3.0)]
-    assert estimate_seconds(LARGE, both, 2) == pytest.approx(20.0)
-    assert estimate_seconds(SMALL, both, 2) == pytest.approx(3.0)
-    assert estimate_seconds(SMALL, both[:1], 2) == pytest.approx(20.0 / 40)
+    completed = [CompletedBake(LARGE, 40.0), CompletedBake(SMALL, 3.0)]
+    assert estimate_seconds(LARGE, completed, 2) == pytest.approx(20.0)
+    assert estimate_seconds(SMALL, completed, 2) == pytest.approx(3.0)
+    assert estimate_seconds(SMALL, completed[:1], 2) == pytest.approx(20.0 / 40)
 
 
 def test_larger_bakes_count_for_more():
@@ -83,9 +83,9 @@ def ball(fineness):
 def test_bakes_of_other_methods_judge_by_what_a_ray_takes_in_each():
     recipe = Recipe("direct", ("front",), (640, 480), 500)
     direct, surface = (METHODS[name].plan(ball(4), replace(recipe, method=name)) for name in ("direct", "probes"))
-    found = estimate_seconds(surface, [CompletedBake(direct, 5.0)], 1)
-    assert found == pytest.approx(5.0 * surface.work_s / direct.work_s)
-    assert found > 5 * 5.0 * surface.num_rays / direct.num_rays
+    estimate = estimate_seconds(surface, [CompletedBake(direct, 5.0)], 1)
+    assert estimate == pytest.approx(5.0 * surface.work_s / direct.work_s)
+    assert estimate > 5 * 5.0 * surface.num_rays / direct.num_rays
 
 
 def test_what_small_bakes_took_for_themselves_is_no_rate_of_large_ones():
@@ -97,9 +97,11 @@ def test_what_small_bakes_took_for_themselves_is_no_rate_of_large_ones():
 
 
 def test_plans_that_tell_rays_alone_judge_where_there_are_no_others():
-    told = replace(LARGE, work_s=10.0)
+    timed_plan = replace(LARGE, work_s=10.0)
     assert (
-        estimate_seconds(replace(told, work_s=50.0), [CompletedBake(told, 20.0), CompletedBake(LARGE, 900.0)], 1)
+        estimate_seconds(
+            replace(timed_plan, work_s=50.0), [CompletedBake(timed_plan, 20.0), CompletedBake(LARGE, 900.0)], 1
+        )
         == 100.0
     )
-    assert estimate_seconds(told, [CompletedBake(LARGE, 30.0)], 1) == pytest.approx(30.0)
+    assert estimate_seconds(timed_plan, [CompletedBake(LARGE, 30.0)], 1) == pytest.approx(30.0)

@@ -106,10 +106,10 @@ def test_lease_of_a_dead_process_ends_at_once() -> None:
 
 
 def test_places_are_told_apart_by_more_than_a_host_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    place, _, nonce, number = lease.new_owner().split("/")
-    host, rest = place.split(":", 1)
+    host_id, _, nonce, number = lease.new_owner().split("/")
+    host, rest = host_id.split(":", 1)
     gone = 2**22 + 1
-    assert not lease.may_run(f"{place}/{gone}/{nonce}/{number}")
+    assert not lease.may_run(f"{host_id}/{gone}/{nonce}/{number}")
     assert lease.may_run(f"{host}/{gone}/{nonce}/{number}"), "another machine may have the same name"
     assert lease.may_run(f"{host}:another-start{rest}/{gone}/{nonce}/{number}")
     assert lease.owner_text(lease.new_owner()).startswith(f"{host}, process ")

@@ -130,8 +130,8 @@ def test_everything_killed_resumes_where_the_ledger_stands(
 
 def test_two_processes_bake_one_recipe_once(tmp_path: Path, ledger_url: str, expected: str) -> None:
     log = tmp_path / "log"
-    both = [start(tmp_path / "data", ledger_url, delay_s=0.02, log=str(log)) for _ in range(2)]
-    assert [finish(process)[-1].split()[0] for process in both] == ["ready", "ready"]
+    processes = [start(tmp_path / "data", ledger_url, delay_s=0.02, log=str(log)) for _ in range(2)]
+    assert [finish(process)[-1].split()[0] for process in processes] == ["ready", "ready"]
     assert set(Counter(log.read_text().split()).values()) == {1}
     assert tree_hash(bake_path(tmp_path / "data", IDENTITY)) == expected
 

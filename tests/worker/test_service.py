@@ -65,11 +65,13 @@ def test_bake_is_followed_to_the_end_and_published(tmp_path: Path, expected: str
     with open_service(tmp_path) as service:
         identity = service.submit(SCENE.id, RECIPE)
         with service.subscribe(identity) as changes:
-            seen = list(changes)
-        assert seen[-1].state == "ready"
-        assert seen[-1].progress == 1.0
-        assert seen[-1].bytes == sum(f.stat().st_size for f in service.store_path(identity).rglob("*") if f.is_file())
-        assert [s.progress for s in seen] == sorted(s.progress for s in seen)
+            statuses = list(changes)
+        assert statuses[-1].state == "ready"
+        assert statuses[-1].progress == 1.0
+        assert statuses[-1].bytes == sum(
+            f.stat().st_size for f in service.store_path(identity).rglob("*") if f.is_file()
+        )
+        assert [s.progress for s in statuses] == sorted(s.progress for s in statuses)
         assert tree_hash(service.store_path(identity)) == expected
         assert service.submit(SCENE.id, RECIPE) == identity
         assert service.get(identity).state == "ready"
@@ -145,10 +147,10 @@ def test_where_the_ledger_has_no_room_to_delete_stores_make_some(
         identity = follow(service, service.submit(SCENE.id, RECIPE)).id
         store, cancel = service.store_path(identity), service.ledger.cancel
 
-        def cancel_where_there_is_room(of: str) -> bool:
+        def cancel_where_there_is_room(identity: str) -> bool:
             if store.exists():
                 raise DiskFullError("the database")
-            return cancel(of)
+            return cancel(identity)
 
         monkeypatch.setattr(service.ledger, "cancel", cancel_where_there_is_room)
         delete_scene(service.data_dir, service.ledger, SCENE.id)
@@ -228,10 +230,10 @@ def test_a_bake_that_the_ledger_cannot_be_told_of_says_why_it_waits(
     service, has_room = open_service(tmp_path), threading.Event()
     claim = service.ledger.claim
 
-    def claims(*of: Any) -> bool:
+    def claims(*arguments: Any) -> bool:
         if not has_room.is_set():
             raise DiskFullError("the database")
-        return claim(*of)
+        return claim(*arguments)
 
     monkeypatch.setattr(service.ledger, "claim", claims)
     with service, service.subscribe(service.submit(SCENE.id, RECIPE)) as changes:
@@ -255,8 +257,8 @@ def test_defect_of_a_method_is_named_and_the_service_lives_on(tmp_path: Path, ca
 
 
 def test_plan_that_does_not_fit_is_refused_before_anything_is_computed(tmp_path: Path) -> None:
-    lacking: dict[str, type[BudgetError]] = {"peak_bytes": MemoryBudgetError, "store_bytes": DiskBudgetError}
-    for cost, refusal in lacking.items():
+    error_of_field: dict[str, type[BudgetError]] = {"peak_bytes": MemoryBudgetError, "store_bytes": DiskBudgetError}
+    for cost, refusal in error_of_field.items():
         with open_service(tmp_path, **{cost: 1 << 60}) as service:
             with pytest.raises(refusal, match="fewer lights"):
                 service.plan(SCENE.id, RECIPE)
@@ -400,10 +402,10 @@ def test_a_bake_that_is_deleted_as_a_task_of_it_ends_is_no_failure(
 ) -> None:
     finish, deleted = Ledger.finish_task, threading.Event()
 
-    def finish_deleted(ledger: Ledger, identity: str, *told: Any) -> bool:
+    def finish_deleted(ledger: Ledger, identity: str, *arguments: Any) -> bool:
         ledger.delete_bakes([identity])
         deleted.set()
-        return finish(ledger, identity, *told)
+        return finish(ledger, identity, *arguments)
 
     monkeypatch.setattr(Ledger, "finish_task", finish_deleted)
     with open_service(tmp_path) as service:

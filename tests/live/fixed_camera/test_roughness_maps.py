@@ -224,5 +224,5 @@ def test_inconsistent_levels_are_damage(direct, damage) -> None:
                 levels = levels[::-1].copy() if damage == "not sorted" else levels + np.uint8(200)
             return levels
 
-    with pytest.raises(ChunkDamagedError, match="levels of roughness"):
+    with pytest.raises(ChunkDamagedError, match="roughness levels"):
         open_view(Damaged(), 0, Cache(BUDGET), "damaged")

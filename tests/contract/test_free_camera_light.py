@@ -1,0 +1,236 @@
+"""What pictures whose eyes move show of a light that moves, and of what surfaces send each other, while it is found."""
+
+import numpy as np
+import pytest
+from free_camera_pictures import finish_lighting, finish_refinement, make_picture, make_watched_picture, run_job
+from look_edits import (
+    EDITS,
+    LOBE,
+    add_lights,
+    draw_curve,
+    edit_environment,
+    edit_transport,
+    replace_terms,
+    set_exponent,
+    set_floor_color,
+)
+from session_edits import make_look, relative_rmse
+
+from relume.core.cache import Cache
+from relume.core.errors import CancelledError, ChunkDamagedError
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+from relume.methods.registry import open_bake
+from relume.methods.spherical_harmonic_transfer import read_harmonic_light
+from relume.methods.store_layout import read_patches
+from relume.store import open_store
+
+ROUNDED = 1e-4  # of sums of a thousand lights in float32, in another order
+
+
+@pytest.mark.parametrize("edit", ["a lamp moved", "the environment turned", "fewer paths", "all at once"])
+def test_light_that_moves_is_rough_at_first_and_at_rest_as_if_nobody_had_watched(moving, edit):
+    _, change = EDITS[edit]
+    other = edit_environment(rotation=11.0 * (1 + list(EDITS).index(edit)))  # nobody has asked for its light before
+    picture = FreeCameraPicture(moving, "front", is_watched=True)
+    picture.set_look(make_look(moving, add_lights(change, other)))
+    assert picture.advance(None).fidelity == "preview"
+    rough = picture.image()
+    assert not picture.advance(None).changed
+    job = picture.next_job()
+    assert job.is_refinement
+    with pytest.raises(CancelledError):
+        job.run(lambda share: None, lambda: True)
+    shares = []
+    picture.install(job, job.run(shares.append, lambda: False))
+    assert shares == sorted(shares)
+    assert shares[-1] == 1
+    assert picture.next_job() is None
+    assert picture.advance(None).fidelity == "approximate"
+    finish_refinement(picture)
+    exact = make_picture(moving, change, other).image()
+    np.testing.assert_array_equal(picture.image(), exact)
+    assert relative_rmse(rough, exact) < 0.3
+
+
+def test_bakes_that_know_no_harmonics_follow_light_too(baked, moving, monkeypatch):
+    turned = edit_environment(rotation=203.0)
+
+    def rough(transfer):
+        picture = FreeCameraPicture(transfer, "front", is_watched=True)
+        picture.set_look(make_look(transfer, add_lights(turned)))
+        assert picture.advance(None).fidelity == "preview"
+        return picture.image()
+
+    harmonic = rough(moving)
+    monkeypatch.setattr("relume.methods.opened.fixed_views_indirect.read_harmonic_light", lambda store, cells: None)
+    plain = rough(open_bake(baked, Cache(1 << 30)))
+    assert 0 < relative_rmse(harmonic, plain) < 0.04
+
+
+def test_harmonics_that_do_not_fit_the_points_are_refused(baked, moving):
+    store = open_store(baked)
+
+    class Damaged:
+        attributes, shape = store.attributes, store.shape
+
+        def read(self, path, start=0, stop=None):
+            rows = store.read(path, start, stop)
+            return rows[:-1] if path == "sh/weight" else rows
+
+    with pytest.raises(ChunkDamagedError, match="sh is damaged"):
+        read_harmonic_light(Damaged(), read_patches(store))
+
+
+FOLLOWED = {
+    "a highlight's exponent": (LOBE, set_exponent(60)),
+    "a curve drawn": (LOBE, draw_curve),
+    "a diffuse colour": ("/materials/Floor/terms/0/color", set_floor_color),
+    "a metal in place of a wall": (None, replace_terms),
+    "fewer paths": (None, edit_transport(bounces=1)),
+    "all of them": (
+        LOBE,
+        lambda document: [change(document) for change in (draw_curve, set_floor_color, edit_transport(bounces=2))],
+    ),
+}
+
+
+@pytest.mark.parametrize("edit", FOLLOWED)
+@pytest.mark.parametrize("solo", [None, frozenset({"Lamp"})])
+def test_light_that_surfaces_send_follows_a_hand(moving, edit, solo):
+    """Under a light that is known, a frame is what was exact and what surfaces send otherwise, made beside the frames;
+    at rest all is exact."""
+    pointer, change = FOLLOWED[edit]
+    other = edit_environment(rotation=100.0 + 2 * list(FOLLOWED).index(edit) + (solo is None))  # known to nobody else
+
+    def shown(*changes):
+        return make_look(moving, add_lights(other, *changes))
+
+    picture = FreeCameraPicture(moving, "front", is_watched=True)
+    picture.set_look(shown(), solo=solo)
+    picture.advance(None)
+    finish_refinement(picture)
+    before = picture.image()
+    if pointer is not None:
+        picture.prepare(pointer)
+    picture.set_look(shown(change), solo=solo)
+    assert picture.advance(None).fidelity == "preview"
+    stale = picture.image()  # of surfaces as they are, in what they sent each other before
+    job = picture.next_job()
+    assert not job.is_refinement
+    picture.install(job, run_job(job))
+    assert picture.advance(None).fidelity == "preview"
+    image = picture.image()
+    finish_lighting(picture)
+    assert np.linalg.norm(image - picture.image()) < 0.1 * np.linalg.norm(stale - picture.image())
+    finish_refinement(picture)
+    exact = picture.image()
+    alone = FreeCameraPicture(moving, "front")
+    alone.set_look(shown(change), solo=solo)
+    alone.advance(None)
+    np.testing.assert_array_equal(exact, alone.image())
+    picture.set_look(shown(), solo=solo)
+    assert picture.advance(None).fidelity == "approximate"  # it is known
+    finish_refinement(picture)
+    np.testing.assert_array_equal(picture.image(), before)
+
+
+def test_edits_wait_for_no_light_and_light_for_no_edits(moving, monkeypatch):
+    """Twice: an edit changes a part of the frame, and what was begun before it comes to all of it afterwards."""
+    other = edit_environment(rotation=301.0)
+    picture = make_watched_picture(moving, other)
+    picture.set_look(make_look(moving, add_lights(other, set_exponent(30))))
+    picture.advance(None)
+    for step in (60, 90):
+        job, before = picture.next_job(), picture.image()
+        with monkeypatch.context() as nothing_whole:
+            nothing_whole.setattr("relume.live.free_camera.free_camera_picture.render_frame", None)
+            nothing_whole.setattr("relume.live.free_camera.probe_light.state.update_reflectances", None)
+            picture.set_look(make_look(moving, add_lights(other, set_exponent(step))))
+            assert picture.advance(None).changed
+        edited = picture.image()
+        assert (edited != before).any()
+        picture.install(job, run_job(job))
+        assert picture.advance(None).changed
+        assert (picture.image() != edited).any()
+        assert picture.next_job().key != job.key  # of the newer look
+    finish_refinement(picture)
+    np.testing.assert_array_equal(picture.image(), make_picture(moving, set_exponent(90), other).image())
+
+
+def test_what_surfaces_send_is_behind_a_light_that_turns_and_catches_up(moving):
+    turns = [make_look(moving, add_lights(edit_environment(rotation=turn))) for turn in (310.0, 318.0, 326.0)]
+    picture = make_watched_picture(moving, edit_environment(rotation=310.0))
+    picture.set_look(turns[1])
+    picture.advance(None)
+    job, behind = picture.next_job(), picture.image()
+    assert not job.is_refinement
+    picture.set_look(turns[2])
+    picture.advance(None)
+    picture.install(job, run_job(job))
+    picture.advance(None)
+    job = picture.next_job()
+    picture.install(job, run_job(job))
+    assert picture.advance(None).fidelity == "preview"
+    assert picture.next_job().is_refinement
+    final_image = picture.image()
+    at_once = FreeCameraPicture(moving, "front", is_watched=True)
+    at_once.set_look(turns[2])
+    at_once.advance(None)
+    np.testing.assert_allclose(final_image, at_once.image(), rtol=ROUNDED, atol=ROUNDED)
+    assert relative_rmse(behind, final_image) > 1e-3
+    finish_refinement(picture)
+    np.testing.assert_array_equal(picture.image(), make_picture(moving, edit_environment(rotation=326.0)).image())
+
+
+def test_an_eye_that_moves_finds_light_from_surfaces_wherever_it_looks(moving, aside):
+    """The light turns, and the eye moves before what surfaces send is there: no point is left without."""
+    picture = make_watched_picture(moving, edit_environment(rotation=331.0))
+    now = make_look(moving, add_lights(edit_environment(rotation=339.0)))
+    picture.set_look(now)
+    picture.advance(None)
+    job = picture.next_job()
+    picture.set_camera(aside, (64, 40))
+    picture.advance(None)
+    before = picture.image()
+    picture.install(job, run_job(job))
+    picture.advance(None)
+    at_once = FreeCameraPicture(moving, "front", is_watched=True)
+    at_once.set_look(now)
+    at_once.set_camera(aside, (64, 40))
+    at_once.advance(None)
+    np.testing.assert_allclose(picture.image(), at_once.image(), rtol=ROUNDED, atol=ROUNDED)
+    assert 0 < relative_rmse(before, at_once.image()) < 0.1
+
+
+def test_a_shader_gets_what_follows(moving):
+    def bounces(*changes):
+        return make_look(moving, add_lights(edit_environment(rotation=171.0), *changes))
+
+    def sent(picture):
+        arrays = {}
+        for name, block in picture.array_blocks()[0].items():
+            if name.startswith("vectors/"):
+                light = block.make()
+                scale, num = light[f"{name}/scale"][0]
+                numbers = light[name].astype(np.float32).reshape(-1, -(-3 * int(num) // 4) * 4)
+                arrays[name, int(num)] = scale * numbers[:, : 3 * int(num)]
+        return arrays
+
+    picture = FreeCameraPicture(moving, "front", is_watched=True)
+    picture.renders_pixels = False
+    picture.set_look(bounces())
+    picture.advance(None)
+    finish_refinement(picture)
+    picture.set_look(bounces(set_floor_color, set_exponent(8.0)))
+    assert picture.advance(None).fidelity == "preview"
+    job = picture.next_job()
+    picture.install(job, run_job(job))
+    assert picture.advance(None).fidelity == "preview"
+    followed = sent(picture)
+    finish_refinement(picture)
+    exact = sent(picture)
+    assert followed.keys() == exact.keys()
+    assert {num for _, num in exact} == {1, 36}  # a diffuse floor, a wall with a highlight
+    for (name, num), values in exact.items():
+        irradiance = slice(None, None, num)  # the first function of each channel
+        assert 0 < relative_rmse(followed[name, num][:, irradiance], values[:, irradiance]) < 0.01

@@ -1,0 +1,201 @@
+"""What pictures whose eyes move promise, whatever method they are of."""
+
+import numpy as np
+import pytest
+from free_camera_pictures import finish_refinement, make_picture, make_watched_picture, run_job
+from look_edits import (
+    EDITS,
+    LOBE,
+    add_lights,
+    draw_curve,
+    edit_environment,
+    edit_light,
+    edit_transport,
+    remove_glossy_term,
+    replace_terms,
+    set_exponent,
+    set_floor_color,
+)
+from session_edits import make_look, relative_rmse
+
+from relume.core.errors import NotFoundError, ParameterError
+from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+from relume.reference import reference_image
+
+ROUNDED = 1e-4  # of sums of a thousand lights in float32, in another order
+
+
+@pytest.mark.parametrize("edit", EDITS)
+def test_an_edited_picture_is_that_of_the_look_from_nothing_and_leaves_no_trace(moving, edit):
+    _, change = EDITS[edit]
+    picture = make_picture(moving)
+    before = picture.image()
+    picture.set_look(make_look(moving, add_lights(change)))
+    assert picture.advance(None).changed
+    np.testing.assert_array_equal(picture.image(), make_picture(moving, change).image())
+    picture.set_look(make_look(moving, add_lights()))
+    picture.advance(None)
+    np.testing.assert_array_equal(picture.image(), before)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [draw_curve, set_exponent(60.0), set_floor_color, remove_glossy_term, replace_terms],
+    ids=lambda function: function.__name__,
+)
+def test_an_edited_material_alone_is_evaluated_anew(moving, change, monkeypatch):
+    """While eye and light stay: the picture, and what is sent of it, are those of the look from nothing."""
+    direct = edit_transport(show="direct")
+    picture = make_watched_picture(moving, direct)
+    picture.encode(picture.all_tiles(), "rgb9e5")
+    before = picture.image()
+    with monkeypatch.context() as nothing_whole:
+        nothing_whole.setattr("relume.live.free_camera.free_camera_picture.render_frame", None)
+        picture.set_look(make_look(moving, add_lights(direct, change)))
+        assert picture.advance(None).changed
+    anew = make_watched_picture(moving, direct, change)
+    np.testing.assert_array_equal(picture.image(), anew.image())
+    assert picture.encode(picture.all_tiles(), "rgb9e5") == anew.encode(anew.all_tiles(), "rgb9e5")
+    differs = (picture.image() != before).any(axis=2)
+    assert differs.any()
+    assert not differs.all()
+
+
+def test_highlights_are_found_finely_once_eye_and_light_rest(moving, aside, monkeypatch):
+    """Twice, the second time after an edit, which costs no whole frame; no eye that moves waits for them."""
+    direct = edit_transport(show="direct")
+    picture = make_watched_picture(moving, direct)
+    at_first, job = picture.image(), picture.next_job()
+    for value in (40, 90):
+        with monkeypatch.context() as nothing_whole:
+            nothing_whole.setattr("relume.live.free_camera.free_camera_picture.render_frame", None)
+            picture.set_look(make_look(moving, add_lights(direct, set_exponent(value))))
+            assert picture.advance(None).changed
+        finish_refinement(picture)
+        assert picture.next_job() is None
+        np.testing.assert_array_equal(picture.image(), make_picture(moving, direct, set_exponent(value)).image())
+    picture.set_look(make_look(moving, add_lights(direct)))
+    for camera in (aside, moving.views["front"].camera):
+        picture.set_camera(camera, (48, 36))
+        picture.advance(None)
+    np.testing.assert_array_equal(picture.image(), at_first)
+    picture.install(job, run_job(job))  # of a frame that is gone
+    assert not picture.advance(None).changed
+    assert picture.next_job().key != job.key
+    coarse, fine = (show(moving, direct, replace_terms).image() for show in (make_watched_picture, make_picture))
+    assert relative_rmse(coarse, fine) > 1e-3
+
+
+def test_a_picture_does_not_depend_on_where_its_eye_was(moving, aside):
+    picture = make_picture(moving)
+    before = picture.image()
+    picture.set_camera(aside, (64, 40))
+    picture.advance(None)
+    np.testing.assert_array_equal(picture.image(), make_picture(moving, camera=aside, size=(64, 40)).image())
+    assert picture.image().shape == (40, 64, 3)
+    picture.set_camera(moving.views["front"].camera, (48, 36))
+    picture.advance(None)
+    np.testing.assert_array_equal(picture.image(), before)
+
+
+def test_it_never_says_that_it_is_exact_and_rests(moving):
+    picture = FreeCameraPicture(moving, "front")
+    picture.set_look(make_look(moving))
+    first, second = picture.advance(None), picture.advance(None)
+    assert (first.changed, first.exact, first.fidelity, first.complete) == (True, False, "approximate", True)
+    assert not second.changed
+    assert picture.next_job() is None
+
+
+def test_no_light_is_black_and_twice_the_light_twice_the_picture(moving):
+    dark = (edit_environment(intensity=0.0), edit_light("Lamp", enabled=False), edit_light("Panel", intensity=0.0))
+    assert not make_picture(moving, *dark).image().any()
+    twice = (edit_environment(intensity=2.0), edit_light("Lamp", intensity=2.0), edit_light("Panel", intensity=2.0))
+    np.testing.assert_allclose(
+        make_picture(moving, *twice).image(), 2 * make_picture(moving).image(), rtol=ROUNDED, atol=ROUNDED
+    )
+
+
+def test_solos_of_all_sources_sum_to_the_whole(moving):
+    diffuse = ("Floor", "Wall")  # what is below nothing is held at nothing: no highlight that rings may be divided
+
+    def plain(document):
+        for name in diffuse:
+            document["materials"][name]["terms"] = [{"model": "lambert", "color": [0.5, 0.4, 0.3], "params": {}}]
+
+    whole, total = make_picture(moving, plain).image(), 0
+    for source in ("Lamp", "Panel", None):
+        off = [edit_light(name, enabled=False) for name in ("Lamp", "Panel") if name != source]
+        alone = make_picture(moving, plain, *off, edit_environment(intensity=float(source is None))).image()
+        assert alone.any()
+        total = total + alone
+    np.testing.assert_allclose(total, whole, rtol=ROUNDED, atol=ROUNDED)
+
+
+@pytest.mark.parametrize("pointer", ["/materials/Nowhere/terms/0/curves/theta_h", LOBE.replace("1", "7"), "nonsense"])
+def test_what_points_to_nothing_is_refused_and_changes_nothing(moving, pointer):
+    picture = make_picture(moving)
+    with pytest.raises(ParameterError):
+        picture.prepare(pointer)
+    assert not picture.advance(None).changed
+
+
+def test_an_environment_that_is_not_here_is_refused_and_changes_nothing(moving):
+    picture = make_picture(moving)
+    before = picture.image()
+    look = make_look(moving, add_lights(set_floor_color))
+    gone = look.environment.model_copy(update={"map": "env:0123456789abcdef"})
+    with pytest.raises(NotFoundError):
+        picture.set_look(look.model_copy(update={"environment": gone}))
+    assert not picture.advance(None).changed
+    np.testing.assert_array_equal(picture.image(), before)
+
+
+def test_a_pixel_says_what_it_shows(moving):
+    picture = make_picture(moving)
+    inspection = picture.inspect(24, 33)
+    assert inspection["material"] == "Floor"
+    assert abs(inspection["position"][1]) < 1e-3
+    np.testing.assert_allclose(inspection["normal"], [0, 1, 0], atol=1e-5)
+    np.testing.assert_array_equal(inspection["radiance"], picture.image()[33, 24])
+    with pytest.raises(ParameterError):
+        picture.inspect(48, 0)
+
+
+@pytest.mark.parametrize("show", ["direct", "all"])
+def test_diffuse_light_from_elsewhere_is_that_of_brute_force(scene, moving, aside, show):
+    """Direct light of soft sources, and reflected: the points of a small scene lie close enough for five per cent."""
+
+    def plain(document):
+        curves = {"theta_o": {"points": [[0, 1.5], [90, 0.5]]}}
+        wall = {"model": "lambert", "color": [0.2, 0.3, 0.5], "params": {}, "curves": curves}
+        document["materials"]["Wall"]["terms"] = [wall]
+
+    changes = (plain, edit_light("Panel", enabled=False), edit_light("Lamp", enabled=False), edit_transport(show=show))
+    look = make_look(moving, add_lights(*changes))
+    passes = [
+        reference_image(_with(scene, aside), "front", look, (48, 36), 64, pass_index=k, reflects=True) for k in range(4)
+    ]
+    reference, noise = np.mean(passes, axis=0), np.std(passes, axis=0).mean() / 2
+    actual = make_picture(moving, *changes, camera=aside).image()
+    inner = ~_edges(make_picture(moving, *changes, camera=aside))
+    assert relative_rmse(actual[inner], reference[inner]) < 0.05
+    assert abs(actual[inner].mean() / reference[inner].mean() - 1) < 0.01 + 4 * noise / reference.mean()
+
+
+def _with(scene, camera):
+    from relume.scene.custom_camera import with_cameras
+
+    return with_cameras(scene, [camera])
+
+
+def _edges(picture):
+    """Pixels beside one that shows something else: brute force sees parts of both. (height, width)"""
+    height, width, _ = picture.image().shape
+    names = np.array([[str(picture.inspect(x, y)["material"]) for x in range(width)] for y in range(height)])
+    edge = np.zeros((height, width), bool)
+    edge[1:] |= names[1:] != names[:-1]
+    edge[:, 1:] |= names[:, 1:] != names[:, :-1]
+    edge[:-1] |= names[1:] != names[:-1]
+    edge[:, :-1] |= names[:, 1:] != names[:, :-1]
+    return edge

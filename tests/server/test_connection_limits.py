@@ -1,0 +1,144 @@
+"""What a connection may send and how long it may take, before anybody is known."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from fastapi.testclient import TestClient
+from running_server import Running, running_server
+from server_fakes import Control
+
+from relume_server.lifecycle import connection
+from relume_server.request_limits import MAX_JSON_BYTES, MAX_LOGIN_BYTES
+from relume_server.settings import Settings
+
+HEAD = b"GET /livez HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+BODY = (
+    b"PUT /api/looks/Red HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\nContent-Length: 100\r\n\r\n{"
+)
+
+
+@pytest.fixture
+def running(settings: Settings, control: Control) -> Iterator[Running]:
+    with running_server(settings, control) as running:
+        yield running
+
+
+def answer_to(running: Running, *sent: bytes, ends: bool = True) -> bytes:
+    """All that comes back until the server closes."""
+    with socket.create_connection(("127.0.0.1", running.port), timeout=60) as asking:
+        answer = b""
+        try:
+            for each in sent:
+                asking.sendall(each)
+            while chunk := asking.recv(1 << 16):
+                answer += chunk
+                if not ends and b"\r\n\r\n" in answer:
+                    break
+        except (ConnectionResetError, BrokenPipeError):  # it was closed while more was sent
+            pass
+        return answer
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [
+        [HEAD, b"X: ", *[b"a" * 100_000] * 200],
+        [HEAD, *[b"X: " + b"a" * 100 + b"\r\n"] * 200_000],
+        [b"GET /", *[b"a" * 100_000] * 200],
+    ],
+)
+def test_a_head_without_end_is_cut_off(running: Running, sent: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
+    num_bytes = 0
+    received = connection.Connection.data_received
+
+    def counted(self: connection.Connection, data: bytes) -> None:
+        nonlocal num_bytes
+        num_bytes += len(data)
+        received(self, data)
+
+    monkeypatch.setattr(connection.Connection, "data_received", counted)
+    answer = answer_to(running, *sent)
+    assert answer[:12] in (b"", b"HTTP/1.1 431", b"HTTP/1.1 400")
+    assert num_bytes <= 2 * connection.MAX_HEAD_BYTES + (1 << 18)  # one read more
+
+
+def test_a_head_with_too_many_lines_is_refused(running: Running) -> None:
+    lines = b"".join(b"X-%d: a\r\n" % number for number in range(connection.MAX_HEADERS))
+    assert answer_to(running, HEAD + lines + b"\r\n").startswith(b"HTTP/1.1 400")
+    fewer = b"".join(b"X-%d: a\r\n" % number for number in range(connection.MAX_HEADERS - 2))
+    assert answer_to(running, HEAD + fewer + b"Connection: close\r\n\r\n").startswith(b"HTTP/1.1 200")
+
+
+class TestTime:
+    @pytest.fixture(autouse=True)
+    def _impatient(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(connection, "HEAD_SECONDS", 0.2)
+        monkeypatch.setattr(connection, "BODY_SECONDS", 0.2)
+
+    @pytest.mark.parametrize("sent", [b"", b"G", HEAD, BODY])
+    def test_a_request_that_is_never_whole_ends(self, running: Running, sent: bytes) -> None:
+        assert answer_to(running, sent).startswith(b"HTTP/1.1 408")
+
+    def test_a_second_request_that_is_never_whole_ends_as_well(self, running: Running) -> None:
+        answer = answer_to(running, HEAD + b"\r\n" + HEAD)
+        assert answer.startswith(b"HTTP/1.1 200")
+        assert b"HTTP/1.1 408" in answer
+
+    @pytest.fixture
+    def late(self, monkeypatch: pytest.MonkeyPatch) -> threading.Event:
+        """Set when a deadline has passed."""
+        late, looked = threading.Event(), connection.Connection._late
+
+        def noted(self: connection.Connection) -> None:
+            looked(self)
+            late.set()
+
+        monkeypatch.setattr(connection.Connection, "_late", noted)
+        return late
+
+    def test_a_body_that_goes_on_coming_may_take_its_time(
+        self, running: Running, late: threading.Event, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(connection, "MIN_BODY_BYTES_PER_SECOND", 1)
+        with socket.create_connection(("127.0.0.1", running.port), timeout=60) as asking:
+            asking.sendall(BODY + b" " * 60)
+            assert late.wait(60)
+            asking.sendall(b" " * 38 + b"}")
+            assert asking.recv(100).startswith(b"HTTP/1.1 201")
+
+    def test_who_waits_for_an_answer_is_not_cut_off(
+        self, running: Running, late: threading.Event, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        library = running.app.state.services.looks
+        monkeypatch.setattr(library, "list", lambda *_: (late.wait(60), [])[1])
+        request = HEAD.replace(b"/livez", b"/api/looks") + b"\r\n"
+        assert answer_to(running, request + b"G", ends=False).startswith(b"HTTP/1.1 200")
+
+
+def test_one_connection_too_many_is_told_so(running: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connection, "MAX_CONNECTIONS", 1)
+    with socket.create_connection(("127.0.0.1", running.port), timeout=60) as first:
+        first.sendall(HEAD)
+        with ThreadPoolExecutor(1) as others:
+            assert others.submit(answer_to, running).result().startswith(b"HTTP/1.1 503")
+        first.sendall(b"\r\n")
+        assert first.recv(100).startswith(b"HTTP/1.1 200")
+
+
+@pytest.mark.parametrize(
+    ("path", "max_bytes"),
+    [("/api/login", MAX_LOGIN_BYTES), ("/api/logout", MAX_LOGIN_BYTES), ("/api/bakes", MAX_JSON_BYTES)],
+)
+def test_bodies_are_as_large_as_they_have_to_be(client: TestClient, path: str, max_bytes: int) -> None:
+    text = {"content-type": "application/json"}
+    beyond = b'{"token": "a", "x": "' + b"1" * max_bytes + b'"}'
+    assert client.post(path, content=beyond, headers=text).status_code == 413
+    if path != "/api/logout":  # which reads none
+        assert client.post(path, content=iter([beyond]), headers=text).status_code == 413
+    within = b'{"token": "a", "x": "' + b"1" * (max_bytes - 100) + b'"}'
+    assert client.post(path, content=within, headers=text).status_code != 413

@@ -1,0 +1,147 @@
+"""The one freeze of a session: told, handed over, canceled, and nothing of it left behind."""
+
+import asyncio
+import gc
+import threading
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from coroutines import run_in_thread
+from server_fakes import Control, FakeJob
+
+from relume.core.errors import ProtocolError, StoreError
+from relume_server.runtime.executors import Threads
+from relume_server.session.frames.precompute import Precomputer
+from relume_server.telemetry.metrics import Metrics
+
+
+class Told:
+    """Stands for the wire: keeps what was said."""
+
+    def __init__(self) -> None:
+        self.states: list[str] = []
+
+    async def send(self, message: Any) -> None:
+        self.states.append(message.state)
+
+
+class Broken(FakeJob):
+    """Cannot be made."""
+
+    def run(self, progress: Any, is_canceled: Any) -> str:
+        raise StoreError("damaged; bake again")
+
+
+class Gone(Told):
+    """A client that has left."""
+
+    async def send(self, message: Any) -> None:
+        raise ProtocolError("nothing was read; reload the page", 4408)
+
+
+def run(scenario: Any, recorder: Told | None = None) -> tuple[list[str], list[str]]:
+    """Run a scenario (freezer, control, news) in a loop of its own; what was told, and what nobody retrieved."""
+    unhandled_errors: list[str] = []
+    recorder = recorder or Told()
+
+    async def main() -> None:
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: unhandled_errors.append(context["message"]))
+        threads, news = Threads(), asyncio.Event()
+        try:
+            await scenario(Precomputer(recorder, threads, Metrics(), None, news), Control(), news)  # type: ignore[arg-type]
+        finally:
+            threads.close()
+        gc.collect()
+
+    run_in_thread(main())
+    return recorder.states, unhandled_errors
+
+
+@pytest.mark.parametrize("state", ["precomputing", "shading"])
+def test_freeze_is_told_by_its_own_word_and_is_ready_once_handed_over(state: str) -> None:
+    recorder = Told()
+
+    async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
+        view: Any = SimpleNamespace(name="front")
+        freezer.start(view, FakeJob(control, "/curves/theta_d", state))  # type: ignore[arg-type]
+        assert await asyncio.to_thread(control.freeze_started.wait, 60)
+        assert not freezer.is_done
+        control.freeze_gate.set()
+        await asyncio.wait_for(news.wait(), 60)
+        assert freezer.is_done
+        taken = await freezer.take()
+        assert taken is not None
+        assert (taken[0], taken[2]) == (view, "/curves/theta_d")
+        assert freezer.running is None
+        assert set(recorder.states) == {state}
+        await freezer.send_ready(taken[0], taken[1])
+
+    states, unhandled_errors = run(scenario, recorder)
+    assert states[-1] == "ready"
+    assert unhandled_errors == []
+
+
+def test_cancelled_freeze_gives_nothing() -> None:
+    async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
+        view: Any = SimpleNamespace(name="front")
+        freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
+        assert await asyncio.to_thread(control.freeze_started.wait, 60)
+        freezer.cancel()
+        await asyncio.wait_for(news.wait(), 60)
+        assert await freezer.take() is None
+
+    assert run(scenario)[1] == []
+
+
+def test_freeze_that_fails_says_why() -> None:
+    async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
+        view: Any = SimpleNamespace(name="front")
+        freezer.start(view, Broken(control, "/curves/theta_d"))  # type: ignore[arg-type]
+        await asyncio.wait_for(news.wait(), 60)
+        with pytest.raises(StoreError):
+            await freezer.take()
+
+    assert run(scenario)[1] == []
+
+
+def test_client_that_leaves_during_a_freeze_ends_it() -> None:
+    async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
+        view: Any = SimpleNamespace(name="front")
+        freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
+        await asyncio.wait_for(news.wait(), 60)
+        with pytest.raises(ProtocolError):
+            await freezer.take()
+        await freezer.end()
+        assert control.num_cancelled == 1
+
+    assert run(scenario, Gone())[1] == []
+
+
+def test_session_that_ends_during_a_freeze_leaves_no_thread_and_no_complaint() -> None:
+    async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
+        view: Any = SimpleNamespace(name="front")
+        freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
+        assert await asyncio.to_thread(control.freeze_started.wait, 60)
+        await freezer.end()
+        assert control.num_cancelled == 1
+
+    assert run(scenario)[1] == []
+    assert not [thread for thread in threading.enumerate() if thread.name.startswith("relume-long")]
+
+
+def test_end_that_is_cut_off_leaves_no_complaint() -> None:
+    async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
+        view: Any = SimpleNamespace(name="front")
+        freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
+        running = freezer._running
+        assert running is not None
+        assert await asyncio.to_thread(control.freeze_started.wait, 60)
+        ending = asyncio.create_task(freezer.end())
+        await asyncio.sleep(0)
+        ending.cancel()
+        await asyncio.wait({ending, running.future})
+        assert ending.cancelled()
+        del ending, running
+
+    assert run(scenario)[1] == []

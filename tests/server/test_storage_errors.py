@@ -1,0 +1,121 @@
+"""What a server answers, and logs, while its disk or its database fails."""
+
+import errno
+import logging
+import os
+from typing import NamedTuple
+
+import pytest
+from fastapi.testclient import TestClient
+from postgres import make_unavailable_error
+from server_fakes import write_tiny_scene
+
+from relume.core.errors import DiskFullError, MaterialError, RelumeError, SceneError
+from relume_server.batch.process import _answer
+from relume_server.errors import make_problem
+from relume_server.io import import_request
+from relume_server.io.import_request import ImportRequest, run_import
+from relume_server.settings import Settings
+
+
+class Usage(NamedTuple):
+    """As `shutil.disk_usage` tells it."""
+
+    total: int
+    used: int
+    free: int
+
+
+def test_a_damaged_database_is_said_in_one_sentence_and_one_line(
+    client: TestClient, settings: Settings, caplog: pytest.LogCaptureFixture
+) -> None:
+    for file in (settings.data / "relume.db", settings.data / "relume.db-wal"):
+        with file.open("r+b") as opened:  # as long as it was: it is mapped into memory
+            opened.write(bytes(range(256)) * (file.stat().st_size // 256))
+    client.app.state.services.bakes.ledger.close()  # type: ignore[attr-defined]  # what was read is read again
+    caplog.clear()
+    with caplog.at_level(logging.ERROR):
+        for path in ("/api/bakes", "/readyz"):
+            answer = client.get(path)
+            assert answer.status_code == 503
+            assert answer.json()["type"] == "urn:relume:problem:database"
+            assert "put a backup of relume.db in its place" in answer.json()["detail"]
+    said = [record for record in caplog.records if record.name == "relume_server.errors"]
+    assert len(said) == 2
+    assert not any(record.exc_info or "\n" in record.getMessage() for record in caplog.records)
+
+
+def test_a_disk_that_is_nearly_full_is_not_ready_and_said_once(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("shutil.disk_usage", lambda path: Usage(1 << 40, 1 << 40, 12_000_000))
+    answer = client.get("/readyz")
+    assert (answer.status_code, answer.json()["title"]) == (507, "Disk is nearly full")
+    assert "12 MB left" in answer.json()["detail"]
+    assert client.head("/readyz").status_code == 507
+    monkeypatch.setattr("shutil.disk_usage", lambda path: Usage(1 << 40, 0, 1 << 40))
+    assert client.get("/readyz").status_code == 200
+    assert client.head("/readyz").status_code == client.head("/livez").status_code == 200
+    said = [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
+    assert len(said) == 2
+    assert "12 MB left" in said[0]
+    assert "enough space again" in said[1]
+
+
+@pytest.mark.parametrize("error", [DiskFullError("a.webp"), OSError(errno.ENOSPC, "No space left on device")])
+def test_a_disk_that_a_step_finds_full_is_no_failure_of_its_process(error: Exception) -> None:
+    problem = make_problem(error)
+    with pytest.raises(DiskFullError, match=r"disk is full; free some space") as raised:
+        _answer({"problem": problem.detail, "kind": problem.type.rpartition(":")[2]})
+    assert make_problem(raised.value) == problem.model_copy(update={"title": "Disk is full"})
+
+
+def test_probes_of_a_server_that_is_stopped_are_no_lines(client: TestClient, caplog: pytest.LogCaptureFixture) -> None:
+    client.app.state.drain.start()  # type: ignore[attr-defined]
+    assert [client.get("/readyz").status_code for _ in range(2)] == [503, 503]
+    assert [record for record in caplog.records if record.levelno >= logging.WARNING] == []
+
+
+def test_the_process_of_an_import_tells_a_full_disk_from_a_bad_file(
+    settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_: object) -> str:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    request = ImportRequest.create(settings, "built_in", None, "cornell_box")
+    monkeypatch.setattr(import_request, "_import", full)
+    assert run_import(request).keys() == {"full"}
+
+
+@pytest.mark.parametrize(
+    ("failure", "key"),
+    [
+        (RelumeError("of the program"), "failure"),
+        (SceneError("empty"), "problem"),
+        (MaterialError("of another size"), "material"),
+        (OSError(errno.EFBIG, os.strerror(errno.EFBIG)), "large"),
+        (OSError(errno.ENOMEM, os.strerror(errno.ENOMEM)), "problem"),
+    ],
+)
+def test_the_process_of_an_import_tells_faults_of_the_service_from_those_of_the_file(
+    settings: Settings, monkeypatch: pytest.MonkeyPatch, failure: Exception, key: str
+) -> None:
+    def fail(_: object) -> str:
+        raise failure
+
+    monkeypatch.setattr(import_request, "_import", fail)
+    assert run_import(ImportRequest.create(settings, "built_in", None, "cornell_box")).keys() == {key}
+
+
+def test_an_import_whose_scene_cannot_be_listed_says_why_and_leaves_nothing_half_there(
+    client: TestClient, settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise make_unavailable_error("refused")
+
+    monkeypatch.setattr("relume_server.io.import_queue.insert_scene", fail)
+    monkeypatch.setattr(client.app.state.services.intake.importers, "run", write_tiny_scene)  # type: ignore[attr-defined]
+    refused = client.post("/api/scenes", files={"scene": ("triangle.glb", b"which nobody reads")})
+    assert refused.status_code == 503
+    assert client.get("/api/scenes").json() == []
+    assert list((settings.data / "scenes").iterdir()) == []

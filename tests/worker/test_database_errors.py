@@ -1,0 +1,89 @@
+"""Databases that fail say so in words, and loops that go on say it once."""
+
+import logging
+import time
+from pathlib import Path
+
+import pytest
+from fake_method import tiny_scene
+from sqlalchemy import event
+from sqlalchemy.exc import OperationalError
+
+from relume.core.errors import DatabaseDamagedError, DiskFullError
+from relume_worker.database import open_database
+from relume_worker.database.failures import DatabaseError, Outage
+from relume_worker.ledger import Ledger
+from relume_worker.scenes import register_scene
+
+GARBAGE = bytes(range(256)) * 64
+
+
+def test_a_damaged_database_is_refused_when_it_is_opened(tmp_path: Path) -> None:
+    (tmp_path / "relume.db").write_bytes(GARBAGE)
+    with pytest.raises(DatabaseDamagedError, match=r"move relume.db, .* away"):
+        open_database(f"sqlite:///{tmp_path / 'relume.db'}")
+    assert (tmp_path / "relume.db").read_bytes() == GARBAGE
+
+
+def test_one_that_is_damaged_while_it_is_open_says_so(tmp_path: Path) -> None:
+    engine = open_database(f"sqlite:///{tmp_path / 'relume.db'}")
+    ledger = Ledger(engine)
+    assert ledger.bakes() == []
+    engine.dispose()  # what was read is read again
+    for file in tmp_path.glob("relume.db*"):
+        file.write_bytes(GARBAGE)
+    with pytest.raises(DatabaseDamagedError):
+        ledger.bakes()
+
+
+def test_a_database_without_room_says_so_and_goes_on_when_there_is_some(tmp_path: Path) -> None:
+    engine = open_database(f"sqlite:///{tmp_path / 'relume.db'}")
+    is_full = [True]
+
+    @event.listens_for(engine, "checkout")
+    def bound(connection, *_: object) -> None:  # type: ignore[no-untyped-def]
+        pages = connection.execute("PRAGMA page_count").fetchone()[0] if is_full[0] else 1 << 20
+        connection.execute(f"PRAGMA max_page_count = {pages}")
+
+    scene, ledger = tiny_scene(), Ledger(engine)
+    with pytest.raises(DiskFullError, match="free some space"), engine.begin() as connection:
+        connection.exec_driver_sql("CREATE TABLE large AS SELECT randomblob(1000000)")
+    is_full[0] = False
+    register_scene(tmp_path, ledger, scene)
+
+
+def test_calls_that_overlap_a_change_say_nothing_new(caplog: pytest.LogCaptureFixture) -> None:
+    outage, away = Outage(logging.getLogger("outage"), "it"), Exception("away")
+    with caplog.at_level(logging.WARNING, "outage"):
+        slow = time.monotonic()
+        outage.report_failure(away, time.monotonic())
+        outage.report_failure(away, time.monotonic())
+        outage.report_recovered(slow)  # it was answered before the server went away
+        late = time.monotonic()
+        outage.report_recovered(time.monotonic())
+        outage.report_failure(away, late)  # it was refused before the server came back
+        outage.report_failure(away, time.monotonic())
+    assert [record.getMessage() for record in caplog.records] == [
+        "it does not answer (away); trying again",
+        "it answers again",
+        "it does not answer (away); trying again",
+    ]
+
+
+def test_a_loop_says_each_fault_once_and_that_it_is_over(caplog: pytest.LogCaptureFixture) -> None:
+    error = DatabaseError(logging.getLogger("loop"), "it cannot be read")
+    with caplog.at_level(logging.WARNING, "loop"):
+        for _ in range(3):
+            error.report_failure(OperationalError("SELECT 1", {}, Exception("away")))
+        error.report_failure(DiskFullError("the database"))
+        for _ in range(2):
+            error.report_recovered()
+        error.report_failure(ZeroDivisionError("nobody foresaw it"))
+    assert [record.getMessage().split(" (")[0] for record in caplog.records] == [
+        "it cannot be read",
+        "it cannot be read",
+        "it cannot be read: resolved",
+        "it cannot be read",
+    ]
+    assert [bool(record.exc_info) for record in caplog.records] == [False, False, False, True]
+    assert "\n" not in caplog.records[0].getMessage()

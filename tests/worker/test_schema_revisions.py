@@ -1,0 +1,231 @@
+"""Databases of every age become what the code works with, once, and newer ones are refused."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+from sqlalchemy import Engine, inspect, select, text
+from sqlalchemy.exc import SQLAlchemyError
+
+from relume.core.errors import LedgerVersionError, ParameterError
+from relume_server.auth.tables import AuditRow, OwnedRow, TokenRow
+from relume_server.persistence.look_store import LookStore
+from relume_server.persistence.share_store import ShareStore
+from relume_server.persistence.tables import (
+    BtfRow,
+    CommentRow,
+    ComparisonRow,
+    JobRow,
+    LookRow,
+    RenderRow,
+    RoomRow,
+    ShareRow,
+)
+from relume_worker.cameras import list_cameras
+from relume_worker.database import open_database, upgrading
+from relume_worker.database.connect import connect
+from relume_worker.database.models import Base
+from relume_worker.database.upgrading import draft_revision, get_revision, latest_revision, upgrade
+from relume_worker.ledger import Ledger
+from relume_worker.scenes import list_scenes
+
+BEFORE = Path(__file__).with_name("before_revisions.sql").read_text(encoding="utf-8")
+TABLES = (LookRow, ShareRow, CommentRow, RoomRow, RenderRow, BtfRow, ComparisonRow, TokenRow, OwnedRow, AuditRow)
+
+
+@pytest.fixture
+def old(tmp_path: Path) -> Path:
+    """A ledger that relume 0.1 made before there were revisions, with rows in every table."""
+    path = tmp_path / "old.db"
+    with closing(sqlite3.connect(path)) as connection:
+        connection.executescript(BEFORE)
+    return path
+
+
+def differences(engine: Engine) -> object:
+    """What the code's tables have and a database lacks, or the other way round."""
+    with engine.connect() as connection:
+        return compare_metadata(MigrationContext.configure(connection), Base.metadata)
+
+
+def revision(engine: Engine) -> str | None:
+    with engine.connect() as connection:
+        return get_revision(connection)
+
+
+def rows(engine: Engine) -> dict[str, list[Any]]:
+    """Everything that a database holds."""
+    with engine.connect() as connection:
+        tables = sorted(set(inspect(connection).get_table_names()) - {"alembic_version"})
+        return {table: list(connection.execute(text(f"SELECT * FROM {table}")).all()) for table in tables}
+
+
+def pairs(now: dict[str, list[Any]], before: dict[str, list[Any]]) -> list[tuple[Any, Any]]:
+    """Rows as they are and as they were; columns that were added are the last, and tables that were are empty."""
+    expected = {table: len(before.get(table, [])) for table in now}
+    assert {table: len(rows) for table, rows in now.items()} == expected
+    assert before.keys() <= now.keys()
+    return [(row, old) for table in before for row, old in zip(now[table], before[table], strict=True)]
+
+
+def test_revisions_make_the_tables_of_the_code(ledger_url: str) -> None:
+    with closing(Ledger(engine := open_database(ledger_url))):
+        assert differences(engine) == []
+        assert revision(engine) == latest_revision()
+
+
+def test_a_ledger_from_before_revisions_becomes_a_new_one_with_its_rows(old: Path) -> None:
+    before = connect(f"sqlite:///{old}")
+    assert revision(before) is None
+    old_rows = rows(before)
+    before.dispose()
+    with closing(Ledger(engine := open_database(f"sqlite:///{old}"))) as ledger:
+        assert (revision(engine), differences(engine)) == (latest_revision(), [])
+        assert all(old_rows.values())
+        now = rows(engine)
+        assert [row[: len(old)] for row, old in pairs(now, old_rows)] == [old for _, old in pairs(now, old_rows)]
+        (scene,), (bake,) = list_scenes(ledger), ledger.bakes()
+        assert (bake.scene, bake.state, len(ledger.finished_tasks(bake.id))) == (scene.id, "ready", 20)
+        assert [camera.name for camera in list_cameras(ledger, scene.id)] == ["kept"]
+        assert LookStore(ledger.sessions).get("red").document == '{"materials":{}}'
+        assert ShareStore(ledger.sessions).get("0123456789").document == {"bake": "x"}
+        kinds: tuple[type[JobRow], ...] = (RenderRow, BtfRow, ComparisonRow)
+        with ledger.sessions() as session:
+            states = [session.scalars(select(kind)).one().state for kind in kinds]
+        assert states == ["ready", "failed", "queued"]
+
+
+def test_older_ones_get_the_columns_and_tables_that_they_lack(old: Path) -> None:
+    with sqlite3.connect(old) as connection:
+        for column in ("phase", "phase_since", "crowding"):
+            connection.execute(f"ALTER TABLE bakes DROP COLUMN {column}")
+        connection.execute("DROP TABLE shares")  # only the command line was used
+    with ThreadPoolExecutor(4) as threads:  # a server and the command line may start at once
+        engines = list(threads.map(open_database, [f"sqlite:///{old}"] * 4))
+    assert differences(engines[0]) == []
+    assert Ledger(engines[0]).bakes()[0].phase is None
+    for engine in engines:
+        engine.dispose()
+
+
+def test_many_processes_make_the_tables_once(ledger_url: str) -> None:
+    with ThreadPoolExecutor(4) as threads:
+        engines = list(threads.map(open_database, [ledger_url] * 4))
+    assert {revision(engine) for engine in engines} == {latest_revision()}
+    for engine in engines:
+        engine.dispose()
+
+
+def test_a_ledger_of_a_newer_relume_is_refused_and_stays_as_it_is(ledger_url: str) -> None:
+    engine = open_database(ledger_url)
+    with engine.begin() as connection:
+        connection.execute(text("UPDATE alembic_version SET version_num = '9999'"))
+    with pytest.raises(LedgerVersionError, match="upgraded by a newer relume"):
+        open_database(ledger_url)
+    with pytest.raises(LedgerVersionError, match="restore a backup"):
+        upgrade(engine, is_requested=True)
+    assert revision(engine) == "9999"
+    engine.dispose()
+
+
+REVISION = '''"""{doc}."""
+import sqlalchemy as sa
+from alembic import op
+revision, down_revision, is_additive = "{name}", "{before}", {is_additive}
+
+def upgrade() -> None:
+    {step}
+'''
+
+
+@pytest.fixture
+def another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[SimpleNamespace]:
+    """Write a revision after the newest, in a copy of their folder."""
+    folder = tmp_path / "revisions"
+    (folder / "versions").mkdir(parents=True)
+    for file in upgrading.REVISIONS.rglob("*.*"):
+        if "__pycache__" not in file.parts:
+            (folder / file.relative_to(upgrading.REVISIONS)).write_text(file.read_text())
+    monkeypatch.setattr(upgrading, "REVISIONS", folder)
+
+    def write(step: str, is_additive: bool) -> None:
+        before, name = latest_revision(), f"{int(latest_revision()) + 1:04d}"
+        source = REVISION.format(doc="Tests", name=name, before=before, is_additive=is_additive, step=step)
+        (folder / "versions" / f"{name}_tests.py").write_text(source)
+        upgrading._scripts.cache_clear()
+
+    yield SimpleNamespace(write=write, folder=folder)
+    upgrading._scripts.cache_clear()
+
+
+def test_what_adds_is_made_at_start_and_what_does_not_waits_for_a_word(
+    ledger_url: str, another: SimpleNamespace
+) -> None:
+    open_database(ledger_url).dispose()
+    another.write('op.add_column("looks", sa.Column("note", sa.Text()))', True)
+    open_database(ledger_url).dispose()
+    another.write('op.drop_column("looks", "note")', False)
+    with pytest.raises(LedgerVersionError, match="run: relume backup FOLDER, then: relume db upgrade"):
+        open_database(ledger_url)
+    engine = connect(ledger_url)
+    assert "note" in {column["name"] for column in inspect(engine).get_columns("looks")}
+    assert [name for _, name in upgrade(engine, is_requested=True)] == ["Tests"]
+    assert upgrade(engine, is_requested=True) == []
+    engine.dispose()
+    open_database(ledger_url).dispose()
+
+
+def test_a_revision_that_fails_changes_nothing(ledger_url: str, another: SimpleNamespace) -> None:
+    open_database(ledger_url).dispose()
+    another.write('op.add_column("looks", sa.Column("note", sa.Text())); raise ZeroDivisionError', True)
+    with pytest.raises(ZeroDivisionError):
+        open_database(ledger_url)
+    engine = connect(ledger_url)
+    assert "note" not in {column["name"] for column in inspect(engine).get_columns("looks")}
+    assert revision(engine) == f"{int(latest_revision()) - 1:04d}"
+    engine.dispose()
+
+
+def test_a_draft_has_what_the_tables_of_the_code_have_and_the_ledger_lacks(old: Path, another: SimpleNamespace) -> None:
+    with closing(Ledger(engine := open_database(f"sqlite:///{old}"))):
+        with engine.begin() as connection:
+            connection.execute(text("DROP TABLE shares"))
+        with engine.begin() as connection:
+            path = draft_revision(connection, Base.metadata, "links of looks")
+    assert path.parent == another.folder / "versions"
+    assert path.name == f"{int(latest_revision()) + 1:04d}_links_of_looks.py"
+    assert "op.create_table('shares'" in path.read_text()
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "mysql://root@host/name",
+        "nonsense",
+        "oracle://secret@host",
+        "postgresql://host/secret",
+        "postgresql://me:secret@host/name?sslmode=secret",
+        "postgresql://me@host/name?sslmode=require&options=secret",
+    ],
+)
+def test_other_databases_are_refused_in_words(url: str) -> None:
+    with pytest.raises(ParameterError, match=r"postgresql://user:password@host/name|sslmode=prefer") as refusal:
+        open_database(url)
+    assert "secret" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("ledger_url", ["postgresql"], indirect=True)
+@pytest.mark.parametrize("mode", ["require", "verify-full"])
+def test_a_server_without_tls_is_not_talked_to_where_it_is_demanded(ledger_url: str, mode: str) -> None:
+    with pytest.raises(SQLAlchemyError, match="refuses SSL"):
+        open_database(f"{ledger_url}?sslmode={mode}")
+    open_database(f"{ledger_url}?sslmode=prefer").dispose()
