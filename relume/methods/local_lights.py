@@ -147,7 +147,7 @@ class LocalLights:
         return ShadowCache(self.trace(geometry, points, self.num_samples(geometry)))
 
     def is_emissive_at(
-        self, material: int, camera_position: Shaped[F32, "cameras 3"], position: Shaped[F32, "n 3"]
+        self, material: int, camera_position: Shaped[F32, "*cameras 3"], position: Shaped[F32, "n 3"]
     ) -> Shaped[NDArray[np.bool_], " n"]:
         """True for points of an emissive material that are visible from an emissive side.
 

@@ -47,7 +47,7 @@ def test_all_paths_are_brighter_than_those_of_the_method_and_what_it_leaves_out_
     assert main([*common, str(tmp_path / "all.exr")]) == 0
     assert "not simulated" not in capsys.readouterr().err
     assert main([*common, str(tmp_path / "method.exr"), "--paths", "method"]) == 0
-    assert "not simulated by the method: Light that surfaces reflect" in capsys.readouterr().err
+    assert "not simulated by the method: Indirect light" in capsys.readouterr().err
     assert main([*common, str(tmp_path / "direct.exr"), "--method", "direct"]) == 0
     whole, method, direct = (picture(tmp_path / f"{name}.exr") for name in ("all", "method", "direct"))
     assert whole.mean() > 1.05 * method.mean()
@@ -69,7 +69,7 @@ def test_a_bake_is_compared_with_both_kinds_of_paths(
     of_method = re.fullmatch(r"against the light paths of its method: .*(?:error|below) ([\d.]+) .*", against_method)
     assert of_method is not None
     assert float(of_method[1]) < 5
-    assert left_out.startswith("not simulated by the method: Light that surfaces reflect")
+    assert left_out.startswith("not simulated by the method: Indirect light")
     assert main([*ASKED, str(look), "--spp", "256", "--output", output, "--compare", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert (document["path"], document["size"]) == (output, [32, 24])

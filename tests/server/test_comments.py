@@ -77,7 +77,7 @@ def test_comments_go_with_their_scene(client: TestClient, baked: Baked, path: st
 
 
 WRONG: list[tuple[dict[str, Any], str]] = [
-    ({"text": "  "}, "words"),
+    ({"text": "  "}, "give text"),
     ({"text": "a\x00b"}, "control characters"),
     ({"text": "a" * 2001}, "2000"),
     ({"author": "\n"}, "printable"),
