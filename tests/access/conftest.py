@@ -1,4 +1,4 @@
-"""A server that people log in to, and clients of each role."""
+"""A server with login, and clients for each role."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def access(client: TestClient) -> AuthServices:
 
 @pytest.fixture
 def bearer(access: AuthServices) -> Callable[..., dict[str, str]]:
-    """Headers of somebody with a role."""
+    """Authorization headers for a role."""
 
     def headers(role: str, name: str | None = None, **more: Any) -> dict[str, str]:
         return {"Authorization": f"Bearer {access.tokens.add(name or role, role, **more)}"}

@@ -1,4 +1,4 @@
-"""The table of roles names every route and every message, and nothing else."""
+"""The table of roles lists every route and every message, and nothing else."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from relume_server.settings import Settings
 
 
 def operations() -> set[tuple[str, str]]:
-    """What the document says that there is, and live sessions, which it does not tell of."""
+    """Operations of the OpenAPI document and live sessions, which it does not describe."""
     paths = create_app(Settings()).openapi()["paths"]
     documented = {(method.upper(), path) for path, each in paths.items() for method in each}
     routes = [route for group in ROUTE_GROUPS for route in group.router.routes]
@@ -37,21 +37,21 @@ def test_every_message_has_a_role() -> None:
     assert types | {"edit_local", "prepare_parameter"} == set(MESSAGES)
 
 
-def test_a_call_that_is_not_listed_is_for_admins() -> None:
+def test_unlisted_calls_need_an_admin() -> None:
     assert required_role("GET", "/api/secrets") is Role.ADMIN
     assert required_role("PATCH", "/api/scenes") is Role.ADMIN
     assert required_role("POST", "/elsewhere") is Role.ADMIN
     assert required_role("GET", "/assets/index.js") is Role.ANYONE
 
 
-def test_of_lines_that_fit_the_strictest_counts() -> None:
+def test_strictest_matching_rule_applies() -> None:
     assert required_role("GET", "/api/materials/measured/0123456789abcdef/thumbnail.png") is Role.VIEW
     assert required_role("DELETE", "/api/scenes/0123456789abcdef") is Role.EDIT
     assert required_role("POST", "/api/scenes/0123456789abcdef/viewport") is Role.VIEW
 
 
-def test_an_answer_of_200_says_that_nothing_was_changed() -> None:
-    """Which is how the audit tells changes: each call that makes one has another answer for it."""
+def test_status_200_means_no_change() -> None:
+    """The audit log depends on it: each call that changes something returns another status."""
     paths = create_app(Settings()).openapi()["paths"]
     for path, each in paths.items():
         for method, operation in each.items():
@@ -59,7 +59,7 @@ def test_an_answer_of_200_says_that_nothing_was_changed() -> None:
                 assert {"201", "202", "204"} & set(operation["responses"]), (method, path)
 
 
-def test_changes_are_what_others_see() -> None:
+def test_queries_and_logins_are_not_changes() -> None:
     assert is_change("PUT", "/api/looks/Red")
     assert not is_change("POST", "/api/models/albedo")
     assert not is_change("POST", "/api/scenes/x/ball")

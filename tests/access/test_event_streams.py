@@ -1,4 +1,4 @@
-"""What a caller has open for long: streams of events are counted, and end where the caller's access ends."""
+"""Event streams: they are counted, and end when the caller's access ends."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def asked(client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The bake runs for ever; each time that somebody looks after it is noted here."""
+def checks(client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The bake never ends; each authorization check is recorded here."""
     bakes: BakeService = client.app.state.services.bakes  # type: ignore[attr-defined]
-    get, asked = bakes.get, list[str]()
+    get, checks = bakes.get, list[str]()
 
     def runs(bake: str) -> BakeStatus:
-        asked.append(bake)
+        checks.append(bake)
         return replace(get(bake), state="running")
 
     monkeypatch.setattr(bakes, "get", runs)
-    return asked
+    return checks
 
 
 def named_by_a_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -54,7 +54,7 @@ def named_by_a_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Identity, "caller", caller)
 
 
-def test_streams_of_a_caller_are_bounded_and_those_of_others_are_not_in_their_way(access: AuthServices) -> None:
+def test_streams_are_limited_per_caller(access: AuthServices) -> None:
     bob, unnamed, elsewhere = (
         Caller("Bob", Role.VIEW, "10.0.0.1", "token"),
         *(Caller("", Role.ADMIN, address, "open") for address in ("10.0.0.1", "10.0.0.2")),
@@ -74,7 +74,7 @@ def check_bound(user_quotas: Quotas, caller: Caller) -> None:
         pass
 
 
-def test_a_stream_too_many_is_refused(client: TestClient, baked: Baked, access: AuthServices, bearer: Bearer) -> None:
+def test_excess_streams_are_rejected(client: TestClient, baked: Baked, access: AuthServices, bearer: Bearer) -> None:
     ann = bearer("view", "Ann")
     with ExitStack() as held:
         for _ in range(quotas.MAX_STREAMS_EACH):
@@ -83,24 +83,24 @@ def test_a_stream_too_many_is_refused(client: TestClient, baked: Baked, access: 
         assert (refused.status_code, refused.json()["type"]) == (429, "urn:relume:problem:quota")
     assert client.get(f"/api/bakes/{baked.bake}/events", headers=ann).status_code == 200
     assert client.get(f"/api/bakes/{'0' * 16}/events", headers=ann).status_code == 404
-    check_bound(access.quotas, ANN)  # all of them were counted to their end
+    check_bound(access.quotas, ANN)  # all were released at their end
 
 
-def test_a_stream_ends_with_the_token(
-    client: TestClient, baked: Baked, access: AuthServices, bearer: Bearer, asked: list[str]
+def test_stream_ends_when_the_token_is_revoked(
+    client: TestClient, baked: Baked, access: AuthServices, bearer: Bearer, checks: list[str]
 ) -> None:
     ann = bearer("view", "Ann")
     with ThreadPoolExecutor() as beside:
         stream = beside.submit(client.get, f"/api/bakes/{baked.bake}/events", headers=ann)
-        while len(asked) < 3:
+        while len(checks) < 3:
             time.sleep(0.01)
         assert not stream.done()
         access.tokens.revoke("Ann")
         assert "event: bake" in stream.result().text
 
 
-def test_whom_a_proxy_named_comes_by_it_again(
-    client: TestClient, baked: Baked, asked: list[str], monkeypatch: pytest.MonkeyPatch
+def test_streams_of_proxy_users_need_the_proxy(
+    client: TestClient, baked: Baked, checks: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     named_by_a_proxy(monkeypatch)
     monkeypatch.setattr("relume_server.api.bakes.PROXY_REVALIDATION_S", 0.2)
@@ -113,7 +113,7 @@ class TestSession:
         settings.drain_seconds = 0.2
         return settings
 
-    def test_whom_a_proxy_named_is_sent_by_it_again(
+    def test_sessions_of_proxy_users_need_the_proxy(
         self, client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         named_by_a_proxy(monkeypatch)

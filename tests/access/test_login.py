@@ -1,4 +1,4 @@
-"""Who is let in: by a token in a header or a cookie, or by the word of a trusted proxy."""
+"""Authentication by a token in a header or a cookie, or by a trusted proxy."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Bearer = Callable[..., dict[str, str]]
 
 
 def calls(at_least: Role) -> list[tuple[str, str]]:
-    """Calls that need so much, their ids filled in."""
+    """Calls that need at least a role, with their ids filled in."""
     calls_of_role = []
     for path, roles in RULES.items():
         filled = re.sub(r"\{\w+\}", "0123456789abcdef", path)
@@ -32,13 +32,13 @@ def calls(at_least: Role) -> list[tuple[str, str]]:
 
 
 def me(client: TestClient) -> dict[str, Any]:
-    """Who the server thinks it is, without what it says of itself."""
+    """The caller's identity as the server knows it, without the server's own fields."""
     identity: dict[str, Any] = client.get("/api/me").json()
     assert identity.pop("allow_viewer_comments") is False
     return identity
 
 
-def test_nobody_gets_in_anywhere(client: TestClient) -> None:
+def test_anonymous_callers_are_rejected_everywhere(client: TestClient) -> None:
     for method, path in calls(Role.VIEW):
         refused = client.request(method, path)
         assert refused.status_code == 401, (method, path)
@@ -63,14 +63,14 @@ def test_editors_edit_and_only_admins_read_the_audit(client: TestClient, bearer:
     assert client.get("/api/audit", headers=admin).status_code == 200
 
 
-def test_what_is_open_stays_open(client: TestClient) -> None:
+def test_public_routes_stay_public(client: TestClient) -> None:
     for path in ("/livez", "/readyz", "/api/openapi.json"):
         assert client.get(path).status_code == 200
     assert me(client) == {"login": True, "name": "", "role": "anyone", "auth_method": "nobody"}
     assert client.get("/").status_code == 503  # the editor, which is not built here
 
 
-def test_a_body_is_not_read_before_it_is_known_who_sends_it(client: TestClient) -> None:
+def test_body_is_not_read_before_authentication(client: TestClient) -> None:
     def body() -> Any:
         raise AssertionError("the body was asked for")
         yield b""
@@ -81,27 +81,27 @@ def test_a_body_is_not_read_before_it_is_known_who_sends_it(client: TestClient) 
 @pytest.mark.parametrize(
     "sent", ["nonsense", "relume__", "relume_000000000000_x", "relume_0_0_0", "rélume_1", "x" * 10_000, ""]
 )
-def test_wrong_tokens_open_nothing(client: TestClient, sent: str) -> None:
+def test_wrong_tokens_are_rejected(client: TestClient, sent: str) -> None:
     refused = client.get("/api/scenes", headers={"Authorization": f"Bearer {sent}".encode()})
     assert refused.status_code == 401
     assert client.get("/api/scenes", headers={"Cookie": f"relume_token={sent}".encode()}).status_code == 401
 
 
-def test_the_secret_counts_not_the_id(client: TestClient, bearer: Bearer) -> None:
+def test_secret_authenticates_not_the_id(client: TestClient, bearer: Bearer) -> None:
     token = bearer("edit")["Authorization"]
     other = token[:-1] + ("a" if token[-1] != "a" else "b")
     assert client.get("/api/scenes", headers={"Authorization": token}).status_code == 200
     assert client.get("/api/scenes", headers={"Authorization": other}).status_code == 401
 
 
-def test_secrets_are_not_kept(access: AuthServices, settings: Settings) -> None:
+def test_secrets_are_not_stored(access: AuthServices, settings: Settings) -> None:
     secret = access.tokens.add("Ann", "edit").split("_", 2)[2]
     database_bytes = b"".join(path.read_bytes() for path in settings.data.glob("relume.db*"))
     assert b"Ann" in database_bytes
     assert secret.encode() not in database_bytes
 
 
-def test_tokens_run_out_and_are_revoked(
+def test_tokens_expire_and_are_revoked(
     client: TestClient, access: AuthServices, bearer: Bearer, monkeypatch: Any
 ) -> None:
     short, long = bearer("edit", "short", days=1), bearer("edit", "long")
@@ -114,7 +114,7 @@ def test_tokens_run_out_and_are_revoked(
     assert client.get("/api/scenes", headers=long).status_code == 401
 
 
-def test_a_token_that_another_process_revokes_is_soon_refused(
+def test_token_that_another_process_revokes_is_soon_rejected(
     client: TestClient, access: AuthServices, bearer: Bearer, monkeypatch: Any
 ) -> None:
     headers = bearer("edit", "Ann")
@@ -124,7 +124,7 @@ def test_a_token_that_another_process_revokes_is_soon_refused(
     assert client.get("/api/scenes", headers=headers).status_code == 401
 
 
-def test_browsers_log_in_and_out_by_a_cookie(client: TestClient, access: AuthServices) -> None:
+def test_browsers_log_in_and_out_with_a_cookie(client: TestClient, access: AuthServices) -> None:
     token = access.tokens.add("Ann", "edit")
     assert client.post("/api/login", json={"token": "relume_000000000000_x"}).status_code == 401
     answer = client.post("/api/login", json={"token": token})
@@ -139,7 +139,7 @@ def test_browsers_log_in_and_out_by_a_cookie(client: TestClient, access: AuthSer
 
 
 @pytest.mark.parametrize("beside", ['prefs={"a":1,"b":2}', "a[b]=1", "a@b=1", "novalue", "name=Zo\xeb", "path=/x"])
-def test_cookies_of_other_programs_on_the_host_hide_no_login(
+def test_cookies_of_other_programs_on_the_host_do_not_hide_the_login(
     client: TestClient, access: AuthServices, beside: str
 ) -> None:
     cookie = f"{beside}; relume_token={access.tokens.add('Ann', 'edit')}; {beside}".encode("latin-1")
@@ -147,7 +147,9 @@ def test_cookies_of_other_programs_on_the_host_hide_no_login(
     assert answer.json()["name"] == "Ann"
 
 
-def test_what_is_sent_to_another_address_is_no_change(client: TestClient, access: AuthServices, bearer: Bearer) -> None:
+def test_redirected_requests_are_not_audited_as_changes(
+    client: TestClient, access: AuthServices, bearer: Bearer
+) -> None:
     headers = bearer("admin")
     assert client.delete("/api/looks/Red/", headers=headers, follow_redirects=False).status_code == 307
     assert not [line for line in access.audit.list() if line.status]
@@ -161,7 +163,7 @@ def test_another_site_cannot_use_the_cookie(client: TestClient, access: AuthServ
 
 
 class TestProxy:
-    """A proxy at 10.0.0.0/8 that says who calls."""
+    """A proxy at 10.0.0.0/8 that authenticates callers."""
 
     @pytest.fixture
     def settings(self, settings: Settings) -> Settings:
@@ -172,7 +174,7 @@ class TestProxy:
     def at(self, client: TestClient, address: str) -> TestClient:
         return TestClient(client.app, client=(address, 1), base_url="http://testserver")
 
-    def test_its_word_counts_and_roles_are_settings(self, client: TestClient) -> None:
+    def test_proxy_names_users_and_settings_give_roles(self, client: TestClient) -> None:
         proxy = self.at(client, "10.1.2.3")
         ann = proxy.get("/api/me", headers={"X-Forwarded-User": "Ann"}).json()
         bob = proxy.get("/api/me", headers={"X-Forwarded-User": "Bob"}).json()
@@ -180,26 +182,28 @@ class TestProxy:
         assert (bob["name"], bob["role"]) == ("Bob", "view")
         assert proxy.get("/api/scenes").status_code == 401
 
-    def test_it_writes_names_in_utf_8(self, client: TestClient, settings: Settings) -> None:
+    def test_proxy_sends_names_in_utf_8(self, client: TestClient, settings: Settings) -> None:
         settings.proxy_roles["Zoë"] = "edit"
         for sent in ("Zoë".encode(), "Zoë".encode("latin-1")):
             identity = self.at(client, "10.1.2.3").get("/api/me", headers={b"X-Forwarded-User": sent}).json()
             assert (identity["name"], identity["role"]) == ("Zoë", "edit")
 
-    def test_nobody_elses_word_counts(self, client: TestClient) -> None:
+    def test_headers_of_untrusted_peers_are_ignored(self, client: TestClient) -> None:
         for address in ("192.168.0.1", "testclient", ""):
             other = self.at(client, address)
             assert other.get("/api/scenes", headers={"X-Forwarded-User": "Ann"}).status_code == 401
             headers = {"X-Forwarded-User": "Ann", "X-Forwarded-For": "10.1.2.3"}
             assert other.get("/api/scenes", headers=headers).status_code == 401
 
-    def test_addresses_are_those_that_it_saw(self, client: TestClient, bearer: Bearer, access: AuthServices) -> None:
-        headers = {"X-Forwarded-For": "1.2.3.4, 192.0.2.7"}  # of which the client may have made up the first
+    def test_client_addresses_come_from_the_proxy(
+        self, client: TestClient, bearer: Bearer, access: AuthServices
+    ) -> None:
+        headers = {"X-Forwarded-For": "1.2.3.4, 192.0.2.7"}  # the client may have forged the first
         for each, name in ((self.at(client, "10.1.2.3"), "Red"), (client, "Blue")):
             each.put(f"/api/looks/{name}", json={}, headers={**headers, **bearer("edit", name)})
         assert [line.address for line in access.audit.list()] == ["testclient", "192.0.2.7"]
 
-    def test_tls_that_it_ends_makes_cookies_secure(self, client: TestClient, access: AuthServices) -> None:
+    def test_tls_at_the_proxy_makes_cookies_secure(self, client: TestClient, access: AuthServices) -> None:
         token = {"token": access.tokens.add("Ann", "edit")}
         headers = {"X-Forwarded-Proto": "https"}
         behind, direct = (
@@ -209,12 +213,12 @@ class TestProxy:
         assert "secure" in behind
         assert "secure" not in direct
 
-    def test_a_token_goes_before_it(self, client: TestClient, bearer: Bearer) -> None:
+    def test_token_has_precedence_over_the_proxy(self, client: TestClient, bearer: Bearer) -> None:
         headers = {"X-Forwarded-User": "Ann", **bearer("admin", "Root")}
         assert self.at(client, "10.1.2.3").get("/api/me", headers=headers).json()["name"] == "Root"
 
 
-def test_names_of_tokens_are_unique_while_they_open(access: AuthServices) -> None:
+def test_names_of_valid_tokens_are_unique(access: AuthServices) -> None:
     access.tokens.add("Ann", "view")
     with pytest.raises(Exception, match="revoke the valid token of this name first"):
         access.tokens.add("Ann", "edit")
@@ -226,7 +230,7 @@ def test_names_of_tokens_are_unique_while_they_open(access: AuthServices) -> Non
         access.tokens.revoke("Eve")
 
 
-def test_while_the_database_is_damaged_nobody_is_let_in_and_one_line_says_why(
+def test_damaged_database_rejects_everyone_with_one_log_line(
     client: TestClient, bearer: Bearer, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     headers = bearer("edit")
@@ -245,7 +249,7 @@ def test_while_the_database_is_damaged_nobody_is_let_in_and_one_line_says_why(
     assert not line.exc_info
 
 
-def test_calls_while_the_database_is_away_log_nothing_of_their_own(
+def test_calls_during_a_database_outage_log_nothing(
     client: TestClient, bearer: Bearer, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     headers = bearer("edit")
@@ -259,7 +263,7 @@ def test_calls_while_the_database_is_away_log_nothing_of_their_own(
     assert not [record for record in caplog.records if record.levelno == logging.ERROR]
 
 
-def test_open_sessions_go_on_while_the_database_is_away(access: AuthServices, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_open_sessions_continue_during_a_database_outage(access: AuthServices, monkeypatch: pytest.MonkeyPatch) -> None:
     def away(*_: object) -> None:
         raise DatabaseDamagedError("database disk image is malformed")
 

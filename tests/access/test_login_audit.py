@@ -1,4 +1,4 @@
-"""What trying to get in costs and leaves behind: guesses of tokens, logins and refusals in the audit, cookies."""
+"""Rate limit of token guesses, logins and rejections in the audit log, and cookies."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ GUESS = "relume_{:012x}_x"
 
 @pytest.fixture
 def settings(settings: Settings) -> Settings:
-    settings.requests_at_once = 4  # and no RELUME_REQUESTS_PER_SECOND: calls are not counted
+    settings.requests_at_once = 4  # without RELUME_REQUESTS_PER_SECOND, calls are not counted
     return settings
 
 
 @pytest.fixture
-def looked_up(client: TestClient, access: AuthServices, monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Has an entry for each question to the database about a token."""
+def lookups(client: TestClient, access: AuthServices, monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """One entry for each token lookup in the database."""
     asked: list[int] = []
     sessions = access.tokens._sessions
 
@@ -37,19 +37,19 @@ def looked_up(client: TestClient, access: AuthServices, monkeypatch: pytest.Monk
     return asked
 
 
-def test_guesses_are_looked_up_so_often_and_no_more(client: TestClient, looked_up: list[int]) -> None:
+def test_number_of_looked_up_guesses_is_limited(client: TestClient, lookups: list[int]) -> None:
     answers = [client.get("/api/scenes", headers={"Authorization": f"Bearer {GUESS.format(k)}"}) for k in range(8)]
     assert [answer.status_code for answer in answers[:4]] == [401] * 4
     assert answers[-1].status_code == 429
     assert "too many wrong tokens; wait" in answers[-1].json()["detail"]
-    assert len(looked_up) < 8
-    before = len(looked_up)
+    assert len(lookups) < 8
+    before = len(lookups)
     for k in range(10):
         client.post("/api/login", json={"token": GUESS.format(100 + k)})
-    assert len(looked_up) < before + 10
+    assert len(lookups) < before + 10
 
 
-def test_who_is_known_is_not_held_up_by_guesses_from_the_same_address(
+def test_guesses_from_the_same_address_do_not_delay_known_users(
     client: TestClient, bearer: Bearer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ann = bearer("view", "Ann")
@@ -60,17 +60,17 @@ def test_who_is_known_is_not_held_up_by_guesses_from_the_same_address(
     assert [client.get("/api/scenes", headers=ann).status_code for _ in range(8)] == [200] * 8
 
 
-def test_that_there_is_no_such_token_is_remembered_for_so_many(
-    access: AuthServices, looked_up: list[int], monkeypatch: pytest.MonkeyPatch
+def test_number_of_cached_unknown_tokens_is_bounded(
+    access: AuthServices, lookups: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("relume_server.auth.tokens.MAX_UNKNOWN_IDS", 2)
     for k in (0, 0, 1, 2):
         assert access.tokens.authenticate(GUESS.format(k)) is None
-    assert len(looked_up) == 3
+    assert len(lookups) == 3
     assert len(access.tokens._unknown_ids) == 2
 
 
-def test_a_right_id_with_a_wrong_secret_is_a_guess(access: AuthServices) -> None:
+def test_valid_id_with_a_wrong_secret_is_a_guess(access: AuthServices) -> None:
     tokens: TokenStore = access.tokens
     right = tokens.add("Ann", "view")
     assert not tokens.is_cached(right)
@@ -90,12 +90,12 @@ def test_a_right_id_with_a_wrong_secret_is_a_guess(access: AuthServices) -> None
         ("somewhere", "somewhere"),
     ],
 )
-def test_ipv6_counts_by_network(address: str, bucket: str) -> None:
+def test_ipv6_addresses_count_by_network(address: str, bucket: str) -> None:
     assert bucket_name(address) == bucket
 
 
 class TestAudit:
-    def test_logins_wrong_tokens_and_refusals_are_lines(
+    def test_logins_wrong_tokens_and_rejections_are_logged(
         self, client: TestClient, bearer: Bearer, access: AuthServices
     ) -> None:
         token = access.tokens.add("Ann", "edit")
@@ -105,7 +105,7 @@ class TestAudit:
         wrong = {"Authorization": f"Bearer {GUESS.format(2)}"}
         assert client.get("/api/scenes", headers=wrong).status_code == 401
         assert client.put("/api/looks/a%1b[2Jb", json={}, headers=bearer("view", "Vera")).status_code == 403
-        assert client.get("/api/scenes").status_code == 401  # no try to get in
+        assert client.get("/api/scenes").status_code == 401  # not a login attempt
         lines = [(line.who, line.role, line.what, line.status) for line in reversed(access.audit.list())]
         assert lines == [
             ("Ann", "edit", "POST /api/login", 204),
@@ -115,7 +115,7 @@ class TestAudit:
         ]
         assert token not in str(access.audit.list())
 
-    def test_refusals_push_no_change_out(self, access: AuthServices) -> None:
+    def test_rejections_do_not_evict_changes(self, access: AuthServices) -> None:
         audit = Audit(access.tokens._sessions, 20)
         audit.add(Change("Ann", "edit", "::1", "PUT /api/looks/Red", "/api/looks/Red", 201, "r1"))
         for _ in range(210):
@@ -131,11 +131,11 @@ class TestHttpsOnly:
         settings.https_only = True
         return settings
 
-    def test_cookies_are_secure_and_browsers_keep_to_it(self, client: TestClient, access: AuthServices) -> None:
+    def test_cookies_are_secure_and_hsts_is_set(self, client: TestClient, access: AuthServices) -> None:
         answer = client.post("/api/login", json={"token": access.tokens.add("Ann", "edit")})
         assert "; secure" in answer.headers["set-cookie"].lower()
         assert answer.headers["strict-transport-security"] == "max-age=31536000"
 
 
-def test_otherwise_browsers_may_come_by_http(client: TestClient) -> None:
+def test_http_is_allowed_otherwise(client: TestClient) -> None:
     assert "strict-transport-security" not in client.get("/livez").headers

@@ -1,4 +1,4 @@
-"""Live sessions: who may open one, who may edit in it, and how it ends where a token is revoked."""
+"""Live sessions: permission to open one and to edit in it, and its end when a token is revoked."""
 
 from __future__ import annotations
 
@@ -29,16 +29,14 @@ def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("relume_server.auth.tokens.TOKEN_CACHE_S", 0.0)
 
 
-def test_nobody_opens_a_session(client: TestClient, baked: Baked) -> None:
+def test_anonymous_callers_cannot_open_a_session(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session, pytest.raises(ConnectionError) as ended:
         session.receive()
     assert ended.value.args[0] == 4401
     assert "login required" in ended.value.args[1]
 
 
-def test_editors_edit_and_the_audit_says_what(
-    client: TestClient, baked: Baked, bearer: Bearer, access: AuthServices
-) -> None:
+def test_edits_are_in_the_audit_log(client: TestClient, baked: Baked, bearer: Bearer, access: AuthServices) -> None:
     opening = {"room": "abcdefgh" * 4}
     with open_session(client, baked.bake, opening=opening, headers=bearer("edit", "Ann")) as session:
         hello = session.text("hello")
@@ -47,12 +45,12 @@ def test_editors_edit_and_the_audit_says_what(
         session.edit(2, EXPOSURE_EDIT["path"], 2.0)
         session.exact(2)
         assert access.audit.list() == []
-    (line,) = lines_of(access, 1)  # it is written when the session has ended
+    (line,) = lines_of(access, 1)  # it is written when the session ends
     assert (line.who, line.what) == ("Ann", "2 edits in a session: /materials/Paper, /display/exposure")
     assert line.object == f"/api/bakes/{baked.bake}/session, {hello['session']}, room abcdefgh…"
 
 
-def test_what_is_edited_is_in_the_audit_before_the_session_ends(
+def test_edits_are_in_the_audit_log_before_the_session_ends(
     client: TestClient, baked: Baked, bearer: Bearer, access: AuthServices, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("relume_server.session.audit_edits.WRITE_INTERVAL_S", 0.05)
@@ -61,18 +59,18 @@ def test_what_is_edited_is_in_the_audit_before_the_session_ends(
         for k in (1, 2):
             session.edit(k, SIGMA, 0.3 + k / 10)
             assert [line.what for line in lines_of(access, k)] == ["1 edits in a session: /materials/Paper"] * k
-        time.sleep(0.2)  # nothing is said of nothing
+        time.sleep(0.2)  # no line without edits
     assert len(lines_of(access, 2)) == 2
 
 
 def lines_of(access: AuthServices, least: int) -> Sequence[Entry]:
-    """The audit's lines, when there are so many."""
+    """The audit lines, once there are at least so many."""
     while len(lines := access.audit.list()) < least:
         time.sleep(0.01)
     return lines
 
 
-def test_a_line_of_edits_is_bounded_and_can_be_read(access: AuthServices) -> None:
+def test_audit_line_of_edits_is_bounded_and_valid_json(access: AuthServices) -> None:
     async def edit(places: Sequence[str]) -> str:
         notes = AuditWriter(access.audit, Caller("Ann", Role.EDIT, "", "token"), "here")
         notes.add_edit(places)
@@ -92,7 +90,9 @@ def test_a_line_of_edits_is_bounded_and_can_be_read(access: AuthServices) -> Non
     assert len(access.audit.list()) == 4
 
 
-def test_viewers_watch_and_are_told_why_they_do_not_edit(client: TestClient, baked: Baked, bearer: Bearer) -> None:
+def test_viewers_watch_and_their_edits_are_rejected_with_a_reason(
+    client: TestClient, baked: Baked, bearer: Bearer
+) -> None:
     with open_session(client, baked.bake, headers=bearer("view", "Vera")) as session:
         assert session.text("hello")["role"] == "view"
         before = session.exact(0)
@@ -106,7 +106,7 @@ def test_viewers_watch_and_are_told_why_they_do_not_edit(client: TestClient, bak
         assert session.text("problem")["problem"]["status"] == 403
         session.send_message(
             type="edit", revision=1, patch=[EXPOSURE_EDIT], active_control=SIGMA
-        )  # which would prepare it
+        )  # this would prepare an operator
         assert session.text("problem")["problem"]["status"] == 403
         session.send_message(type="prepare", curve=THETA_H)
         shape = session.text("curve")
@@ -122,7 +122,7 @@ def test_viewers_watch_and_are_told_why_they_do_not_edit(client: TestClient, bak
         assert session.text("inspect")["material"] == "Paper"
 
 
-def test_how_viewers_look_is_their_own_and_no_edit(
+def test_display_changes_of_viewers_are_not_edits(
     client: TestClient, baked: Baked, bearer: Bearer, access: AuthServices
 ) -> None:
     ann, vera = bearer("edit", "Ann"), bearer("view", "Vera")
@@ -136,7 +136,7 @@ def test_how_viewers_look_is_their_own_and_no_edit(
     assert access.audit.list() == []
 
 
-def test_the_place_of_somebody_is_nobody_elses(client: TestClient, baked: Baked, bearer: Bearer) -> None:
+def test_participant_token_is_bound_to_its_user(client: TestClient, baked: Baked, bearer: Bearer) -> None:
     with open_session(client, baked.bake, opening=ROOM_FIELDS, headers=bearer("edit", "Ann")) as ann:
         participant_token = ann.text("hello")["room"]["participant_token"]
         opening = {**ROOM_FIELDS, "participant_token": participant_token}
@@ -145,7 +145,7 @@ def test_the_place_of_somebody_is_nobody_elses(client: TestClient, baked: Baked,
             assert [(each["name"], each["role"]) for each in room["people"]] == [("Ann", "edit"), ("Vera", "view")]
 
 
-def test_whom_a_proxy_names_comes_back_to_the_own_place_and_to_nobody_elses() -> None:
+def test_proxy_users_resume_only_their_own_participant() -> None:
     room = Room({}, 8, 60.0, lambda room: None)
     door = JoinRequest(ROOM_FIELDS["room"], "watch", None, None)
     ann = room.join(door, Caller("proxy:Ann", Role.EDIT, "10.0.0.5", "proxy"))
@@ -196,7 +196,7 @@ class TestQuota:
         settings.max_sessions_per_user = 1
         return settings
 
-    def test_each_has_so_many_sessions(self, client: TestClient, baked: Baked, bearer: Bearer) -> None:
+    def test_sessions_per_user_are_limited(self, client: TestClient, baked: Baked, bearer: Bearer) -> None:
         ann, bob = bearer("edit", "Ann"), bearer("edit", "Bob")
         with open_session(client, baked.bake, headers=ann) as first:
             first.text("hello")

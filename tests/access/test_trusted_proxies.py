@@ -1,4 +1,4 @@
-"""What a trusted proxy says: where a call comes from, and, where settings ask for that, who calls."""
+"""Trusted proxies: the client's address, and its user name if the settings ask for it."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ def proxy(client: TestClient, address: str = "10.1.2.3") -> TestClient:
     return TestClient(client.app, client=(address, 1), base_url="http://testserver")
 
 
-def test_of_a_proxy_whose_addresses_count_nobody_is_known_by_name(client: TestClient) -> None:
+def test_proxy_trusted_for_addresses_names_no_users(client: TestClient) -> None:
     said = {"X-Forwarded-User": "Ann", "X-Forwarded-For": "192.0.2.7"}
     assert proxy(client).get("/api/scenes", headers=said).status_code == 401
 
 
-def test_the_line_that_the_proxy_adds_counts_not_the_clients_own(
+def test_header_of_the_proxy_overrides_that_of_the_client(
     client: TestClient, bearer: Bearer, access: AuthServices
 ) -> None:
     lines = [("X-Forwarded-For", "1.2.3.4"), ("X-Forwarded-For", "5.6.7.8, 192.0.2.7"), *bearer("edit").items()]
@@ -52,11 +52,11 @@ class TestNames:
         settings.requests_per_second, settings.requests_at_once = 0.001, 3
         return settings
 
-    def test_of_several_lines_the_proxys_own_counts(self, client: TestClient) -> None:
+    def test_last_of_several_headers_is_the_proxys(self, client: TestClient) -> None:
         lines = [("X-Forwarded-User", "Root"), ("X-Forwarded-User", "Ann")]
         assert proxy(client).get("/api/me", headers=lines).json()["name"] == "Ann"
 
-    def test_whom_a_proxy_calls_ann_uses_up_nothing_of_who_has_anns_token(
+    def test_proxy_user_and_token_of_the_same_name_have_separate_quotas(
         self, client: TestClient, bearer: Bearer, access: AuthServices
     ) -> None:
         said, token = {"X-Forwarded-User": "Ann"}, bearer("edit", "Ann")
@@ -67,46 +67,44 @@ class TestNames:
         with access.quotas.session("proxy:Ann"), access.quotas.session("Ann"):
             assert access.quotas.num_sessions == 2
 
-    def test_other_people_read_the_name_alone(self, client: TestClient, baked: Baked, settings: Settings) -> None:
+    def test_other_users_see_only_the_name(self, client: TestClient, baked: Baked, settings: Settings) -> None:
         settings.proxy_roles["Ann"] = "edit"
         pin = {"bake": baked.bake, "view": "front", "x": 1, "y": 2, "size": SIZE, "text": "Too bright"}
         path = f"/api/scenes/{baked.scene}/comments"
         made = proxy(client).post(path, json=pin, headers={"X-Forwarded-User": "Ann"})
         assert (made.status_code, made.json()["author"]) == (201, "Ann")
 
-    def test_no_token_is_called_as_a_proxy_calls_people(self, access: AuthServices) -> None:
+    def test_token_names_cannot_equal_proxy_users(self, access: AuthServices) -> None:
         with pytest.raises(Exception, match="does not begin with proxy:"):
             access.tokens.add("proxy:Ann", "edit")
 
-    def test_a_token_that_is_called_as_an_address_is_counted_apart_from_it(
-        self, client: TestClient, bearer: Bearer
-    ) -> None:
+    def test_token_named_like_an_address_has_a_separate_count(self, client: TestClient, bearer: Bearer) -> None:
         assert [client.get("/api/me").status_code for _ in range(4)] == [200, 200, 200, 429]
         assert client.get("/api/me", headers=bearer("view", "testclient")).status_code == 200
 
 
-def test_a_name_is_looked_up_again_when_its_proxy_calls_from_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_host_name_is_resolved_again_when_the_proxy_address_changes(monkeypatch: pytest.MonkeyPatch) -> None:
     now_s, address = 0.0, "10.9.9.9"
     lookups: list[str] = []
 
-    async def found(_: Any, name: str, *args: object, **more: object) -> list[Any]:
+    async def resolve(_: Any, name: str, *args: object, **more: object) -> list[Any]:
         lookups.append(name)
         if not address:
             raise socket.gaierror("no such name")
         return [(socket.AF_INET, socket.SOCK_STREAM, 0, "", (address, 0))]
 
     proxies = Proxies(["relight-proxy.relume.svc", "192.0.2.1"], lambda: now_s)
-    monkeypatch.setattr(asyncio.BaseEventLoop, "getaddrinfo", found)
+    monkeypatch.setattr(asyncio.BaseEventLoop, "getaddrinfo", resolve)
 
     async def trusts(peer: str) -> bool:
         await proxies.resolve(peer)
         return proxies.has(peer)
 
     assert run_in_thread(trusts("192.0.2.1"))
-    assert lookups == []  # it is known without
+    assert lookups == []  # no lookup is needed
     assert run_in_thread(trusts("10.9.9.9"))
     address = "10.9.9.8"
-    assert not run_in_thread(trusts("10.9.9.8"))  # asked too lately
+    assert not run_in_thread(trusts("10.9.9.8"))  # the last lookup is too recent
     now_s = RESOLVE_INTERVAL_S
     assert run_in_thread(trusts("10.9.9.8"))
     assert not proxies.has("10.9.9.9")
@@ -129,7 +127,7 @@ class TestStart:
             ({"host": "relight.example.org"}, "RELUME_LOGIN=true"),
         ],
     )
-    def test_settings_that_let_in_more_than_they_sound_like_are_refused(self, given: Any, said: str) -> None:
+    def test_settings_that_trust_too_much_are_rejected(self, given: Any, said: str) -> None:
         with pytest.raises(OpennessError, match=said):
             check_openness(Settings(**given))
 
@@ -145,14 +143,14 @@ class TestStart:
             {"trusted_proxies": ["10.0.0.5"]},
         ],
     )
-    def test_others_are_not(self, given: Any) -> None:
+    def test_other_settings_are_accepted(self, given: Any) -> None:
         check_openness(Settings(**given))
 
     @pytest.mark.parametrize("text", ["10.0.0.0/33", "a b", "-x", "", "10.0.0"])
-    def test_what_is_no_place_of_a_proxy_is_refused(self, text: str) -> None:
+    def test_invalid_proxy_addresses_are_rejected(self, text: str) -> None:
         with pytest.raises(ValueError, match=r"an address such as 10\.0\.0\.5"):
             Settings(trusted_proxies=[text])
 
 
-def test_without_a_login_all_are_one_client_whatever_proxies_there_are() -> None:
+def test_without_login_all_callers_are_one_client() -> None:
     assert Settings(trusted_proxies=["10.0.0.5"], max_queued=8).max_queued_per_client == 8

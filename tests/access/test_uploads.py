@@ -1,4 +1,4 @@
-"""Uploads: room for them is there before their bodies are read, and while they unpack; one user takes no other's."""
+"""Uploads reserve space before their bodies are read and while they unpack; one user cannot use another's space."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ CALLER = Caller("Ann", Role.EDIT, "", "token")
 
 
 def some_scene(request: ImportRequest) -> str:
-    """Each name is another scene."""
+    """Each name gives another scene."""
     scene = tiny_scene(request.name)
     light = Environment("gray", np.full((4, 8, 3), float(request.name.removeprefix("n")), np.float32))
     return _write_scene(request, make_scene(request.name, scene.meshes, scene.materials, scene.cameras, light))
@@ -47,7 +47,7 @@ def _imports(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class Body:
-    """A request's body, piece by piece, and what came back."""
+    """A request body in pieces, and the response."""
 
     def __init__(self, app: Callable[..., Any], pieces: list[bytes], length: int | None = None) -> None:
         headers = [] if length is None else [(b"content-length", str(length).encode())]
@@ -71,8 +71,8 @@ class Body:
         self.sent.append(message)
 
 
-async def taken(scope: Scope, receive: Receive, send: Send) -> None:
-    """A route that reads the whole body, and turns whatever happens into an answer of its own, as FastAPI does."""
+async def read_all(scope: Scope, receive: Receive, send: Send) -> None:
+    """A route that reads the whole body and turns any error into its own response, as FastAPI does."""
     try:
         while (await receive())["more_body"]:
             pass
@@ -83,7 +83,7 @@ async def taken(scope: Scope, receive: Receive, send: Send) -> None:
     await send({"type": "http.response.body", "body": b""})
 
 
-def a_door(access: AuthServices, app: Callable[..., Any] = taken, each: int = 8) -> UploadMiddleware:
+def upload_middleware_for(access: AuthServices, app: Callable[..., Any] = read_all, each: int = 8) -> UploadMiddleware:
     return UploadMiddleware(app, access=lambda: access, max_per_user=each, weights={})
 
 
@@ -93,32 +93,32 @@ class TestBodies:
         settings.max_bytes_per_user = 100_000
         return settings
 
-    def test_one_that_says_that_it_is_too_large_is_not_read(self, access: AuthServices) -> None:
-        body = Body(a_door(access), [b"x"], length=100_001)
+    def test_body_with_too_large_content_length_is_not_read(self, access: AuthServices) -> None:
+        body = Body(upload_middleware_for(access), [b"x"], length=100_001)
         assert run_in_thread(body()) == 429
         assert body.num_read == 0
         assert access.quotas.used_bytes("Ann") == 0
 
-    def test_one_that_does_not_say_it_is_read_as_far_as_there_is_room(
+    def test_body_without_content_length_is_read_up_to_the_quota(
         self, access: AuthServices, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(upload_middleware, "STEP_BYTES", 10_000)
-        body = Body(a_door(access), [b"x" * 10_000] * 50)
+        body = Body(upload_middleware_for(access), [b"x" * 10_000] * 50)
         assert run_in_thread(body()) == 429
         assert body.num_read <= 10
         assert access.quotas.used_bytes("Ann") == 0
 
-    def test_those_that_come_together_count_each_other(self, access: AuthServices) -> None:
+    def test_concurrent_bodies_share_the_quota(self, access: AuthServices) -> None:
         reading = asyncio.Event()
         waiting: list[bool] = []
 
         async def slow(scope: Scope, receive: Receive, send: Send) -> None:
             waiting.append(True)
             await reading.wait()
-            await taken(scope, receive, send)
+            await read_all(scope, receive, send)
 
         async def all_at_once() -> list[int]:
-            whole = a_door(access, slow)
+            whole = upload_middleware_for(access, slow)
             tasks = [asyncio.create_task(Body(whole, [b"x"], length=30_000)()) for _ in range(5)]
             while sum(task.done() for task in tasks) < 2 or len(waiting) < 3:
                 await asyncio.sleep(0)
@@ -129,7 +129,7 @@ class TestBodies:
         assert run_in_thread(all_at_once()) == [201, 201, 201, 429, 429]
         assert access.quotas.used_bytes("Ann") == 0
 
-    def test_of_one_user_so_many_are_read_at_once(self, access: AuthServices) -> None:
+    def test_concurrent_uploads_per_user_are_limited(self, access: AuthServices) -> None:
         now, peak = [0], [0]
 
         async def slow(scope: Scope, receive: Receive, send: Send) -> None:
@@ -137,28 +137,28 @@ class TestBodies:
             peak[0] = max(peak[0], now[0])
             await asyncio.sleep(0.01)
             now[0] -= 1
-            await taken(scope, receive, send)
+            await read_all(scope, receive, send)
 
         async def all_at_once() -> list[int]:
-            whole = a_door(access, slow, each=2)
+            whole = upload_middleware_for(access, slow, each=2)
             return list(await asyncio.gather(*(Body(whole, [b"x"], length=1)() for _ in range(6))))
 
         assert run_in_thread(all_at_once()) == [201] * 6
         assert peak == [2]
 
-    def test_who_goes_away_takes_nothing_any_more(self, access: AuthServices) -> None:
-        async def gone(scope: Scope, receive: Receive, send: Send) -> None:
+    def test_disconnected_client_releases_its_reservation(self, access: AuthServices) -> None:
+        async def disconnect(scope: Scope, receive: Receive, send: Send) -> None:
             assert access.quotas.used_bytes("Ann") == 5
             raise asyncio.CancelledError
 
         with pytest.raises(asyncio.CancelledError):
-            run_in_thread(Body(a_door(access, gone), [b"x"], length=5)())
+            run_in_thread(Body(upload_middleware_for(access, disconnect), [b"x"], length=5)())
         assert access.quotas.used_bytes("Ann") == 0
 
 
 @pytest.mark.usefixtures("_imports")
 class TestUnpacking:
-    def test_ten_at_once_keep_no_more_than_a_quota(
+    def test_ten_concurrent_imports_stay_within_the_quota(
         self, client: TestClient, bearer: Bearer, access: AuthServices, settings: Settings
     ) -> None:
         ann = bearer("edit", "Ann")
@@ -177,7 +177,7 @@ class TestUnpacking:
         assert access.quotas.used_bytes("Ann") == stored_bytes
         assert not list(settings.data.glob("upload-*"))
 
-    def test_what_unpacks_to_more_than_there_is_left_is_stopped_there(
+    def test_unpacking_stops_at_the_remaining_quota(
         self,
         client: TestClient,
         bearer: Bearer,
@@ -207,7 +207,7 @@ class TestDisk:
         for name in ("quotas", "reservations"):
             monkeypatch.setattr(f"relume_server.auth.{name}.free_bytes", lambda _: 10_000)
 
-    def test_what_all_send_leaves_the_ledger_its_room(self, access: AuthServices) -> None:
+    def test_uploads_leave_disk_space_for_the_ledger(self, access: AuthServices) -> None:
         quotas = access.quotas
         ann, bob = Reservation(quotas, "Ann"), Reservation(quotas, "Bob")
         ann.reserve(3_000)
@@ -217,12 +217,12 @@ class TestDisk:
         ann.release()
         bob.reserve(4_000)
 
-    def test_what_one_makes_leaves_the_ledger_its_room(self, access: AuthServices) -> None:
+    def test_imports_leave_disk_space_for_the_ledger(self, access: AuthServices) -> None:
         reservation = Reservation(access.quotas, "Ann")
-        assert reservation.max_import_bytes() == (10_000 - 1_000) // 2  # another may unpack at the same time
+        assert reservation.max_import_bytes() == (10_000 - 1_000) // 2  # another import may unpack at the same time
         assert isinstance(reservation.too_large_error(4_500), NearlyFullError)
 
-    def test_what_a_killed_server_has_reserved_ends(
+    def test_reservations_of_a_killed_server_expire(
         self, access: AuthServices, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         Reservation(access.quotas, "Ann").reserve(4_000)
@@ -231,7 +231,7 @@ class TestDisk:
         Reservation(access.quotas, "Bob").reserve(4_000)
         assert access.quotas.used_bytes("Ann") == 0
 
-    def test_what_was_held_is_held_where_more_is_refused(self, access: AuthServices, settings: Settings) -> None:
+    def test_reservation_remains_when_an_increase_is_rejected(self, access: AuthServices, settings: Settings) -> None:
         settings.max_bytes_per_user = 2_000
         reservation = Reservation(access.quotas, "Ann")
         reservation.reserve(1_500)
@@ -242,7 +242,7 @@ class TestDisk:
 
 class TestSlots:
     def order_of(self, slots: Slots, who: str) -> str:
-        """In which order those get a slot who ask while the first one has it."""
+        """The order in which waiting clients get the slot of the first one."""
         got: list[str] = []
 
         async def take(client: str) -> None:
@@ -250,20 +250,20 @@ class TestSlots:
                 got.append(client)
                 await asyncio.sleep(0)
 
-        async def all_of_them() -> None:
+        async def run_all() -> None:
             await asyncio.gather(*map(take, who))
 
-        run_in_thread(all_of_them())
+        run_in_thread(run_all())
         return "".join(got)
 
-    def test_users_take_turns(self) -> None:
+    def test_slots_alternate_between_users(self) -> None:
         assert self.order_of(Slots(1, 1, {}), "aaaabb") == "aababa"
 
-    def test_one_user_leaves_a_slot_to_others(self) -> None:
+    def test_one_user_cannot_take_every_slot(self) -> None:
         assert self.order_of(Slots(2, 1, {}), "aab") == "aba"
 
-    def test_one_who_does_not_wait_any_more_leaves_the_slot(self) -> None:
-        async def one_gives_up() -> None:
+    def test_canceled_waiter_releases_the_slot(self) -> None:
+        async def cancel_waiter() -> None:
             slots = Slots(1, 1, {})
             async with slots.acquire("a"):
                 waiting = asyncio.create_task(slots.acquire("b").__aenter__())
@@ -273,4 +273,4 @@ class TestSlots:
             async with slots.acquire("c"):
                 pass
 
-        run_in_thread(one_gives_up())
+        run_in_thread(cancel_waiter())

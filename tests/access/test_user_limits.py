@@ -1,4 +1,4 @@
-"""How much each may have, how often each may call, and the audit of what they did."""
+"""Quotas and rates per user, and the audit log."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ SCENE = {"scene": ("triangle.glb", b"which nobody reads")}
 
 @pytest.fixture
 def _imports(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Importing makes the tiny scene, without a process of its own."""
+    """Importing creates the tiny scene without a separate process."""
     monkeypatch.setattr(client.app.state.services.intake.importers, "run", write_tiny_scene)
 
 
-def test_buckets_fill_again() -> None:
+def test_buckets_refill() -> None:
     now_s = 0.0
     buckets = TokenBuckets(2.0, 3, lambda: now_s)
     assert [buckets.take("Ann") for _ in range(4)] == [0, 0, 0, 0.5]
@@ -47,7 +47,7 @@ def test_buckets_fill_again() -> None:
     assert [buckets.take("Ann") for _ in range(4)] == [0, 0, 0, 0.5]
 
 
-def test_buckets_are_of_bounded_number(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_number_of_buckets_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("relume_server.auth.rate_limit.MAX_BUCKETS", 2)
     buckets = TokenBuckets(1.0, 1, lambda: 0.0)
     assert [buckets.take(name) for name in "abc"] == [0, 0, 0]
@@ -60,7 +60,7 @@ class TestRates:
         settings.requests_per_second, settings.requests_at_once = 0.001, 3
         return settings
 
-    def test_each_user_has_a_bucket_and_each_address(
+    def test_each_user_and_each_address_has_a_bucket(
         self, client: TestClient, bearer: Bearer, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         ann, bob = bearer("edit", "Ann"), bearer("edit", "Bob")
@@ -93,7 +93,7 @@ class TestBytes:
         used = access.quotas.used_bytes("Ann")
         on_disk = sum(path.stat().st_size for path in (settings.data / "scenes" / scene).rglob("*") if path.is_file())
         assert used == on_disk > 0
-        client.post("/api/scenes", files=SCENE, headers=bob)  # the same scene, which is Ann's
+        client.post("/api/scenes", files=SCENE, headers=bob)  # the same recipe scene; Ann owns it
         assert access.quotas.used_bytes("Bob") == 0
         settings.max_bytes_per_user = used
         refused = client.post("/api/scenes", files=SCENE, headers=ann)
@@ -106,7 +106,7 @@ class TestBytes:
         assert client.delete(f"/api/scenes/{scene}", headers=ann).status_code == 204
         assert access.quotas.used_bytes("Ann") == 0
 
-    def test_of_stopped_bakes_the_share_that_is_done_counts(
+    def test_finished_fraction_of_stopped_bakes_counts(
         self, client: TestClient, access: AuthServices, baked: Baked
     ) -> None:
         access.quotas.assign_owner("Ann", "bake", baked.bake, 1_000)
@@ -116,7 +116,7 @@ class TestBytes:
                 session.execute(update(BakeRow).where(BakeRow.id == baked.bake).values(changed))
             assert access.quotas.used_bytes("Ann") == used
 
-    def test_renders_count_by_what_they_may_take_until_they_are_there(
+    def test_unfinished_renders_count_with_their_upper_bound(
         self, client: TestClient, bearer: Bearer, access: AuthServices, settings: Settings, baked: Baked
     ) -> None:
         settings.max_bytes_per_user = 1_000_000
@@ -133,7 +133,7 @@ class TestBytes:
         assert client.delete(url, headers=ann).status_code == 204
         assert access.quotas.used_bytes("Ann") == 0
 
-    def test_a_btf_that_was_made_here_counts_by_what_is_kept(
+    def test_compressed_btf_counts_with_its_stored_size(
         self, client: TestClient, bearer: Bearer, access: AuthServices, settings: Settings, tmp_path: Path
     ) -> None:
         settings.max_bytes_per_user = 1_000_000
@@ -148,7 +148,9 @@ class TestBytes:
             time.sleep(0.02)
         stored_bytes = sum(file.stat().st_size for file in (settings.data / "btfs" / body["material"]).iterdir())
         assert stored_bytes > 0
-        while access.quotas.used_bytes("Ann") != stored_bytes:  # what has failed lets go when its row has said so
+        while (
+            access.quotas.used_bytes("Ann") != stored_bytes
+        ):  # a failed job releases its bytes after its row is updated
             time.sleep(0.02)
         settings.max_bytes_per_user = stored_bytes
         refused = client.post(f"{works}/synthetic", json={"geometry": "weave", "size": 8}, headers=ann)
@@ -158,7 +160,7 @@ class TestBytes:
         assert client.delete(f"/api/materials/btf/{body['material']}", headers=ann).status_code == 204
         assert access.quotas.used_bytes("Ann") == 0
 
-    def test_a_work_is_its_owners_before_it_can_be_done_and_nobodys_where_it_is_refused(
+    def test_job_has_an_owner_before_it_starts_and_none_if_rejected(
         self,
         client: TestClient,
         bearer: Bearer,
@@ -185,13 +187,13 @@ class TestBytes:
         assert access.quotas.used_bytes("Ann") == 0
 
 
-class TestTurns:
+class TestFairScheduling:
     @pytest.fixture
     def settings(self, settings: Settings) -> Settings:
         settings.fair_shares = {"Cem": 2.0}
         return settings
 
-    def test_bakes_of_one_do_not_wait_for_all_of_another(
+    def test_bakes_of_two_users_alternate(
         self, client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         bakes: BakeService = client.app.state.services.bakes
@@ -225,13 +227,15 @@ class TestBakes:
         yield gate
         gate.set()
 
-    def test_each_has_so_many_under_way(self, gate: threading.Event, client: TestClient, bearer: Bearer) -> None:
+    def test_running_bakes_per_user_are_limited(
+        self, gate: threading.Event, client: TestClient, bearer: Bearer
+    ) -> None:
         ann, bob = bearer("edit", "Ann"), bearer("edit", "Bob")
         scene = client.post("/api/example-scenes/cornell_box", headers=ann).json()["id"]
         recipes = [{"scene": scene, "size": list(SIZE), "lights": lights} for lights in (10, 20)]
         first = client.post("/api/bakes", json=recipes[0], headers=ann)
         assert first.status_code == 202, first.text
-        assert client.post("/api/bakes", json=recipes[0], headers=ann).status_code == 202  # the same
+        assert client.post("/api/bakes", json=recipes[0], headers=ann).status_code == 202  # the same recipe
         refused = client.post("/api/bakes", json=recipes[1], headers=ann)
         assert refused.status_code == 429
         assert "RELUME_MAX_BAKES_PER_USER" in refused.json()["detail"]
@@ -250,7 +254,7 @@ class TestQueues:
         settings.max_queued = 8
         return settings
 
-    def test_one_user_fills_a_quarter_of_a_queue(
+    def test_one_user_fills_at_most_a_quarter_of_a_queue(
         self, client: TestClient, bearer: Bearer, baked: Baked, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(client.app.state.services.renders, "_next", lambda: None)  # all wait
@@ -261,17 +265,17 @@ class TestQueues:
         assert "limit of 2 unfinished renders; " in answers[2].json()["detail"]
 
 
-def test_without_names_all_are_one_client_who_may_fill_a_queue() -> None:
+def test_anonymous_users_share_one_client_that_may_fill_a_queue() -> None:
     assert Settings(max_queued=8).max_queued_per_client == 8
     assert Settings(max_queued=8, login=True).max_queued_per_client == 2
     assert Settings(max_queued=8, max_queued_per_user=3).max_queued_per_client == 3
 
 
-def test_each_change_is_a_line_and_each_refusal(client: TestClient, bearer: Bearer, baked: Baked) -> None:
+def test_each_change_and_each_rejection_is_an_audit_line(client: TestClient, bearer: Bearer, baked: Baked) -> None:
     ann, root, viewer = bearer("edit", "Ann"), bearer("admin", "Root"), bearer("view")
     client.put("/api/looks/Red", json={}, headers={**ann, "X-Request-ID": "abc-1"})
-    client.put("/api/looks/Red", json={}, headers=ann)  # refused: which version?
-    client.put("/api/looks/Red", json={}, headers=viewer)  # refused
+    client.put("/api/looks/Red", json={}, headers=ann)  # rejected: no version given
+    client.put("/api/looks/Red", json={}, headers=viewer)  # rejected
     client.get("/api/looks", headers=ann)
     client.post("/api/bakes", json={"scene": baked.scene, "dry_run": True}, headers=ann)
     request = {"bake": baked.bake, "view": "front", "views": ["front"], "look": {}}
@@ -304,7 +308,7 @@ def test_the_audit_is_bounded(client: TestClient, monkeypatch: pytest.MonkeyPatc
     assert [line.number for line in lines] == list(range(20, 20 - len(lines), -1))
 
 
-def test_request_ids_are_given_or_taken(client: TestClient) -> None:
+def test_request_ids_are_generated_or_accepted(client: TestClient) -> None:
     assert client.get("/livez", headers={"X-Request-ID": "from.proxy-7"}).headers["x-request-id"] == "from.proxy-7"
     first_id, second_id = (
         client.get("/livez", headers={"X-Request-ID": "ev il\n"}).headers["x-request-id"] for _ in range(2)

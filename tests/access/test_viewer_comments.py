@@ -1,4 +1,4 @@
-"""Whether those who only look may comment is a setting."""
+"""A setting decides whether viewers may comment."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def settings(settings: Settings) -> Settings:
     return settings
 
 
-def test_viewers_write_under_their_name_and_change_nothing_else(
+def test_viewers_comment_under_their_own_name_and_change_nothing_else(
     client: TestClient, baked: Baked, bearer: Callable[..., dict[str, str]], access: AuthServices
 ) -> None:
     vera, path = bearer("view", "Vera"), f"/api/scenes/{baked.scene}/comments"

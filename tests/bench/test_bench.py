@@ -1,4 +1,4 @@
-"""The benchmarks run in a size that means nothing, and say what they must in its form. No time is asserted."""
+"""The benchmarks run at a meaningless size, and print their figures in the right form. Times are not asserted."""
 
 import json
 import math
@@ -35,7 +35,7 @@ LONG = [
     "btf_several", "plan_disk", "probes_live", "probes_error", "real_files",
     "opening", "flood", "slow_readers", "room_join",
 ]  # fmt: skip
-# of random points, or by a renderer that is noisy: they carry a standard error
+# figures from random points or a noisy renderer have a standard error
 ESTIMATES = (
     "accuracy.",
     "paper.",
@@ -76,7 +76,7 @@ def check(group: registry.Group) -> None:
         assert figure.context
 
 
-def test_names_are_those_that_scripts_know() -> None:
+def test_names_are_those_that_scripts_use() -> None:
     assert set(registry.names()) >= FIXED_NAMES
     assert len(registry.names()) == len(set(registry.names()))
     assert {group.module for group in registry.GROUPS} == {f"relume_bench.{name}" for name in (*IN_PROCESS, *LONG)}
@@ -93,7 +93,7 @@ def test_long_benchmark_runs_small(module: str) -> None:
     check(group_of(module))
 
 
-def test_stolen_share_is_a_share_of_what_was_wanted() -> None:
+def test_stolen_fraction_is_relative_to_the_requested_time() -> None:
     assert measure_stolen_fraction((1000, 10), (1200, 60)) == 0.25
     assert measure_stolen_fraction((1000, 10), (1000, 10)) is None
     assert measure_stolen_fraction(None, (1, 1)) is None
@@ -115,7 +115,7 @@ def test_unknown_name_is_one_clear_line(capsys: pytest.CaptureFixture[str]) -> N
     assert re.fullmatch(r"relume: no benchmark starts with 'nothing'.*frame\.bandwidth_ratio.*\n", said.err)
 
 
-def test_failure_is_a_figure_and_the_others_go_on(
+def test_failure_is_a_figure_and_the_others_continue(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     broken = registry.Group("nowhere", ("frame.broken",))
@@ -127,7 +127,7 @@ def test_failure_is_a_figure_and_the_others_go_on(
     assert second["value"] > 0
 
 
-def test_merge_keeps_figures_that_were_not_measured() -> None:
+def test_merge_preserves_figures_that_were_not_measured() -> None:
     text = f"before\n{table.BEGIN}\n{table.END}\nafter\n"
     details = {"size": [640, 480], "measured_on": "2026-11-28, schema 8"}
     first_figure = {"name": "bake.nothing_s", "value": 12.345, "unit": "s", "context": details}
@@ -168,14 +168,14 @@ def test_tables_show_the_stored_figures(name: str) -> None:
         assert figure["value"] is None or re.fullmatch(r"\d{4}-\d\d-\d\d, schema \d+", measured_on), figure["name"]
 
 
-def test_figure_without_a_value_says_why() -> None:
+def test_figure_without_a_value_has_a_reason() -> None:
     assert "not measured" in table.row({"name": "x", "value": None, "unit": "s", "context": {"skipped": "no browser"}})
     assert Figure("x", None, "s").context == {}
 
 
 @pytest.mark.parametrize("num_rows", [6, 500, 2048])
-def test_mitsuba_reads_the_rows_of_a_map_where_they_are(num_rows: int) -> None:
-    """It reads between rows that lie at the ends of [0, π]; the middles of ours are what they were."""
+def test_mitsuba_reads_map_rows_at_their_elevations(num_rows: int) -> None:
+    """Mitsuba interpolates between rows at the ends of [0, π]; the centers of our rows keep their values."""
     radiance = np.random.default_rng(1).random((num_rows, 3, 3)).astype(np.float32)
     handed = map_for_mitsuba(radiance)
     finer = handed.shape[1] // 3

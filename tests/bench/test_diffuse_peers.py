@@ -1,4 +1,4 @@
-"""What peers that know diffuse surfaces alone are compared with."""
+"""Input for peers that support only diffuse surfaces."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ def light_in(materials: list[Material]) -> Illumination:
     )
 
 
-def test_highlights_send_nothing_inside_and_what_they_do_after():
+def test_glossy_reflection_is_ignored_only_inside_the_context():
     glossy = cornell_box(is_floor_glossy=True).materials
     diffuse = [replace(material, terms=tuple(filter(scatters_diffusely, material.terms))) for material in glossy]
     before = light_in(glossy)

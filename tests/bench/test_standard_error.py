@@ -1,4 +1,4 @@
-"""Standard errors of figures are the spread that the figures have when they are estimated again and again."""
+"""Standard errors of figures equal the spread of repeated estimates."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def test_standard_error_over_passes_is_the_spread_of_repeated_renders() -> None:
     )
 
 
-def test_picture_that_is_right_is_not_told_from_the_noise() -> None:
+def test_error_of_a_correct_picture_is_rarely_significant() -> None:
     reference = np.random.default_rng(7).uniform(0.5, 1.5, (32, 32, 3))
     significant = [
         compare_with_passes(reference, _passes(reference, 0.3, 8, seed)).is_significant for seed in range(50)

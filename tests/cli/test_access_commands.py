@@ -1,4 +1,4 @@
-"""`relume token` and `relume audit`: what they print, and what of it another process finds."""
+"""`relume token` and `relume audit`: their output, and the tokens that another process reads."""
 
 from __future__ import annotations
 
@@ -18,9 +18,7 @@ def run(capsys: pytest.CaptureFixture[str], data: Path, *words: str) -> tuple[in
     return code, *capsys.readouterr()
 
 
-def test_a_token_is_told_once_listed_revoked_and_written_down(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_token_is_printed_once_listed_revoked_and_audited(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, text, _ = run(capsys, tmp_path, "token", "add", "Ann", "--role", "edit", "--days", "30")
     assert code == 0
     identity = open_access(tmp_path).tokens.authenticate(text.strip())
@@ -43,7 +41,7 @@ def test_a_token_is_told_once_listed_revoked_and_written_down(
     assert "token revoke  Ann" in run(capsys, tmp_path, "audit", "--last", "1")[1]
 
 
-def test_tokens_are_told_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_tokens_are_printed_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = json.loads(run(capsys, tmp_path, "token", "add", "Ann", "--role", "edit", "--json")[1])
     identity = open_access(tmp_path).tokens.authenticate(made["token"])
     assert identity is not None
@@ -65,7 +63,7 @@ def test_tokens_are_told_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[s
         (["revoke", "Eve"], "relume: there is no valid token 'Eve'; relume token list shows them\n"),
     ],
 )
-def test_what_cannot_be_is_one_line(
+def test_invalid_arguments_print_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], sentence: str
 ) -> None:
     code, text, said = run(capsys, tmp_path, "token", *words)
@@ -73,9 +71,7 @@ def test_what_cannot_be_is_one_line(
 
 
 @pytest.mark.parametrize("command", [["audit"], ["token", "list"]])
-def test_a_folder_that_nobody_has_used_is_said(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: list[str]
-) -> None:
+def test_unused_folder_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str], command: list[str]) -> None:
     code, out, err = run(capsys, tmp_path / "mistyped", *command)
     assert (code, out) == (1, "")
     assert "a directory that relume has used" in err

@@ -1,4 +1,4 @@
-"""Commands that keep what there is, upgrades of the ledger, backups, restores; and workers for a team."""
+"""Commands that upgrade, back up and restore a ledger, and workers."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ BEFORE = (Path(__file__).parents[1] / "worker" / "before_revisions.sql").read_te
 
 @pytest.fixture
 def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A data folder of before revisions; its scene and its bake have no files any more."""
+    """A data folder from before schema revisions; the files of its scene and bake are missing."""
     folder = tmp_path / "data"
     folder.mkdir()
     with closing(sqlite3.connect(folder / "relume.db")) as connection:
@@ -37,7 +37,7 @@ def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def test_an_upgrade_says_what_it_does(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_upgrade_prints_its_steps(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["db", "upgrade"]) == 0
     said = capsys.readouterr().out.splitlines()
     assert said[0] == "0001: The tables before revisions were introduced"
@@ -45,7 +45,7 @@ def test_an_upgrade_says_what_it_does(data: Path, capsys: pytest.CaptureFixture[
     assert capsys.readouterr().out.splitlines() == said[-1:] == [f"the database is at revision {latest_revision()}"]
 
 
-def test_a_backup_says_what_is_not_in_it_and_comes_back(
+def test_backup_lists_missing_files_and_is_restored(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     backups = str(tmp_path / "backups")
@@ -62,7 +62,7 @@ def test_a_backup_says_what_is_not_in_it_and_comes_back(
 @pytest.mark.parametrize(
     ("more", "said"), [([], "valid: token Ann, edit"), (["--revoke-tokens"], "revoked: token Ann, edit")]
 )
-def test_tokens_that_a_backup_brings_back_are_said_or_revoked(
+def test_tokens_restored_from_a_backup_are_listed_or_revoked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], said: str
 ) -> None:
     old, backups, new = (str(tmp_path / name) for name in ("old", "backups", "new"))
@@ -75,14 +75,14 @@ def test_tokens_that_a_backup_brings_back_are_said_or_revoked(
     assert (open_access(Path(new)).tokens.authenticate(token) is None) == bool(more)
 
 
-def test_what_is_kept_is_for_its_own_user_alone(tmp_path: Path) -> None:
+def test_stored_files_are_private_to_their_user(tmp_path: Path) -> None:
     data, backups = tmp_path / "data", tmp_path / "backups"
     before = os.umask(0o022)
     try:
         assert main(["token", "add", "Ann", "--data", str(data)]) == 0
         assert main(["backup", str(backups), "--data", str(data)]) == 0
         assert main(["restore", str(backups), "--data", str(tmp_path / "new")]) == 0
-        assert os.umask(0o022) == 0o022  # what else a shell's command writes is as the user wants it
+        assert os.umask(0o022) == 0o022  # other files of a shell command keep the user's umask
     finally:
         os.umask(before)
     folders = [data, backups, tmp_path / "new"]
@@ -92,21 +92,21 @@ def test_what_is_kept_is_for_its_own_user_alone(tmp_path: Path) -> None:
     assert {stat.S_IMODE(path.stat().st_mode) & 0o077 for path in files} == {0}
 
 
-def test_backups_are_told_as_json(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    def told(*words: str) -> dict[str, Any]:
+def test_backups_are_printed_as_json(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def read_json(*words: str) -> dict[str, Any]:
         assert main([*words, "--json"]) in (0, 1)
         document: dict[str, Any] = json.loads(capsys.readouterr().out)
         return document
 
     backups = str(tmp_path / "backups")
-    assert told("db", "upgrade")["revision"] == latest_revision()
-    made = told("backup", backups)
+    assert read_json("db", "upgrade")["revision"] == latest_revision()
+    made = read_json("backup", backups)
     assert (made["files"], len(made["left_out"])) == (0, 2)
-    assert told("backup", backups, "--verify") == {"name": made["name"], "files": 1, "damaged": []}
-    assert told("restore", backups, "--data", str(tmp_path / "new"))["name"] == made["name"]
+    assert read_json("backup", backups, "--verify") == {"name": made["name"], "files": 1, "damaged": []}
+    assert read_json("restore", backups, "--data", str(tmp_path / "new"))["name"] == made["name"]
 
 
-def test_what_cannot_be_restored_is_one_line(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_failed_restore_prints_one_line(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["restore", str(tmp_path / "nothing"), "--data", str(tmp_path / "new")]) == 1
     said = capsys.readouterr().err.strip()
     assert said.startswith("relume: ")
@@ -114,7 +114,7 @@ def test_what_cannot_be_restored_is_one_line(data: Path, tmp_path: Path, capsys:
     assert "\n" not in said
 
 
-def test_a_worker_bakes_what_waits_in_the_ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_worker_bakes_queued_jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RELUME_DATA", str(tmp_path / "server"))
     monkeypatch.setenv("RELUME_DATABASE", f"sqlite:///{tmp_path / 'ledger.db'}")
     monkeypatch.setenv("RELUME_STORAGE", f"file://{tmp_path / 'shared'}")

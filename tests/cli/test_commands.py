@@ -1,4 +1,4 @@
-"""The `relume` command: what it prints, how it fails, what Ctrl-C does. Real bakes of a tiny scene."""
+"""The `relume` command: its output, its errors and Ctrl-C, with real bakes of a tiny scene."""
 
 import json
 import os
@@ -49,7 +49,7 @@ def only_bake(data: Path) -> BakeStatus:
 
 @pytest.fixture
 def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A data folder with one scene, "quad": a white square that fills the picture."""
+    """A data folder with the scene "quad": a white square that fills the picture."""
     positions = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32)
     normals = np.tile(np.array([[0, 0, 1]], np.float32), (4, 1))
     zeros = np.zeros((4, 4), np.float32)
@@ -69,7 +69,7 @@ def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def test_help_loads_nothing_heavy() -> None:
+def test_help_imports_no_heavy_modules() -> None:
     script = (
         "import sys; from relume_cli.main import main; main(['--help']); "
         "heavy = {'numpy', 'zarr', 'numba', 'fastapi', 'distributed', 'sqlalchemy'} & set(sys.modules); "
@@ -98,7 +98,7 @@ def test_help_loads_nothing_heavy() -> None:
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_scenes_made_by_code_are_imported_by_name(data: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+def test_built_in_scenes_are_imported_by_name(data: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
     assert main(["import", "--built-in", name]) == 0
     said = capsys.readouterr()
     assert said.out.splitlines()[0] == built_in(name).id
@@ -150,24 +150,24 @@ def test_failure_is_one_line_on_stderr(
     assert "secret" not in err
 
 
-def test_a_summary_is_never_cut_short(capsys: pytest.CaptureFixture[str]) -> None:
+def test_summaries_are_never_truncated(capsys: pytest.CaptureFixture[str]) -> None:
     for group in ([], ["token"], ["material"], ["environment"], ["db"]):
         assert main([*group, "--help"]) == 0
         lines = capsys.readouterr().out.splitlines()
         assert [line for line in lines if line.endswith("...") and "Usage" not in line] == []
 
 
-def test_the_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
+def test_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"{version('relume')}\n"
 
 
-def test_verbose_shows_the_trace(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_verbose_shows_the_traceback(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bake", "nowhere", "--verbose"]) == 1
     assert "Traceback" in capsys.readouterr().err
 
 
-def test_bake_prints_its_id_and_the_second_time_too(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bake_prints_its_id_every_time(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bake", "quad", "--view", "front", *TINY]) == 0
     first = capsys.readouterr().out
     status = only_bake(data)
@@ -177,13 +177,13 @@ def test_bake_prints_its_id_and_the_second_time_too(data: Path, capsys: pytest.C
     assert capsys.readouterr().out == first
 
 
-def test_bake_without_watch_is_left_in_the_queue(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bake_without_watch_stays_queued(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bake", "quad", "--no-watch", *TINY]) == 0
     assert capsys.readouterr().out == f"{only_bake(data).id}\n"
     assert only_bake(data).state == "queued"
 
 
-def test_scenes_of_one_name_must_be_told_apart(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_ambiguous_scene_names_are_rejected(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from relume_worker.database.models import SceneRow
 
     ledger = open_ledger(data)
@@ -196,7 +196,7 @@ def test_scenes_of_one_name_must_be_told_apart(data: Path, capsys: pytest.Captur
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{", "[" * 5000])
-def test_look_that_is_no_object_is_refused(
+def test_look_that_is_not_an_object_is_rejected(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str
 ) -> None:
     (tmp_path / "look.json").write_text(text)
@@ -206,7 +206,7 @@ def test_look_that_is_no_object_is_refused(
     assert not output.exists()
 
 
-def test_render_writes_the_picture_that_the_light_says(data: Path, tmp_path: Path) -> None:
+def test_render_writes_the_expected_radiance(data: Path, tmp_path: Path) -> None:
     import OpenImageIO
 
     assert main(["bake", "quad", "--view", "front", *TINY]) == 0
@@ -235,7 +235,7 @@ def test_render_takes_a_bake_by_its_id(data: Path, tmp_path: Path, capsys: pytes
         assert words in capsys.readouterr().err
 
 
-def test_render_writes_layers_and_says_what_cannot_have_them(
+def test_render_writes_layers_and_rejects_formats_without_them(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     import OpenImageIO
@@ -262,7 +262,7 @@ def test_render_writes_layers_and_says_what_cannot_have_them(
     assert ".exr" in capsys.readouterr().err
 
 
-def test_a_turntable_is_numbered_frames_that_a_second_run_goes_on_with(
+def test_turntable_writes_numbered_frames_and_resumes(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder, look = tmp_path / "round", tmp_path / "look.json"
@@ -292,7 +292,7 @@ def test_a_turntable_is_numbered_frames_that_a_second_run_goes_on_with(
     assert main(["render", "quad", "--turntable", "0", "--output", str(tmp_path / "none")]) == 1
 
 
-def test_a_server_with_a_damaged_database_says_one_sentence(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_server_with_a_damaged_database_prints_one_sentence(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (data / "relume.db").write_bytes(bytes(range(256)) * 64)
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = str(probe.getsockname()[1])
@@ -313,7 +313,7 @@ def test_a_server_with_a_damaged_database_says_one_sentence(data: Path, capsys: 
         ("RELUME_DATABASE", "postgresql://ann@127.0.0.1:9/x", "the database cannot be used (network error: "),
     ],
 )
-def test_a_setting_that_cannot_be_is_one_sentence(
+def test_invalid_setting_prints_one_sentence(
     data: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
@@ -329,15 +329,15 @@ def test_a_setting_that_cannot_be_is_one_sentence(
     assert line.startswith(f"relume: {said}")
 
 
-def test_what_a_server_writes_is_for_its_own_user_alone(
+def test_files_of_a_server_are_private_to_its_user(
     data: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     masks: list[int] = []
 
-    def noted(*_: object, **__: object) -> None:
+    def record(*_: object, **__: object) -> None:
         masks.append(os.umask(0o077))
 
-    monkeypatch.setattr("relume_server.app.serve", noted)
+    monkeypatch.setattr("relume_server.app.serve", record)
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = str(probe.getsockname()[1])
     before = os.umask(0o022)
@@ -349,7 +349,7 @@ def test_what_a_server_writes_is_for_its_own_user_alone(
     assert masks == [0o077]
 
 
-def test_taken_port_is_said(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_port_in_use_is_reported(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = str(taken.getsockname()[1])
         assert main(["serve", "--port", port]) == 1
@@ -359,7 +359,7 @@ def test_taken_port_is_said(data: Path, capsys: pytest.CaptureFixture[str]) -> N
 
 
 def hear_interrupts() -> None:
-    """Whoever runs the tests in the background of a script has them, and what they start, ignore SIGINT."""
+    """Tests that run in the background of a script, and the processes they start, ignore SIGINT; restore it."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
@@ -367,7 +367,7 @@ LONG = ["bake", "quad", "--size", "320x240", "--lights", "200"]  # long enough f
 
 
 def wait_for_state(data: Path, state: str) -> None:
-    """Wait until the only bake has come to this state; a machine with other work beside may take minutes."""
+    """Wait until the only bake reaches this state; on a busy machine this may take minutes."""
     end = time.monotonic() + 300
     states: list[str] = []
     while time.monotonic() < end:
@@ -380,7 +380,7 @@ def wait_for_state(data: Path, state: str) -> None:
     pytest.fail(f"the bake is {states}, not {state}")
 
 
-def test_interrupt_is_noted_and_raised_nowhere_else() -> None:
+def test_interrupt_is_recorded_and_not_raised_elsewhere() -> None:
     with capture_interrupts() as asked:
         assert not asked.is_set()
         os.kill(os.getpid(), signal.SIGINT)
@@ -388,7 +388,7 @@ def test_interrupt_is_noted_and_raised_nowhere_else() -> None:
 
 
 @pytest.mark.slow
-def test_interrupt_without_a_terminal_cancels_and_the_same_command_goes_on(data: Path) -> None:
+def test_interrupt_without_a_terminal_cancels_and_the_same_command_resumes(data: Path) -> None:
     process = subprocess.Popen(
         [*RELUME, *LONG], stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, preexec_fn=hear_interrupts
     )
@@ -404,7 +404,7 @@ def test_interrupt_without_a_terminal_cancels_and_the_same_command_goes_on(data:
     assert only_bake(data).state == "ready"
 
 
-def test_a_bake_in_the_background_has_no_password_among_its_arguments(
+def test_background_bake_has_no_password_in_its_arguments(
     data: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begun: dict[str, Any] = {}

@@ -1,4 +1,4 @@
-"""What `relume demo` bakes, and what the editor opens with."""
+"""The bake of `relume demo` and the curve that the editor opens first."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from relume_server.settings import Settings
 from relume_worker.status import bake_id
 
 
-def test_the_demo_bakes_what_the_editor_asks_for_first(tmp_path: Path) -> None:
+def test_demo_bakes_the_view_that_the_editor_opens(tmp_path: Path) -> None:
     app = create_app(Settings(data=tmp_path, preload_importer=False, prewarm=False))
     with TestClient(app, "http://127.0.0.1") as client:
         scene = client.post("/api/example-scenes/still_life").json()
@@ -24,7 +24,7 @@ def test_the_demo_bakes_what_the_editor_asks_for_first(tmp_path: Path) -> None:
             assert asked.json()["id"] == bake_id(scene["id"], recipe)
 
 
-def test_the_demo_opens_with_a_curve_that_its_scene_has() -> None:
+def test_demo_opens_a_curve_of_its_scene() -> None:
     (material,) = (each for each in demo_scene().materials if each.name == SELECTED["material"])
     term = material.terms[int(SELECTED["term"])]
     assert SELECTED["curve"] in [curve.name for curve in TERMS[term["model"]].curves]

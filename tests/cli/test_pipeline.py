@@ -1,4 +1,4 @@
-"""What pipelines do by commands: list, plan, follow, cancel and delete, and read all of it as JSON."""
+"""Commands in pipelines: list, plan, follow, cancel and delete, all with JSON output."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ BLUE = {"materials": {"White": {"terms": [{"model": "lambert", "color": [0.0, 0.
 
 @pytest.fixture(scope="module")
 def baked(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A data folder with a scene, "Quad": a white square that fills the picture; baked, and saved looks of it."""
+    """A data folder with the scene "Quad", a white square that fills the picture; baked, with saved looks."""
     folder = tmp_path_factory.mktemp("data")
     positions = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32)
     normals, zeros = np.tile(np.array([[0, 0, 1]], np.float32), (4, 1)), np.zeros((4, 4), np.float32)
@@ -57,7 +57,7 @@ def baked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def run(baked: Path, capsys: pytest.CaptureFixture[str]) -> Iterator[Any]:
-    """Runs a command on the folder: its exit code, stdout and stderr."""
+    """Run a command on the folder and return its exit code, stdout and stderr."""
     capsys.readouterr()
 
     def command(*words: str, data: Path = baked) -> tuple[int, str, str]:
@@ -71,7 +71,7 @@ def parsed(text: str) -> list[dict[str, Any]]:
     return [json.loads(line) for line in text.splitlines()]
 
 
-def test_lists_begin_each_line_with_what_names_a_thing(run: Any) -> None:
+def test_list_lines_begin_with_an_identifier(run: Any) -> None:
     (scene,) = parsed(run("list", "--json")[1])
     assert set(scene) == set(SceneBody.model_fields) - {"thumbnail"}
     assert run("list")[1].startswith(f"{scene['id']} ")
@@ -88,12 +88,12 @@ def test_lists_begin_each_line_with_what_names_a_thing(run: Any) -> None:
     assert "cornell_box" in [line.split()[0] for line in run("list", "built-ins")[1].splitlines()]
 
 
-def test_a_list_takes_filters_only_where_they_mean_something(run: Any) -> None:
+def test_lists_accept_only_meaningful_filters(run: Any) -> None:
     assert "--scene is 'quad'" in run("list", "looks", "--scene", "quad")[2]
     assert "--state is 'ready'" in run("list", "scenes", "--state", "ready")[2]
 
 
-def test_a_dry_run_says_what_it_costs_and_queues_nothing(run: Any) -> None:
+def test_dry_run_prints_the_cost_and_queues_nothing(run: Any) -> None:
     code, text, _ = run("bake", "quad one", "--preset", "preview", "--dry-run", "--json")
     (plan,) = parsed(text)
     assert code == 0
@@ -107,7 +107,7 @@ def test_a_dry_run_says_what_it_costs_and_queues_nothing(run: Any) -> None:
     assert "of disk" in said
 
 
-def test_the_same_bake_again_is_one_line_of_json(run: Any) -> None:
+def test_repeated_bake_prints_one_line_of_json(run: Any) -> None:
     (bake,) = parsed(run("bake", "quad one", "--view", "FRONT", *TINY, "--json")[1])
     assert set(bake) == set(BakeBody.model_fields)
     assert bake["state"] == "ready"
@@ -119,7 +119,7 @@ def test_the_same_bake_again_is_one_line_of_json(run: Any) -> None:
     assert f"{bake['id']}  ready  100%" in run("status", bake["id"][:10])[1]
 
 
-def test_a_queued_bake_is_cancelled_and_deleted_and_the_audit_knows(run: Any, baked: Path) -> None:
+def test_queued_bake_is_canceled_deleted_and_audited(run: Any, baked: Path) -> None:
     _, text, _ = run("bake", "quad one", "--size", "24x16", "--lights", "50", "--no-watch")
     bake = text.strip()
     assert f"{bake}  queued" in run("list", "bakes", "--state", "queued")[1]
@@ -136,8 +136,8 @@ def test_a_queued_bake_is_cancelled_and_deleted_and_the_audit_knows(run: Any, ba
     assert noted == [("delete bake", bake), ("cancel bake", bake)]
 
 
-def test_whoever_follows_a_bake_hears_that_it_is_deleted(tmp_path: Path) -> None:
-    with closing(BakeService(tmp_path)) as service:  # which runs nothing
+def test_followers_of_a_bake_learn_that_it_is_deleted(tmp_path: Path) -> None:
+    with closing(BakeService(tmp_path)) as service:  # runs no bakes
         scene = register_scene(tmp_path, service.ledger, still_life())
         bake = service.submit(scene, Recipe("direct", ("front",), (16, 16), 50))
         with service.subscribe(bake) as changes:
@@ -146,13 +146,13 @@ def test_whoever_follows_a_bake_hears_that_it_is_deleted(tmp_path: Path) -> None
                 follow(changes, "still life")
 
 
-def test_what_is_ready_cannot_be_cancelled(run: Any) -> None:
+def test_finished_bake_cannot_be_canceled(run: Any) -> None:
     code, text, said = run("cancel", "quad one")
     assert (code, text) == (1, "")
     assert "is ready; nothing to cancel" in said
 
 
-def test_a_scene_goes_with_its_bakes_and_looks_by_their_names(tmp_path: Path, run: Any) -> None:
+def test_scenes_bakes_and_looks_are_deleted_by_name(tmp_path: Path, run: Any) -> None:
     service = BakeService(tmp_path)
     scene = register_scene(tmp_path, service.ledger, still_life())
     LookStore(service.ledger.sessions).put("Red night", json.dumps(RED), None, None)
@@ -169,7 +169,7 @@ def test_a_scene_goes_with_its_bakes_and_looks_by_their_names(tmp_path: Path, ru
 
 
 @pytest.mark.parametrize("command", [["list"], ["status"], ["cancel", "x"], ["delete", "look", "x"]])
-def test_a_folder_that_nobody_has_used_is_said(run: Any, tmp_path: Path, command: list[str]) -> None:
+def test_unused_folder_is_reported(run: Any, tmp_path: Path, command: list[str]) -> None:
     code, _, said = run(*command, data=tmp_path / "typo")
     assert code == 1
     assert "a directory that relume has used" in said
@@ -179,7 +179,7 @@ def mean_of(path: Path) -> list[int]:
     return [int(value) for value in np.asarray(Image.open(path))[..., :3].reshape(-1, 3).mean(axis=0)]
 
 
-def test_many_looks_are_rendered_in_one_go(
+def test_many_looks_are_rendered_by_one_command(
     run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "looks"
@@ -199,7 +199,7 @@ def test_many_looks_are_rendered_in_one_go(
         assert (red > blue) == is_red
 
 
-def test_a_resumed_batch_leaves_out_what_is_written(run: Any, tmp_path: Path) -> None:
+def test_resumed_batch_skips_existing_files(run: Any, tmp_path: Path) -> None:
     (tmp_path / "Blue.png").write_bytes(b"there already")
     words = ["--look", "Blue", "--look", "Red night", "--output", str(tmp_path / "{look}.png"), "--json"]
     code, text, _ = run("render", "quad one", *words, "--resume")
@@ -209,7 +209,7 @@ def test_a_resumed_batch_leaves_out_what_is_written(run: Any, tmp_path: Path) ->
     assert mean_of(tmp_path / "Red-night.png")[0] > 0
 
 
-def test_a_dry_run_of_a_render_checks_all_and_writes_nothing(run: Any, tmp_path: Path) -> None:
+def test_dry_run_of_a_render_validates_and_writes_nothing(run: Any, tmp_path: Path) -> None:
     words = ["--look", "Blue", "--output", str(tmp_path / "{look}.exr"), "--dry-run"]
     (document,) = parsed(run("render", "quad one", *words, "--json")[1])
     assert (document["path"], document["look"]) == (str(tmp_path / "Blue.exr"), "Blue")
@@ -237,7 +237,7 @@ def test_a_dry_run_of_a_render_checks_all_and_writes_nothing(run: Any, tmp_path:
         (["--float", "--output", "x.png"], "--output is 'x.png'; give a file name that ends in .exr"),
     ],
 )
-def test_what_cannot_be_rendered_is_one_sentence(
+def test_invalid_render_prints_one_sentence(
     run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], said: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -248,18 +248,18 @@ def test_what_cannot_be_rendered_is_one_sentence(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_turntable_becomes_a_video_and_what_was_written_is_printed(run: Any, tmp_path: Path) -> None:
+def test_turntable_video_is_written_and_its_path_printed(run: Any, tmp_path: Path) -> None:
     words = ["--turntable", "3", "--rotate", "environment", "--fps", "3"]
     code, text, _ = run("render", "quad one", *words, "--output", str(tmp_path / "x.mp4"))
     assert (code, text) == (0, f"{tmp_path / 'x.mp4'}\n")
     assert (tmp_path / "x.mp4").read_bytes()[4:8] == b"ftyp"
-    assert [path.name for path in tmp_path.iterdir()] == ["x.mp4"]  # its frames are not needed any more
+    assert [path.name for path in tmp_path.iterdir()] == ["x.mp4"]  # the frames are removed
     code, text, _ = run("render", "quad one", *words[:4], "--output", str(tmp_path / "round"))
     assert (code, text) == (0, f"{tmp_path / 'round'}\n")
     assert sorted(path.name for path in (tmp_path / "round").iterdir()) == ["0000.png", "0001.png", "0002.png"]
 
 
-def test_quiet_leaves_results_alone(run: Any, tmp_path: Path) -> None:
+def test_quiet_still_prints_results(run: Any, tmp_path: Path) -> None:
     look = tmp_path / "look.json"
     look.write_text('{"environment": {"map": "sunset"}}')
     words = ["render", "quad one", "--look", str(look), "--output", str(tmp_path / "x.png")]
@@ -267,7 +267,7 @@ def test_quiet_leaves_results_alone(run: Any, tmp_path: Path) -> None:
     assert run(*words, "--quiet") == (0, f"{tmp_path / 'x.png'}\n", "")
 
 
-def test_an_import_prints_its_id_and_what_was_read(run: Any, tmp_path: Path) -> None:
+def test_import_prints_its_id_and_a_summary(run: Any, tmp_path: Path) -> None:
     (tmp_path / "m.mtl").write_text("newmtl M\nKd .5 0 0\nKs .5 .5 .5\nNs 18\nmap_Bump gone.png\nmap_Ka x.png\n")
     (tmp_path / "t.obj").write_text("mtllib m.mtl\nv 0 0 0\nv 2 0 0\nv 0 1 0\nusemtl M\nf 1 2 3\n")
     code, text, said = run("import", str(tmp_path / "t.obj"), data=tmp_path / "data")

@@ -1,4 +1,4 @@
-"""`relume reference`: which light paths it traces, and what it says of a bake's frame."""
+"""`relume reference`: the light paths that it traces, and its comparison with a bake's frame."""
 
 import json
 import re
@@ -40,7 +40,7 @@ def picture(path: Path) -> NDArray[np.float32]:
     return np.asarray(OpenImageIO.ImageBuf(str(path)).get_pixels(OpenImageIO.FLOAT))
 
 
-def test_all_paths_are_brighter_than_those_of_the_method_and_what_it_leaves_out_is_said(
+def test_all_paths_are_brighter_than_method_paths_and_omissions_are_printed(
     look: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     common = [*ASKED, str(look), "--spp", "64", "--size", "32x24", "--output"]
@@ -54,7 +54,7 @@ def test_all_paths_are_brighter_than_those_of_the_method_and_what_it_leaves_out_
     np.testing.assert_array_equal(method, direct)
 
 
-def test_a_bake_is_compared_with_both_kinds_of_paths(
+def test_bake_is_compared_with_method_paths_and_all_paths(
     look: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     output = str(tmp_path / "truth.exr")
@@ -90,5 +90,5 @@ def test_a_bake_is_compared_with_both_kinds_of_paths(
         (0.5, 1e-12, "50.0000 ± 0.0000 %"),
     ],
 )
-def test_a_share_has_the_digits_that_its_error_lets_it_have(share: float, error: float | None, said: str) -> None:
+def test_digits_follow_the_standard_error(share: float, error: float | None, said: str) -> None:
     assert percent(share, error) == said

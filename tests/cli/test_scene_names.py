@@ -1,4 +1,4 @@
-"""Names as people type them."""
+"""Names as users type them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ KNOWN = [("aaaa1111", "Still life"), ("bbbb2222", "still-life 2"), ("cccc3333", 
         ("box", "dddd4444"),
     ],
 )
-def test_a_thing_is_found_by_its_id_its_name_and_spellings_of_it(given: str, identity: str) -> None:
+def test_entries_match_by_id_name_and_spelling_variants(given: str, identity: str) -> None:
     assert pick("scene", given, KNOWN, "import one") == identity
 
 
@@ -37,12 +37,12 @@ def test_a_thing_is_found_by_its_id_its_name_and_spellings_of_it(given: str, ide
         ("", "there is no scene ''"),
     ],
 )
-def test_what_cannot_be_told_apart_is_said(given: str, said: str) -> None:
+def test_ambiguous_names_are_reported(given: str, said: str) -> None:
     with pytest.raises(NotFoundError, match=said):
         pick("scene", given, KNOWN, "import one")
 
 
-def test_a_spelling_becomes_the_name_only_where_there_is_one() -> None:
+def test_spelling_variant_resolves_only_if_unique() -> None:
     assert match_name("FRONT", ["front", "back"]) == "front"
     assert match_name("Front", ["front", "Front"]) == "Front"
     assert match_name("FRONT", ["front", "Front"]) == "FRONT"

@@ -1,4 +1,4 @@
-"""A scene, and for every registered method its bake, opened."""
+"""A scene, and an opened bake of it for each registered method."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -34,7 +34,7 @@ def _quad(name: str, corners: list[list[float]], material: int) -> Mesh:
 
 @pytest.fixture(scope="session")
 def scene() -> Scene:
-    """A floor and a wall that shadows it, a name that is hard on file names, two views, light from one side."""
+    """A floor and a wall that shadows it, a name with special characters, two views, and a light from one side."""
     floor = _quad("floor", [[-2, 0, 2], [2, 0, 2], [2, 0, -2], [-2, 0, -2]], 0)
     wall = _quad("wall", [[-0.5, 0, 0], [0.5, 0, 0], [0.5, 1, 0], [-0.5, 1, 0]], 1)
     glossy = {"model": "blinn_phong", "color": [0.2, 0.2, 0.2], "params": {"exponent": 20.0}}
@@ -55,15 +55,15 @@ def scene() -> Scene:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Every registered method, and the tests' own; of those with pictures, the ones whose eyes move or do not."""
+    """Parametrize over all methods; `transfer` takes those with fixed cameras, `free_bake` the others."""
     if "method" not in metafunc.fixturenames:
         return
     fixed, names = {*METHODS, FurnaceMethod.name} - FREE_CAMERA_METHODS, {*METHODS, FurnaceMethod.name}
-    if "moving" in metafunc.fixturenames:
+    if "free_bake" in metafunc.fixturenames:
         names = FREE_CAMERA_METHODS
     elif "transfer" in metafunc.fixturenames:
         names = fixed
-    # what a hand does is the same for the tests' own method: it goes through all of it with the long tests
+    # edits behave the same for the tests' own method: it takes all of them with the slow tests
     long = {FurnaceMethod.name} if "edit" in metafunc.fixturenames else set()
     marked = [pytest.param(name, marks=[pytest.mark.slow] * (name in long)) for name in sorted(names)]
     metafunc.parametrize("method", marked, indirect=True, scope="session")
@@ -71,7 +71,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.fixture(scope="session")
 def method(request: pytest.FixtureRequest) -> Iterator[TransferMethod]:
-    """One of them; the tests' own joins by the same one line."""
+    """A method; the tests' own is registered with the same line as the others."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(METHODS, FurnaceMethod.name, FurnaceMethod())
         yield METHODS[request.param]
@@ -84,7 +84,7 @@ def recipe(method: TransferMethod, scene: Scene) -> Recipe:
 
 @pytest.fixture(scope="session")
 def watched(method: TransferMethod, scene: Scene, recipe: Recipe, tmp_path_factory: pytest.TempPathFactory) -> Bake:
-    """An undisturbed bake, and what was done for it."""
+    """An undisturbed bake with a record of its tasks."""
     done: list[Done] = []
     store = tmp_path_factory.mktemp("contract") / "store.zarr"
     bake_in_process(
@@ -95,7 +95,7 @@ def watched(method: TransferMethod, scene: Scene, recipe: Recipe, tmp_path_facto
 
 @pytest.fixture(scope="session")
 def baked(watched: Bake) -> Path:
-    """Its store."""
+    """The store of the undisturbed bake."""
     return watched.store
 
 
@@ -107,22 +107,22 @@ def opened(baked: Path) -> OpenBake:
 
 @pytest.fixture(scope="session")
 def transfer(opened: OpenBake) -> OpenBake:
-    """A bake of fixed views, opened."""
+    """An opened bake with fixed cameras."""
     assert opened.camera_mode is CameraMode.FIXED
     return opened
 
 
 @pytest.fixture(scope="session")
-def moving(opened: OpenBake) -> OpenBake:
-    """A bake whose eyes move, opened."""
+def free_bake(opened: OpenBake) -> OpenBake:
+    """An opened bake with a free camera."""
     assert opened.camera_mode is CameraMode.FREE
     return opened
 
 
 @pytest.fixture
-def aside(moving: OpenBake) -> Camera:
-    """An eye that nobody baked."""
-    first = moving.views["front"].camera
+def moved_camera(free_bake: OpenBake) -> Camera:
+    """A camera that is not in the bake."""
+    first = free_bake.views["front"].camera
     to_world = first.to_world.copy()
     to_world[:3, 3] += [0.4, 0.3, -0.2]
     return Camera("front", to_world, first.yfov)

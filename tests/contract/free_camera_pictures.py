@@ -1,4 +1,4 @@
-"""Pictures whose eyes move, made as tests of them want them."""
+"""Free-camera pictures for tests."""
 
 from look_edits import add_lights
 from session_edits import make_look
@@ -17,7 +17,7 @@ def make_picture(views, *changes, camera=None, size=(48, 36)):
 
 
 def make_watched_picture(views, *changes):
-    """A picture that somebody watches, all its light there, its highlights not found finely yet."""
+    """A watched picture with complete lighting, before highlights are refined."""
     picture = FreeCameraPicture(views, "front", is_watched=True)
     picture.set_look(make_look(views, add_lights(*changes)))
     picture.advance(None)
@@ -26,7 +26,7 @@ def make_watched_picture(views, *changes):
 
 
 def finish_lighting(picture):
-    """What follows when a hand rests, but for fine highlights."""
+    """Run all pending jobs except the refinement of highlights."""
     while not isinstance(job := picture.next_job(), RefineHighlights):
         picture.install(job, run_job(job))
         picture.advance(None)
@@ -37,7 +37,7 @@ def run_job(job):
 
 
 def finish_refinement(picture):
-    """As when a hand rests."""
+    """Run all pending jobs."""
     while (job := picture.next_job()) is not None:
         picture.install(job, run_job(job))
         picture.advance(None)

@@ -1,4 +1,4 @@
-"""Looks that pictures are held to: two lamps beside the environment, and what a hand does to them."""
+"""Looks for picture tests: two lights beside the environment, and edits."""
 
 import pytest
 
@@ -7,12 +7,12 @@ PANEL = {
     "kind": "rectangle", "position": [-0.8, 1.2, 0.8], "direction": [1, -1, -1], "size": [0.5, 0.4],
     "emission": [4.0, 4.0, 6.0],
 }  # fmt: skip
-LIGHTS = {"Lamp": POINT_LIGHT, "Panel": PANEL}
+LIGHTS = {"Bulb": POINT_LIGHT, "Panel": PANEL}
 LOBE, EXPONENT = "/materials/Wall/terms/1/curves/theta_h", "/materials/Wall/terms/1/params/exponent"
 
 
 def add_lights(*changes):
-    """A change of the look: two lamps beside the environment, and what else is given."""
+    """A change that adds two lights to the environment, then applies further changes."""
 
     def change(document):
         document["lights"].update(LIGHTS)
@@ -69,21 +69,21 @@ def apply_all_edits(document):
         change(document)
 
 
-EDITS = {  # what a hand has touched before, and what it then does
+EDITS = {  # prepared pointer and the edit that follows
     "a curve drawn": (LOBE, draw_curve),
-    "a curve drawn that nobody has touched": (None, draw_curve),
+    "a curve drawn without preparation": (None, draw_curve),
     "a parameter, its curve open": (LOBE, set_exponent(60)),
-    "a parameter held": (EXPONENT, set_exponent(60)),
-    "a diffuse colour": ("/materials/Floor/terms/0/color", set_floor_color),
+    "a parameter prepared": (EXPONENT, set_exponent(60)),
+    "a diffuse color": ("/materials/Floor/terms/0/color", set_floor_color),
     "another model": (LOBE, replace_terms),
-    "brightness of a lamp": ("/lights/Lamp", edit_light("Lamp", intensity=0.3)),
-    "a lamp moved": ("/lights/Lamp", edit_light("Lamp", position=[-0.4, 0.9, 0.7])),
-    "a lamp switched off": (None, edit_light("Panel", enabled=False)),
+    "intensity of a light": ("/lights/Bulb", edit_light("Bulb", intensity=0.3)),
+    "a light moved": ("/lights/Bulb", edit_light("Bulb", position=[-0.4, 0.9, 0.7])),
+    "a light switched off": (None, edit_light("Panel", enabled=False)),
     "tint of the environment": (None, edit_environment(intensity=0.5, color=[1.0, 0.6, 0.4])),
     "the environment turned": ("/environment/rotation", edit_environment(rotation=40.0)),
     "fewer paths": (None, edit_transport(bounces=1)),
     "all at once": (LOBE, apply_all_edits),
 }
-# of every kind one: a curve, a model, a light, light that turns, and all
-FAST_EDITS = ("a curve drawn", "another model", "a lamp moved", "the environment turned", "all at once")
+# one of each kind: curve, model, light, rotation, and all
+FAST_EDITS = ("a curve drawn", "another model", "a light moved", "the environment turned", "all at once")
 MARKED_EDITS = [pytest.param(edit, marks=[pytest.mark.slow] * (edit not in FAST_EDITS)) for edit in EDITS]

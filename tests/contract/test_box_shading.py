@@ -1,4 +1,4 @@
-"""The product's own shading, by boxes: what a picture shows before a curve is touched, and after."""
+"""The product's shading with prefiltered boxes, before and after a curve is prepared."""
 
 import pytest
 from exact_pictures import open_copy, render_uncached
@@ -19,8 +19,8 @@ def by_boxes(shade_with_projector, monkeypatch):
     monkeypatch.setattr(relume.operators.shade, "Shader", Shader)
 
 
-def shown(transfer, *changes, touched=None):
-    """A picture at rest, what a hand touches made ready."""
+def converged_picture(transfer, *changes, touched=None):
+    """A converged picture with a prepared pointer."""
     picture = Picture(transfer, "front", Cache(BUDGET))
     picture.set_look(make_look(transfer, add_lights(*changes)))
     run_until_exact(picture)
@@ -31,10 +31,10 @@ def shown(transfer, *changes, touched=None):
 
 
 @pytest.mark.parametrize("edit", MARKED_EDITS)
-def test_an_edited_picture_is_the_shaded_one_to_a_thousandth(by_boxes, transfer, edit):
+def test_edited_picture_matches_shading_to_one_thousandth(by_boxes, transfer, edit):
     pointer, change = EDITS[edit]
     with open_copy(transfer) as fresh:
-        picture = shown(fresh, touched=pointer)
+        picture = converged_picture(fresh, touched=pointer)
         picture.set_look(make_look(fresh, add_lights(change)))
         picture.advance(8)
         actual = run_until_exact(picture).image()
@@ -42,8 +42,8 @@ def test_an_edited_picture_is_the_shaded_one_to_a_thousandth(by_boxes, transfer,
     assert relative_rmse(actual, expected) < A_THOUSANDTH
 
 
-def test_boxes_are_not_leaves(by_boxes, transfer, monkeypatch):
-    """Were they the same, the above would hold whatever boxes give."""
+def test_boxes_differ_from_subdivided_triangles(by_boxes, transfer, monkeypatch):
+    """If they were equal, the test above could not detect errors of the boxes."""
     if transfer.method == "furnace":
         pytest.skip("it has no light triangles to take boxes of")
     look = make_look(transfer, add_lights())

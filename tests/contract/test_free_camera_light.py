@@ -1,4 +1,4 @@
-"""What pictures whose eyes move show of a light that moves, and of what surfaces send each other, while it is found."""
+"""Free-camera pictures during light edits: direct light and delayed indirect light."""
 
 import numpy as np
 import pytest
@@ -24,15 +24,15 @@ from relume.methods.spherical_harmonic_transfer import read_harmonic_light
 from relume.methods.store_layout import read_patches
 from relume.store import open_store
 
-ROUNDED = 1e-4  # of sums of a thousand lights in float32, in another order
+ROUNDED = 1e-4  # float32 sums of one thousand lights in another order
 
 
-@pytest.mark.parametrize("edit", ["a lamp moved", "the environment turned", "fewer paths", "all at once"])
-def test_light_that_moves_is_rough_at_first_and_at_rest_as_if_nobody_had_watched(moving, edit):
+@pytest.mark.parametrize("edit", ["a light moved", "the environment turned", "fewer paths", "all at once"])
+def test_moving_light_is_approximate_and_converges_to_the_unwatched_picture(free_bake, edit):
     _, change = EDITS[edit]
-    other = edit_environment(rotation=11.0 * (1 + list(EDITS).index(edit)))  # nobody has asked for its light before
-    picture = FreeCameraPicture(moving, "front", is_watched=True)
-    picture.set_look(make_look(moving, add_lights(change, other)))
+    other = edit_environment(rotation=11.0 * (1 + list(EDITS).index(edit)))  # its light is not cached
+    picture = FreeCameraPicture(free_bake, "front", is_watched=True)
+    picture.set_look(make_look(free_bake, add_lights(change, other)))
     assert picture.advance(None).fidelity == "preview"
     rough = picture.image()
     assert not picture.advance(None).changed
@@ -47,12 +47,12 @@ def test_light_that_moves_is_rough_at_first_and_at_rest_as_if_nobody_had_watched
     assert picture.next_job() is None
     assert picture.advance(None).fidelity == "approximate"
     finish_refinement(picture)
-    exact = make_picture(moving, change, other).image()
+    exact = make_picture(free_bake, change, other).image()
     np.testing.assert_array_equal(picture.image(), exact)
     assert relative_rmse(rough, exact) < 0.3
 
 
-def test_bakes_that_know_no_harmonics_follow_light_too(baked, moving, monkeypatch):
+def test_bakes_without_harmonics_follow_light(baked, free_bake, monkeypatch):
     turned = edit_environment(rotation=203.0)
 
     def rough(transfer):
@@ -61,13 +61,13 @@ def test_bakes_that_know_no_harmonics_follow_light_too(baked, moving, monkeypatc
         assert picture.advance(None).fidelity == "preview"
         return picture.image()
 
-    harmonic = rough(moving)
+    harmonic = rough(free_bake)
     monkeypatch.setattr("relume.methods.opened.fixed_views_indirect.read_harmonic_light", lambda store, cells: None)
     plain = rough(open_bake(baked, Cache(1 << 30)))
     assert 0 < relative_rmse(harmonic, plain) < 0.04
 
 
-def test_harmonics_that_do_not_fit_the_points_are_refused(baked, moving):
+def test_harmonics_of_a_wrong_shape_are_rejected(baked, free_bake):
     store = open_store(baked)
 
     class Damaged:
@@ -84,7 +84,7 @@ def test_harmonics_that_do_not_fit_the_points_are_refused(baked, moving):
 FOLLOWED = {
     "a highlight's exponent": (LOBE, set_exponent(60)),
     "a curve drawn": (LOBE, draw_curve),
-    "a diffuse colour": ("/materials/Floor/terms/0/color", set_floor_color),
+    "a diffuse color": ("/materials/Floor/terms/0/color", set_floor_color),
     "a metal in place of a wall": (None, replace_terms),
     "fewer paths": (None, edit_transport(bounces=1)),
     "all of them": (
@@ -95,17 +95,20 @@ FOLLOWED = {
 
 
 @pytest.mark.parametrize("edit", FOLLOWED)
-@pytest.mark.parametrize("solo", [None, frozenset({"Lamp"})])
-def test_light_that_surfaces_send_follows_a_hand(moving, edit, solo):
-    """Under a light that is known, a frame is what was exact and what surfaces send otherwise, made beside the frames;
-    at rest all is exact."""
+@pytest.mark.parametrize("solo", [None, frozenset({"Bulb"})])
+def test_indirect_light_follows_edits(free_bake, edit, solo):
+    """With cached light, a frame is the exact image plus the change of indirect light, computed in the background;
+    the final picture is exact.
+    """
     pointer, change = FOLLOWED[edit]
-    other = edit_environment(rotation=100.0 + 2 * list(FOLLOWED).index(edit) + (solo is None))  # known to nobody else
+    other = edit_environment(
+        rotation=100.0 + 2 * list(FOLLOWED).index(edit) + (solo is None)
+    )  # not cached by other tests
 
     def shown(*changes):
-        return make_look(moving, add_lights(other, *changes))
+        return make_look(free_bake, add_lights(other, *changes))
 
-    picture = FreeCameraPicture(moving, "front", is_watched=True)
+    picture = FreeCameraPicture(free_bake, "front", is_watched=True)
     picture.set_look(shown(), solo=solo)
     picture.advance(None)
     finish_refinement(picture)
@@ -114,7 +117,7 @@ def test_light_that_surfaces_send_follows_a_hand(moving, edit, solo):
         picture.prepare(pointer)
     picture.set_look(shown(change), solo=solo)
     assert picture.advance(None).fidelity == "preview"
-    stale = picture.image()  # of surfaces as they are, in what they sent each other before
+    stale = picture.image()  # new materials, previous indirect light
     job = picture.next_job()
     assert not job.is_refinement
     picture.install(job, run_job(job))
@@ -124,42 +127,42 @@ def test_light_that_surfaces_send_follows_a_hand(moving, edit, solo):
     assert np.linalg.norm(image - picture.image()) < 0.1 * np.linalg.norm(stale - picture.image())
     finish_refinement(picture)
     exact = picture.image()
-    alone = FreeCameraPicture(moving, "front")
+    alone = FreeCameraPicture(free_bake, "front")
     alone.set_look(shown(change), solo=solo)
     alone.advance(None)
     np.testing.assert_array_equal(exact, alone.image())
     picture.set_look(shown(), solo=solo)
-    assert picture.advance(None).fidelity == "approximate"  # it is known
+    assert picture.advance(None).fidelity == "approximate"  # cached
     finish_refinement(picture)
     np.testing.assert_array_equal(picture.image(), before)
 
 
-def test_edits_wait_for_no_light_and_light_for_no_edits(moving, monkeypatch):
-    """Twice: an edit changes a part of the frame, and what was begun before it comes to all of it afterwards."""
+def test_edits_and_indirect_light_do_not_wait_for_each_other(free_bake, monkeypatch):
+    """Twice: an edit updates part of the frame, then the earlier background job updates all of it."""
     other = edit_environment(rotation=301.0)
-    picture = make_watched_picture(moving, other)
-    picture.set_look(make_look(moving, add_lights(other, set_exponent(30))))
+    picture = make_watched_picture(free_bake, other)
+    picture.set_look(make_look(free_bake, add_lights(other, set_exponent(30))))
     picture.advance(None)
     for step in (60, 90):
         job, before = picture.next_job(), picture.image()
         with monkeypatch.context() as nothing_whole:
             nothing_whole.setattr("relume.live.free_camera.free_camera_picture.render_frame", None)
             nothing_whole.setattr("relume.live.free_camera.probe_light.state.update_reflectances", None)
-            picture.set_look(make_look(moving, add_lights(other, set_exponent(step))))
+            picture.set_look(make_look(free_bake, add_lights(other, set_exponent(step))))
             assert picture.advance(None).changed
         edited = picture.image()
         assert (edited != before).any()
         picture.install(job, run_job(job))
         assert picture.advance(None).changed
         assert (picture.image() != edited).any()
-        assert picture.next_job().key != job.key  # of the newer look
+        assert picture.next_job().key != job.key  # for the newer look
     finish_refinement(picture)
-    np.testing.assert_array_equal(picture.image(), make_picture(moving, set_exponent(90), other).image())
+    np.testing.assert_array_equal(picture.image(), make_picture(free_bake, set_exponent(90), other).image())
 
 
-def test_what_surfaces_send_is_behind_a_light_that_turns_and_catches_up(moving):
-    turns = [make_look(moving, add_lights(edit_environment(rotation=turn))) for turn in (310.0, 318.0, 326.0)]
-    picture = make_watched_picture(moving, edit_environment(rotation=310.0))
+def test_indirect_light_lags_behind_a_rotating_light_and_converges(free_bake):
+    turns = [make_look(free_bake, add_lights(edit_environment(rotation=turn))) for turn in (310.0, 318.0, 326.0)]
+    picture = make_watched_picture(free_bake, edit_environment(rotation=310.0))
     picture.set_look(turns[1])
     picture.advance(None)
     job, behind = picture.next_job(), picture.image()
@@ -173,40 +176,40 @@ def test_what_surfaces_send_is_behind_a_light_that_turns_and_catches_up(moving):
     assert picture.advance(None).fidelity == "preview"
     assert picture.next_job().is_refinement
     final_image = picture.image()
-    at_once = FreeCameraPicture(moving, "front", is_watched=True)
+    at_once = FreeCameraPicture(free_bake, "front", is_watched=True)
     at_once.set_look(turns[2])
     at_once.advance(None)
     np.testing.assert_allclose(final_image, at_once.image(), rtol=ROUNDED, atol=ROUNDED)
     assert relative_rmse(behind, final_image) > 1e-3
     finish_refinement(picture)
-    np.testing.assert_array_equal(picture.image(), make_picture(moving, edit_environment(rotation=326.0)).image())
+    np.testing.assert_array_equal(picture.image(), make_picture(free_bake, edit_environment(rotation=326.0)).image())
 
 
-def test_an_eye_that_moves_finds_light_from_surfaces_wherever_it_looks(moving, aside):
-    """The light turns, and the eye moves before what surfaces send is there: no point is left without."""
-    picture = make_watched_picture(moving, edit_environment(rotation=331.0))
-    now = make_look(moving, add_lights(edit_environment(rotation=339.0)))
+def test_moving_camera_has_indirect_light_everywhere(free_bake, moved_camera):
+    """The light rotates and the camera moves before indirect light is ready: every probe still has indirect light."""
+    picture = make_watched_picture(free_bake, edit_environment(rotation=331.0))
+    now = make_look(free_bake, add_lights(edit_environment(rotation=339.0)))
     picture.set_look(now)
     picture.advance(None)
     job = picture.next_job()
-    picture.set_camera(aside, (64, 40))
+    picture.set_camera(moved_camera, (64, 40))
     picture.advance(None)
     before = picture.image()
     picture.install(job, run_job(job))
     picture.advance(None)
-    at_once = FreeCameraPicture(moving, "front", is_watched=True)
+    at_once = FreeCameraPicture(free_bake, "front", is_watched=True)
     at_once.set_look(now)
-    at_once.set_camera(aside, (64, 40))
+    at_once.set_camera(moved_camera, (64, 40))
     at_once.advance(None)
     np.testing.assert_allclose(picture.image(), at_once.image(), rtol=ROUNDED, atol=ROUNDED)
     assert 0 < relative_rmse(before, at_once.image()) < 0.1
 
 
-def test_a_shader_gets_what_follows(moving):
+def test_shader_blocks_contain_followed_light(free_bake):
     def bounces(*changes):
-        return make_look(moving, add_lights(edit_environment(rotation=171.0), *changes))
+        return make_look(free_bake, add_lights(edit_environment(rotation=171.0), *changes))
 
-    def sent(picture):
+    def blocks_of(picture):
         arrays = {}
         for name, block in picture.array_blocks()[0].items():
             if name.startswith("vectors/"):
@@ -216,7 +219,7 @@ def test_a_shader_gets_what_follows(moving):
                 arrays[name, int(num)] = scale * numbers[:, : 3 * int(num)]
         return arrays
 
-    picture = FreeCameraPicture(moving, "front", is_watched=True)
+    picture = FreeCameraPicture(free_bake, "front", is_watched=True)
     picture.renders_pixels = False
     picture.set_look(bounces())
     picture.advance(None)
@@ -226,11 +229,11 @@ def test_a_shader_gets_what_follows(moving):
     job = picture.next_job()
     picture.install(job, run_job(job))
     assert picture.advance(None).fidelity == "preview"
-    followed = sent(picture)
+    followed = blocks_of(picture)
     finish_refinement(picture)
-    exact = sent(picture)
+    exact = blocks_of(picture)
     assert followed.keys() == exact.keys()
-    assert {num for _, num in exact} == {1, 36}  # a diffuse floor, a wall with a highlight
+    assert {num for _, num in exact} == {1, 36}  # diffuse floor, glossy wall
     for (name, num), values in exact.items():
         irradiance = slice(None, None, num)  # the first function of each channel
         assert 0 < relative_rmse(followed[name, num][:, irradiance], values[:, irradiance]) < 0.01

@@ -1,4 +1,4 @@
-"""What pictures whose eyes move promise, whatever method they are of."""
+"""Requirements on free-camera pictures of every method."""
 
 import numpy as np
 import pytest
@@ -22,18 +22,18 @@ from relume.core.errors import NotFoundError, ParameterError
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.reference import reference_image
 
-ROUNDED = 1e-4  # of sums of a thousand lights in float32, in another order
+ROUNDED = 1e-4  # float32 sums of one thousand lights in another order
 
 
 @pytest.mark.parametrize("edit", EDITS)
-def test_an_edited_picture_is_that_of_the_look_from_nothing_and_leaves_no_trace(moving, edit):
+def test_edited_picture_equals_a_new_one_and_undo_leaves_no_trace(free_bake, edit):
     _, change = EDITS[edit]
-    picture = make_picture(moving)
+    picture = make_picture(free_bake)
     before = picture.image()
-    picture.set_look(make_look(moving, add_lights(change)))
+    picture.set_look(make_look(free_bake, add_lights(change)))
     assert picture.advance(None).changed
-    np.testing.assert_array_equal(picture.image(), make_picture(moving, change).image())
-    picture.set_look(make_look(moving, add_lights()))
+    np.testing.assert_array_equal(picture.image(), make_picture(free_bake, change).image())
+    picture.set_look(make_look(free_bake, add_lights()))
     picture.advance(None)
     np.testing.assert_array_equal(picture.image(), before)
 
@@ -43,17 +43,17 @@ def test_an_edited_picture_is_that_of_the_look_from_nothing_and_leaves_no_trace(
     [draw_curve, set_exponent(60.0), set_floor_color, remove_glossy_term, replace_terms],
     ids=lambda function: function.__name__,
 )
-def test_an_edited_material_alone_is_evaluated_anew(moving, change, monkeypatch):
-    """While eye and light stay: the picture, and what is sent of it, are those of the look from nothing."""
+def test_only_the_edited_material_is_evaluated_again(free_bake, change, monkeypatch):
+    """With camera and light unchanged, the picture and the encoded tiles equal those of a new picture."""
     direct = edit_transport(show="direct")
-    picture = make_watched_picture(moving, direct)
+    picture = make_watched_picture(free_bake, direct)
     picture.encode(picture.all_tiles(), "rgb9e5")
     before = picture.image()
     with monkeypatch.context() as nothing_whole:
         nothing_whole.setattr("relume.live.free_camera.free_camera_picture.render_frame", None)
-        picture.set_look(make_look(moving, add_lights(direct, change)))
+        picture.set_look(make_look(free_bake, add_lights(direct, change)))
         assert picture.advance(None).changed
-    anew = make_watched_picture(moving, direct, change)
+    anew = make_watched_picture(free_bake, direct, change)
     np.testing.assert_array_equal(picture.image(), anew.image())
     assert picture.encode(picture.all_tiles(), "rgb9e5") == anew.encode(anew.all_tiles(), "rgb9e5")
     differs = (picture.image() != before).any(axis=2)
@@ -61,89 +61,92 @@ def test_an_edited_material_alone_is_evaluated_anew(moving, change, monkeypatch)
     assert not differs.all()
 
 
-def test_highlights_are_found_finely_once_eye_and_light_rest(moving, aside, monkeypatch):
-    """Twice, the second time after an edit, which costs no whole frame; no eye that moves waits for them."""
+def test_highlights_are_refined_when_camera_and_light_stop(free_bake, moved_camera, monkeypatch):
+    """Twice: the second time after an edit, without a whole frame; a moving camera does not wait for refinement."""
     direct = edit_transport(show="direct")
-    picture = make_watched_picture(moving, direct)
+    picture = make_watched_picture(free_bake, direct)
     at_first, job = picture.image(), picture.next_job()
     for value in (40, 90):
         with monkeypatch.context() as nothing_whole:
             nothing_whole.setattr("relume.live.free_camera.free_camera_picture.render_frame", None)
-            picture.set_look(make_look(moving, add_lights(direct, set_exponent(value))))
+            picture.set_look(make_look(free_bake, add_lights(direct, set_exponent(value))))
             assert picture.advance(None).changed
         finish_refinement(picture)
         assert picture.next_job() is None
-        np.testing.assert_array_equal(picture.image(), make_picture(moving, direct, set_exponent(value)).image())
-    picture.set_look(make_look(moving, add_lights(direct)))
-    for camera in (aside, moving.views["front"].camera):
+        np.testing.assert_array_equal(picture.image(), make_picture(free_bake, direct, set_exponent(value)).image())
+    picture.set_look(make_look(free_bake, add_lights(direct)))
+    for camera in (moved_camera, free_bake.views["front"].camera):
         picture.set_camera(camera, (48, 36))
         picture.advance(None)
     np.testing.assert_array_equal(picture.image(), at_first)
-    picture.install(job, run_job(job))  # of a frame that is gone
+    picture.install(job, run_job(job))  # for an outdated frame
     assert not picture.advance(None).changed
     assert picture.next_job().key != job.key
-    coarse, fine = (show(moving, direct, replace_terms).image() for show in (make_watched_picture, make_picture))
+    coarse, fine = (show(free_bake, direct, replace_terms).image() for show in (make_watched_picture, make_picture))
     assert relative_rmse(coarse, fine) > 1e-3
 
 
-def test_a_picture_does_not_depend_on_where_its_eye_was(moving, aside):
-    picture = make_picture(moving)
+def test_picture_does_not_depend_on_earlier_cameras(free_bake, moved_camera):
+    picture = make_picture(free_bake)
     before = picture.image()
-    picture.set_camera(aside, (64, 40))
+    picture.set_camera(moved_camera, (64, 40))
     picture.advance(None)
-    np.testing.assert_array_equal(picture.image(), make_picture(moving, camera=aside, size=(64, 40)).image())
+    np.testing.assert_array_equal(picture.image(), make_picture(free_bake, camera=moved_camera, size=(64, 40)).image())
     assert picture.image().shape == (40, 64, 3)
-    picture.set_camera(moving.views["front"].camera, (48, 36))
+    picture.set_camera(free_bake.views["front"].camera, (48, 36))
     picture.advance(None)
     np.testing.assert_array_equal(picture.image(), before)
 
 
-def test_it_never_says_that_it_is_exact_and_rests(moving):
-    picture = FreeCameraPicture(moving, "front")
-    picture.set_look(make_look(moving))
+def test_picture_is_never_exact_and_becomes_idle(free_bake):
+    picture = FreeCameraPicture(free_bake, "front")
+    picture.set_look(make_look(free_bake))
     first, second = picture.advance(None), picture.advance(None)
     assert (first.changed, first.exact, first.fidelity, first.complete) == (True, False, "approximate", True)
     assert not second.changed
     assert picture.next_job() is None
 
 
-def test_no_light_is_black_and_twice_the_light_twice_the_picture(moving):
-    dark = (edit_environment(intensity=0.0), edit_light("Lamp", enabled=False), edit_light("Panel", intensity=0.0))
-    assert not make_picture(moving, *dark).image().any()
-    twice = (edit_environment(intensity=2.0), edit_light("Lamp", intensity=2.0), edit_light("Panel", intensity=2.0))
+def test_no_light_is_black_and_doubled_light_doubles_the_picture(free_bake):
+    dark = (edit_environment(intensity=0.0), edit_light("Bulb", enabled=False), edit_light("Panel", intensity=0.0))
+    assert not make_picture(free_bake, *dark).image().any()
+    twice = (edit_environment(intensity=2.0), edit_light("Bulb", intensity=2.0), edit_light("Panel", intensity=2.0))
     np.testing.assert_allclose(
-        make_picture(moving, *twice).image(), 2 * make_picture(moving).image(), rtol=ROUNDED, atol=ROUNDED
+        make_picture(free_bake, *twice).image(), 2 * make_picture(free_bake).image(), rtol=ROUNDED, atol=ROUNDED
     )
 
 
-def test_solos_of_all_sources_sum_to_the_whole(moving):
-    diffuse = ("Floor", "Wall")  # what is below nothing is held at nothing: no highlight that rings may be divided
+def test_solo_free_camera_pictures_sum_to_the_whole(free_bake):
+    diffuse = (
+        "Floor",
+        "Wall",
+    )  # negative values are clamped to zero: the sum needs materials without ringing highlights
 
     def plain(document):
         for name in diffuse:
             document["materials"][name]["terms"] = [{"model": "lambert", "color": [0.5, 0.4, 0.3], "params": {}}]
 
-    whole, total = make_picture(moving, plain).image(), 0
-    for source in ("Lamp", "Panel", None):
-        off = [edit_light(name, enabled=False) for name in ("Lamp", "Panel") if name != source]
-        alone = make_picture(moving, plain, *off, edit_environment(intensity=float(source is None))).image()
+    whole, total = make_picture(free_bake, plain).image(), 0
+    for source in ("Bulb", "Panel", None):
+        off = [edit_light(name, enabled=False) for name in ("Bulb", "Panel") if name != source]
+        alone = make_picture(free_bake, plain, *off, edit_environment(intensity=float(source is None))).image()
         assert alone.any()
         total = total + alone
     np.testing.assert_allclose(total, whole, rtol=ROUNDED, atol=ROUNDED)
 
 
 @pytest.mark.parametrize("pointer", ["/materials/Nowhere/terms/0/curves/theta_h", LOBE.replace("1", "7"), "nonsense"])
-def test_what_points_to_nothing_is_refused_and_changes_nothing(moving, pointer):
-    picture = make_picture(moving)
+def test_invalid_pointers_are_rejected_without_change(free_bake, pointer):
+    picture = make_picture(free_bake)
     with pytest.raises(ParameterError):
         picture.prepare(pointer)
     assert not picture.advance(None).changed
 
 
-def test_an_environment_that_is_not_here_is_refused_and_changes_nothing(moving):
-    picture = make_picture(moving)
+def test_missing_environment_is_rejected_without_change(free_bake):
+    picture = make_picture(free_bake)
     before = picture.image()
-    look = make_look(moving, add_lights(set_floor_color))
+    look = make_look(free_bake, add_lights(set_floor_color))
     gone = look.environment.model_copy(update={"map": "env:0123456789abcdef"})
     with pytest.raises(NotFoundError):
         picture.set_look(look.model_copy(update={"environment": gone}))
@@ -151,8 +154,8 @@ def test_an_environment_that_is_not_here_is_refused_and_changes_nothing(moving):
     np.testing.assert_array_equal(picture.image(), before)
 
 
-def test_a_pixel_says_what_it_shows(moving):
-    picture = make_picture(moving)
+def test_pixel_probe_reports_the_displayed_radiance(free_bake):
+    picture = make_picture(free_bake)
     inspection = picture.inspect(24, 33)
     assert inspection["material"] == "Floor"
     assert abs(inspection["position"][1]) < 1e-3
@@ -163,22 +166,23 @@ def test_a_pixel_says_what_it_shows(moving):
 
 
 @pytest.mark.parametrize("show", ["direct", "all"])
-def test_diffuse_light_from_elsewhere_is_that_of_brute_force(scene, moving, aside, show):
-    """Direct light of soft sources, and reflected: the points of a small scene lie close enough for five per cent."""
+def test_diffuse_light_from_a_new_camera_matches_the_reference(scene, free_bake, moved_camera, show):
+    """Direct light of soft sources, and indirect light; five percent with the dense probes of a small scene."""
 
     def plain(document):
         curves = {"theta_o": {"points": [[0, 1.5], [90, 0.5]]}}
         wall = {"model": "lambert", "color": [0.2, 0.3, 0.5], "params": {}, "curves": curves}
         document["materials"]["Wall"]["terms"] = [wall]
 
-    changes = (plain, edit_light("Panel", enabled=False), edit_light("Lamp", enabled=False), edit_transport(show=show))
-    look = make_look(moving, add_lights(*changes))
+    changes = (plain, edit_light("Panel", enabled=False), edit_light("Bulb", enabled=False), edit_transport(show=show))
+    look = make_look(free_bake, add_lights(*changes))
     passes = [
-        reference_image(_with(scene, aside), "front", look, (48, 36), 64, pass_index=k, reflects=True) for k in range(4)
+        reference_image(_with(scene, moved_camera), "front", look, (48, 36), 64, pass_index=k, reflects=True)
+        for k in range(4)
     ]
     reference, noise = np.mean(passes, axis=0), np.std(passes, axis=0).mean() / 2
-    actual = make_picture(moving, *changes, camera=aside).image()
-    inner = ~_edges(make_picture(moving, *changes, camera=aside))
+    actual = make_picture(free_bake, *changes, camera=moved_camera).image()
+    inner = ~_edges(make_picture(free_bake, *changes, camera=moved_camera))
     assert relative_rmse(actual[inner], reference[inner]) < 0.05
     assert abs(actual[inner].mean() / reference[inner].mean() - 1) < 0.01 + 4 * noise / reference.mean()
 
@@ -190,7 +194,7 @@ def _with(scene, camera):
 
 
 def _edges(picture):
-    """Pixels beside one that shows something else: brute force sees parts of both. (height, width)"""
+    """Pixels beside a different surface: the reference averages both. (height, width)"""
     height, width, _ = picture.image().shape
     names = np.array([[str(picture.inspect(x, y)["material"]) for x in range(width)] for y in range(height)])
     edge = np.zeros((height, width), bool)

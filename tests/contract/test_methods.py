@@ -1,7 +1,7 @@
-"""What every transfer method's bakes promise: a new one inherits these tests by standing in the registry.
+"""Requirements on bakes of every method; new methods inherit these tests through the registry.
 
-Tasks tile what they fill, once; neither their order nor an interruption changes a byte; a store that is opened again
-gives the same arrays; a method that travels to another process computes the same there.
+Tasks tile their arrays exactly once; neither task order nor interruption changes a byte; a reopened store
+gives the same arrays; a method that is pickled to another process computes the same result there.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ from relume.store.publish import array_paths
 
 
 def tree_hash(folder: Path) -> str:
-    """Of what was baked; images that pictures of other tests have kept beside it, and edited ones, are left out."""
+    """Hash of the baked files, without images that other tests stored or edited there."""
     digest = hashlib.sha256()
     for file in sorted(p for p in folder.rglob("*") if p.is_file()):
         if file.relative_to(folder).parts[0] in DERIVED_FOLDERS:
@@ -36,12 +36,14 @@ def tree_hash(folder: Path) -> str:
 
 
 def run_elsewhere(method: TransferMethod, scene: Scene, recipe: Recipe, staging: Path, task: Task) -> None:
-    """A task with a copy of the method as another process gets it."""
+    """Run a task with a pickled copy of the method, as another process would."""
     copy: TransferMethod = pickle.loads(pickle.dumps(method))
     run_bake.run_task(copy, scene, recipe, staging, task)
 
 
-def test_plan_bounds_what_the_bake_takes(method: TransferMethod, scene: Scene, recipe: Recipe, watched: Bake) -> None:
+def test_plan_is_an_upper_bound_of_the_bake(
+    method: TransferMethod, scene: Scene, recipe: Recipe, watched: Bake
+) -> None:
     plan, reader = method.plan(scene, recipe), open_store(watched.store)
     paths = [path for path in array_paths(watched.store) if path.split("/")[0] not in DERIVED_FOLDERS]
     stored = sum(reader.read(path).nbytes for path in paths)
@@ -57,7 +59,7 @@ def test_plan_is_pure(method: TransferMethod, scene: Scene, recipe: Recipe) -> N
 @pytest.mark.parametrize(
     "changes", [{"views": ("nowhere",)}, {"views": ()}, {"num_lights": 10**9}, {"num_lights": 0}, {"size": (0, 0)}]
 )
-def test_recipe_that_does_not_fit_is_refused_by_the_plan(
+def test_invalid_recipe_is_rejected_by_the_plan(
     method: TransferMethod, scene: Scene, recipe: Recipe, changes: dict[str, Any]
 ) -> None:
     with pytest.raises(PlanError):
@@ -84,7 +86,7 @@ def test_tasks_tile_every_announced_array_once(
 
 
 @pytest.mark.slow
-def test_order_changes_no_byte(
+def test_task_order_changes_no_byte(
     method: TransferMethod, scene: Scene, recipe: Recipe, baked: Path, tmp_path: Path
 ) -> None:
     staging = tmp_path / "staging"
@@ -101,7 +103,7 @@ def test_neither_interruption_nor_repetition_changes_a_byte(
 ) -> None:
     staging, done = tmp_path / "staging", set()
 
-    def go_on(stop_after: int | None) -> None:
+    def resume(stop_after: int | None) -> None:
         run_bake.create_staging_store(method, scene, recipe, staging)
         for stage in range(len(method.stages)):
             for task in run_bake.create_stage(method, scene, recipe, staging, stage):
@@ -117,16 +119,14 @@ def test_neither_interruption_nor_repetition_changes_a_byte(
         return tree_hash(tmp_path / name)
 
     for stop_after in (1, 3, None):
-        go_on(stop_after)
+        resume(stop_after)
     assert published("resumed") == tree_hash(baked)
     done.clear()
-    go_on(None)
+    resume(None)
     assert published("repeated") == tree_hash(baked)
 
 
-def test_task_alone_computes_what_it_computed_in_the_bake(
-    method: TransferMethod, scene: Scene, recipe: Recipe, baked: Path
-) -> None:
+def test_single_task_reproduces_its_rows(method: TransferMethod, scene: Scene, recipe: Recipe, baked: Path) -> None:
     store = open_store(baked)
     for stage in range(len(method.stages)):
         announced = {spec.path for spec in method.arrays(stage, scene, recipe, store)}
@@ -136,6 +136,6 @@ def test_task_alone_computes_what_it_computed_in_the_bake(
                 np.testing.assert_array_equal(store.read(path, *span), rows)
 
 
-def test_unknown_task_does_not_pass_silently(method: TransferMethod, scene: Scene, recipe: Recipe, baked: Path) -> None:
+def test_unknown_task_is_an_error(method: TransferMethod, scene: Scene, recipe: Recipe, baked: Path) -> None:
     with pytest.raises(ValueError, match="not in"):
         method.compute(scene, recipe, Task(len(method.stages) - 1, 0, "no such view", 0, 1), open_store(baked))

@@ -1,6 +1,6 @@
-"""Plans are upper bounds, also where a scene is made to break them: blades, large environments, large textures.
+"""Plans are upper bounds, even for adversarial scenes: grass blades, large environments, large textures.
 
-The figures of ordinary scenes are by `relume bench plan`.
+`relume bench plan` gives the figures of ordinary scenes.
 """
 
 from dataclasses import replace
@@ -29,7 +29,7 @@ def blades() -> Scene:
 
 
 def large_environment() -> Scene:
-    """A quad below 2 million texels."""
+    """A quad under an environment of 2 million texels."""
     radiance = np.random.default_rng(1).random((1024, 2048, 3), np.float32)
     return _lit_by(radiance, Material("Plain", (BLUE,)))
 
@@ -59,16 +59,16 @@ def check(method: TransferMethod, scene: Scene, recipe: Recipe) -> dict[str, int
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] * (name != "direct")) for name in sorted(METHODS)]
 )
-def test_a_tuft_of_blades_stays_below_its_plan(name: str, blades: Scene) -> None:
+def test_tuft_of_blades_stays_below_its_plan(name: str, blades: Scene) -> None:
     took = check(METHODS[name], blades, Recipe(name, ("front",), (16, 16), 40, num_probes=1000))
-    if name not in FREE_CAMERA_METHODS:  # nearly every pixel is an edge, and all flights are short beside one
+    if name not in FREE_CAMERA_METHODS:  # nearly every pixel is an edge
         assert took["view_samples"] > 3 * 16 * 16
 
 
 @linux
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["gather", "probes"])
-def test_many_gather_samples_and_rays_stay_below_their_plan(name: str, blades: Scene) -> None:
+def test_many_patches_and_rays_stay_below_their_plan(name: str, blades: Scene) -> None:
     asked = Recipe(name, ("front",), (16, 16), 40, num_probes=1000, num_patches=4000, gather_rays=1024)
     check(METHODS[name], blades, asked)
 
@@ -76,12 +76,12 @@ def test_many_gather_samples_and_rays_stay_below_their_plan(name: str, blades: S
 @linux
 @pytest.mark.slow
 @pytest.mark.parametrize("make", [large_environment, large_textures])
-def test_what_a_scene_brings_is_planned(make: object) -> None:
+def test_environment_and_textures_are_in_the_plan(make: object) -> None:
     check(METHODS["direct"], make(), Recipe("direct", ("front",), (32, 32), 40))  # type: ignore[operator]
 
 
 @pytest.mark.parametrize("name", sorted(set(METHODS) - FREE_CAMERA_METHODS))
-def test_a_picture_of_3840_pixels_fits_where_one_process_samples_it(name: str, blades: Scene) -> None:
+def test_3840_pixel_view_fits_if_one_process_samples_it(name: str, blades: Scene) -> None:
     views = [replace(blades.cameras[0], name=view) for view in ("front", "again")]
     plans = [
         METHODS[name].plan(replace(blades, cameras=views), Recipe(name, view_names, (3840, 2160), 1000))
@@ -94,7 +94,7 @@ def test_a_picture_of_3840_pixels_fits_where_one_process_samples_it(name: str, b
 
 
 @pytest.mark.parametrize("name", sorted(METHODS))
-def test_what_a_scene_brings_is_in_the_plan(name: str, blades: Scene) -> None:
+def test_scene_data_is_in_the_plan(name: str, blades: Scene) -> None:
     recipe = Recipe(name, ("front",), (32, 32), 40)
     plan = METHODS[name].plan
     larger = replace(blades, environment=Environment("sky", np.ones((512, 1024, 3), np.float32)))

@@ -1,4 +1,4 @@
-"""What the tests keep of a bake beside its store."""
+"""A record of a bake's tasks beside its store."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -7,7 +7,7 @@ from relume.store.bake_protocol import Task
 
 
 class Done(NamedTuple):
-    """A task, the arrays that it wrote into, and the rays that it says it traced."""
+    """A task, the arrays that it wrote, and its number of traced rays."""
 
     task: Task
     paths: tuple[str, ...]
@@ -15,7 +15,7 @@ class Done(NamedTuple):
 
 
 class Bake(NamedTuple):
-    """A store, and what its tasks did in their order."""
+    """A store and its tasks in order."""
 
     store: Path
     done: list[Done]

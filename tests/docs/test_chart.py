@@ -1,4 +1,4 @@
-"""The chart for Kubernetes: sets what there is, and takes the configuration of nginx that is tried elsewhere."""
+"""The Kubernetes chart sets existing settings and values, and uses the tested nginx configuration."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_variables_are_settings() -> None:
     assert named >= {"DATABASE", "DATA", "LOGIN", "ALLOWED_HOSTS"}
 
 
-def test_values_that_templates_take_are_there() -> None:
+def test_template_values_exist() -> None:
     values = yaml.safe_load((CHART / "values.yaml").read_text())
     for path in re.findall(r"\.Values\.([A-Za-z.]+)", "".join(TEMPLATES.values())):
         value = values
@@ -40,17 +40,17 @@ def test_values_that_templates_take_are_there() -> None:
             value = value[key]
 
 
-def test_nginx_is_the_one_that_is_tried() -> None:
+def test_nginx_configuration_is_the_tested_one() -> None:
     assert (CHART / "nginx.conf").resolve() == ROOT / "docker" / "replicas" / "nginx.conf"
     (pattern,) = re.findall(r'regexReplaceAll "([^"]+)"', TEMPLATES["proxy.yaml"])
     assert len(re.findall(pattern.replace("\\n", "\n"), (CHART / "nginx.conf").read_text())) == 1
 
 
-def test_servers_believe_the_proxys_pods_and_hear_nobody_else() -> None:
+def test_servers_trust_only_the_proxy_pods() -> None:
     server, policy, proxy = (TEMPLATES[name] for name in ("server.yaml", "policy.yaml", "proxy.yaml"))
     assert re.search(r'RELUME_TRUSTED_PROXIES\n +value: {{ list \(printf "%s-proxy.%s.svc"', server)
     (headless,) = [document for document in proxy.split("\n---\n") if "clusterIP: None" in document]
-    assert "name: {{ $name }}-proxy" in headless  # so that the name has the addresses of the pods
+    assert "name: {{ $name }}-proxy" in headless  # the name resolves to the addresses of the pods
     assert "kind: NetworkPolicy" in policy
     assert "app.kubernetes.io/component: proxy" in policy
     values = yaml.safe_load((CHART / "values.yaml").read_text())
@@ -58,13 +58,13 @@ def test_servers_believe_the_proxys_pods_and_hear_nobody_else() -> None:
     assert values["networkPolicy"]["from"] == values["proxy"]["realIpFrom"] == []
 
 
-def test_addresses_of_clients_come_through_the_ingress() -> None:
+def test_client_addresses_pass_the_ingress() -> None:
     (marker,) = re.findall(r'replace "([^"]+)"', TEMPLATES["proxy.yaml"])
     assert (CHART / "nginx.conf").read_text().count(marker) == 1
 
 
 @pytest.mark.parametrize("options", [SECRET, FULL])
-def test_helm_has_nothing_to_say(options: list[str]) -> None:
+def test_chart_passes_helm_lint_and_renders(options: list[str]) -> None:
     helm = shutil.which("helm")
     if helm is None:
         pytest.skip("helm is not installed")

@@ -1,4 +1,4 @@
-"""The files for containers: who is believed, who reaches whom, what each may take."""
+"""The container files: trusted proxies, networks and limits."""
 
 from __future__ import annotations
 
@@ -36,20 +36,20 @@ def networks(service: dict[str, Any]) -> set[str]:
 @pytest.mark.parametrize(
     ("name", "network"), [("compose.production.yml", "front"), ("compose.replicas.yml", "replicas")]
 )
-def test_the_proxy_is_believed_and_nobody_else(name: str, network: str) -> None:
+def test_only_the_proxy_is_trusted(name: str, network: str) -> None:
     file = read(name)
     (trusted,) = json.loads(file["services"]["server"]["environment"]["RELUME_TRUSTED_PROXIES"])
     assert trusted == file["services"]["proxy"]["networks"][network]["ipv4_address"]
     (pool,) = file["networks"][network]["ipam"]["config"]
     assert ip_address(trusted) in ip_network(pool["subnet"])
-    assert ip_address(trusted) not in ip_network(pool["ip_range"])  # from which all others have theirs
-    gateway = ip_network(pool["subnet"])[1]  # as processes of the machine itself arrive
+    assert ip_address(trusted) not in ip_network(pool["ip_range"])  # the range of all other addresses
+    gateway = ip_network(pool["subnet"])[1]  # the address of processes on the host
     assert ip_address(trusted) != gateway
-    assert networks(file["services"]["proxy"]) == {network}  # servers would not trust it in another that they share
+    assert networks(file["services"]["proxy"]) == {network}  # servers would not trust it in another shared network
     assert network in networks(file["services"]["server"])
 
 
-def test_grafana_reaches_prometheus_alone() -> None:
+def test_grafana_reaches_only_prometheus() -> None:
     services = read("compose.production.yml")["services"]
     assert networks(services["grafana"]) & networks(services["server"]) == set()
     assert networks(services["grafana"]) & networks(services["proxy"]) == set()
@@ -58,7 +58,7 @@ def test_grafana_reaches_prometheus_alone() -> None:
 
 
 @pytest.mark.parametrize("name", ["compose.production.yml", "compose.replicas.yml"])
-def test_what_has_a_network_of_its_own_has_no_rights_that_it_does_not_need(name: str) -> None:
+def test_services_have_minimal_privileges(name: str) -> None:
     for service in read(name)["services"].values():
         if "image" in service:
             assert service["cap_drop"] == ["ALL"]
@@ -66,7 +66,7 @@ def test_what_has_a_network_of_its_own_has_no_rights_that_it_does_not_need(name:
             assert service["mem_limit"]
 
 
-def test_what_a_server_keeps_fits_its_limit_of_memory() -> None:
+def test_server_caches_fit_the_memory_limit() -> None:
     server = read("compose.yml")["services"]["server"]
     given = {key: int(server["environment"][f"RELUME_{key}_BYTES"]) for key in ("CACHE", "BATCH", "IMPORT")}
     imports_at_once = 2
@@ -80,13 +80,13 @@ def test_variables_are_settings() -> None:
     assert {name.lower() for name in named} - {"storage", "host_name"} <= set(Settings.model_fields)
 
 
-def test_files_with_secrets_are_in_no_commit_and_no_image() -> None:
+def test_secret_files_are_ignored_by_git_and_docker() -> None:
     secrets = {each["file"].removeprefix("./") for each in read("compose.production.yml")["secrets"].values()}
     for name in (".gitignore", ".dockerignore"):
         assert {f"docker/{secret}" for secret in secrets} <= set((DOCKER.parent / name).read_text().split())
 
 
-def test_the_overlay_for_a_team_gives_time_to_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_team_overlay_gives_time_to_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     server, plain = (read(name)["services"]["server"] for name in ("compose.production.yml", "compose.yml"))
     for name, value in server["environment"].items():
         monkeypatch.setenv(name, re.sub(r"\$\{(\w+)[^}]*\}", "relight.example.org", value))
@@ -98,7 +98,7 @@ def test_the_overlay_for_a_team_gives_time_to_stop(tmp_path: Path, monkeypatch: 
 
 
 @pytest.mark.parametrize("name", ["compose.production.yml", "compose.replicas.yml"])
-def test_files_that_the_overlay_mounts_are_there(name: str) -> None:
+def test_files_mounted_by_the_overlay_exist(name: str) -> None:
     for service in read(name)["services"].values():
         for volume in service.get("volumes", ()):
             if volume.startswith("./"):

@@ -1,4 +1,4 @@
-"""What the documents claim about names, folders, terms and settings is what the code has."""
+"""Names, folders, terms and settings in the documents agree with the code."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _anchors(page: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
-def test_links_and_images_lead_somewhere(document: Path) -> None:
+def test_links_and_images_resolve(document: Path) -> None:
     text = re.sub(r"```.*?```", "", document.read_text(encoding="utf-8"), flags=re.DOTALL)
     for target in re.findall(r"\[[^\]]*\]\(([^)\s]+)\)", text):
         if target.startswith(("http://", "https://")):
@@ -68,7 +68,7 @@ def test_links_and_images_lead_somewhere(document: Path) -> None:
         assert not anchor or anchor in _anchors(file), f"{target} has no such heading"
 
 
-def test_pages_and_decisions_that_the_code_names_are_there() -> None:
+def test_pages_and_decisions_named_in_code_exist() -> None:
     decisions = {int(page.name[:4]) for page in ROOT.glob("docs/adr/0*.md")}
     references = 0
     for source in SOURCES:
@@ -90,7 +90,7 @@ EXAMPLES = {"relume/brdf/terms/your_term.py", "bench/.venv-peers", "bench/.venv-
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
-def test_files_and_modules_that_are_named_are_there(document: Path) -> None:
+def test_named_files_and_modules_exist(document: Path) -> None:
     text = document.read_text(encoding="utf-8")
     for path in set(PATH.findall(text)) - EXAMPLES:
         assert (ROOT / path).exists(), f"{path} is not there"
@@ -108,8 +108,8 @@ def _is_module_or_of_one(name: str) -> bool:
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
-def test_lists_of_files_name_what_is_there(document: Path) -> None:
-    """A name without a folder stands in that of the name before it."""
+def test_lists_of_files_name_existing_files(document: Path) -> None:
+    """A name without a folder is in the folder of the name before it."""
     for listed in re.findall(r"^\*Files?:\*(.*?)\n\n", document.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL):
         folder = None
         for name in re.findall(r"`([^`]+)`", listed):

@@ -1,4 +1,4 @@
-"""The limits that docs/operations.md names are those of the code."""
+"""The limits in docs/operations.md agree with the code."""
 
 import re
 from pathlib import Path
@@ -31,7 +31,7 @@ KIB, MIB, MILLION = 1 << 10, 1 << 20, 1_000_000
 OPERATIONS = Path(__file__).resolve().parents[2] / "docs" / "operations.md"
 
 
-def most(field: str) -> int:
+def maximum(field: str) -> int:
     """The upper bound of a number in a comparison's request."""
     return int(bodies.ComparisonRequest.model_json_schema()["properties"][field]["maximum"])
 
@@ -76,19 +76,19 @@ ROWS = {
     ),
     "looks and cameras of a batch render; its frames": f"{renders.MAX_LOOKS:,}; {renders.MAX_FRAMES:,}",
     "frames with listed looks; total": f"{renders.MAX_LISTED_FRAMES}; {renders.MAX_LISTED_BYTES // MIB} MiB",
-    "passes of a comparison; queued jobs of each kind": f"{most('passes'):,}; {Settings().max_queued}",
+    "passes of a comparison; queued jobs of each kind": f"{maximum('passes'):,}; {Settings().max_queued}",
     "pixels of a free-camera view": f"{protocol.MAX_CAMERA_PIXELS:,}",
 }
 
 
-def test_the_table_of_limits_says_what_the_code_checks() -> None:
+def test_table_of_limits_agrees_with_the_code() -> None:
     section = OPERATIONS.read_text(encoding="utf-8").split("## Limits")[1].split("\n## ")[0]
     documented = dict(re.findall(r"^\| (?!what)(.+?) \| (.+?) \|$", section, re.MULTILINE))
     assert {limit: at_most for limit, at_most in documented.items() if limit in ROWS} == ROWS
     assert set(documented) - set(ROWS) == {"cached images of edited looks beside a bake"}
 
 
-def test_what_is_said_of_plans_is_what_plans_count() -> None:
+def test_documented_plan_figures_agree_with_plans() -> None:
     text = " ".join(OPERATIONS.read_text(encoding="utf-8").split())
     assert [view_sample_limit([], side * side) / side**2 for side in (256, 512, 1024, 4096)] == [8, 4, 2, 2]
     assert "eight view samples a pixel in pictures up to 256 × 256" in text

@@ -1,4 +1,4 @@
-"""Metrics are named as Prometheus wants them; those that a rule, a dashboard or a page names are the server's."""
+"""Metric names follow Prometheus conventions; rules, dashboards and pages name only metrics of the server."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ LABELS = {"format", "instance", "kind", "outcome", "reason", "state", "status"}
 
 @pytest.fixture(scope="module")
 def registry(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CollectorRegistry]:
-    """The metrics of a server that runs."""
+    """The metrics of a running server."""
     settings = Settings(data=tmp_path_factory.mktemp("metrics"), allowed_hosts=["testserver"], preload_importer=False)
     library = Control().open_library
     app = create_app(settings, open_library=library, open_batches=InThreadBatches, open_bakes=open_fake_bakes)
@@ -37,7 +37,7 @@ def registry(tmp_path_factory: pytest.TempPathFactory) -> Iterator[CollectorRegi
 
 @pytest.fixture(scope="module")
 def names(registry: CollectorRegistry) -> set[str]:
-    """Of all samples that the server may give."""
+    """Names of all samples that the server may export."""
     sample_names = {family.name + suffix for family in registry.collect() for suffix in SUFFIXES[family.type]}
     assert "relume_edit_to_socket_seconds_bucket" in sample_names
     return sample_names | OF_PROMETHEUS
@@ -55,14 +55,14 @@ def expressions() -> dict[str, str]:
 
 
 @pytest.mark.parametrize("name", expressions())
-def test_what_is_asked_for_is_there(name: str, names: set[str]) -> None:
+def test_expressions_name_existing_metrics(name: str, names: set[str]) -> None:
     text = re.sub(r"\{[^}]*\}|\[[^\]]*\]", "", expressions()[name])  # matchers and ranges
     asked = set(re.findall(r"[A-Za-z_]\w*", text)) - WORDS - LABELS
     assert asked
     assert asked <= names
 
 
-def test_labels_that_rules_match_are_there(registry: CollectorRegistry) -> None:
+def test_matched_labels_exist(registry: CollectorRegistry) -> None:
     labels = {"instance", "job"}
     for collector in set(registry._collector_to_names):
         labels |= set(getattr(collector, "_labelnames", ()))
@@ -73,17 +73,17 @@ def test_labels_that_rules_match_are_there(registry: CollectorRegistry) -> None:
         assert matched | grouped <= labels, text
 
 
-def test_of_the_ledger_that_servers_share_none_is_counted_twice() -> None:
+def test_shared_ledger_metrics_are_not_counted_twice() -> None:
     asked = [text for text in expressions().values() if "relume_jobs{" in text]
     assert len(asked) > 1
     assert all("instance" in text.partition("(")[2].partition(")")[0] or text.startswith("max by") for text in asked)
 
 
-def test_what_an_alert_sees_grow_is_there_before_it_does(registry: CollectorRegistry) -> None:
+def test_counters_of_alerts_start_at_zero(registry: CollectorRegistry) -> None:
     assert registry.get_sample_value("relume_refused_sessions_total", {"reason": "busy"}) == 0.0
 
 
-def test_names_follow_the_rules(registry: CollectorRegistry) -> None:
+def test_metric_names_follow_the_conventions(registry: CollectorRegistry) -> None:
     for family in registry.collect():
         if not family.name.startswith("relume_"):
             continue
@@ -93,7 +93,7 @@ def test_names_follow_the_rules(registry: CollectorRegistry) -> None:
         assert family.type != "histogram" or family.name.endswith("_seconds")
 
 
-def test_pages_name_metrics_that_are_there(names: set[str], registry: CollectorRegistry) -> None:
+def test_pages_name_existing_metrics(names: set[str], registry: CollectorRegistry) -> None:
     text = (ROOT / "docs" / "operations.md").read_text()
     named = set(re.findall(r"`((?:relume|process)_[a-z_]+)", text))
     assert named
