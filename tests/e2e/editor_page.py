@@ -1,4 +1,4 @@
-"""What a person does in the editor, in the words of these tests."""
+"""Actions of a person in the editor."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Editor:
 
 
 def wait_until_drawn(page: Page) -> None:
-    """Until the first picture of a moving view is there."""
+    """Wait for the first image of a free-camera view."""
     page.locator(".camera-bar").wait_for(timeout=WAIT_MS)
     page.wait_for_function("() => document.querySelector('.zoom')?.textContent.includes('%')", timeout=WAIT_MS)
 

@@ -63,14 +63,14 @@ class CurvePage:
         self.page.evaluate("window.said = []")
 
     def said(self) -> list[Any]:
-        """What the curve became, edit by edit since it was last asked; None where it was given back."""
+        """The values of the curve after each edit since the last call; None for an undo."""
         self.page.evaluate(WAIT_FOR_FRAMES)
         messages = [json.loads(text) for text in self.page.evaluate("window.said.splice(0)")]
         edits = [op for message in messages if message["type"] == "edit" for op in message["patch"]]
         return [op.get("value") for op in edits if "/curves" in op["path"]]
 
     def shown(self) -> list[str | None]:
-        """Where the points are, in words."""
+        """The positions of the points as text."""
         return [point.get_attribute("aria-valuetext") for point in self.points.all()]
 
     def value(self, index: int) -> Locator:
@@ -95,7 +95,7 @@ class CurvePage:
 
 @pytest.fixture
 def curve(editor: Editor) -> CurvePage:
-    """Of the ball's highlight."""
+    """The curve of the ball's highlight."""
     editor.choose("Ball", 1)
     return CurvePage(editor)
 

@@ -65,7 +65,7 @@ def value_of(name: str) -> Callable[[Editor, Locator], str | None]:
 
 
 def painted(editor: Editor, _: Locator) -> str | None:
-    """What the plot shows."""
+    """The content of the plot."""
     editor.page.evaluate(WAIT_FOR_FRAMES)
     return str(editor.page.locator(".plot canvas").evaluate("canvas => canvas.toDataURL()"))
 
@@ -136,14 +136,14 @@ def drag(editor: Editor, it: Draggable, sign: int) -> None:
     before = it.read(editor, thing)
     mouse.move(x, y)
     mouse.down()
-    seen = []
+    frames = []
     for step in range(1, NUM_MOVES + 1):
         mouse.move(x + sign * step * dx, y + sign * step * dy)
         editor.page.evaluate(WAIT_FOR_FRAMES)
-        seen.append(it.read(editor, thing))
+        frames.append(it.read(editor, thing))
     mouse.up()
-    assert seen[0] != before or seen[1] != before
-    assert len(set(seen[1:])) == NUM_MOVES - 1, seen
+    assert frames[0] != before or frames[1] != before
+    assert len(set(frames[1:])) == NUM_MOVES - 1, frames
     it.clear(editor)
 
 

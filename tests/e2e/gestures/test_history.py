@@ -9,7 +9,7 @@ SIGMA = "Roughness σ"
 
 
 def steps(editor: Editor) -> list[str | None]:
-    """What the steps are called, the first being the look that was opened."""
+    """Names of the steps; the first is the opened look."""
     return [name.get_attribute("title") for name in editor.page.locator(".tile.step .tile-name").all()][1:]
 
 

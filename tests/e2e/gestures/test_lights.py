@@ -132,7 +132,7 @@ def test_keys_and_numbers_place_and_aim_a_light_and_escape_leaves_it(editor: Edi
 
 
 @pytest.mark.slow
-def test_a_light_is_switched_off_and_seen_alone(editor: Editor) -> None:
+def test_a_light_is_switched_off_and_soloed(editor: Editor) -> None:
     page = editor.page
     dark = editor.pixels()
     add_by_click(editor, "Point")

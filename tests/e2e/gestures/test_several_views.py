@@ -25,7 +25,7 @@ def both(editor: Editor) -> Editor:
 
 
 def cells(editor: Editor) -> list[NDArray[np.int16]]:
-    """What each view shows."""
+    """The image of each view."""
     editor.wait_until_exact()
     editor.page.mouse.move(2, 2)
     editor.page.evaluate(WAIT_FOR_FRAMES)
@@ -64,7 +64,7 @@ def test_one_drag_changes_every_view_and_a_stretch_of_the_curve_tints_each(both:
         assert time.monotonic() < deadline, "a view was not tinted"
 
 
-def test_the_pointer_is_told_to_the_server_and_probes_its_own_view(both: Editor) -> None:
+def test_the_pointer_is_sent_to_the_server_and_inspects_its_own_view(both: Editor) -> None:
     sent: list[str] = []
     both.page.on("websocket", lambda socket: socket.on("framesent", lambda data: sent.append(str(data))))
     both.page.reload()

@@ -28,11 +28,11 @@ def test_exr_is_called_like_the_png_has_layers_and_can_be_stopped(editor: Editor
     picture = OpenImageIO.ImageBuf(str(path))
     channels, pixels = picture.spec().channelnames, picture.get_pixels(OpenImageIO.FLOAT)
     assert pixels.shape[1::-1] == SIZE
-    (lamp,) = {name.partition(".")[0] for name in channels if name.startswith("light_")} - {"light_environment"}
+    (light,) = {name.partition(".")[0] for name in channels if name.startswith("light_")} - {"light_environment"}
     red = {name: pixels[..., k] for k, name in enumerate(channels)}
-    parts = red["light_environment.R"] + red[f"{lamp}.R"]
+    parts = red["light_environment.R"] + red[f"{light}.R"]
     np.testing.assert_allclose(parts, red["R"], rtol=2e-3, atol=1e-4)
-    assert red[f"{lamp}.R"].max() > 0.01
+    assert red[f"{light}.R"].max() > 0.01
     expect(bar).to_have_count(0)
 
     page.get_by_role("button", name="More export formats").press("Enter")
@@ -40,7 +40,7 @@ def test_exr_is_called_like_the_png_has_layers_and_can_be_stopped(editor: Editor
         page.get_by_role("button", name="EXR with light groups").press("Enter")
     download.value.save_as(path)
     layers = {name.partition(".")[0] for name in OpenImageIO.ImageBuf(str(path)).spec().channelnames}
-    assert layers == {"R", "G", "B", "light_environment_direct", f"{lamp}_direct"}
+    assert layers == {"R", "G", "B", "light_environment_direct", f"{light}_direct"}
 
     page.get_by_role("button", name="More export formats").press("Enter")
     with page.expect_download(timeout=WAIT_MS) as download:

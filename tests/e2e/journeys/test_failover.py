@@ -107,6 +107,6 @@ def test_a_room_goes_on_when_its_server_is_killed(
 
 
 def _away_s() -> float:
-    """How long nginx sends nobody to a server that it could not reach."""
+    """Seconds for which nginx avoids an unreachable server."""
     (found,) = re.findall(r"fail_timeout=(\d+)s", CONFIGURATION.read_text())
     return float(found)

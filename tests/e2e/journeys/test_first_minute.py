@@ -70,15 +70,15 @@ def test_one_click_takes_a_built_in_scene_and_opens_it(start: Page, server: Serv
     expect(start.get_by_role("option", name="Teapot")).to_be_visible()
 
 
-def test_a_dropped_folder_becomes_a_scene_baked_in_any_shape_whose_remarks_stay_at_hand(
+def test_a_dropped_folder_becomes_a_scene_with_import_warnings_baked_in_any_shape(
     start: Page, server: Server, room: Path
 ) -> None:
     drop(start, room)
     expect(start.get_by_text("Scene: room.obj with 2 files")).to_be_visible()
     start.get_by_role("button", name="Import", exact=True).click()
     dialog = start.get_by_role("region", name="Bake room")
-    seen = dialog.get_by_role("region", name="Looks different from the source file")
-    expect(seen).to_contain_text("Missing image “../images/gone.png” (map_Ks of material “Wall”).")
+    warnings = dialog.get_by_role("region", name="Looks different from the source file")
+    expect(warnings).to_contain_text("Missing image “../images/gone.png” (map_Ks of material “Wall”).")
     expect(dialog.get_by_role("region", name="Ignored")).to_contain_text("lines aren't supported")
     own = dialog.get_by_role("group", name="Custom bake")
     own.get_by_label("Height").fill("16385")
@@ -109,7 +109,7 @@ def test_a_dropped_folder_becomes_a_scene_baked_in_any_shape_whose_remarks_stay_
 
 
 @pytest.mark.slow
-def test_several_files_are_several_scenes_and_what_is_lacking_is_said(
+def test_several_files_are_several_scenes_and_missing_files_are_named(
     start: Page, server: Server, tmp_path: Path
 ) -> None:
     before = len(server.call("/api/scenes"))

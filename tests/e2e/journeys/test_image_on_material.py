@@ -159,17 +159,17 @@ def drop_on_the_middle(editor: Editor, files: dict[str, Path], mime: str = "imag
     place = {"clientX": box["x"] + 0.5 * box["width"], "clientY": box["y"] + 0.5 * box["height"]}
     page.mouse.move(place["clientX"], place["clientY"])
     material = page.locator(".picture-bar .material").inner_text()
-    told = [[name, base64.b64encode(file.read_bytes()).decode()] for name, file in files.items()]
+    messages = [[name, base64.b64encode(file.read_bytes()).decode()] for name, file in files.items()]
     carried = page.evaluate_handle(
-        """([told, type]) => {
+        """([messages, type]) => {
           const held = new DataTransfer();
-          for (const [name, text] of told) {
+          for (const [name, text] of messages) {
             const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
             held.items.add(new File([bytes], name, { type }));
           }
           return held;
         }""",
-        [told, mime],
+        [messages, mime],
     )
     editor.canvas.dispatch_event("dragover", {"dataTransfer": carried, **place})
     editor.canvas.dispatch_event("drop", {"dataTransfer": carried, **place})

@@ -15,7 +15,7 @@ def add_light(page: Page, kind: str) -> None:
 
 
 def test_the_focus_passes_a_handle_and_enter_takes_it(editor: Editor) -> None:
-    """Of two lights. With a light selected no material is; one that is deleted leaves the focus to the other."""
+    """A selected light deselects the material; deleting it focuses the other."""
     page = editor.page
     for kind in ("Panel", "Sun"):
         editor.choose("Floor", 0)

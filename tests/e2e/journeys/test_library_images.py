@@ -15,7 +15,7 @@ from relume_worker.paths import materials_path
 
 @pytest.fixture(scope="module")
 def measured(server: Server, tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Name of a measured material on the server's shelf."""
+    """Name of a measured material in the server's library."""
     path = tmp_path_factory.mktemp("measured") / "paint.binary"
     write_merl(path, make_planes())
     store_material(materials_path(server.data), path, "Blue paint")
@@ -33,7 +33,7 @@ def textures(page: Page) -> list[str]:
 
 
 def place_of(editor: Editor, material: str) -> tuple[float, float]:
-    """Where the window shows a material: the panels leave the picture little room."""
+    """Screen position of a material: the panels leave little room for the image."""
     box = editor.canvas.bounding_box()
     assert box is not None
     for share in (0.5, 0.55, 0.6, 0.65, 0.7, 0.8):  # beside the picture, what was last read would stay
@@ -47,7 +47,7 @@ def place_of(editor: Editor, material: str) -> tuple[float, float]:
 
 
 def first_ball(page: Page) -> Locator:
-    """Of the library."""
+    """Entries of the library."""
     return page.locator(".library-balls button").first
 
 

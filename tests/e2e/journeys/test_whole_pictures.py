@@ -1,4 +1,4 @@
-"""What the canvas shows while pictures take each other's place: each is whole, of one light, and marked."""
+"""The canvas while images replace each other: each is complete, of one light, and labeled."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ RECORD = """() => {
 
 
 def draws(page: Page) -> list[dict[str, float]]:
-    """What was drawn since this was asked last."""
+    """Draw calls since the last call."""
     found: list[dict[str, float]] = page.evaluate("window.draws.splice(0)")
     return found
 

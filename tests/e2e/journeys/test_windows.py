@@ -42,7 +42,7 @@ def assert_nothing_is_cut_off(page: Page, where: str) -> None:
 
 
 def assert_top_bar_is_whole(page: Page) -> None:
-    """What the row has no room for is in its menu."""
+    """Items that do not fit the row are in its menu."""
     bar = page.locator(".top-bar")
     more = bar.get_by_role("button", name="More", exact=True)
     if more.count():

@@ -90,8 +90,8 @@ def test_a_number_beyond_its_range_says_what_it_became(editor: Editor) -> None:
         expect(slider).to_be_focused()
 
 
-def test_many_dropped_scenes_are_counted_and_errors_go_when_they_are_mended(start: Page, tmp_path: Path) -> None:
-    """Of so many the list shows some and can be scrolled; which one is sent is said with how many there are."""
+def test_many_dropped_scenes_are_counted_and_errors_go_when_fixed(start: Page, tmp_path: Path) -> None:
+    """The list shows some of many and scrolls; the upload is numbered."""
     scenes = [tmp_path / f"scene{k}.glb" for k in range(1, NUM_SCENES + 1)]
     for scene in scenes:
         scene.write_bytes(b"nothing")

@@ -1,4 +1,4 @@
-"""How true is this? Asked in a browser: how long it takes, what it finds, stopping it, and going on."""
+"""The comparison with a reference in a browser: its time, its result, stopping and resuming it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from playwright.sync_api import expect
 
 
 @pytest.mark.slow
-def test_truth_says_how_long_it_takes_and_can_be_stopped_and_gone_on_with(editor: Editor) -> None:
+def test_a_comparison_shows_its_time_and_can_be_stopped_and_resumed(editor: Editor) -> None:
     page = editor.page
     page.get_by_role("button", name="Compare with reference").click()
     panel = page.get_by_role("complementary", name="Compare with reference")

@@ -70,16 +70,16 @@ def test_looks_and_lights_keep_their_order_and_thumbnails_are_for_everybody(
     page.keyboard.press("Control+z")
     expect(page.get_by_role("button", name="Show Night", exact=True)).to_be_visible()
     order = ["Night", "Noon", "Dawn", "Lit"]
-    with opened_page(browser) as guest:
-        guest.goto(page.url)
-        Editor(guest).wait_until_exact()
-        expect(guest.locator(".tiles.saved .tile-picture img")).to_have_count(4)
-        expect_looks(guest, order)
+    with opened_page(browser) as participant:
+        participant.goto(page.url)
+        Editor(participant).wait_until_exact()
+        expect(participant.locator(".tiles.saved .tile-picture img")).to_have_count(4)
+        expect_looks(participant, order)
         shown = "(image) => image.complete && image.naturalWidth > 0"
-        for image in guest.locator(".tiles.saved .tile-picture img").all():
-            guest.wait_for_function(shown, arg=image.element_handle())
-        guest.get_by_role("button", name="Show Lit", exact=True).click()
-        expect_lights(guest, ["Spot", "Point"])
+        for image in participant.locator(".tiles.saved .tile-picture img").all():
+            participant.wait_for_function(shown, arg=image.element_handle())
+        participant.get_by_role("button", name="Show Lit", exact=True).click()
+        expect_lights(participant, ["Spot", "Point"])
     for name in order:
         delete(page, name)
 
@@ -92,10 +92,10 @@ def test_a_link_keeps_the_order_of_lights(editor: Editor, browser: Browser) -> N
     page.evaluate("() => { navigator.clipboard.writeText = () => Promise.reject(new Error('not allowed')); }")
     page.get_by_role("button", name="Share: copy a link to this look").click()
     link = page.get_by_role("dialog", name="Link to this look").get_by_role("textbox").input_value()
-    with opened_page(browser) as guest:
-        guest.goto(link)
-        Editor(guest).wait_until_exact()
-        expect_lights(guest, ["Spot", "Point"])
+    with opened_page(browser) as participant:
+        participant.goto(link)
+        Editor(participant).wait_until_exact()
+        expect_lights(participant, ["Spot", "Point"])
 
 
 def test_a_step_that_is_left_at_once_has_a_picture(editor: Editor) -> None:

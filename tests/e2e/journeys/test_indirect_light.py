@@ -33,7 +33,7 @@ def start_page(tmp_path: Path, browser: Browser) -> Iterator[Page]:
 
 
 @pytest.mark.slow
-def test_reflected_light_is_baked_by_the_dialogue_and_seen_by_paths(start_page: Page) -> None:
+def test_indirect_light_is_baked_from_the_dialog_and_shown_by_paths(start_page: Page) -> None:
     page, editor = start_page, Editor(start_page)
     page.get_by_role("button", name="Bake…").click()
     plan = page.locator(".presets .plan").first

@@ -1,4 +1,4 @@
-"""What is behind the objects, and a ground that catches their shadows, in a browser."""
+"""Backgrounds and shadow-catching grounds, in a browser."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def downloaded(editor: Editor, button: str, path: Path) -> Path:
 
 
 def shown_in(picture: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Where a mask of the baked picture is on the screen, its edges left out."""
+    """Screen pixels of a mask of the baked image, without its edges."""
     height, width = picture.shape[:2]
     aspect = mask.shape[1] / mask.shape[0]
     inner = min(width, height * aspect) - 24  # the editor leaves a margin round it
@@ -131,7 +131,7 @@ def test_a_ground_shows_shadows_alone_or_itself(grounded: Editor, server: Server
     page = grounded.page
     bake = page.url.split("bake=")[1].split("&")[0] if "bake=" in page.url else server.call("/api/bakes")[0]["id"]
     material = ids(server, bake)
-    caught = grounded.pixels()
+    on_ground = grounded.pixels()
     page.get_by_role("option", name="Ground").click()
     only = page.get_by_role("checkbox", name="Shadow catcher")
     expect(only).to_be_checked()
@@ -139,12 +139,12 @@ def test_a_ground_shows_shadows_alone_or_itself(grounded: Editor, server: Server
     only.press("Space")
     expect(page.locator(".card")).to_have_count(1)
     plain = grounded.pixels()
-    ground, ball = shown_in(caught, material == 3), shown_in(caught, material == 2)
+    ground, ball = shown_in(on_ground, material == 3), shown_in(on_ground, material == 2)
     assert ground.sum() > 1000
-    assert (np.abs(plain - caught)[ground].max(axis=1) > 2).mean() > 0.5
-    assert np.abs(plain - caught)[ball].max() <= 1
+    assert (np.abs(plain - on_ground)[ground].max(axis=1) > 2).mean() > 0.5
+    assert np.abs(plain - on_ground)[ball].max() <= 1
     page.get_by_role("button", name="Undo", exact=False).first.click()
-    assert changed(caught, grounded.pixels()) == 0
+    assert changed(on_ground, grounded.pixels()) == 0
     page.get_by_role("radiogroup", name="Background").get_by_role("radio", name="Transparent").click()
     grounded.wait_until_exact()
     with Image.open(downloaded(grounded, "PNG", tmp_path / "a.png")) as image:

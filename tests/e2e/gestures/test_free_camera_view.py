@@ -40,7 +40,7 @@ def wait_until(holds: Callable[[], bool], else_words: str) -> None:
 
 
 def differs(editor: Editor, before: NDArray[np.int16], least: float = 0.02) -> None:
-    """Wait until the picture is another one, and the exact one of where the eye rests."""
+    """Wait until the image has changed, and is the exact one of the stopped camera."""
     wait_until(lambda: changed(before, editor.read_pixels()) >= least, "the picture stays as it was")
     editor.wait_until_exact()
 
@@ -50,7 +50,7 @@ def comes_back(editor: Editor, before: NDArray[np.int16], left: int = 0) -> None
     wait_until(lambda: changed(before[:, left:], editor.pixels()[:, left:]) < 0.02, "the picture is not what it was")
 
 
-def test_every_gesture_moves_the_eye_twice(moving: Editor) -> None:
+def test_every_gesture_moves_the_camera_twice(moving: Editor) -> None:
     page, box = moving.page, moving.canvas.bounding_box()
     assert box is not None
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -104,7 +104,7 @@ def test_every_gesture_moves_the_eye_twice(moving: Editor) -> None:
             differs(moving, before)
 
 
-def test_the_eye_goes_back_to_where_it_began_and_a_reload_leaves_it(moving: Editor) -> None:
+def test_the_camera_is_reset_and_a_reload_keeps_it(moving: Editor) -> None:
     page, first = moving.page, moving.read_pixels()
     moving.canvas.focus()
     page.keyboard.press("ArrowLeft")
@@ -120,7 +120,7 @@ def test_the_eye_goes_back_to_where_it_began_and_a_reload_leaves_it(moving: Edit
     comes_back(moving, first)
 
 
-def test_a_material_is_chosen_by_a_click_and_edited_while_the_eye_is_elsewhere(moving: Editor) -> None:
+def test_a_material_is_selected_by_a_click_and_edited_after_the_camera_moved(moving: Editor) -> None:
     page, first = moving.page, moving.read_pixels()
     moving.canvas.focus()
     page.keyboard.press("ArrowRight")
@@ -183,7 +183,7 @@ def test_the_camera_has_an_angle_a_size_and_names(moving: Editor, server: Server
 
 
 @pytest.mark.slow
-def test_a_turntable_from_where_the_eye_is_is_taken_away(moving: Editor, tmp_path: Path) -> None:
+def test_a_turntable_from_the_current_camera_is_removed(moving: Editor, tmp_path: Path) -> None:
     page, first = moving.page, moving.read_pixels()
     moving.canvas.focus()
     page.keyboard.press("ArrowUp")

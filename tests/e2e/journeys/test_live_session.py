@@ -78,7 +78,7 @@ def test_two_edit_one_look_and_a_third_watches(editor: Editor, others: tuple[Pag
     assert changed(undone, both) > 0.01
     assert changed(bob.pixels(), undone) == 0
 
-    # each has their own exposure; Vera is told that she watches
+    # each has their own exposure; Vera reads that she has view-only access
     expect(vera_page.locator(".read-only")).to_contain_text("View-only link")
     ann.page.get_by_role("slider", name="Exposure").press("ArrowRight")
     assert changed(ann.pixels(), undone) > 0.01

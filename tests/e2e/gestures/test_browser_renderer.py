@@ -1,4 +1,4 @@
-"""Moving views that the browser draws itself: as the server does, without a byte for an eye; edits and rest."""
+"""Free-camera views drawn by the browser: as the server does, without a byte per camera move; edits and rest."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def test_it_shows_what_the_server_does(moving: tuple[Editor, list[int]]) -> None
     assert changed(by_browser[:-BAR_PX], settled(editor)[:-BAR_PX]) == 0
 
 
-def test_an_eye_costs_no_pictures_on_the_network_twice(moving: tuple[Editor, list[int]]) -> None:
+def test_a_camera_move_costs_no_frames_on_the_network_twice(moving: tuple[Editor, list[int]]) -> None:
     editor, sizes = moving
     page, box = editor.page, editor.canvas.bounding_box()
     assert box is not None
@@ -209,7 +209,7 @@ def test_highlights_are_where_the_server_has_them(moving: tuple[Editor, list[int
 
 
 @pytest.mark.slow
-def test_the_exact_picture_takes_over_where_the_eye_rests_twice(
+def test_the_exact_image_takes_over_when_the_camera_stops_twice(
     server: Server, browser: Browser, moving_scene: str
 ) -> None:
     with opened_page(browser) as page:
@@ -239,7 +239,7 @@ def ball_on_a_floor(server: Server) -> Iterator[str]:
 def test_reflections_turn_between_points_as_the_server_has_them(
     server: Server, browser: Browser, ball_on_a_floor: str
 ) -> None:
-    """Of a floor in a metal ball: a tenth of all pixels would be other ones without gradients
+    """A floor in a metal ball: without gradients a tenth of all pixels would differ
     (docs/free-camera.md#highlights)."""
     with opened_page(browser) as page:
         never_at_rest(page, [])

@@ -10,7 +10,7 @@ from editor_page import WAIT_MS, Editor, opened_page
 from editor_server import Server
 from playwright.sync_api import Browser, Page, expect
 
-SEEN = "canvas => canvas.toDataURL()"
+PIXEL_HASH = "canvas => canvas.toDataURL()"
 
 
 @pytest.fixture
@@ -23,7 +23,7 @@ def scene(server: Server) -> Iterator[str]:
 
 @pytest.fixture
 def page(server: Server, scene: str, browser: Browser) -> Iterator[Page]:
-    """The start page with the scene's bake dialog open, and the finder on it, its first picture drawn."""
+    """The start page with the scene's bake dialog open, after the first image of its placement viewport."""
     with opened_page(browser) as page:
         page.goto(server.url)
         page.locator(".scene-card", has_text="Cornell box").get_by_role("button", name="Bake…").click()
@@ -33,7 +33,7 @@ def page(server: Server, scene: str, browser: Browser) -> Iterator[Page]:
 
 
 def moved(page: Page, before: str) -> str:
-    """Wait until the finder's picture is another one and rests; returns it."""
+    """Wait until the placement viewport shows another image and stops; return it."""
     page.wait_for_function(
         """before => {
           const canvas = document.querySelector('.placement canvas');
@@ -44,7 +44,7 @@ def moved(page: Page, before: str) -> str:
         arg=before,
         timeout=WAIT_MS,
     )
-    return str(page.locator(".placement canvas").evaluate(SEEN))
+    return str(page.locator(".placement canvas").evaluate(PIXEL_HASH))
 
 
 @pytest.mark.slow
@@ -53,26 +53,26 @@ def test_every_gesture_moves_the_camera_twice(page: Page) -> None:
     canvas = dialog.locator("canvas")
     box = canvas.bounding_box()
     assert box is not None
-    x, y, seen = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, str(canvas.evaluate(SEEN))
+    x, y, previous = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, str(canvas.evaluate(PIXEL_HASH))
     for _ in range(2):
         for button in ("left", "right"):
             page.mouse.move(x, y)
             page.mouse.down(button=button)
             page.mouse.move(x + 25, y + 12, steps=4)
             page.mouse.up(button=button)
-            seen = moved(page, seen)
+            previous = moved(page, previous)
         page.mouse.wheel(0, -120)
-        seen = moved(page, seen)
+        previous = moved(page, previous)
         page.mouse.click(x + 30, y + 20)
-        seen = moved(page, seen)
+        previous = moved(page, previous)
         for key in ("ArrowLeft", "Shift+ArrowUp", "+"):
             canvas.press(key)
-            seen = moved(page, seen)
+            previous = moved(page, previous)
         for name in ("Orbit right", "Show all"):
             dialog.get_by_role("button", name=name).click()
-            seen = moved(page, seen)
+            previous = moved(page, previous)
         Editor(page).drag(dialog.get_by_role("slider", name="Field of view"), 0.6, 0.8)
-        seen = moved(page, seen)
+        previous = moved(page, previous)
 
 
 def test_a_camera_is_kept_moved_deleted_and_baked(page: Page, server: Server, scene: str) -> None:
@@ -82,9 +82,9 @@ def test_a_camera_is_kept_moved_deleted_and_baked(page: Page, server: Server, sc
     dialog.get_by_label("Name").fill("front")
     dialog.get_by_role("button", name="Save camera").click()
     expect(dialog.get_by_role("alert")).to_contain_text("camera of the scene file")
-    seen = str(canvas.evaluate(SEEN))
+    previous = str(canvas.evaluate(PIXEL_HASH))
     canvas.press("ArrowRight")
-    moved(page, seen)  # a picture that comes after the refusal takes nothing of it away
+    moved(page, previous)  # a picture that comes after the refusal takes nothing of it away
     expect(dialog.get_by_role("alert")).to_contain_text("camera of the scene file")
     dialog.get_by_label("Name").fill("Aside")
     dialog.get_by_label("Name").press("Enter")
@@ -93,9 +93,9 @@ def test_a_camera_is_kept_moved_deleted_and_baked(page: Page, server: Server, sc
     before = placed(server.call(url))
 
     views.get_by_role("button", name="Move or rename Aside").click()
-    seen = moved(page, "")
+    previous = moved(page, "")
     canvas.press("ArrowUp")
-    moved(page, seen)
+    moved(page, previous)
     dialog.get_by_label("Name").fill("Beside")
     dialog.get_by_role("button", name="Save camera").click()
     expect(dialog).to_be_hidden()
