@@ -1,4 +1,4 @@
-"""The fixtures of server tests."""
+"""Fixtures of the server tests."""
 
 from server_fixtures import ack_seconds, baked, client, control, empty_ledger, settings
 

@@ -1,4 +1,4 @@
-"""What every refusal of the server looks like."""
+"""A parser for the server's problem responses."""
 
 from typing import Any
 

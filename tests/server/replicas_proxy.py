@@ -1,4 +1,4 @@
-"""nginx with docker/replicas/nginx.conf, before servers of a test."""
+"""nginx with docker/replicas/nginx.conf in front of test servers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NGINX = shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin")
 
 @contextmanager
 def proxy_to_ports(folder: Path, ports: Sequence[int]) -> Iterator[int]:
-    """Port of nginx before servers at ports of this machine; skips the test where there is no nginx.
+    """Port of nginx in front of servers at local ports; skips the test if nginx is not installed.
 
     Args:
         folder: for its files.
@@ -32,9 +32,9 @@ def proxy_to_ports(folder: Path, ports: Sequence[int]) -> Iterator[int]:
 
 @contextmanager
 def proxy_to_shared_name(folder: Path, addresses: Sequence[str], server_port: int) -> Iterator[int]:
-    """As `proxy_to_ports`, before servers at addresses that the name `server` means together, as in compose."""
+    """As `proxy_to_ports`, for servers at several addresses of the name `server`, as in Compose."""
     (folder / "hosts").write_text("".join(f"{address} server\n" for address in addresses))
-    private_mounts = ["unshare", "--map-root-user", "--mount"]  # the name means them to this nginx, and to nobody else
+    private_mounts = ["unshare", "--map-root-user", "--mount"]  # only this nginx resolves the name to these addresses
     if shutil.which("unshare") is None or subprocess.run([*private_mounts, "true"], check=False).returncode != 0:
         pytest.skip("unshare may not give a process mounts of its own here")
     mount_script = 'mount --bind "$0" /etc/hosts && exec "$@"'
@@ -47,7 +47,7 @@ def proxy_to_shared_name(folder: Path, addresses: Sequence[str], server_port: in
 
 @contextmanager
 def _running(folder: Path, port: int, servers: Sequence[str], command_prefix: Sequence[str] = ()) -> Iterator[None]:
-    """nginx at that port until the end, started by what stands before its command."""
+    """nginx at a port until the context ends; `command_prefix` precedes its command."""
     if _NGINX is None:
         pytest.skip("nginx is not installed (Debian: apt-get install nginx-light)")
     text = CONFIGURATION.read_text().replace("/tmp/", f"{folder}/")
@@ -55,7 +55,7 @@ def _running(folder: Path, port: int, servers: Sequence[str], command_prefix: Se
     (line,) = re.findall(r"server server:8420[^;]*;", text)
     lines = "".join(line.replace("server:8420", each) for each in servers)
     (folder / "nginx.conf").write_text(text.replace(line, lines))
-    # root there is who runs this, and can be nobody else
+    # root in the namespace is the current user and cannot become another
     directives = "daemon off;" + (" user root;" if command_prefix else "")
     command = [*command_prefix, _NGINX, "-p", str(folder), "-c", str(folder / "nginx.conf"), "-g", directives]
     process = subprocess.Popen(command)

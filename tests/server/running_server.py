@@ -1,4 +1,4 @@
-"""The server as uvicorn runs it, in a thread, on a real socket."""
+"""The server under uvicorn, in a thread, on a real socket."""
 
 import json
 import socket
@@ -24,7 +24,7 @@ from relume_worker.scenes import register_scene
 
 @dataclass(frozen=True)
 class Running:
-    """A server, the thread that it runs in, and its port."""
+    """A server, its thread and its port."""
 
     app: FastAPI
     process: ServerProcess
@@ -32,7 +32,7 @@ class Running:
     port: int
 
     def baked_url(self) -> str:
-        """Address of the session of a bake that is ready."""
+        """Address of the session of a finished bake."""
         bakes = self.app.state.services.bakes
         scene = register_scene(bakes.data_dir, bakes.ledger, tiny_scene())
         bake = bakes.submit(scene, Recipe("direct", ("front",), SIZE, 10))
@@ -43,7 +43,7 @@ class Running:
 
 @contextmanager
 def open_socket(url: str, **opening: Any) -> Iterator[ClientConnection]:
-    """A session that has said `opening`, the fields of its first message."""
+    """A session after its `opening` message with these fields."""
     with connect(url, subprotocols=[Subprotocol("relume.v2")], max_size=None, proxy=None) as session:
         session.send(json.dumps({"type": "open", **opening}))
         yield session

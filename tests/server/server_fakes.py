@@ -1,4 +1,4 @@
-"""Stand-ins for the library: a picture whose every pixel is known, a bake method that computes nothing."""
+"""Fakes: a picture whose pixels are known, and a bake method without computation."""
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -34,7 +34,7 @@ NUM_COEFFICIENTS = 16
 
 
 def tiny_scene(name: str = "triangle") -> Scene:
-    """One triangle of one material with a diffuse and a glossy term, seen from two views."""
+    """One triangle with one material of a diffuse and a glossy term, and two views."""
     positions = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
     normals = np.tile(np.array([[0, 0, 1]], np.float32), (3, 1))
     zeros = np.zeros((3, 4), np.float32)
@@ -50,13 +50,13 @@ def tiny_scene(name: str = "triangle") -> Scene:
 
 
 def write_tiny_scene(request: ImportRequest) -> str:
-    """What the process of an import does, without one: it makes the tiny scene, whatever the file is."""
+    """In place of an import process: write the tiny scene, whatever the file is."""
     return _write_scene(request, tiny_scene())
 
 
 @dataclass(frozen=True)
 class FakeMethod:
-    """One task per bake; it waits for `gate` where there is one."""
+    """One task per bake; it waits for `gate` if there is one."""
 
     gate: threading.Event | None = None
     name: str = "direct"
@@ -98,7 +98,7 @@ class FakeView:
 
 @dataclass
 class FakeTransfer:
-    """What `open_transfer` gives."""
+    """The result of `open_transfer`."""
 
     scene_id: str
     views: dict[str, FakeView]
@@ -118,7 +118,7 @@ class FakeTransfer:
 
 @dataclass(frozen=True)
 class FakeJob:
-    """One curve; made when `control.freeze_gate` says so."""
+    """One curve; the job waits for `control.freeze_gate`."""
 
     control: "Control"
     key: str
@@ -141,7 +141,7 @@ class FakeJob:
 
 
 def make_advance(tiles: list[Any], exact: bool) -> SimpleNamespace:
-    """What a step of a whole picture says."""
+    """The result of a step of a whole picture."""
     fidelity = "exact" if exact else "approximate"
     fields = {"exact": exact, "fidelity": fidelity, "complete": True, "previous_error": None}
     return SimpleNamespace(tiles=tiles, changed=bool(tiles), **fields)
@@ -149,7 +149,7 @@ def make_advance(tiles: list[Any], exact: bool) -> SimpleNamespace:
 
 @dataclass
 class FakePicture:
-    """Radiance = lambert colour + sigma, everywhere; reached in steps. ior needs θd, which is not frozen at first."""
+    """Radiance = lambert color + sigma everywhere, reached in steps. ior needs θd, which is not frozen initially."""
 
     transfer: FakeTransfer
     view: FakeView
@@ -257,7 +257,7 @@ def _open_gate() -> threading.Event:
 
 @dataclass
 class Control:
-    """What tests set and see."""
+    """State that tests set and read."""
 
     max_step: int = NUM_COEFFICIENTS
     is_refinement: bool = False
@@ -311,7 +311,7 @@ class Control:
         camera_and_size: tuple[Camera, tuple[int, int]] | None = None,
         exact: bool = True,
     ) -> np.ndarray:
-        """It waits half way while `render_gate` is clear."""
+        """Waits half way while `render_gate` is clear."""
         self.frame_cameras.append(camera_and_size)
         progress(0.5)
         while not self.render_gate.wait(0.01):
@@ -342,7 +342,7 @@ class Control:
         reflects: bool,
         is_whole: bool,
     ) -> ReferenceImage:
-        """Noise of a fiftieth around a truth that the frame misses by a tenth, and by a third by all paths."""
+        """Noise of 1/50 around a reference that differs from the frame by a tenth, and by a third with all paths."""
         if not scene.is_dir():
             raise FileNotFoundError(scene)
         self.requested_passes.append(pass_index)
@@ -359,7 +359,7 @@ class Control:
 
 
 class InThreadBatches:
-    """Does steps in the thread that asks, with the library that the server has."""
+    """Run steps in the calling thread with the server's library."""
 
     def __init__(self, settings: Settings, library: Library) -> None:
         self._context = BatchContext(settings.data, library)
@@ -387,5 +387,5 @@ def get_ior(look: Any) -> float:
 
 
 def exact_pixel(look: Any) -> float:
-    """What `FakePicture` shows everywhere when it is exact."""
+    """Value of each pixel of `FakePicture` when it is exact."""
     return sum_color_and_sigma(look) + get_ior(look) - 1.5

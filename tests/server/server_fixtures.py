@@ -1,4 +1,4 @@
-"""An app over a fake library and real bakes of a fake method, all in a folder of the test."""
+"""An app with a fake library and real bakes of a fake method, in the test's folder."""
 
 import asyncio
 import math
@@ -22,7 +22,7 @@ from relume_worker.database import open_database
 from relume_worker.scenes import register_scene
 from relume_worker.service import BakeService
 
-impatient = pytest.mark.parametrize("ack_seconds", [1.5])  # for tests of what happens then
+impatient = pytest.mark.parametrize("ack_seconds", [1.5])  # for tests of unacknowledged frames
 
 
 @pytest.fixture
@@ -32,13 +32,13 @@ def control() -> Control:
 
 @pytest.fixture
 def ack_seconds() -> float:
-    """How long a client may leave frames unread: longer than any test; `impatient` shortens it."""
+    """Time before unacknowledged frames close a session: longer than any test; `impatient` shortens it."""
     return 600.0
 
 
 @pytest.fixture(scope="session")
 def empty_ledger(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A ledger without rows: copied, its tables are there in a tenth of the time that making them takes."""
+    """An empty ledger to copy: ten times as fast as creating the tables."""
     path = tmp_path_factory.mktemp("ledger") / "relume.db"
     open_database(f"sqlite:///{path}").dispose()
     return path
@@ -69,14 +69,14 @@ def open_fake_bakes(settings: Settings) -> BakeService:
 
 @contextmanager
 def no_database_on_the_loop() -> Iterator[None]:
-    """Fails where the event loop of a server waits for its database, and all sessions with it."""
+    """Fail if an event loop of a server, and with it all sessions, waits for the database."""
     blocking_statements: list[str] = []
 
     def check_statement(connection: object, cursor: object, statement: str, *_: object) -> None:
         if asyncio._get_running_loop() is None or threading.current_thread() is threading.main_thread():
             return
         calls = traceback.extract_stack()[:-1]
-        if not any("/tests/" in call.filename for call in calls):  # tests ask what they like
+        if not any("/tests/" in call.filename for call in calls):  # queries of tests are allowed
             own_calls = [call for call in calls if "/site-packages/" not in call.filename]
             blocking_statements.append(
                 f"{statement.splitlines()[0]}\n" + "".join(traceback.format_list(own_calls[-6:]))
@@ -92,8 +92,8 @@ def no_database_on_the_loop() -> Iterator[None]:
 
 @pytest.fixture
 def client(settings: Settings, control: Control, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
-    monkeypatch.setattr("relume_server.client_state.flow_control.SLOW_S", math.inf)  # a busy machine is no slow link
-    # nor does it take more steps
+    monkeypatch.setattr("relume_server.client_state.flow_control.SLOW_S", math.inf)  # a busy machine is not a slow link
+    # and it does not take more steps
     monkeypatch.setattr("relume_server.session.frames.coefficient_budget.MIN_COEFFICIENTS", 512)
     app = create_app(
         settings, open_library=control.open_library, open_batches=InThreadBatches, open_bakes=open_fake_bakes
@@ -104,7 +104,7 @@ def client(settings: Settings, control: Control, monkeypatch: pytest.MonkeyPatch
 
 @pytest.fixture
 def baked(client: TestClient) -> Baked:
-    """A scene and a bake of it that is ready."""
+    """A scene and a finished bake of it."""
     bakes: BakeService = client.app.state.services.bakes
     scene = register_scene(bakes.data_dir, bakes.ledger, tiny_scene())
     bake = bakes.submit(scene, Recipe("direct", ("front", "left"), SIZE, 10))

@@ -29,7 +29,7 @@ class Frame:
 
 
 class Session:
-    """Reads messages by kind; acknowledges frames unless told not to."""
+    """Read messages by kind, and acknowledge frames unless `acknowledges` is false."""
 
     def __init__(self, websocket: Any, acknowledges: bool) -> None:
         self.websocket, self.acknowledges = websocket, acknowledges
@@ -62,7 +62,7 @@ class Session:
                 return message
 
     def wait_until_ready(self, label: str) -> None:
-        """Wait until this has been prepared; other jobs may end before it."""
+        """Wait until the precomputation with this label is ready; other jobs may end first."""
         while (status := self.text("status"))["state"] != "ready" or status["label"] != label:
             pass
 
@@ -87,7 +87,7 @@ ROOM_FIELDS = {"room": "together-on-one-look-here"}
 def open_session(
     client: TestClient, bake: str, *, acknowledges: bool = True, opening: Mapping[str, Any] = NO_FIELDS, **options: Any
 ) -> Iterator[Session]:
-    """A session that has said `opening`, the fields of its first message."""
+    """A session after its `opening` message with these fields."""
     options = {"subprotocols": ["relume.v2"], **options}
     with client.websocket_connect(session_path(bake, opening), **options) as websocket:
         session = Session(websocket, acknowledges)
@@ -96,6 +96,6 @@ def open_session(
 
 
 def session_path(bake: str, opening: Mapping[str, Any]) -> str:
-    """The address of a session that will say this."""
+    """The address of a session that will send these fields."""
     room = opening.get("room") or opening.get("view_token")
     return f"/api/bakes/{bake}/session" + ("" if room is None else f"?room_prefix={room[:8]}")

@@ -1,4 +1,4 @@
-"""Animations: eyes that go round or along, looks that change on the way, frames and videos of them."""
+"""Animations: camera paths and turntables, interpolated looks, frames and videos."""
 
 import math
 import shutil
@@ -13,7 +13,7 @@ from fastapi.testclient import TestClient
 from PIL import Image
 from shared_bakes import unmeasured
 from test_end_to_end import wait_until_done
-from test_free_camera_sessions import SIZE, bake, client, eye, scene
+from test_free_camera_sessions import SIZE, bake, camera_message, client, scene
 
 from relume.core.errors import RelumeError
 from relume_server.io.video import write_video
@@ -26,12 +26,12 @@ def material(client: TestClient, scene: dict[str, Any]) -> str:
     return str(scene["materials"][0]["name"])
 
 
-def of(material: str, color: list[float]) -> dict[str, Any]:
+def material_color(material: str, color: list[float]) -> dict[str, Any]:
     return {"materials": {material: {"terms": [{"model": "lambert", "color": color}]}}}
 
 
 def frames_of(client: TestClient, request: dict[str, Any], folder: Path) -> list[np.ndarray]:
-    """All pictures of a batch. (height, width, 3) float32 each"""
+    """All images of a batch. (height, width, 3) float32 each"""
     answer = client.post("/api/renders", json={"view": "view", "looks": [{}], "format": "exr", **request})
     assert answer.status_code == 202, answer.text
     url = answer.headers["location"]
@@ -53,7 +53,7 @@ def view(client: TestClient, bake: str) -> dict[str, Any]:
     return first_view
 
 
-def test_a_turntable_goes_once_around_exactly_or_quickly(
+def test_turntable_is_one_revolution_exact_or_interactive(
     client: TestClient, bake: str, view: dict[str, Any], tmp_path: Path
 ) -> None:
     request = {"bake": bake, "view": view["name"], "path": {"turntable": 3}, "size": [24, 18]}
@@ -67,7 +67,7 @@ def test_a_turntable_goes_once_around_exactly_or_quickly(
     np.testing.assert_array_equal(exact[0], still)
 
 
-def test_an_object_turns_under_light_that_stays_and_the_light_alone(
+def test_turntable_rotates_the_object_or_the_environment(
     client: TestClient, scene: dict[str, Any], bake: str, view: dict[str, Any], tmp_path: Path
 ) -> None:
     light = {"kind": "point", "position": [2.0, 1.0, 2.0], "emission": [60.0, 30.0, 0.0]}
@@ -84,7 +84,7 @@ def test_an_object_turns_under_light_that_stays_and_the_light_alone(
     assert max(frames[0] for frames in of_frame.values()) == 0
     assert max(of_frame["object"]) < 0.3 * min(
         of_frame["camera"][1:]
-    )  # a ball looks alike from all sides, but for facets
+    )  # a ball looks the same from all sides, except for facets
     assert min(of_frame["environment"][1:]) > 3 * max(of_frame["object"])
     fixed = client.post("/api/bakes", json={"scene": scene["id"], "size": SIZE, "lights": 50}).headers["location"]
     of_fixed = {"bake": wait_until_done(client, fixed)["id"], "view": scene["views"][0]["name"]}
@@ -99,14 +99,14 @@ def test_an_object_turns_under_light_that_stays_and_the_light_alone(
     assert response.json()["cameras"] is None
 
 
-def test_a_way_from_camera_to_camera_with_looks_between_looks(
+def test_camera_path_interpolates_cameras_and_looks(
     client: TestClient, bake: str, view: dict[str, Any], material: str, tmp_path: Path
 ) -> None:
     cameras = []
     for aside in (0.0, 0.4):
-        placed = eye(view, 1, aside)
+        placed = camera_message(view, 1, aside)
         cameras.append({"to_world": placed["to_world"], "yfov": math.degrees(placed["yfov"])})
-    looks = [of(material, [0.8, 0.0, 0.0]), of(material, [0.0, 0.0, 0.8])]
+    looks = [material_color(material, [0.8, 0.0, 0.0]), material_color(material, [0.0, 0.0, 0.8])]
     request = {
         "bake": bake,
         "view": view["name"],
@@ -146,7 +146,7 @@ def test_a_way_from_camera_to_camera_with_looks_between_looks(
     ],
     ids=str,
 )
-def test_what_cannot_be_is_refused_in_words(
+def test_invalid_paths_are_rejected_with_a_reason(
     client: TestClient, bake: str, view: dict[str, Any], bad: dict[str, Any]
 ) -> None:
     request = {"bake": bake, "view": view["name"], "looks": [{}], "format": "png"} | bad
@@ -155,7 +155,7 @@ def test_what_cannot_be_is_refused_in_words(
     assert len(answer.json()["detail"]) > 10
 
 
-def test_a_fixed_view_follows_looks_but_no_path(
+def test_fixed_view_follows_looks_and_rejects_paths(
     client: TestClient, scene: dict[str, Any], material: str, tmp_path: Path
 ) -> None:
     request = {"scene": scene["id"], "size": SIZE, "lights": 50}
@@ -167,12 +167,12 @@ def test_a_fixed_view_follows_looks_but_no_path(
     )
     assert refused.status_code == 422
     assert "probes" in refused.json()["detail"]
-    looks = [of(material, [0.8, 0.4, 0.0]), of(material, [0.0, 0.4, 0.8])]
+    looks = [material_color(material, [0.8, 0.4, 0.0]), material_color(material, [0.0, 0.4, 0.8])]
     frames = frames_of(client, {"bake": fixed["id"], "view": name, "looks": looks, "frames": 3}, tmp_path)
     np.testing.assert_allclose(frames[1], (frames[0] + frames[2]) / 2, rtol=2e-3, atol=2e-3)
 
 
-def test_a_video_is_made_where_there_is_an_encoder(
+def test_video_needs_an_encoder(
     client: TestClient, bake: str, view: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     request = {
@@ -195,10 +195,10 @@ def test_a_video_is_made_where_there_is_an_encoder(
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed: no video can be made")
-def test_a_video_shows_the_colours_of_its_frames_and_says_by_which_matrix(tmp_path: Path) -> None:
-    colours = np.array([[255, 0, 0], [0, 255, 0], [0, 0, 255], [200, 100, 50], [30, 180, 160]], np.uint8)
+def test_video_keeps_frame_colors_and_declares_its_matrix(tmp_path: Path) -> None:
+    frame_colors = np.array([[255, 0, 0], [0, 255, 0], [0, 0, 255], [200, 100, 50], [30, 180, 160]], np.uint8)
     for k in range(2):
-        Image.fromarray(np.kron(colours[None], np.ones((33, 33, 1), np.uint8))).save(tmp_path / f"{k:04d}.png")
+        Image.fromarray(np.kron(frame_colors[None], np.ones((33, 33, 1), np.uint8))).save(tmp_path / f"{k:04d}.png")
     write_video(tmp_path, 25, tmp_path / "video.mp4", lambda: False)
     read = ["ffmpeg", "-loglevel", "info", "-i", str(tmp_path / "video.mp4"), "-frames:v", "1"]
     matrix = [
@@ -207,15 +207,15 @@ def test_a_video_shows_the_colours_of_its_frames_and_says_by_which_matrix(tmp_pa
     ]
     done = subprocess.run([*read, *matrix, str(tmp_path / "seen.png")], capture_output=True, text=True, check=True)
     assert "yuv420p(tv, bt709/bt709/iec61966-2-1" in done.stderr
-    decoded = np.asarray(Image.open(tmp_path / "seen.png"))[16, 16::33][: len(colours)]
-    assert np.abs(decoded.astype(int) - colours).max() <= 4
+    decoded = np.asarray(Image.open(tmp_path / "seen.png"))[16, 16::33][: len(frame_colors)]
+    assert np.abs(decoded.astype(int) - frame_colors).max() <= 4
 
 
 @pytest.mark.parametrize(
     ("does", "said"),
     [("kill -9 $$", "killed by signal 9"), ("exit 3", "ended with 3"), ("echo odd >&2; exit 1", "odd")],
 )
-def test_an_encoder_that_ends_early_leaves_no_video_and_is_said(
+def test_failed_encoder_is_reported_and_leaves_no_video(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, does: str, said: str
 ) -> None:
     program = tmp_path / "ffmpeg"
@@ -227,10 +227,14 @@ def test_an_encoder_that_ends_early_leaves_no_video_and_is_said(
     assert list(tmp_path.iterdir()) == [program]
 
 
-def test_looks_of_frames_are_told_as_they_will_be_rendered(
+def test_listed_looks_are_those_that_are_rendered(
     client: TestClient, bake: str, view: dict[str, Any], material: str, tmp_path: Path
 ) -> None:
-    keys = {"bake": bake, "looks": [of(material, [0.8, 0.0, 0.0]), of(material, [0.0, 0.0, 0.8])], "frames": 5}
+    keys = {
+        "bake": bake,
+        "looks": [material_color(material, [0.8, 0.0, 0.0]), material_color(material, [0.0, 0.0, 0.8])],
+        "frames": 5,
+    }
     answer = client.post("/api/renders/looks", json=keys)
     assert answer.status_code == 200, answer.text
     looks = answer.json()["looks"]
@@ -243,10 +247,13 @@ def test_looks_of_frames_are_told_as_they_will_be_rendered(
         np.testing.assert_array_equal(actual, expected)
 
 
-def test_places_of_frames_are_told_as_they_will_be_rendered(
+def test_listed_cameras_are_those_that_are_rendered(
     client: TestClient, bake: str, view: dict[str, Any], tmp_path: Path
 ) -> None:
-    cameras = [{"to_world": placed["to_world"], "yfov": 40.0} for placed in (eye(view, 1, 0.0), eye(view, 1, 0.4))]
+    cameras = [
+        {"to_world": placed["to_world"], "yfov": 40.0}
+        for placed in (camera_message(view, 1, 0.0), camera_message(view, 1, 0.4))
+    ]
     keys = {"bake": bake, "looks": [{}, {}], "frames": 3, "view": view["name"]}
     for path in ({"cameras": cameras}, {"turntable": 3, "start_camera": cameras[1]}):
         answer = client.post("/api/renders/looks", json={**keys, "path": path})
@@ -273,7 +280,7 @@ def test_places_of_frames_are_told_as_they_will_be_rendered(
         ({"bake": "0" * 16}, "bake"),
     ],
 )
-def test_looks_of_frames_that_cannot_be_are_refused_in_words(
+def test_invalid_looks_of_frames_are_rejected_with_a_reason(
     client: TestClient, bake: str, fields: dict[str, Any], word: str
 ) -> None:
     answer = client.post("/api/renders/looks", json={"bake": bake, "looks": [{}, {}], "frames": 3, **fields})

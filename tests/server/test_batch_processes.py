@@ -1,4 +1,4 @@
-"""Processes that do steps: killed, stopped, exchanged; and whose turn it is."""
+"""Batch processes: killed, stopped and replaced; and fair scheduling."""
 
 import threading
 import time
@@ -64,7 +64,7 @@ def pool(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ProcessPoo
     new_pool.close()
 
 
-def test_a_process_is_kept_between_steps_and_ends_when_nobody_needs_it(pool: ProcessPool) -> None:
+def test_process_is_reused_between_steps_and_ends_when_idle(pool: ProcessPool) -> None:
     first, second = (pool.run(Step("work"), ignore, always)["pid"] for _ in range(2))
     assert [first] == [second] == pool.pids()
     assert pool.resident_bytes() > 0
@@ -84,7 +84,7 @@ def test_a_process_is_kept_between_steps_and_ends_when_nobody_needs_it(pool: Pro
         ({"kind": "not-found"}, NotFoundError),
     ],
 )
-def test_what_a_step_meets_is_what_its_process_met(
+def test_errors_of_the_process_are_raised_in_the_caller(
     pool: ProcessPool, values: dict[str, str], kind: type[Exception]
 ) -> None:
     with pytest.raises(RelumeError, match="no") as met:
@@ -92,7 +92,7 @@ def test_what_a_step_meets_is_what_its_process_met(
     assert met.type is kind
 
 
-def test_a_step_is_tried_once_more_and_then_fails_in_words(pool: ProcessPool, tmp_path: Path) -> None:
+def test_step_is_retried_once_and_then_fails_with_a_message(pool: ProcessPool, tmp_path: Path) -> None:
     values = {"mark": str(tmp_path / "once")}
     assert pool.run(Step("die once", values=values), ignore, always)["pid"] > 0
     mark = tmp_path / "twice"
@@ -102,15 +102,13 @@ def test_a_step_is_tried_once_more_and_then_fails_in_words(pool: ProcessPool, tm
     assert pool.run(Step("work"), ignore, always)["pid"] > 0
 
 
-def test_what_a_step_says_is_why_it_failed(pool: ProcessPool) -> None:
+def test_failed_step_reports_its_reason(pool: ProcessPool) -> None:
     with pytest.raises(RelumeError, match=r"^no\.$"):
         pool.run(Step("fail"), ignore, always)
     assert len(pool.pids()) == 1
 
 
-def test_a_step_that_does_not_listen_is_ended_with_its_process(
-    pool: ProcessPool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_step_that_ignores_cancellation_is_killed(pool: ProcessPool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(processes, "_STOP_S", 0.05)
     running, reports = threading.Event(), []
 
@@ -126,16 +124,14 @@ def test_a_step_that_does_not_listen_is_ended_with_its_process(
     assert pool.run(Step("work"), ignore, always)["pid"] != pid
 
 
-def test_a_process_that_has_grown_is_exchanged(pool: ProcessPool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_process_that_uses_too_much_memory_is_replaced(pool: ProcessPool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("relume_server.batch.pool._PROGRAM_BYTES", 1 << 27)
     small = pool.run(Step("work"), ignore, always)["pid"]
     assert pool.run(Step("grow"), ignore, always)["pid"] == small
     assert pool.pids() == []
 
 
-def test_what_somebody_waits_for_is_done_before_what_came_earlier(
-    pool: ProcessPool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_interactive_steps_run_before_earlier_ones(pool: ProcessPool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(processes, "_STOP_S", 0.05)
     order: list[str] = []
     gate = threading.Event()
@@ -169,36 +165,36 @@ def wait_for(is_reached: Callable[[], bool]) -> None:
         time.sleep(0.005)
 
 
-def following(turns: FairShare, waiting: Sequence[WaitingBake]) -> WaitingBake:
+def next_client(turns: FairShare, waiting: Sequence[WaitingBake]) -> WaitingBake:
     first = turns.sort(waiting)[0]
     turns.pick_next(first.client)
     return first
 
 
-def test_clients_have_their_turns_one_after_another_and_small_work_goes_first() -> None:
+def test_clients_take_turns_and_small_jobs_go_first() -> None:
     turns = FairShare({})
     waiting = [
         WaitingBake("a1", "ann", False, 1.0),
         WaitingBake("a2", "ann", False, 2.0),
         WaitingBake("b1", "bob", False, 3.0),
     ]
-    assert [following(turns, waiting).id for _ in range(4)] == ["a1", "b1", "a1", "b1"]
+    assert [next_client(turns, waiting).id for _ in range(4)] == ["a1", "b1", "a1", "b1"]
     waiting.append(WaitingBake("a3", "ann", True, 4.0))
-    assert [following(turns, waiting).id for _ in range(2)] == ["a3", "a3"]
+    assert [next_client(turns, waiting).id for _ in range(2)] == ["a3", "a3"]
     del waiting[0], waiting[-1]
     waiting.append(WaitingBake("c1", "cem", False, 5.0))
-    assert [following(turns, waiting).id for _ in range(6)] == ["b1", "c1", "b1", "c1", "a2", "b1"]
+    assert [next_client(turns, waiting).id for _ in range(6)] == ["b1", "c1", "b1", "c1", "a2", "b1"]
 
 
-def test_shares_say_how_many_turns_somebody_has() -> None:
+def test_weights_set_the_number_of_turns() -> None:
     turns = FairShare({"ann": 3.0})
     waiting = [WaitingBake("b", "bob", False, 1.0), WaitingBake("a", "ann", False, 2.0)]
-    assert "".join(following(turns, waiting).id for _ in range(12)).count("a") == 9
-    assert following(turns, [WaitingBake("b", "bob", False, 1.0), WaitingBake("c", "cem", False, 0.0)]).id == "c"
+    assert "".join(next_client(turns, waiting).id for _ in range(12)).count("a") == 9
+    assert next_client(turns, [WaitingBake("b", "bob", False, 1.0), WaitingBake("c", "cem", False, 0.0)]).id == "c"
 
 
 class Counting(JobQueue[RenderRequest]):
-    """Its steps only say what they are of."""
+    """A queue whose steps only record their client."""
 
     row, noun, request_type = RenderRow, "render", RenderRequest
 
@@ -244,7 +240,7 @@ def test_steps_of_clients_alternate_and_each_client_has_a_quota(tmp_path: Path) 
     assert done == ["a", "b", "a", "b", "A", "A"]
 
 
-def test_two_servers_do_no_step_twice_and_go_on_with_what_one_left(tmp_path: Path) -> None:
+def test_two_servers_repeat_no_step_and_resume_abandoned_jobs(tmp_path: Path) -> None:
     done: list[str] = []
     at_work: set[str] = set()
 
@@ -263,7 +259,7 @@ def test_two_servers_do_no_step_twice_and_go_on_with_what_one_left(tmp_path: Pat
             name: queues[0].submit(RenderRequest.model_validate({**asked, "looks": [{}] * 4, "name": name}))
             for name in "abc"
         }
-        gone = f"{new_owner().split('/')[0]}/{2**22 + 1}/nobody/0"  # no process has this number
+        gone = f"{new_owner().split('/')[0]}/{2**22 + 1}/nobody/0"  # no process has this id
         with ledger.sessions.begin() as session:
             session.execute(update(RenderRow).values(owner=gone, heartbeat=time.time(), state="running"))
         for queue in queues:
@@ -276,8 +272,6 @@ def test_two_servers_do_no_step_twice_and_go_on_with_what_one_left(tmp_path: Pat
     assert sorted(done) == sorted("abc" * 4)
 
 
-def test_a_process_that_ends_is_asked_no_more_though_it_is_not_gone_yet(
-    pool: ProcessPool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setattr("subprocess.Popen.poll", lambda process: process.returncode)  # as long as nobody has waited
+def test_exiting_process_gets_no_more_steps(pool: ProcessPool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("subprocess.Popen.poll", lambda process: process.returncode)  # until somebody waits for it
     assert pool.run(Step("die once", values={"mark": str(tmp_path / "once")}), ignore, always)["pid"] > 0

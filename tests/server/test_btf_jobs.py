@@ -1,4 +1,4 @@
-"""BTFs that are made and imported over REST: the way to the library, what is wrong with files, stop and resume."""
+"""BTF jobs over REST: compression and import, invalid files, stop and resume."""
 
 import threading
 import time
@@ -32,7 +32,7 @@ def wait_for(client: TestClient, url: str, *states: str) -> dict[str, Any]:
 
 
 def wait_until_gone(path: Path) -> None:
-    """What is left of a work goes when its row has said that it has ended."""
+    """A job's files are deleted after its row says that it has ended."""
     deadline = time.monotonic() + WAIT_S
     while path.exists():
         assert time.monotonic() < deadline, path
@@ -46,7 +46,7 @@ def send(client: TestClient, path: Path, **form: Any) -> str:
     return str(answer.headers["location"])
 
 
-def test_images_become_a_material_of_the_library(client: TestClient, settings: Settings, tmp_path: Path) -> None:
+def test_images_become_a_library_material(client: TestClient, settings: Settings, tmp_path: Path) -> None:
     url = send(client, zipped(tmp_path / "a.zip"), error=0.02)
     body = wait_for(client, url, "ready", "failed")
     assert (body["state"], body["name"], body["geometry"], body["problem"]) == ("ready", "Felt", None, None)
@@ -62,9 +62,7 @@ def test_images_become_a_material_of_the_library(client: TestClient, settings: S
     assert len(client.get("/api/materials/btf").json()) == 1
 
 
-def test_a_container_becomes_a_material_whatever_it_is_called(
-    client: TestClient, settings: Settings, tmp_path: Path
-) -> None:
+def test_container_is_recognized_under_any_name(client: TestClient, settings: Settings, tmp_path: Path) -> None:
     path, _ = container(tmp_path / "a.btf")
     body = wait_for(client, send(client, path, error=0.02), "ready", "failed")
     assert (body["state"], body["problem"]) == ("ready", None)
@@ -77,7 +75,7 @@ def test_a_container_becomes_a_material_whatever_it_is_called(
 
 
 @pytest.mark.slow
-def test_a_small_geometry_is_rendered(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_small_geometry_is_rendered(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("relume_server.batch.btf_steps._GRID", 1)
     answer = client.post(f"{WORKS}/synthetic", json={"geometry": "corduroy", "size": 8, "error": 0.3})
     assert answer.status_code == 202
@@ -89,7 +87,7 @@ def test_a_small_geometry_is_rendered(client: TestClient, monkeypatch: pytest.Mo
 SQUARE = "v 0 0 0\nv 2 0 0\nv 2 0.1 -2\nv 0 0 -2\nf 1 2 3 4\n"
 
 
-def test_a_mesh_that_is_sent_is_rendered_with_its_period(
+def test_uploaded_mesh_is_rendered_with_its_period(
     client: TestClient, settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def render(asset_store: Path, wanted: Any, name: str, *others: Any) -> Any:
@@ -116,7 +114,7 @@ def test_a_mesh_that_is_sent_is_rendered_with_its_period(
         (SQUARE, {"size": 10**9}, "256"),
     ],
 )
-def test_meshes_that_are_no_period_are_refused_at_once(
+def test_invalid_meshes_are_rejected_immediately(
     client: TestClient, settings: Settings, mesh: str, form: dict[str, Any], said: str
 ) -> None:
     answer = client.post(f"{WORKS}/geometry", files={"geometry": ("a.obj", mesh)}, data=form)
@@ -126,7 +124,7 @@ def test_meshes_that_are_no_period_are_refused_at_once(
     assert not list(settings.data.glob("upload-*"))
 
 
-def test_what_is_wrong_with_a_file_is_said_and_the_next_one_is_taken(client: TestClient, tmp_path: Path) -> None:
+def test_invalid_file_is_reported_and_the_next_job_runs(client: TestClient, tmp_path: Path) -> None:
     (tmp_path / "no.zip").write_bytes(b"no zip")
     body = wait_for(client, send(client, tmp_path / "no.zip"), "ready", "failed")
     assert (body["state"], body["material"]) == ("failed", None)
@@ -139,28 +137,28 @@ def test_what_is_wrong_with_a_file_is_said_and_the_next_one_is_taken(client: Tes
     [{"geometry": "fur"}, {"geometry": "weave", "size": 4}, {"geometry": "weave", "size": 10**9},
      {"geometry": "weave", "error": 0}, {"geometry": "weave", "name": ""}, {}],
 )  # fmt: skip
-def test_what_cannot_be_made_is_refused(client: TestClient, wanted: dict[str, Any]) -> None:
+def test_invalid_requests_are_rejected(client: TestClient, wanted: dict[str, Any]) -> None:
     assert client.post(f"{WORKS}/synthetic", json=wanted).status_code == 422
     assert client.get(WORKS).json() == []
 
 
-def test_what_is_stopped_keeps_what_it_has_found_and_goes_on(
+def test_stopped_job_keeps_partial_data_and_resumes(
     client: TestClient, control: Control, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     has_begun, has_ended, had_partial_data = threading.Event(), threading.Event(), []
 
-    def slow(folder: Path, file: Path, name: str, bound: float, tell: Callable[[float], object],
-             is_canceled: Callable[[], bool], making: Path, images: ViewArrays) -> Any:  # fmt: skip
-        had_partial_data.append(making.exists())
+    def slow(folder: Path, file: Path, name: str, bound: float, report: Callable[[float], object],
+             is_canceled: Callable[[], bool], partial_path: Path, images: ViewArrays) -> Any:  # fmt: skip
+        had_partial_data.append(partial_path.exists())
         if not has_begun.is_set():
-            making.mkdir()
-            tell(0.5)
+            partial_path.mkdir()
+            report(0.5)
             has_begun.set()
             while not is_canceled():
                 time.sleep(0.01)
             has_ended.set()
             raise CancelledError("stopped")
-        return import_btf(folder, file, name, bound, tell, is_canceled, making, images)
+        return import_btf(folder, file, name, bound, report, is_canceled, partial_path, images)
 
     monkeypatch.setattr("relume_server.batch.btf_steps.import_btf", slow)
     url = send(client, zipped(tmp_path / "a.zip"))
@@ -174,16 +172,16 @@ def test_what_is_stopped_keeps_what_it_has_found_and_goes_on(
     assert had_partial_data == [False, True]
 
 
-def test_one_is_made_in_turns_and_images_do_not_wait_for_geometry(
+def test_jobs_take_turns_and_images_do_not_wait_for_geometry(
     client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("relume_server.batch.btf_steps.SLICE_S", 0.0)
     done: list[float] = []
 
-    def render(asset_store: Path, wanted: Any, name: str, tell: Callable[[float], object],
-               is_canceled: Callable[[], bool], making: Path) -> Any:  # fmt: skip
+    def render(asset_store: Path, wanted: Any, name: str, report: Callable[[float], object],
+               is_canceled: Callable[[], bool], partial_path: Path) -> Any:  # fmt: skip
         while not is_canceled():
-            tell(0.1 * len(done))
+            report(0.1 * len(done))
             done.append(0.1 * len(done))
             if len(done) == 7:
                 return import_btf(
@@ -201,7 +199,7 @@ def test_one_is_made_in_turns_and_images_do_not_wait_for_geometry(
     assert client.get(images[0]).json()["state"] == "ready"
 
 
-def test_uploads_and_forms_that_are_too_large_are_refused(client: TestClient, settings: Settings) -> None:
+def test_oversized_uploads_and_forms_are_rejected(client: TestClient, settings: Settings) -> None:
     large = b"0" * (settings.max_upload_bytes + 1)
     assert client.post(WORKS, files={"images": ("a.zip", large)}).status_code == 413
     assert client.post(WORKS, files={"images": ("a.zip", b"0")}, data={"error": 7}).status_code == 422

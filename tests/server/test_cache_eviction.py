@@ -1,4 +1,4 @@
-"""What nobody looks at is let go, what somebody looks at is not, and a bake that was let go opens as it was."""
+"""Idle bakes are evicted, bakes in use are not, and an evicted bake reopens unchanged."""
 
 import asyncio
 import gc
@@ -28,7 +28,7 @@ from relume_server.settings import Settings
 from relume_worker.scenes import register_scene
 
 SIGMA = "/materials/Ball/terms/1/params/sigma"
-IDLE_S, FLOOR_BYTES = 60.0, 2_000_000  # room for one operator: whichever entry was used last stays
+IDLE_S, FLOOR_BYTES = 60.0, 2_000_000  # room for one operator: the last used entry stays
 NUM_SCENES = 3
 CURVE = "/materials/Ball/terms/1/curves/theta_h"
 
@@ -46,7 +46,7 @@ def clock() -> Clock:
 
 
 @pytest.fixture
-def real(tmp_path: Path, clock: Clock) -> Iterator[TestClient]:
+def real_client(tmp_path: Path, clock: Clock) -> Iterator[TestClient]:
     settings = Settings(data=tmp_path, allowed_hosts=["testserver"], idle_seconds=IDLE_S, cache_floor_bytes=FLOOR_BYTES)
     with TestClient(create_app(settings, clock=clock)) as client:
         yield client
@@ -57,7 +57,7 @@ def go_round(client: TestClient) -> None:
 
 
 def bake_scenes(client: TestClient, num_scenes: int = NUM_SCENES) -> list[str]:
-    """Bakes of scenes that differ in the colour of the ball."""
+    """Bakes of scenes that differ in the color of the ball."""
     bakes, base, bake_ids = client.app.state.services.bakes, still_life(), []
     for number in range(num_scenes):
         ball = base.materials[2]
@@ -73,116 +73,118 @@ def bake_scenes(client: TestClient, num_scenes: int = NUM_SCENES) -> list[str]:
 
 
 def look_at(client: TestClient, bake: str) -> bytes:
-    """The exact picture of a bake, one of its curves frozen and moved."""
+    """Exact picture of a bake after one of its curves was frozen and edited."""
     with open_session(client, bake) as session:
         session.exact(0)
         session.send_message(type="prepare", curve=CURVE)
-        # shading adds in another order: the last bits of a picture would tell
+        # shading sums in another order: the last bits would differ
         session.wait_until_ready("Ball, half angle θh")
         session.edit(1, SIGMA, 0.3, control=SIGMA)
         return session.exact(1).payload
 
 
 def gauges(client: TestClient) -> dict[str, float]:
-    """Every sample of /metrics by its name, and by its component where it has one."""
+    """Each sample of /metrics by its name, or by its component if it has one."""
     families = text_string_to_metric_families(client.get("/metrics").text)
     return {s.labels.get("component", s.name): s.value for family in families for s in family.samples}
 
 
-def held(client: TestClient) -> dict[tuple[str, str], float]:
-    """What is in the memory, by kind and bake."""
+def cache_bytes(client: TestClient) -> dict[tuple[str, str], float]:
+    """Cached bytes by kind and bake."""
     families = text_string_to_metric_families(client.get("/metrics").text)
     samples = [sample for family in families for sample in family.samples if sample.name == "relume_cache_bytes"]
     return {(s.labels["kind"], s.labels["bake"]): s.value for s in samples}
 
 
-def test_metrics_tell_who_holds_what(real: TestClient) -> None:
-    bakes = bake_scenes(real, 2)
+def test_metrics_show_cache_bytes_by_bake(real_client: TestClient) -> None:
+    bakes = bake_scenes(real_client, 2)
     for bake in bakes:
-        look_at(real, bake)
-    entries = held(real)
+        look_at(real_client, bake)
+    entries = cache_bytes(real_client)
     assert {(kind, bake) for kind in ("linear operator", "shaded term") for bake in bakes} <= set(entries)
     assert all(num_bytes > 0 for num_bytes in entries.values())
-    assert sum(entries.values()) == gauges(real)["cache"]
+    assert sum(entries.values()) == gauges(real_client)["cache"]
 
 
-def test_a_thumbnail_of_other_code_is_painted_again(
-    real: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_thumbnail_of_another_version_is_rendered_again(
+    real_client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    bake_scenes(real, 1)
-    address = real.get("/api/scenes").json()[0]["thumbnail"]
-    assert real.get(address).status_code == 200
+    bake_scenes(real_client, 1)
+    address = real_client.get("/api/scenes").json()[0]["thumbnail"]
+    assert real_client.get(address).status_code == 200
     (before,) = (tmp_path / "thumbnails").iterdir()
     monkeypatch.setattr("relume_server.batch.thumbnails.image_code", lambda: "0123456789abcdef")
-    assert real.get(address).status_code == 200
+    assert real_client.get(address).status_code == 200
     (after,) = (tmp_path / "thumbnails").iterdir()
     assert after != before
 
 
-def test_bakes_that_nobody_looks_at_are_let_go(real: TestClient, clock: Clock) -> None:
-    pool = real.app.state.services.transfers
-    bakes = bake_scenes(real)
-    pictures = [look_at(real, bake) for bake in bakes]
-    go_round(real)
+def test_idle_bakes_are_evicted(real_client: TestClient, clock: Clock) -> None:
+    pool = real_client.app.state.services.transfers
+    bakes = bake_scenes(real_client)
+    pictures = [look_at(real_client, bake) for bake in bakes]
+    go_round(real_client)
     references = [weakref.ref(transfer) for transfer in pool.open_bakes]
-    before = gauges(real)
+    before = gauges(real_client)
     assert references
     assert before["open_bakes"] > 0
     assert before["cache"] == before["relume_frozen_cache_bytes"] > FLOOR_BYTES
     assert before["process_resident_memory_bytes"] > before["open_bakes"]
 
     clock.now += IDLE_S + 1
-    go_round(real)
+    go_round(real_client)
     gc.collect()
     assert [ref() for ref in references] == [None] * len(references)
-    after = gauges(real)
+    after = gauges(real_client)
     assert after["open_bakes"] == 0
     assert 0 < after["cache"] <= FLOOR_BYTES
 
-    assert [look_at(real, bake) for bake in bakes] == pictures
+    assert [look_at(real_client, bake) for bake in bakes] == pictures
 
 
-def test_what_is_looked_at_is_kept_however_long(real: TestClient, clock: Clock) -> None:
-    shown, left = bake_scenes(real, 2)
-    look_at(real, left)
-    with open_session(real, shown) as session:
+def test_bakes_in_use_are_not_evicted(real_client: TestClient, clock: Clock) -> None:
+    shown, left = bake_scenes(real_client, 2)
+    look_at(real_client, left)
+    with open_session(real_client, shown) as session:
         session.send_message(type="prepare", curve=CURVE)
         session.edit(1, "/materials/Ball/terms/1/params/sigma", 0.3)
         session.exact(1)
         (transfer,) = [
-            open_bake for open_bake in real.app.state.services.transfers.open_bakes if shown in open_bake.key
+            open_bake for open_bake in real_client.app.state.services.transfers.open_bakes if shown in open_bake.key
         ]
         clock.now += 100 * IDLE_S
-        go_round(real)
-        assert real.app.state.services.transfers.open_bakes == [transfer]
-        assert gauges(real)["cache"] > FLOOR_BYTES
+        go_round(real_client)
+        assert real_client.app.state.services.transfers.open_bakes == [transfer]
+        assert gauges(real_client)["cache"] > FLOOR_BYTES
         session.edit(2, "/materials/Ball/terms/1/params/sigma", 0.25)
         session.exact(2)
     clock.now += IDLE_S - 1
-    go_round(real)
-    assert real.app.state.services.transfers.open_bakes == [transfer]
+    go_round(real_client)
+    assert real_client.app.state.services.transfers.open_bakes == [transfer]
 
 
 @pytest.mark.slow
-def test_comparisons_and_renders_go_on_while_their_bake_is_let_go(real: TestClient, clock: Clock) -> None:
-    bake = bake_scenes(real)[0]
-    comparison = real.post("/api/comparisons", json={"bake": bake, "view": "front", "passes": 2}).headers["location"]
+def test_comparisons_and_renders_continue_during_eviction(real_client: TestClient, clock: Clock) -> None:
+    bake = bake_scenes(real_client)[0]
+    comparison = real_client.post("/api/comparisons", json={"bake": bake, "view": "front", "passes": 2}).headers[
+        "location"
+    ]
     request = {"bake": bake, "view": "front", "format": "png", "looks": [{"display": {"exposure": 1.0}}] * 2}
-    render = real.post("/api/renders", json=request).headers["location"]
+    render = real_client.post("/api/renders", json=request).headers["location"]
     works = [comparison, render]
     for _ in range(6000):
         clock.now += IDLE_S + 1
-        go_round(real)
-        states = [real.get(work).json()["state"] for work in works]
+        go_round(real_client)
+        states = [real_client.get(work).json()["state"] for work in works]
         if not {"queued", "running"} & set(states):
             break
         time.sleep(0.02)
     assert states == ["ready", "ready"]
-    assert real.app.state.services.transfers.open_bakes == []
+    assert real_client.app.state.services.transfers.open_bakes == []
 
 
-def test_a_bake_that_is_opened_while_others_are_let_go_is_kept() -> None:
-    """At every moment of opening and leaving: whoever has asked gets a transfer, and all who use one get the same."""
+def test_bake_opened_during_eviction_is_kept() -> None:
+    """At any point of opening and closing, every caller gets a transfer, and concurrent users share it."""
     clock, may_open, opened = Clock(), threading.Event(), []
 
     def open_transfer(path: Path) -> Any:
@@ -217,13 +219,13 @@ def test_a_bake_that_is_opened_while_others_are_let_go_is_kept() -> None:
     assert len(opened) == 2
 
 
-def test_what_is_reached_twice_is_counted_once() -> None:
+def test_shared_objects_are_counted_once() -> None:
     array = np.zeros(1000, np.float64)
     views = {"a": array, "b": [array[10:], array.reshape(10, 100)], "own": np.ones(5, np.uint8)}
     assert live_bytes(views) == array.nbytes + 5
     assert live_bytes(lambda: views) == array.nbytes + 5
 
 
-def test_a_file_mapped_into_memory_is_the_systems(tmp_path: Path) -> None:
+def test_memory_mapped_files_are_not_counted(tmp_path: Path) -> None:
     np.save(tmp_path / "map.npy", np.zeros(1000))
     assert live_bytes(np.load(tmp_path / "map.npy", mmap_mode="r").view(np.ndarray)) == 0

@@ -1,4 +1,4 @@
-"""What is for those who log in is handed on by no cache between."""
+"""Shared caches do not store responses that require login."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def settings(settings: Settings) -> Settings:
     return settings
 
 
-def test_no_answer_that_needs_a_role_is_public(client: TestClient, baked: Baked) -> None:
+def test_responses_that_need_a_role_are_not_public(client: TestClient, baked: Baked) -> None:
     parameters = {"scene": baked.scene, "bake": baked.bake, "view": "front", "environment": "studio"}
     answers = []
     for path, roles in RULES.items():
@@ -36,12 +36,12 @@ def test_no_answer_that_needs_a_role_is_public(client: TestClient, baked: Baked)
         assert {"Cookie", "Authorization"} <= set(answer.headers["vary"].split(", ")), answer.url
 
 
-def test_pictures_stay_in_the_browsers_own_cache(client: TestClient, baked: Baked) -> None:
+def test_images_stay_in_the_private_cache(client: TestClient, baked: Baked) -> None:
     said = client.get(f"/api/bakes/{baked.bake}/views/front/materials.png").headers["cache-control"]
     assert said.startswith("private, max-age=")
 
 
-def test_the_editors_files_are_everybodys(client: TestClient) -> None:
+def test_editor_files_are_public(client: TestClient) -> None:
     answer = client.get("/assets/a-1.js")
     assert answer.headers["cache-control"].startswith("public")
     assert "vary" not in answer.headers

@@ -1,4 +1,4 @@
-"""Comments: words pinned to a pixel, with a picture of the moment."""
+"""Comments: text pinned to a pixel, with a snapshot of the picture."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def pin(baked: Baked) -> dict[str, Any]:
     return {"bake": baked.bake, "view": "front", "x": 12, "y": 40, "size": SIZE, "text": "Too bright here"}
 
 
-def test_a_comment_is_kept_listed_settled_opened_and_deleted(
+def test_comment_is_saved_listed_resolved_reopened_and_deleted(
     client: TestClient, path: str, pin: dict[str, Any]
 ) -> None:
     sent = {**pin, "text": "  Too <b>bright</b>\nhere ", "author": "Ann", "picture": image()}
@@ -67,7 +67,9 @@ def test_a_comment_is_kept_listed_settled_opened_and_deleted(
     assert parse_problem(client.get(made["picture"]))["status"] == 404
 
 
-def test_comments_go_with_their_scene(client: TestClient, baked: Baked, path: str, pin: dict[str, Any]) -> None:
+def test_comments_are_deleted_with_their_scene(
+    client: TestClient, baked: Baked, path: str, pin: dict[str, Any]
+) -> None:
     client.post(path, json=pin)
     store = client.app.state.services.comments  # type: ignore[attr-defined]
     assert len(store.list(baked.scene)) == 1
@@ -93,7 +95,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-def test_what_is_wrong_is_said(client: TestClient, path: str, pin: dict[str, Any]) -> None:
+def test_invalid_comments_are_rejected_with_a_reason(client: TestClient, path: str, pin: dict[str, Any]) -> None:
     for wrong, word in WRONG:
         answer = client.post(path, json={**pin, **wrong})
         assert parse_problem(answer)["status"] in (404, 422), wrong
@@ -101,7 +103,7 @@ def test_what_is_wrong_is_said(client: TestClient, path: str, pin: dict[str, Any
     assert client.get(path).json() == []
 
 
-def test_a_scene_has_so_many_comments(
+def test_comments_per_scene_are_limited(
     client: TestClient, path: str, pin: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(comment_store, "MAX_PER_SCENE", 1)
@@ -109,7 +111,7 @@ def test_a_scene_has_so_many_comments(
     assert parse_problem(client.post(path, json=pin))["status"] == 503
 
 
-def test_those_who_work_together_are_told(client: TestClient, baked: Baked, path: str, pin: dict[str, Any]) -> None:
+def test_participants_are_notified(client: TestClient, baked: Baked, path: str, pin: dict[str, Any]) -> None:
     with open_session(client, baked.bake, opening=ROOM_FIELDS) as ann:
         ann.text("hello")
         made = client.post(path, json=pin).json()
@@ -118,7 +120,7 @@ def test_those_who_work_together_are_told(client: TestClient, baked: Baked, path
         ann.text("comments")
 
 
-def test_rooms_are_told_of_what_another_server_took(
+def test_rooms_are_notified_of_comments_on_another_server(
     client: TestClient, baked: Baked, pin: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     services = client.app.state.services  # type: ignore[attr-defined]
@@ -127,7 +129,7 @@ def test_rooms_are_told_of_what_another_server_took(
     def look() -> None:
         client.portal.call(news.refresh)  # type: ignore[union-attr]
 
-    # the server's own looks once at most
+    # the server's own loop polls at most once
     monkeypatch.setattr("relume_server.collaboration.comment_sync.POLL_INTERVAL_S", 1e9)
     notified: list[str] = []
     monkeypatch.setattr(services.live.rooms, "notify_comment", notified.append)

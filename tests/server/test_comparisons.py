@@ -1,4 +1,4 @@
-"""A frame compared with brute force over REST: figures, pictures, restart, deletion, bad requests."""
+"""Comparisons with the reference over REST: figures, images, restart, deletion and invalid requests."""
 
 import io
 import threading
@@ -43,12 +43,12 @@ def submit(client: TestClient, baked: Baked, passes: int, **more: Any) -> str:
     return str(queued.headers["location"])
 
 
-def test_comparison_finds_the_error_and_shows_it(client: TestClient, control: Control, baked: Baked) -> None:
+def test_comparison_measures_and_shows_the_error(client: TestClient, control: Control, baked: Baked) -> None:
     control.trace_gate.set()
     url = submit(client, baked, 6)
     body = wait_until(client, url, is_done)
     assert (body["state"], body["completed"], body["progress"]) == ("ready", 6, 1.0)
-    # the stand-in's truth is the frame's pixel over 1.1, its noise a fiftieth; by all paths it is three quarters
+    # the fake reference is the frame's pixel / 1.1 with noise of 1/50; with all paths, three quarters of the pixel
     assert (body["paths"], body["omitted_paths"], body["unsupported_paths"]) == ("all", ["What surfaces reflect."], [])
     assert body["error_all_paths"]["error"] == pytest.approx(1 / 3, rel=0.02)
     method_error = body["error_method_paths"]
@@ -62,7 +62,7 @@ def test_comparison_finds_the_error_and_shows_it(client: TestClient, control: Co
         assert error.shape == (SIZE[1], SIZE[0], 3)
         assert np.mean(error[..., 0] > error[..., 2] + 20) > 0.99  # too bright
     whole, followed = (_brightness(client, f"{url}/{name}.png") for name in ("reference", "method-reference"))
-    assert whole < followed - 4  # of 255
+    assert whole < followed - 4  # in units of 1/255
     assert client.get(f"{url}/other.png").status_code == 422
 
 
@@ -72,7 +72,7 @@ def _brightness(client: TestClient, url: str) -> float:
     return float(np.asarray(image).mean())
 
 
-def test_the_paths_of_the_method_alone_may_be_asked_for(client: TestClient, control: Control, baked: Baked) -> None:
+def test_comparison_may_trace_only_method_paths(client: TestClient, control: Control, baked: Baked) -> None:
     control.trace_gate.set()
     url = submit(client, baked, 4, paths="method")
     body = wait_until(client, url, is_done)
@@ -84,7 +84,7 @@ def test_the_paths_of_the_method_alone_may_be_asked_for(client: TestClient, cont
 
 
 @pytest.mark.parametrize(("is_upgraded", "asked"), [(False, [3, 4]), (True, [0, 0, 1, 2, 3, 4])])
-def test_comparison_goes_on_after_a_restart_and_starts_again_after_an_upgrade(
+def test_comparison_resumes_after_a_restart_and_restarts_after_an_upgrade(
     settings: Settings,
     client: TestClient,
     control: Control,
@@ -99,8 +99,8 @@ def test_comparison_goes_on_after_a_restart_and_starts_again_after_an_upgrade(
     queue = client.app.state.services.comparisons
     identity = url.rsplit("/", 1)[1]
     request = queue.get(identity).request.model_copy(update={"passes": 5}).model_dump_json()
-    queue.close()  # or it might be the first to look
-    # as a kill after three passes leaves it
+    queue.close()  # otherwise it might take the job first
+    # the state after a kill in the fourth pass
     queue._update(identity, ("ready",), state="running", request=request)
     if is_upgraded:
         monkeypatch.setattr("relume_server.batch.reference_passes.comparison_code", lambda: "0123456789abcdef")
@@ -111,19 +111,19 @@ def test_comparison_goes_on_after_a_restart_and_starts_again_after_an_upgrade(
     assert later.requested_passes == asked
 
 
-def test_deleting_stops_the_work_and_forgets_its_files(client: TestClient, control: Control, baked: Baked) -> None:
+def test_deletion_stops_the_job_and_deletes_its_files(client: TestClient, control: Control, baked: Baked) -> None:
     url = submit(client, baked, 1000)
     wait_until(client, url, lambda body: body["state"] == "running")
     assert client.get(f"{url}/error.png").status_code == 409
     assert client.delete(url, params={"delete_files": True}).status_code == 204
     assert client.get(url).status_code == 404
-    control.trace_gate.set()  # the next one is worked on
+    control.trace_gate.set()  # the next job runs
     assert wait_until(client, submit(client, baked, 2), is_done)["state"] == "ready"
     folder = client.app.state.services.settings.data / "comparisons"
     assert len(list(folder.iterdir())) == 1
 
 
-def test_stopping_keeps_what_was_found_and_it_can_go_on(client: TestClient, control: Control, baked: Baked) -> None:
+def test_stopped_comparison_keeps_its_result_and_resumes(client: TestClient, control: Control, baked: Baked) -> None:
     control.trace_gate.set()
     url = submit(client, baked, 1000)
     wait_until(client, url, lambda body: body["completed"] >= 3 and body["error_all_paths"] is not None)
@@ -132,30 +132,30 @@ def test_stopping_keeps_what_was_found_and_it_can_go_on(client: TestClient, cont
     assert (stopped["state"], stopped["seconds_left"]) == ("stopped", None)
     assert stopped["error_all_paths"]["noise"] > 0
     assert client.get(f"{url}/error.png").status_code == 200
-    assert client.delete(url).status_code == 204  # again: nothing more to stop
-    assert wait_until(client, submit(client, baked, 2), is_done)["state"] == "ready"  # the next one has its turn
+    assert client.delete(url).status_code == 204  # again: nothing left to stop
+    assert wait_until(client, submit(client, baked, 2), is_done)["state"] == "ready"  # the next job runs
     passes = client.get(url).json()["completed"]
     resumed = client.post(f"{url}/resume")
     assert resumed.status_code == 202
-    assert resumed.json()["state"] in ("queued", "running")  # the queue may be quicker than the answer
+    assert resumed.json()["state"] in ("queued", "running")  # the queue may be faster than the response
     on = wait_until(client, url, lambda body: body["completed"] > passes + 1)
     assert on["seconds_left"] > 0
     whole = [
         index for index, (_, size) in zip(control.requested_passes, control.pass_cameras, strict=False) if size == SIZE
     ]
-    assert len(whole) - len(set(whole)) <= 3  # no finished pass was made again
+    assert len(whole) - len(set(whole)) <= 3  # no finished pass was repeated
     assert client.delete(url, params={"delete_files": True}).status_code == 204
     assert client.post(f"{url}/resume").status_code == 404
 
 
-def test_how_long_it_takes_is_said_before_it_begins(client: TestClient, control: Control, baked: Baked) -> None:
+def test_duration_is_estimated_before_the_start(client: TestClient, control: Control, baked: Baked) -> None:
     control.trace_gate.set()
     request = {"bake": baked.bake, "view": "front", "passes": 10, "dry_run": True}
     planned = client.post("/api/comparisons", json=request)
     assert planned.status_code == 200
     assert planned.json()["passes"] == 10
     assert planned.json()["seconds"] > 0
-    assert len(control.requested_passes) == 1  # a small picture; the second time its pace is known
+    assert len(control.requested_passes) == 1  # one small picture; the second estimate reuses its rate
     again = client.post("/api/comparisons", json=request | {"passes": 20}).json()
     assert again["seconds"] == pytest.approx(2 * planned.json()["seconds"])
     assert len(control.requested_passes) == 1
@@ -172,7 +172,7 @@ def test_how_long_it_takes_is_said_before_it_begins(client: TestClient, control:
         ({"look": {"materials": {"Nobody": {"terms": []}}}}, 422),
         ({"spp": 5}, 422),
         ({"paths": "some"}, 422),
-        ({"camera": {"to_world": np.eye(4).ravel().tolist(), "yfov": 40}}, 422),  # its eye does not move
+        ({"camera": {"to_world": np.eye(4).ravel().tolist(), "yfov": 40}}, 422),  # the view has a fixed camera
         ({"size": [80, 60]}, 422),
     ],
 )
@@ -184,20 +184,20 @@ def test_bad_request_is_refused(client: TestClient, baked: Baked, change: dict[s
 
 
 @pytest.mark.parametrize("method", ["direct", "gather"])
-def test_brute_force_has_the_light_paths_of_the_bake(
+def test_reference_traces_the_light_paths_of_the_bake(
     client: TestClient, control: Control, baked: Baked, monkeypatch: pytest.MonkeyPatch, method: str
 ) -> None:
     monkeypatch.setattr(FakeTransfer, "__init__", _baked_by(method, FakeTransfer.__init__))
     control.trace_gate.set()
     wait_until(client, submit(client, baked, 2), is_done)
-    assert control.requested_reflections == [method == "gather"] * 3  # a small first one, and two passes
+    assert control.requested_reflections == [method == "gather"] * 3  # a small estimate and two passes
 
 
 def _baked_by(method: str, init: Callable[..., None], **also: Any) -> Callable[..., None]:
     return lambda self, *args, **more: init(self, *args, **{**more, "method": method, **also})
 
 
-def test_a_moving_view_is_compared_from_where_its_eye_is(
+def test_free_camera_view_is_compared_from_its_camera(
     client: TestClient, control: Control, baked: Baked, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
@@ -211,7 +211,7 @@ def test_a_moving_view_is_compared_from_where_its_eye_is(
     assert Image.open(io.BytesIO(client.get(f"{url}/error.png").content)).size == (40, 24)
     (frame_from,) = [pose for pose in control.frame_cameras if pose is not None]
     for pose_of_pass, size in (frame_from, *control.pass_cameras):
-        assert size == (40, 24)  # smaller ones are made of larger pictures first
+        assert size == (40, 24)  # smaller ones are rendered larger first
         assert np.array_equal(pose_of_pass.to_world, to_world)
         assert pose_of_pass.yfov == pytest.approx(np.radians(40))
     request = {"bake": baked.bake, "view": "front", "camera": camera}
@@ -224,12 +224,12 @@ def test_a_moving_view_is_compared_from_where_its_eye_is(
         assert refused.status_code == 422, refused.text
 
 
-def test_an_estimate_waits_for_no_other_and_is_judged_by_other_views_until_it_is_timed(
+def test_estimates_do_not_queue_and_use_other_views_until_timed(
     client: TestClient, control: Control, baked: Baked, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("relume_server.jobs.comparison_jobs.ANSWER_S", 0.01)
     question = {"bake": baked.bake, "view": "front", "passes": 4, "dry_run": True}
-    guessed = client.post("/api/comparisons", json=question)  # nothing may be traced
+    guessed = client.post("/api/comparisons", json=question)  # no tracing is allowed
     assert (guessed.status_code, guessed.json()["is_measured"]) == (200, False)
     assert guessed.json()["seconds"] == pytest.approx(4 * DEFAULT_PIXEL_S * SIZE[0] * SIZE[1])
     assert client.post("/api/comparisons", json=question | {"paths": "method"}).json()["is_measured"] is False
@@ -241,7 +241,7 @@ def test_an_estimate_waits_for_no_other_and_is_judged_by_other_views_until_it_is
     assert len(control.requested_passes) == 1
 
 
-def test_there_is_a_picture_and_progress_while_the_first_pass_is_made(
+def test_image_and_progress_exist_during_the_first_pass(
     client: TestClient, control: Control, baked: Baked, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     half_way = threading.Event()
@@ -266,7 +266,7 @@ def test_there_is_a_picture_and_progress_while_the_first_pass_is_made(
     client.delete(url)
 
 
-def test_brute_force_can_be_looked_at_after_one_pass(client: TestClient, control: Control, baked: Baked) -> None:
+def test_reference_image_exists_after_one_pass(client: TestClient, control: Control, baked: Baked) -> None:
     control.trace_gate.set()
     queue = client.app.state.services.comparisons  # type: ignore[attr-defined]
     step = queue.step

@@ -1,4 +1,4 @@
-"""HEAD on every GET, and no body for a client that has it."""
+"""HEAD for every GET, and status 304 for unchanged content."""
 
 from typing import Any
 
@@ -21,14 +21,14 @@ def rendered(client: TestClient, baked: Baked) -> str:
 
 @pytest.fixture
 def urls(client: TestClient, baked: Baked, rendered: str) -> list[str]:
-    """Of files and JSON that have a validator."""
+    """Files and JSON with a validator."""
     assert client.put("/api/looks/a", json={}).status_code == 201
     made = [f"{rendered}/frames/0", f"{rendered}/archive.zip", f"/api/scenes/{baked.scene}/thumbnail.webp"]
     lists = ["/api/materials", "/api/models", "/api/openapi.json", "/api/scenes", "/api/bakes", rendered]
     return [*made, *lists, "/api/looks/a"]
 
 
-def test_what_a_client_has_is_not_sent_again(client: TestClient, urls: list[str]) -> None:
+def test_unchanged_content_is_not_sent_again(client: TestClient, urls: list[str]) -> None:
     for url in urls:
         first = client.get(url)
         assert first.status_code == 200, url
@@ -50,7 +50,7 @@ def test_what_a_client_has_is_not_sent_again(client: TestClient, urls: list[str]
             assert client.get(url, headers={"If-Modified-Since": nonsense}).status_code == 200
 
 
-def test_what_has_changed_is_sent(client: TestClient, baked: Baked) -> None:
+def test_changed_content_is_sent(client: TestClient, baked: Baked) -> None:
     before = client.get("/api/looks").headers["etag"]
     assert client.put("/api/looks/b", json={}).status_code == 201
     assert client.get("/api/looks", headers={"If-None-Match": before}).json()[0]["name"] == "b"
@@ -61,19 +61,19 @@ def test_head_answers_as_get_does_without_the_body(client: TestClient, urls: lis
         get, head = client.get(url), client.head(url)
         assert (head.status_code, head.content) == (get.status_code, b""), url
         assert head.headers["content-type"] == get.headers["content-type"]
-        if url not in ("/metrics",):  # which counts this very call
+        if url not in ("/metrics",):  # it counts this call
             assert head.headers["content-length"] == str(len(get.content)), url
         if "etag" in get.headers:
             assert client.head(url, headers={"If-None-Match": get.headers["etag"]}).status_code == 304
 
 
-def test_head_of_what_never_ends_ends(client: TestClient, control: Control, baked: Baked) -> None:
+def test_head_of_an_event_stream_ends(client: TestClient, control: Control, baked: Baked) -> None:
     head = client.head(f"/api/bakes/{baked.bake}/events")
     assert (head.status_code, head.content) == (200, b"")
     assert head.headers["content-type"].startswith("text/event-stream")
 
 
-def test_a_part_of_a_file_is_still_a_part(client: TestClient, rendered: str) -> None:
+def test_range_requests_still_work(client: TestClient, rendered: str) -> None:
     whole = client.get(f"{rendered}/frames/0").content
     response: Any = client.get(f"{rendered}/frames/0", headers={"Range": "bytes=2-5"})
     assert (response.status_code, response.content) == (206, whole[2:6])

@@ -1,4 +1,4 @@
-"""What a connection may send and how long it may take, before anybody is known."""
+"""Limits on the data and time of a connection before authentication."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def running(settings: Settings, control: Control) -> Iterator[Running]:
 
 
 def answer_to(running: Running, *sent: bytes, ends: bool = True) -> bytes:
-    """All that comes back until the server closes."""
+    """All bytes until the server closes."""
     with socket.create_connection(("127.0.0.1", running.port), timeout=60) as asking:
         answer = b""
         try:
@@ -39,7 +39,7 @@ def answer_to(running: Running, *sent: bytes, ends: bool = True) -> bytes:
                 answer += chunk
                 if not ends and b"\r\n\r\n" in answer:
                     break
-        except (ConnectionResetError, BrokenPipeError):  # it was closed while more was sent
+        except (ConnectionResetError, BrokenPipeError):  # closed while sending
             pass
         return answer
 
@@ -52,7 +52,7 @@ def answer_to(running: Running, *sent: bytes, ends: bool = True) -> bytes:
         [b"GET /", *[b"a" * 100_000] * 200],
     ],
 )
-def test_a_head_without_end_is_cut_off(running: Running, sent: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_endless_header_is_cut_off(running: Running, sent: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
     num_bytes = 0
     received = connection.Connection.data_received
 
@@ -64,10 +64,10 @@ def test_a_head_without_end_is_cut_off(running: Running, sent: list[bytes], monk
     monkeypatch.setattr(connection.Connection, "data_received", counted)
     answer = answer_to(running, *sent)
     assert answer[:12] in (b"", b"HTTP/1.1 431", b"HTTP/1.1 400")
-    assert num_bytes <= 2 * connection.MAX_HEAD_BYTES + (1 << 18)  # one read more
+    assert num_bytes <= 2 * connection.MAX_HEAD_BYTES + (1 << 18)  # plus one read
 
 
-def test_a_head_with_too_many_lines_is_refused(running: Running) -> None:
+def test_header_with_too_many_lines_is_rejected(running: Running) -> None:
     lines = b"".join(b"X-%d: a\r\n" % number for number in range(connection.MAX_HEADERS))
     assert answer_to(running, HEAD + lines + b"\r\n").startswith(b"HTTP/1.1 400")
     fewer = b"".join(b"X-%d: a\r\n" % number for number in range(connection.MAX_HEADERS - 2))
@@ -81,17 +81,17 @@ class TestTime:
         monkeypatch.setattr(connection, "BODY_SECONDS", 0.2)
 
     @pytest.mark.parametrize("sent", [b"", b"G", HEAD, BODY])
-    def test_a_request_that_is_never_whole_ends(self, running: Running, sent: bytes) -> None:
+    def test_incomplete_request_times_out(self, running: Running, sent: bytes) -> None:
         assert answer_to(running, sent).startswith(b"HTTP/1.1 408")
 
-    def test_a_second_request_that_is_never_whole_ends_as_well(self, running: Running) -> None:
+    def test_incomplete_second_request_times_out(self, running: Running) -> None:
         answer = answer_to(running, HEAD + b"\r\n" + HEAD)
         assert answer.startswith(b"HTTP/1.1 200")
         assert b"HTTP/1.1 408" in answer
 
     @pytest.fixture
     def late(self, monkeypatch: pytest.MonkeyPatch) -> threading.Event:
-        """Set when a deadline has passed."""
+        """Set when a deadline passes."""
         late, looked = threading.Event(), connection.Connection._late
 
         def noted(self: connection.Connection) -> None:
@@ -101,7 +101,7 @@ class TestTime:
         monkeypatch.setattr(connection.Connection, "_late", noted)
         return late
 
-    def test_a_body_that_goes_on_coming_may_take_its_time(
+    def test_slow_but_steady_body_is_accepted(
         self, running: Running, late: threading.Event, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(connection, "MIN_BODY_BYTES_PER_SECOND", 1)
@@ -111,7 +111,7 @@ class TestTime:
             asking.sendall(b" " * 38 + b"}")
             assert asking.recv(100).startswith(b"HTTP/1.1 201")
 
-    def test_who_waits_for_an_answer_is_not_cut_off(
+    def test_client_that_waits_for_a_response_is_not_cut_off(
         self, running: Running, late: threading.Event, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         library = running.app.state.services.looks
@@ -120,7 +120,7 @@ class TestTime:
         assert answer_to(running, request + b"G", ends=False).startswith(b"HTTP/1.1 200")
 
 
-def test_one_connection_too_many_is_told_so(running: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_excess_connection_is_rejected_with_a_reason(running: Running, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connection, "MAX_CONNECTIONS", 1)
     with socket.create_connection(("127.0.0.1", running.port), timeout=60) as first:
         first.sendall(HEAD)
@@ -134,11 +134,11 @@ def test_one_connection_too_many_is_told_so(running: Running, monkeypatch: pytes
     ("path", "max_bytes"),
     [("/api/login", MAX_LOGIN_BYTES), ("/api/logout", MAX_LOGIN_BYTES), ("/api/bakes", MAX_JSON_BYTES)],
 )
-def test_bodies_are_as_large_as_they_have_to_be(client: TestClient, path: str, max_bytes: int) -> None:
+def test_body_limits_fit_their_routes(client: TestClient, path: str, max_bytes: int) -> None:
     text = {"content-type": "application/json"}
     beyond = b'{"token": "a", "x": "' + b"1" * max_bytes + b'"}'
     assert client.post(path, content=beyond, headers=text).status_code == 413
-    if path != "/api/logout":  # which reads none
+    if path != "/api/logout":  # it reads no body
         assert client.post(path, content=iter([beyond]), headers=text).status_code == 413
     within = b'{"token": "a", "x": "' + b"1" * (max_bytes - 100) + b'"}'
     assert client.post(path, content=within, headers=text).status_code != 413

@@ -1,4 +1,4 @@
-"""A server with an OpenColorIO config: what it lists, and pictures that it renders by it."""
+"""A server with an OpenColorIO config: its display views and renders with them."""
 
 import io
 import json
@@ -31,7 +31,7 @@ def settings(settings: Settings) -> Settings:
     return settings.model_copy(update={"ocio": CONFIG})
 
 
-def test_its_views_are_listed_tabled_and_rendered(client: TestClient, baked: Baked, tmp_path: Path) -> None:
+def test_views_are_listed_exported_as_lut_and_rendered(client: TestClient, baked: Baked, tmp_path: Path) -> None:
     color_settings, config = client.get("/api/color").json(), Config(CONFIG)
     assert {each["name"]: tuple(each["views"]) for each in color_settings["displays"]} == config.displays
     assert (color_settings["default"], color_settings["working"], tuple(color_settings["spaces"])) == (
@@ -70,13 +70,13 @@ def test_its_views_are_listed_tabled_and_rendered(client: TestClient, baked: Bak
     np.testing.assert_array_equal(png, to_bytes(light.reshape(png.shape)))
 
 
-def test_what_it_does_not_have_is_refused_before_anything_is_rendered(client: TestClient, baked: Baked) -> None:
+def test_unknown_views_are_rejected_before_rendering(client: TestClient, baked: Baked) -> None:
     other = VIEW | {"view": "Film of another house"}
     request = {"bake": baked.bake, "view": "front", "looks": [{}, {"display": {"tone_map": other}}], "format": "png"}
     refused = client.post("/api/renders", json=request)
     assert (refused.status_code, refused.json()["parameter"]) == (422, "/looks/1/display/tone_map")
     assert "Un-tone-mapped" in refused.json()["allowed"]
-    assert client.post("/api/renders", json=request | {"format": "exr"}).status_code == 202  # has no tone map
+    assert client.post("/api/renders", json=request | {"format": "exr"}).status_code == 202  # EXR has no tone mapping
     for more in ({"format": "exr", "color_space": "ACEScct"}, {"looks": [{}], "color_space": "ACEScg"}):
         refused = client.post("/api/renders", json=request | more)
         assert (refused.status_code, refused.json()["parameter"]) == (422, "color_space")
@@ -88,7 +88,7 @@ def test_what_it_does_not_have_is_refused_before_anything_is_rendered(client: Te
     assert client.post("/api/comparisons", json=comparison).json()["parameter"] == "/look/display/tone_map"
 
 
-def test_processes_that_render_are_told_the_config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_render_processes_get_the_config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     started: list[list[str]] = []
 
     def start(command: list[str], **_: object) -> SimpleNamespace:

@@ -1,4 +1,4 @@
-"""Files that clients download in parts."""
+"""Range requests on file downloads."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
         ("bytes=90-", DATA[90:]),
         ("bytes=90-999", DATA[90:]),
         ("bytes=-7", DATA[-7:]),
-        ("Bytes = 0-0", DATA),  # no unit has a space
+        ("Bytes = 0-0", DATA),  # units contain no spaces
         ("bytes=0-0", DATA[:1]),
     ],
 )
-def test_a_part_is_what_is_asked_for(client: TestClient, asked: str, given: bytes) -> None:
+def test_requested_range_is_returned(client: TestClient, asked: str, given: bytes) -> None:
     answer = client.get("/file", headers={"Range": asked})
     assert (answer.status_code, answer.content) == (200 if given == DATA else 206, given)
 
@@ -51,13 +51,13 @@ def test_a_part_is_what_is_asked_for(client: TestClient, asked: str, given: byte
 @pytest.mark.parametrize(
     "asked", ["bytes=5-1", "bytes=abc", "items=0-5", "bytes=", "bytes=1", "bytes=0-1,5-4", "x", "bytes=0-" + "9" * 5000]
 )
-def test_what_is_no_range_is_passed_over(client: TestClient, asked: str) -> None:
+def test_invalid_ranges_are_ignored(client: TestClient, asked: str) -> None:
     answer = client.get("/file", headers={"Range": asked})
     assert (answer.status_code, answer.content) == (200, DATA)
 
 
 @pytest.mark.parametrize("asked", ["bytes=100-", "bytes=-0", "bytes=999999999999999999999999999-"])
-def test_a_part_beyond_the_end_is_a_problem(client: TestClient, asked: str) -> None:
+def test_range_beyond_the_end_is_a_problem(client: TestClient, asked: str) -> None:
     answer = client.get("/file", headers={"Range": asked})
     assert (answer.status_code, answer.headers["content-range"]) == (416, "bytes */100")
     assert answer.headers["content-type"] == "application/problem+json"
@@ -65,7 +65,7 @@ def test_a_part_beyond_the_end_is_a_problem(client: TestClient, asked: str) -> N
     assert "100 bytes" in answer.json()["detail"]
 
 
-def test_a_client_that_leaves_while_its_session_is_accepted_is_no_failure() -> None:
+def test_client_that_disconnects_during_accept_is_not_an_error() -> None:
     async def accept(subprotocol: str | None) -> None:
         raise OSError("gone")
 

@@ -1,4 +1,4 @@
-"""Smaller pictures keep the radiance of the area they stand for."""
+"""Downsampling preserves mean radiance."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ def test_whole_factors_average_blocks() -> None:
     assert np.allclose(downsample(image, (4, 3)), expected, rtol=1e-5)
 
 
-def test_mean_is_kept_by_any_size() -> None:
+def test_mean_is_preserved_at_any_size() -> None:
     image = np.random.default_rng(4).random((12, 20, 3), np.float32)
     assert downsample(image, (7, 5)).mean() == pytest.approx(image.mean(), rel=0.02)
     assert downsample(image, (20, 12)) is image

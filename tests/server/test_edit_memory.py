@@ -1,4 +1,4 @@
-"""Edits that need more memory than there is: refused when they come, whatever is being made meanwhile."""
+"""Edits that exceed the memory budget are rejected when they arrive, whatever is being precomputed."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,15 +20,15 @@ DRAWN = {"points": [[0, 1], [90, 0]]}
 
 
 @pytest.fixture
-def short(tmp_path: Path) -> Iterator[TestClient]:
-    """Memory for the images and a preview of the still life, for no operator of its ball."""
+def low_memory_client(tmp_path: Path) -> Iterator[TestClient]:
+    """Memory for the images and a preview of the still life, but not for an operator of its ball."""
     with TestClient(create_app(Settings(data=tmp_path, allowed_hosts=["testserver"], cache_bytes=400_000))) as client:
         yield client
 
 
 @pytest.fixture
-def bake(short: TestClient) -> str:
-    bakes, scene = short.app.state.services.bakes, still_life()
+def bake(low_memory_client: TestClient) -> str:
+    bakes, scene = low_memory_client.app.state.services.bakes, still_life()
     register_scene(bakes.data_dir, bakes.ledger, scene)
     bake: str = bakes.submit(scene.id, Recipe("direct", ("front",), (64, 48), 60))
     with bakes.subscribe(bake) as changes:
@@ -37,7 +37,7 @@ def bake(short: TestClient) -> str:
 
 
 def answer(session: Session, revision: int) -> None:
-    """Wait until an edit is refused or shown exactly."""
+    """Wait until an edit is rejected or shown exactly."""
     while True:
         message = session.receive()
         if isinstance(message, dict):
@@ -47,10 +47,10 @@ def answer(session: Session, revision: int) -> None:
             return
 
 
-def test_curve_over_the_budget_while_a_turned_light_is_prepared_does_not_end_the_session(
-    short: TestClient, bake: str
+def test_curve_over_the_budget_during_a_light_rotation_keeps_the_session(
+    low_memory_client: TestClient, bake: str
 ) -> None:
-    with open_session(short, bake) as session:
+    with open_session(low_memory_client, bake) as session:
         session.exact(0)
         session.send_message(type="prepare", parameter="/environment/rotation")
         session.edit(1, f"{BALL}/curves", {"theta_h": DRAWN})
@@ -59,7 +59,7 @@ def test_curve_over_the_budget_while_a_turned_light_is_prepared_does_not_end_the
         session.exact(2)
 
 
-def test_edit_that_needs_too_much_memory_is_taken_back_and_the_next_one_builds_on_the_look_before(
+def test_edit_over_the_budget_is_undone_and_the_next_edit_uses_the_previous_look(
     client: TestClient, baked: Baked, control: Control
 ) -> None:
     control.views_over_budget = {"front"}
@@ -73,9 +73,7 @@ def test_edit_that_needs_too_much_memory_is_taken_back_and_the_next_one_builds_o
     assert not control.freeze_started.is_set()
 
 
-def test_edit_that_one_of_two_views_has_no_memory_for_is_taken_back_in_both(
-    client: TestClient, baked: Baked, control: Control
-) -> None:
+def test_edit_over_the_budget_of_one_view_is_undone_in_both(client: TestClient, baked: Baked, control: Control) -> None:
     control.views_over_budget = {"left"}
     with open_session(client, baked.bake) as session:
         session.send_message(type="views", names=["front", "left"])
@@ -89,7 +87,7 @@ def test_edit_that_one_of_two_views_has_no_memory_for_is_taken_back_in_both(
         assert all(np.frombuffer(frame.payload, "<u4")[0] == 900 for frame in shown)
 
 
-def test_edit_too_large_that_a_hand_prepares_for_is_taken_back_and_prepared_for_the_look_before(
+def test_edit_over_the_budget_is_undone_and_the_previous_look_prepared_again(
     client: TestClient, baked: Baked, control: Control
 ) -> None:
     control.views_over_budget = {"front"}

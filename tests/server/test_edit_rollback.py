@@ -1,4 +1,4 @@
-"""Edits in a room that the pictures of whoever made them cannot show: they alone are taken back."""
+"""Edits in a room that the author's picture cannot show: only these are undone."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from relume_server.collaboration.join import derive_view_token
 from relume_server.settings import Settings
 
 WATCH = {"view_token": derive_view_token(ROOM_FIELDS["room"])}
-EXPOSURE, ROTATION = "/display/exposure", "/environment/rotation"  # the bake cannot follow the rotation
+EXPOSURE, ROTATION = "/display/exposure", "/environment/rotation"  # the bake does not support rotation
 COLOR = "/materials/Paper/terms/0/color"
 EXTINCTION = "/materials/Paper/terms/1/params/extinction"
 
@@ -34,7 +34,7 @@ def joined(client: TestClient, baked: Baked) -> AbstractContextManager[Session]:
 
 
 class Client:
-    """What an editor takes the look for: what the server has told, and its own edits that it has not refused."""
+    """An editor's look: the server's updates, and its own edits that the server has not rejected."""
 
     def __init__(self, session: Session) -> None:
         self.session, self._revision = session, 0
@@ -47,14 +47,14 @@ class Client:
         self.session.edit(self._revision, path, value, op=op)
 
     def hear(self, kind: str) -> dict[str, Any]:
-        """Follow all messages up to the next one of a kind."""
+        """Process messages up to the next one of a kind."""
         while True:
             message = self._next()
             if isinstance(message, dict) and message["type"] == kind:
                 return message
 
     def exact(self, revision: int) -> None:
-        """Follow all messages up to the exact picture of a revision."""
+        """Process messages up to the exact picture of a revision."""
         while True:
             message = self._next()
             if isinstance(message, Frame) and message.header["exact"] and message.header["revision"] == revision:
@@ -70,8 +70,8 @@ class Client:
                 jsonpatch.apply_patch(self.look, patch, in_place=True)
         return message
 
-    def asks(self) -> None:
-        """Follow what has come until now."""
+    def synchronize(self) -> None:
+        """Process all messages so far."""
         self.session.send_message(type="ping")
         self.hear("pong")
 
@@ -80,18 +80,18 @@ class Client:
         return not self._sent
 
     def has(self, look: dict[str, Any]) -> bool:
-        """Whether the look is this one, but for ways of looking."""
+        """True if the look equals this one, except for display settings."""
         return all(self.look[name] == look[name] for name in ("materials", "environment", "lights"))
 
-    def comes_to(self, look: dict[str, Any]) -> None:
-        """Hear until the look is this one."""
+    def wait_for_look(self, look: dict[str, Any]) -> None:
+        """Process messages until the look equals this one."""
         while not self.has(look):
             self.hear("room_update")
 
 
 @contextmanager
-def waiting(client: TestClient) -> Iterator[None]:
-    """No picture is painted meanwhile."""
+def rendering_paused(client: TestClient) -> Iterator[None]:
+    """No picture is rendered meanwhile."""
     turns = client.app.state.services.threads.short_slots  # type: ignore[attr-defined]
     assert client.portal is not None
     while not turns.locked():
@@ -111,7 +111,7 @@ def params(look: dict[str, Any]) -> dict[str, float]:
     return values
 
 
-def in_a_view_that_cannot_follow(session: Session, control: Control) -> None:
+def switch_to_unsupported_view(session: Session, control: Control) -> None:
     session.text("hello")
     session.send_message(type="view", name="left")
     while session.exact(0).header["view"] != "left":
@@ -119,8 +119,8 @@ def in_a_view_that_cannot_follow(session: Session, control: Control) -> None:
     control.views_over_budget.add("left")
 
 
-def is_told_once(session: Session) -> None:
-    """Wait for the word that somebody's edit cannot be shown here."""
+def assert_one_problem(session: Session) -> None:
+    """Assert exactly one message that another participant's edit cannot be shown here."""
     assert session.text("problem")["revision"] is None
     session.send_message(type="ping")
     while (message := session.receive()) != {"type": "pong"}:
@@ -128,93 +128,91 @@ def is_told_once(session: Session) -> None:
 
 
 @pytest.mark.parametrize("opening", [ROOM_FIELDS, WATCH])
-def test_an_edit_that_fails_for_the_edits_of_others_takes_none_of_them_back(
+def test_failed_edit_does_not_undo_edits_of_others(
     client: TestClient, baked: Baked, control: Control, opening: dict[str, str]
 ) -> None:
     control.freeze_gate.set()
     with ExitStack() as stack:
-        ann = Client(stack.enter_context(joined(client, baked)))  # the room is there before anybody may watch it
+        ann = Client(stack.enter_context(joined(client, baked)))  # viewers need an existing room
         vera = stack.enter_context(open_session(client, baked.bake, opening=opening))
-        in_a_view_that_cannot_follow(vera, control)
+        switch_to_unsupported_view(vera, control)
         ann.edit(IOR, 1.7)
         ann.exact(1)
-        is_told_once(vera)
+        assert_one_problem(vera)
         for revision in (1, 2):
             vera.edit(revision, EXPOSURE, float(revision))
-            is_told_once(vera)
+            assert_one_problem(vera)
         ann.edit(SIGMA, 0.31)
         ann.exact(2)
         look = rooms_look(client, baked)
         assert (params(look)["ior"], params(look)["sigma"]) == (1.7, 0.31)
-        ann.comes_to(look)
+        ann.wait_for_look(look)
 
 
-def test_an_editor_whose_bake_cannot_follow_another_goes_on_editing(
-    client: TestClient, baked: Baked, control: Control
-) -> None:
+def test_editor_whose_bake_cannot_show_an_edit_continues(client: TestClient, baked: Baked, control: Control) -> None:
     control.freeze_gate.set()
     with joined(client, baked) as first, joined(client, baked) as bob:
         ann = Client(first)
-        in_a_view_that_cannot_follow(bob, control)
+        switch_to_unsupported_view(bob, control)
         ann.edit(IOR, 1.7)
-        is_told_once(bob)
+        assert_one_problem(bob)
         bob.edit(1, SIGMA, 0.31)
-        is_told_once(bob)
+        assert_one_problem(bob)
         look = rooms_look(client, baked)
         assert (params(look)["ior"], params(look)["sigma"]) == (1.7, 0.31)
-        ann.comes_to(look)
+        ann.wait_for_look(look)
 
 
-def test_of_a_moment_only_what_failed_is_taken_back_and_every_client_knows(client: TestClient, baked: Baked) -> None:
+def test_only_failed_edits_of_a_batch_are_undone_for_all(client: TestClient, baked: Baked) -> None:
     with joined(client, baked) as first, joined(client, baked) as second:
         ann, bob = Client(first), Client(second)
         first.exact(0)
         second.exact(0)
-        with waiting(client):
+        with rendering_paused(client):
             bob.edit(SIGMA, 0.31)
-            bob.asks()
+            bob.synchronize()
             ann.edit(EXTINCTION, 1.7)
-            ann.asks()
+            ann.synchronize()
             bob.edit(ROTATION, 30.0)
-            bob.asks()
+            bob.synchronize()
         assert bob.hear("problem")["revision"] == 2
         look = rooms_look(client, baked)
         assert (params(look)["sigma"], params(look)["extinction"]) == (0.2, 1.7)
         assert look["environment"]["rotation"] == 0.0
         for person in (ann, bob):
-            person.comes_to(look)
+            person.wait_for_look(look)
 
 
-def test_what_others_have_put_on_top_goes_where_there_is_nothing_under_it(client: TestClient, baked: Baked) -> None:
+def test_edits_on_top_of_an_undone_edit_are_undone(client: TestClient, baked: Baked) -> None:
     light = {"kind": "point", "position": [0.0, 1.0, 0.0]}
     with joined(client, baked) as first, joined(client, baked) as second:
         ann, bob = Client(first), Client(second)
         first.exact(0)
         second.exact(0)
-        with waiting(client):
+        with rendering_paused(client):
             bob.edit("/lights/Lamp", light, op="add")
             bob.edit(ROTATION, 30.0)
-            bob.asks()
+            bob.synchronize()
             ann.hear("room_update")
             ann.edit("/lights/Lamp/intensity", 3.0)
             ann.edit(SIGMA, 0.31)
-            ann.asks()
+            ann.synchronize()
         while bob.hear("problem")["revision"] is None:
             pass
         look = rooms_look(client, baked)
         assert (look["lights"], params(look)["sigma"]) == ({}, 0.31)
         for person in (ann, bob):
-            person.comes_to(look)
+            person.wait_for_look(look)
 
 
-def test_ways_of_looking_of_a_moment_that_failed_are_told_to_whose_they_are(client: TestClient, baked: Baked) -> None:
+def test_display_settings_of_a_failed_batch_go_to_their_owner(client: TestClient, baked: Baked) -> None:
     with joined(client, baked) as session:
         bob = Client(session)
         session.exact(0)
-        with waiting(client):
+        with rendering_paused(client):
             bob.edit(EXPOSURE, 2.0)
             bob.edit(ROTATION, 30.0)
-            bob.asks()
+            bob.synchronize()
         assert bob.hear("problem")["revision"] == 2
         bob.edit(SIGMA, 0.31)
         while not bob.is_confirmed:
@@ -222,7 +220,7 @@ def test_ways_of_looking_of_a_moment_that_failed_are_told_to_whose_they_are(clie
         assert bob.look["display"]["exposure"] == 0.0
 
 
-def test_however_edits_that_fail_and_others_meet_all_have_the_same_look(client: TestClient, baked: Baked) -> None:
+def test_failed_and_other_edits_converge_to_one_look(client: TestClient, baked: Baked) -> None:
     rng = np.random.default_rng(7)
     with ExitStack() as stack:
         opened = [stack.enter_context(joined(client, baked)) for _ in range(3)]
@@ -233,9 +231,9 @@ def test_however_edits_that_fail_and_others_meet_all_have_the_same_look(client: 
             value = round(float(rng.uniform(0.2, 0.4)), 3)
             person.edit(path, [value] * 3 if path == COLOR else value)
             if rng.random() < 0.3:
-                person.asks()
+                person.synchronize()
         for person in people:
             while not person.is_confirmed:
-                person.asks()
-            while not person.has(rooms_look(client, baked)):  # what is there may be taken back the next moment
-                person.asks()
+                person.synchronize()
+            while not person.has(rooms_look(client, baked)):  # the current look may be undone next
+                person.synchronize()

@@ -1,4 +1,4 @@
-"""A real scene, a real bake, a real picture: what the session streams is what a render of the same look gives."""
+"""A real scene, bake and picture: the streamed picture equals a render of the same look."""
 
 import time
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ WIDTH, HEIGHT = 80, 60
 
 
 @pytest.fixture(scope="module")
-def real(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+def real_client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     data = tmp_path_factory.mktemp("data")
     with TestClient(create_app(Settings(data=data, allowed_hosts=["testserver"]))) as client:
         yield client
@@ -38,7 +38,7 @@ def decode_rgb9e5(payload: bytes) -> np.ndarray:
 
 
 def rendered_by(client: TestClient, request: dict[str, Any], folder: Path) -> np.ndarray:
-    """What a batch render gives. (height, width, 3) float32"""
+    """Image of a batch render. (height, width, 3) float32"""
     url = client.post("/api/renders", json={**request, "format": "exr"}).headers["location"]
     assert wait_until_done(client, url)["state"] == "ready"
     file = folder / f"{request['view']}.exr"
@@ -48,7 +48,7 @@ def rendered_by(client: TestClient, request: dict[str, Any], folder: Path) -> np
 
 
 def assert_same(picture: np.ndarray, rendered: np.ndarray) -> None:
-    """Equal but for nine bits of mantissa, shared by the channels."""
+    """Assert equality up to the nine-bit mantissas with a shared exponent."""
     tolerance = rendered.max(axis=-1, keepdims=True) / 256 + 1e-4
     assert rendered.max() > 0.01
     assert np.all(np.abs(picture - rendered) <= tolerance)
@@ -71,11 +71,11 @@ def wait_until_done(client: TestClient, url: str) -> dict[str, Any]:
     raise TimeoutError(url)
 
 
-def test_streamed_picture_is_the_rendered_one(real: TestClient, tmp_path: Path) -> None:
+def test_streamed_picture_equals_the_render(real_client: TestClient, tmp_path: Path) -> None:
     glb = trimesh.Scene(trimesh.creation.icosphere(subdivisions=3)).export(file_type="glb")
-    scene = real.post("/api/scenes", files={"scene": ("ball.glb", glb)}).json()
+    scene = real_client.post("/api/scenes", files={"scene": ("ball.glb", glb)}).json()
     request: dict[str, Any] = {"scene": scene["id"], "size": [WIDTH, HEIGHT], "lights": 200}
-    bake = wait_until_done(real, real.post("/api/bakes", json=request).headers["location"])
+    bake = wait_until_done(real_client, real_client.post("/api/bakes", json=request).headers["location"])
     assert bake["state"] == "ready", bake["problem"]
 
     name = scene["materials"][0]["name"]
@@ -84,7 +84,7 @@ def test_streamed_picture_is_the_rendered_one(real: TestClient, tmp_path: Path) 
         {"model": "cook_torrance", "color": [1.0, 1.0, 1.0], "params": {"sigma": 0.3}},
     ]
     picture = np.zeros((HEIGHT, WIDTH, 3))
-    with open_session(real, bake["id"]) as session:
+    with open_session(real_client, bake["id"]) as session:
         session.edit(1, f"/materials/{name}/terms", terms)
         session.send_message(type="prepare", curve=f"/materials/{name}/terms/1/curves/theta_h")
         session.edit(2, f"/materials/{name}/terms/1/params/sigma", 0.2)
@@ -99,28 +99,28 @@ def test_streamed_picture_is_the_rendered_one(real: TestClient, tmp_path: Path) 
 
     terms[1]["params"] = {"sigma": 0.2}
     looks = [{"materials": {name: {"terms": terms}}}]
-    assert_same(picture, rendered_by(real, {"bake": bake["id"], "view": "front", "looks": looks}, tmp_path))
-    assert real.get(real.get(f"/api/scenes/{scene['id']}").json()["thumbnail"]).status_code == 200
+    assert_same(picture, rendered_by(real_client, {"bake": bake["id"], "view": "front", "looks": looks}, tmp_path))
+    assert real_client.get(real_client.get(f"/api/scenes/{scene['id']}").json()["thumbnail"]).status_code == 200
     assert probe["material"] == name
     assert np.allclose(probe["radiance"], picture[HEIGHT // 2, WIDTH // 2], atol=0.01 * max(probe["radiance"]))
 
 
 @pytest.mark.slow
-def test_frame_is_true(real: TestClient) -> None:
-    """The comparison over REST, with the real reference: what it finds is the bake's error, not its own noise."""
+def test_frame_matches_the_reference(real_client: TestClient) -> None:
+    """The comparison over REST with the real reference measures the error of the bake, not its own noise."""
     glb = trimesh.Scene(trimesh.creation.icosphere(subdivisions=3)).export(file_type="glb")
-    scene = real.post("/api/scenes", files={"scene": ("ball.glb", glb)}).json()
+    scene = real_client.post("/api/scenes", files={"scene": ("ball.glb", glb)}).json()
     bake_request: dict[str, Any] = {"scene": scene["id"], "size": [32, 24], "lights": 1000}
-    bake = wait_until_done(real, real.post("/api/bakes", json=bake_request).headers["location"])
+    bake = wait_until_done(real_client, real_client.post("/api/bakes", json=bake_request).headers["location"])
     request = {"bake": bake["id"], "view": scene["views"][0]["name"], "passes": 8}
-    comparison = wait_until_done(real, real.post("/api/comparisons", json=request).headers["location"])
+    comparison = wait_until_done(real_client, real_client.post("/api/comparisons", json=request).headers["location"])
     assert comparison["state"] == "ready", comparison["problem"]
     assert comparison["error_all_paths"]["noise"] > 0
-    assert comparison["error_all_paths"]["error_upper_bound"] < 0.03  # of the error, which may lie below the noise
+    assert comparison["error_all_paths"]["error_upper_bound"] < 0.03  # of the error, which may be below the noise
 
 
-def test_one_drag_changes_two_views_and_both_end_exact(real: TestClient, tmp_path: Path) -> None:
-    bakes: BakeService = real.app.state.services.bakes  # type: ignore[attr-defined]
+def test_one_drag_changes_two_views_and_both_end_exact(real_client: TestClient, tmp_path: Path) -> None:
+    bakes: BakeService = real_client.app.state.services.bakes  # type: ignore[attr-defined]
     scene = register_scene(bakes.data_dir, bakes.ledger, still_life())
     bake = bakes.submit(scene, Recipe("direct", ("front", "left"), (64, 48), 100))
     with bakes.subscribe(bake) as changes:
@@ -128,7 +128,7 @@ def test_one_drag_changes_two_views_and_both_end_exact(real: TestClient, tmp_pat
 
     pictures = {name: np.zeros((48, 64, 3)) for name in ("front", "left")}
     last, frames = 6, []
-    with open_session(real, bake) as session:
+    with open_session(real_client, bake) as session:
         session.send_message(type="views", names=["front", "left"])
         session.send_message(type="focus", view="left")
         session.send_message(type="prepare", curve="/materials/Ball/terms/1/curves/theta_h")
@@ -138,21 +138,21 @@ def test_one_drag_changes_two_views_and_both_end_exact(real: TestClient, tmp_pat
             frame = session.frame()
             put(pictures[frame.header["view"]], frame)
             frames.append(frame)
-        session.edit(last + 1, "/environment/intensity", 2.0)  # nothing is to be frozen: the focused view comes first
+        session.edit(last + 1, "/environment/intensity", 2.0)  # no freeze is needed: the focused view comes first
         followed = [session.exact(last + 1) for _ in range(2)]
     assert [frame.header["view"] for frame in followed] == ["left", "front"]
 
     params = {"sigma": 0.1 + last / 20}
-    document = real.get(f"/api/scenes/{scene}").json()["materials"]
+    document = real_client.get(f"/api/scenes/{scene}").json()["materials"]
     terms = next(material["terms"] for material in document if material["name"] == "Ball")
     terms[1] = {**terms[1], "params": {**terms[1]["params"], **params}}
     for view, picture in pictures.items():
         request = {"bake": bake, "view": view, "looks": [{"materials": {"Ball": {"terms": terms}}}]}
-        assert_same(picture, rendered_by(real, request, tmp_path))
+        assert_same(picture, rendered_by(real_client, request, tmp_path))
 
 
-def test_view_is_opened_whose_ground_only_catches_shadows_again(real: TestClient) -> None:
-    bakes: BakeService = real.app.state.services.bakes  # type: ignore[attr-defined]
+def test_view_with_a_shadow_catcher_is_opened_again(real_client: TestClient) -> None:
+    bakes: BakeService = real_client.app.state.services.bakes  # type: ignore[attr-defined]
     scene = with_ground(still_life())
     bake = bakes.submit(
         register_scene(bakes.data_dir, bakes.ledger, scene), Recipe("direct", ("front", "left"), (32, 24), 50)
@@ -161,7 +161,7 @@ def test_view_is_opened_whose_ground_only_catches_shadows_again(real: TestClient
         assert list(changes)[-1].state == "ready"
     ground = f"/materials/{scene.materials[-1].name}"
     terms = [{"model": "lambert"}, {"model": "cook_torrance"}]
-    with open_session(real, bake) as session:
+    with open_session(real_client, bake) as session:
         session.edit(1, ground, {"shadow_catcher": False, "terms": terms})
         session.send_message(type="prepare", curve=f"{ground}/terms/1/curves/theta_h")
         session.exact(1)
@@ -171,15 +171,15 @@ def test_view_is_opened_whose_ground_only_catches_shadows_again(real: TestClient
         assert session.exact(2).header["view"] == "left"
 
 
-def test_drag_of_a_slider_shows_pictures_near_the_look_and_ends_exact(real: TestClient, tmp_path: Path) -> None:
-    bakes: BakeService = real.app.state.services.bakes  # type: ignore[attr-defined]
+def test_slider_drag_shows_approximations_and_ends_exact(real_client: TestClient, tmp_path: Path) -> None:
+    bakes: BakeService = real_client.app.state.services.bakes  # type: ignore[attr-defined]
     scene = register_scene(bakes.data_dir, bakes.ledger, still_life())
     bake = bakes.submit(scene, Recipe("direct", ("front",), (64, 48), 100))
     with bakes.subscribe(bake) as changes:
         assert list(changes)[-1].state == "ready"
     term, picture, frames = "/materials/Ball/terms/1", np.zeros((48, 64, 3)), []
     ggx = {"model": "ggx", "color": [0.8, 0.7, 0.6], "params": {"roughness": 0.5}}
-    with open_session(real, bake) as session:
+    with open_session(real_client, bake) as session:
         session.edit(1, term, ggx)
         put(picture, session.exact(1))
         session.send_message(type="prepare", parameter=f"{term}/params/roughness")
@@ -192,21 +192,21 @@ def test_drag_of_a_slider_shows_pictures_near_the_look_and_ends_exact(real: Test
                 frames.append(frame)
     assert [frame.header["exact"] for frame in frames] == [False, True]
     ggx["params"] = {"roughness": 0.3}
-    document = real.get(f"/api/scenes/{scene}").json()["materials"]
+    document = real_client.get(f"/api/scenes/{scene}").json()["materials"]
     first = next(material["terms"][0] for material in document if material["name"] == "Ball")
     looks = [{"materials": {"Ball": {"terms": [first, ggx]}}}]
-    assert_same(picture, rendered_by(real, {"bake": bake, "view": "front", "looks": looks}, tmp_path))
+    assert_same(picture, rendered_by(real_client, {"bake": bake, "view": "front", "looks": looks}, tmp_path))
 
 
-def test_colour_bleeding_follows_a_dragged_colour_and_ends_exact(real: TestClient) -> None:
-    bakes: BakeService = real.app.state.services.bakes  # type: ignore[attr-defined]
+def test_color_bleeding_follows_a_dragged_color_and_ends_exact(real_client: TestClient) -> None:
+    bakes: BakeService = real_client.app.state.services.bakes  # type: ignore[attr-defined]
     scene = register_scene(bakes.data_dir, bakes.ledger, still_life())
     bake = bakes.submit(scene, Recipe("gather", ("front",), (64, 48), 100))
     with bakes.subscribe(bake) as changes:
         assert list(changes)[-1].state == "ready"
     color, picture = "/materials/Floor/terms/0/color", np.zeros((48, 64, 3))
-    with open_session(real, bake) as session:
-        session.edit(1, color, [0.1, 0.1, 0.8], control=color)  # rows are frozen for this one
+    with open_session(real_client, bake) as session:
+        session.edit(1, color, [0.1, 0.1, 0.8], control=color)  # transport rows are frozen for this color
         put(picture, session.exact(1))
         before = picture.copy()
         session.edit(2, color, [0.8, 0.1, 0.1], control=color)

@@ -1,4 +1,4 @@
-"""What is wrong with a call is said in one voice: the field as a JSON pointer, what was given, and what is allowed."""
+"""Validation errors have one form: the field as a JSON pointer, the value, and the allowed values."""
 
 import re
 from typing import Any
@@ -53,7 +53,7 @@ def refused(client: TestClient, url: str, **call: Any) -> dict[str, Any]:
         (SYNTHETIC, {"geometry": "fur"}, "/geometry is 'fur'; give 'weave', 'pebbles' or 'corduroy'"),
     ],
 )
-def test_bodies(client: TestClient, url: str, body: Any, said: str) -> None:
+def test_invalid_bodies(client: TestClient, url: str, body: Any, said: str) -> None:
     whole = {"bake": SCENE, "view": "front", "format": "png", "looks": [{}], **body} if url == RENDERS else body
     problem = refused(client, url, json=whole)
     assert problem["detail"] == said
@@ -62,7 +62,7 @@ def test_bodies(client: TestClient, url: str, body: Any, said: str) -> None:
     assert said.startswith(error["pointer"] or "the body")
 
 
-def test_bodies_that_are_none(client: TestClient) -> None:
+def test_unparsable_bodies(client: TestClient) -> None:
     json_type = {"content-type": "application/json"}
     assert refused(client, BAKES, content="scene", headers=json_type)["detail"] == (
         "the body is not JSON (Expecting value, character 0); send JSON"
@@ -71,7 +71,7 @@ def test_bodies_that_are_none(client: TestClient) -> None:
     assert refused(client, BAKES)["detail"] == "the body is missing; send JSON"
 
 
-def test_forms(client: TestClient) -> None:
+def test_invalid_forms(client: TestClient) -> None:
     assert refused(client, "/api/scenes", data={"scene": "a text"})["detail"] == (
         "/scene is text; give a file, with a file name in its part of the form"
     )
@@ -81,7 +81,7 @@ def test_forms(client: TestClient) -> None:
     assert [error["pointer"] for error in problem["errors"]] == ["/period", "/size"]
 
 
-def test_what_is_refused_later_is_said_alike(client: TestClient, baked: Baked) -> None:
+def test_later_rejections_have_the_same_form(client: TestClient, baked: Baked) -> None:
     body = {"bake": baked.bake, "view": "front", "format": "exr", "looks": [{}]}
     problem = refused(client, RENDERS, json={**body, "view": "back"})
     assert problem["detail"] == "view is 'back'; give one of front, left"
@@ -96,7 +96,7 @@ def test_what_is_refused_later_is_said_alike(client: TestClient, baked: Baked) -
     assert parse_problem(wrong_key)["detail"].startswith("/materialz is {}; give a known name: a look has ")
 
 
-def test_queries_and_methods(client: TestClient) -> None:
+def test_invalid_queries_and_methods(client: TestClient) -> None:
     problem = parse_problem(client.get("/api/bakes?limit=x&state=done"))
     assert problem["errors"][0] == {"parameter": "limit", "detail": "limit is 'x'; give a whole number"}
     assert problem["errors"][1]["parameter"] == "state"
@@ -105,7 +105,7 @@ def test_queries_and_methods(client: TestClient) -> None:
     assert parse_problem(method)["detail"] == "PATCH is not allowed here; use GET or POST"
 
 
-def test_many_faults_are_counted(client: TestClient) -> None:
+def test_many_errors_are_counted(client: TestClient) -> None:
     problem = refused(client, BAKES, json={"scene": SCENE, **{f"x{k}": k for k in range(7)}})
     assert problem["detail"].endswith("; and 4 more")
     assert len(problem["errors"]) == 7
@@ -117,5 +117,5 @@ def test_many_faults_are_counted(client: TestClient) -> None:
     [(0, "0 bytes"), (999, "999 bytes"), (34_123, "34 kB"), (999_600, "1 MB"), (1_234_567, "1.2 MB"),
      (371e6, "371 MB"), (80_683e6, "81 GB"), (4_108_145e6, "4.1 TB"), (9e15, "9000 TB")],
 )  # fmt: skip
-def test_bytes_have_a_unit_that_fits(num_bytes: float, said: str) -> None:
+def test_byte_sizes_have_a_suitable_unit(num_bytes: float, said: str) -> None:
     assert bytes_text(num_bytes) == said

@@ -1,4 +1,4 @@
-"""Pictures to take away: what their files are called, layers and attributes of EXR, progress and an end of them."""
+"""Exported images: file names, EXR layers and attributes, progress and cancellation."""
 
 import json
 import time
@@ -13,7 +13,7 @@ from session_client import Baked
 from test_comparisons import is_done, wait_until
 
 
-def test_renders_are_called_like_the_scene_or_as_asked(client: TestClient, baked: Baked) -> None:
+def test_renders_are_named_after_the_scene_or_as_requested(client: TestClient, baked: Baked) -> None:
     request = {"bake": baked.bake, "view": "front", "looks": [{}], "format": "exr"}
 
     def name_of(more: dict[str, Any]) -> str:
@@ -28,7 +28,7 @@ def test_renders_are_called_like_the_scene_or_as_asked(client: TestClient, baked
     assert name_of({"looks": [{}, {}]}) == 'attachment; filename="triangle-front-0000.exr"'
 
 
-def test_exr_has_layers_tells_how_far_it_is_and_can_be_stopped(
+def test_exr_render_has_layers_progress_and_cancellation(
     client: TestClient, control: Control, baked: Baked, tmp_path: Path
 ) -> None:
     lights = {name: {"kind": "point", "position": [0, 1, 0]} for name in ("Key", "key")}
@@ -43,7 +43,7 @@ def test_exr_has_layers_tells_how_far_it_is_and_can_be_stopped(
     while client.get(stopped).json()["progress"] != 0.5 / 4:
         time.sleep(0.02)
     assert client.delete(stopped).status_code == 204
-    while client.get(url).json()["progress"] == 0.0:  # the next one is begun without waiting for the stopped one
+    while client.get(url).json()["progress"] == 0.0:  # the next job does not wait for the stopped one
         time.sleep(0.02)
     control.render_gate.set()
     assert wait_until(client, url, is_done)["progress"] == 1.0

@@ -1,4 +1,4 @@
-"""A view whose eye moves: baked, looked at from elsewhere while it is edited, rendered, and eyes that cannot be."""
+"""Sessions with a free camera: bakes, camera messages, edits, renders and invalid cameras."""
 
 import math
 from collections.abc import Iterator
@@ -22,7 +22,7 @@ LEVEL = np.eye(4)
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("relume_server.client_state.flow_control.SLOW_S", math.inf)  # a busy machine is no slow link
+        patch.setattr("relume_server.client_state.flow_control.SLOW_S", math.inf)  # a busy machine is not a slow link
         settings = Settings(data=tmp_path_factory.mktemp("moving"), allowed_hosts=["testserver"])
         with TestClient(create_app(settings)) as client:
             yield client
@@ -46,7 +46,7 @@ def bake(client: TestClient, scene: dict[str, Any]) -> str:
 
 
 @pytest.mark.parametrize("method", ["gather", "probes"])
-def test_gather_samples_and_rays_may_be_asked_for(client: TestClient, scene: dict[str, Any], method: str) -> None:
+def test_patches_and_gather_rays_may_be_requested(client: TestClient, scene: dict[str, Any], method: str) -> None:
     request = {"scene": scene["id"], "method": method, "size": SIZE, "lights": 100, "dry_run": True}
     request |= {"probes": 500} if method == "probes" else {}
     usual, asked = (
@@ -67,7 +67,7 @@ def test_gather_samples_and_rays_may_be_asked_for(client: TestClient, scene: dic
 
 
 @pytest.mark.parametrize("method", ["direct", "gather"])
-def test_points_are_refused_where_no_eye_moves(client: TestClient, scene: dict[str, Any], method: str) -> None:
+def test_probes_are_rejected_for_fixed_cameras(client: TestClient, scene: dict[str, Any], method: str) -> None:
     request = {"scene": scene["id"], "method": method, "size": SIZE, "lights": 100, "dry_run": True}
     recipe = client.post("/api/bakes", json=request).json()["recipe"]
     assert recipe["probes"] is None
@@ -89,8 +89,8 @@ def hello(session: Session) -> dict[str, Any]:
     return message
 
 
-def eye(view: dict[str, Any], number: int, aside: float, size: tuple[int, int] = SIZE) -> dict[str, Any]:
-    """An eye that stands aside of where a view begins."""
+def camera_message(view: dict[str, Any], number: int, aside: float, size: tuple[int, int] = SIZE) -> dict[str, Any]:
+    """A camera message, moved sideways from the view's first camera."""
     to_world = np.array(view["camera"]["to_world"]).reshape(4, 4)
     to_world[:3, 3] += aside * to_world[:3, 0]
     where = {"to_world": to_world.ravel().tolist(), "yfov": view["camera"]["yfov"]}
@@ -101,13 +101,13 @@ def shown(frame: Frame) -> np.ndarray:
     return decode_rgb9e5(frame.payload).reshape(frame.header["height"], frame.header["width"], 3)
 
 
-def of_eye(session: Session, number: int) -> Frame:
+def frame_of_camera(session: Session, number: int) -> Frame:
     while (frame := session.frame()).header["camera_seq"] != number:
         pass
     return frame
 
 
-def test_hello_says_that_the_eye_is_free_and_where_there_is_something(session: Session) -> None:
+def test_hello_describes_the_free_camera_and_the_scene_bounds(session: Session) -> None:
     first_view = hello(session)
     (view,) = first_view["views"]
     assert (view["camera_mode"], first_view["method"], "camera" in first_view["axes"]) == ("free", "probes", True)
@@ -116,22 +116,22 @@ def test_hello_says_that_the_eye_is_free_and_where_there_is_something(session: S
     assert 0 < first_view["free_camera_error"]["standard_error"] < first_view["free_camera_error"]["value"] < 0.5
 
 
-def test_frames_follow_the_eye_twice_and_say_which_they_show(session: Session) -> None:
+def test_frames_follow_the_camera_and_name_its_sequence_number(session: Session) -> None:
     (view,) = hello(session)["views"]
     first = session.frame()
     assert (first.header["camera_seq"], first.header["exact"]) == (None, False)
-    while first.header["fidelity"] == "preview":  # light on the points is made beside the frames
+    while first.header["fidelity"] == "preview":  # light at the probes is computed in the background
         first = session.frame()
     assert first.header["fidelity"] == "approximate"
     pictures = [shown(first)]
     for number, aside in ((5, 0.4), (6, -0.3)):
-        session.send_message(**eye(view, number, aside))
-        pictures.append(shown(of_eye(session, number)))
+        session.send_message(**camera_message(view, number, aside))
+        pictures.append(shown(frame_of_camera(session, number)))
     assert all(picture.max() > 0.01 for picture in pictures)
     for k in range(3):
         assert np.abs(pictures[k] - pictures[k - 1]).max() > 0.01
-    session.send_message(**eye(view, 7, 0.0))
-    np.testing.assert_array_equal(shown(of_eye(session, 7)), pictures[0])
+    session.send_message(**camera_message(view, 7, 0.0))
+    np.testing.assert_array_equal(shown(frame_of_camera(session, 7)), pictures[0])
 
 
 def exact_of(session: Session, number: int, revision: int) -> Frame:
@@ -140,15 +140,15 @@ def exact_of(session: Session, number: int, revision: int) -> Frame:
     return frame
 
 
-def test_where_the_eye_rests_the_exact_picture_follows_and_edits_go_on_in_it_twice(
+def test_static_view_follows_when_the_camera_stops_and_edits_continue_in_it(
     session: Session, client: TestClient, scene: dict[str, Any], tmp_path: Any
 ) -> None:
     first_view = hello(session)
     (view,), material = first_view["views"], first_view["materials"][0]
     for number, aside in ((5, 0.4), (6, -0.3)):
-        placed = eye(view, number, aside)
+        placed = camera_message(view, number, aside)
         session.send_message(**placed)
-        moving = of_eye(session, number)
+        moving = frame_of_camera(session, number)
         assert not moving.header["exact"]
         exact_of(session, number, number - 5)
         terms = [{"model": "lambert", "color": [0.1, 0.5, 0.1 * number]}]
@@ -159,35 +159,35 @@ def test_where_the_eye_rests_the_exact_picture_follows_and_edits_go_on_in_it_twi
         fixed = wait_until_done(client, client.post("/api/bakes", json=request).headers["location"])
         look = {"materials": {material: {"terms": terms}}}
         rendered = rendered_by(client, {"bake": fixed["id"], "view": "placed", "looks": [look]}, tmp_path)
-        # nothing lights a ball but the sky: no gather cells that may differ
+        # only the environment lights the ball: no patches that may differ
         assert np.abs(shown(edited) - rendered).max() <= rendered.max() / 256 + 1e-4
 
 
-def test_an_older_eye_says_nothing_and_the_size_is_the_eyes(session: Session) -> None:
+def test_outdated_camera_is_ignored_and_frames_have_the_camera_size(session: Session) -> None:
     (view,) = hello(session)["views"]
-    session.send_message(**eye(view, 9, 0.2, (40, 30)))
-    frame = of_eye(session, 9)
+    session.send_message(**camera_message(view, 9, 0.2, (40, 30)))
+    frame = frame_of_camera(session, 9)
     assert (frame.header["width"], frame.header["height"], frame.header["tiles"]) == (40, 30, [[0, 0, 40, 30]])
-    session.send_message(**eye(view, 8, 0.5))
-    session.send_message(**eye(view, 10, 0.2, (40, 30)))
-    np.testing.assert_array_equal(shown(of_eye(session, 10)), shown(frame))
+    session.send_message(**camera_message(view, 8, 0.5))
+    session.send_message(**camera_message(view, 10, 0.2, (40, 30)))
+    np.testing.assert_array_equal(shown(frame_of_camera(session, 10)), shown(frame))
 
 
-def test_an_edit_a_light_and_an_eye_in_one_burst_are_all_shown(session: Session, client: TestClient, bake: str) -> None:
+def test_burst_of_edit_light_and_camera_is_shown_completely(session: Session, client: TestClient, bake: str) -> None:
     first_view = hello(session)
     (view,), material = first_view["views"], first_view["materials"][0]
     session.frame()
     terms = [{"model": "lambert", "color": [0.1, 0.5, 0.2]}]
     session.edit(1, f"/materials/{material}/terms", terms)
     session.edit(2, "/environment/intensity", 2.0)
-    session.send_message(**eye(view, 3, 0.3))
-    frame = of_eye(session, 3)
+    session.send_message(**camera_message(view, 3, 0.3))
+    frame = frame_of_camera(session, 3)
     while frame.header["revision"] < 2:
         frame = session.frame()
     burst = shown(frame)
     with open_session(client, bake) as other:
         hello(other)
-        other.send_message(**eye(view, 1, 0.3))
+        other.send_message(**camera_message(view, 1, 0.3))
         other.edit(1, f"/materials/{material}/terms", terms)
         other.edit(2, "/environment/intensity", 2.0)
         frame = other.frame()
@@ -196,9 +196,7 @@ def test_an_edit_a_light_and_an_eye_in_one_burst_are_all_shown(session: Session,
         np.testing.assert_array_equal(shown(frame), burst)
 
 
-def test_a_render_is_what_the_eye_sees_where_it_begins(
-    client: TestClient, bake: str, session: Session, tmp_path: Any
-) -> None:
+def test_render_equals_the_first_frame(client: TestClient, bake: str, session: Session, tmp_path: Any) -> None:
     (view,) = hello(session)["views"]
     picture = shown(session.exact(0))
     rendered = rendered_by(client, {"bake": bake, "view": view["name"], "looks": [{}]}, tmp_path)
@@ -223,27 +221,27 @@ def test_a_render_is_what_the_eye_sees_where_it_begins(
     ],
     ids=str,
 )
-def test_bad_eyes_are_refused_in_words_and_nothing_is_lost(session: Session, bad: dict[str, Any]) -> None:
+def test_invalid_cameras_are_rejected_and_the_session_continues(session: Session, bad: dict[str, Any]) -> None:
     (view,) = hello(session)["views"]
     before = shown(session.exact(0))
-    session.send_message(**(eye(view, 1, 0.2) | bad))
+    session.send_message(**(camera_message(view, 1, 0.2) | bad))
     problem = session.text("problem")
     assert len(problem["problem"]["detail"]) > 10
-    session.send_message(**eye(view, 2, 0.0))
+    session.send_message(**camera_message(view, 2, 0.0))
     np.testing.assert_array_equal(shown(exact_of(session, 2, 0)), before)
 
 
-def test_an_eye_inside_a_solid_and_one_that_sees_nothing_are_seen_through(session: Session) -> None:
+def test_cameras_inside_a_solid_or_far_away_are_accepted(session: Session) -> None:
     (view,) = hello(session)["views"]
     session.frame()
     for number, position in ((1, [0, 0, 0]), (2, [0, 0, 1e5])):
         to_world = LEVEL.copy()
         to_world[:3, 3] = position
-        session.send_message(**(eye(view, number, 0.0) | {"to_world": to_world.ravel().tolist()}))
-        assert np.isfinite(shown(of_eye(session, number))).all()
+        session.send_message(**(camera_message(view, number, 0.0) | {"to_world": to_world.ravel().tolist()}))
+        assert np.isfinite(shown(frame_of_camera(session, number))).all()
 
 
-def test_fixed_views_have_no_eye_that_moves_and_moving_ones_no_mask(
+def test_fixed_views_reject_cameras_and_free_cameras_have_no_mask(
     client: TestClient, scene: dict[str, Any], bake: str
 ) -> None:
     request = {"scene": scene["id"], "size": SIZE, "lights": 50}
@@ -251,14 +249,14 @@ def test_fixed_views_have_no_eye_that_moves_and_moving_ones_no_mask(
     with open_session(client, fixed["id"]) as session:
         (view,) = hello(session)["views"]
         assert (view["camera_mode"], view["bounds"]) == ("fixed", None)
-        session.send_message(**eye(view, 1, 0.2))
+        session.send_message(**camera_message(view, 1, 0.2))
         assert "probes" in session.text("problem")["problem"]["detail"]
     answer = client.get(f"/api/bakes/{bake}/views/{view['name']}/materials.png")
     assert answer.status_code == 404
     assert "read its pixels in a session" in answer.json()["detail"]
 
 
-def test_a_scene_deleted_under_a_moving_view_leaves_what_moves(client: TestClient) -> None:
+def test_deleted_scene_leaves_the_free_camera_picture(client: TestClient) -> None:
     file = trimesh.Scene(trimesh.creation.icosphere(subdivisions=2)).export(file_type="glb")
     scene = client.post("/api/scenes", files={"scene": ("gone.glb", file)}).json()["id"]
     request = {"scene": scene, "method": "probes", "size": SIZE, "lights": 50, "probes": 500}
@@ -268,10 +266,10 @@ def test_a_scene_deleted_under_a_moving_view_leaves_what_moves(client: TestClien
         before = shown(session.exact(0))
         assert client.delete(f"/api/scenes/{scene}").status_code == 204
         for number, aside in ((1, 0.3), (2, 0.5)):
-            session.send_message(**eye(view, number, aside))
-            picture = shown(of_eye(session, number))
+            session.send_message(**camera_message(view, number, aside))
+            picture = shown(frame_of_camera(session, number))
             assert np.abs(picture - before).max() > 0.01
-            session.wait_until_ready("the exact image of this camera")  # given up: what it needs is gone
+            session.wait_until_ready("the exact image of this camera")  # abandoned: its scene is missing
             problem = session.text("problem")["problem"]
             assert problem["type"].endswith("generation-failed")
             assert "is not available" in problem["detail"]
@@ -279,11 +277,11 @@ def test_a_scene_deleted_under_a_moving_view_leaves_what_moves(client: TestClien
         assert session.text("inspect")["material"] is not None
 
 
-def test_a_probe_says_what_the_eye_sees(session: Session) -> None:
+def test_pixel_probe_uses_the_current_camera(session: Session) -> None:
     first_view = hello(session)
     (view,) = first_view["views"]
-    session.send_message(**eye(view, 4, 0.0))
-    of_eye(session, 4)
+    session.send_message(**camera_message(view, 4, 0.0))
+    frame_of_camera(session, 4)
     session.send_message(type="inspect", view=view["name"], x=SIZE[0] // 2, y=SIZE[1] // 2)
     answer = session.text("inspect")
     assert answer["material"] == first_view["materials"][0]
@@ -297,7 +295,7 @@ def test_a_probe_says_what_the_eye_sees(session: Session) -> None:
 
 
 def arrays_in(frame: Frame) -> dict[str, np.ndarray]:
-    """The arrays of a frame of kind "scene_update"."""
+    """Arrays of a "scene_update" frame."""
     arrays, offset = {}, 0
     for info in frame.header["scene_update"]["arrays"]:
         dtype, size = np.dtype(info["dtype"]), math.prod(info["shape"])
@@ -314,24 +312,24 @@ def tables_of(session: Session) -> Frame:
 
 
 def until_fine(session: Session, revision: int) -> None:
-    """Take frames up to the tables with all light of a look."""
+    """Read frames up to the tables with complete light of a look."""
     while (frame := tables_of(session)).header["fidelity"] == "preview" or frame.header["revision"] != revision:
         pass
 
 
-def test_a_browser_that_draws_itself_gets_what_has_changed_and_no_frame_for_an_eye(session: Session) -> None:
+def test_client_renderer_gets_changed_arrays_and_no_frames_for_cameras(session: Session) -> None:
     first_view = hello(session)
     (view,), material = first_view["views"], first_view["materials"][0]
     session.frame()
-    session.send_message(**eye(view, 1, 0.2), refine="none")
-    of_eye(session, 1)
+    session.send_message(**camera_message(view, 1, 0.2), refine="none")
+    frame_of_camera(session, 1)
     session.send_message(type="renderer", renderer="client")
     tables = tables_of(session)
     first = arrays_in(tables)
     if tables.header["fidelity"] == "preview":
         until_fine(session, 0)
     assert {"isotropic", "materials", "vectors/0", "environment"} <= set(first)
-    session.send_message(**eye(view, 2, 0.4), refine="none")
+    session.send_message(**camera_message(view, 2, 0.4), refine="none")
     assert arrays_in(tables_of(session)) == {}
     session.edit(1, f"/materials/{material}/terms/0/color", [0.1, 0.2, 0.9])
     recoloured = tables_of(session)
@@ -339,7 +337,7 @@ def test_a_browser_that_draws_itself_gets_what_has_changed_and_no_frame_for_an_e
     assert not np.array_equal(arrays_in(recoloured)["isotropic"], first["isotropic"])
 
 
-def test_what_a_shader_keeps_is_there_once_for_all(client: TestClient, bake: str) -> None:
+def test_static_shader_arrays_are_downloaded_once(client: TestClient, bake: str) -> None:
     answer = client.get(f"/api/bakes/{bake}/probes")
     assert "immutable" in answer.headers["cache-control"]
     description = answer.json()
@@ -349,7 +347,7 @@ def test_what_a_shader_keeps_is_there_once_for_all(client: TestClient, bake: str
     arrays = {name: client.get(f"/api/bakes/{bake}/probes/{name}") for name in description["arrays"]}
     assert all("immutable" in each.headers["cache-control"] for each in arrays.values())
     num_points = len(arrays["probe_positions"].content) // 16
-    assert len(arrays["visible_lights"].content) == num_points * 16  # bits of at most 128 lights
+    assert len(arrays["visible_lights"].content) == num_points * 16  # bit masks of at most 128 lights
     corners = np.frombuffer(arrays["corners"].content, np.uint32).reshape(-1, 4)
     assert corners[:, :3].max() < len(arrays["positions"].content) // 16
     sides = np.frombuffer(arrays["sides"].content, np.uint32).reshape(-1, 4)
@@ -358,7 +356,7 @@ def test_what_a_shader_keeps_is_there_once_for_all(client: TestClient, bake: str
     assert (first[0], first[-1], first == sorted(first)) == (0, num_points, True)
 
 
-def test_there_are_no_other_arrays_and_none_of_fixed_views(
+def test_unknown_arrays_and_arrays_of_fixed_views_are_not_found(
     client: TestClient, bake: str, scene: dict[str, Any]
 ) -> None:
     missing = client.get(f"/api/bakes/{bake}/probes/lights")
@@ -370,10 +368,10 @@ def test_there_are_no_other_arrays_and_none_of_fixed_views(
         assert (refused.status_code, "fixed cameras" in refused.json()["detail"]) == (404, True)
 
 
-def test_a_browser_may_leave_the_drawing_to_the_server_again_twice(session: Session) -> None:
+def test_client_may_return_to_server_rendering(session: Session) -> None:
     (view,) = hello(session)["views"]
-    session.send_message(**eye(view, 1, 0.2), refine="none")
-    while (first := of_eye(session, 1)).header["fidelity"] == "preview":
+    session.send_message(**camera_message(view, 1, 0.2), refine="none")
+    while (first := frame_of_camera(session, 1)).header["fidelity"] == "preview":
         pass
     for _ in range(2):
         session.send_message(type="renderer", renderer="client")
@@ -386,16 +384,16 @@ def test_a_browser_may_leave_the_drawing_to_the_server_again_twice(session: Sess
     assert "/renderer is 'nobody'" in str(session.text("problem"))
 
 
-def test_where_the_link_is_too_slow_for_tables_a_hand_gets_pictures_twice(
+def test_slow_links_get_pictures_instead_of_tables_during_drags(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """And tables when it rests; what is small comes as tables all the while, and an eye costs nothing."""
+    """Tables follow after the drag; small changes always arrive as tables, and cameras need no message."""
     monkeypatch.setattr(FrameWindow, "is_slow_for", lambda self, num_bytes, *, was_slow: num_bytes > 100_000)
     first_view = hello(session)
     (view,), color = first_view["views"], f"/materials/{first_view['materials'][0]}/terms/0/color"
-    session.send_message(**eye(view, 1, 0.05), refine="none")
-    of_eye(session, 1)
-    session.edit(1, "/transport/show", "direct")  # colours would bring other light to all points
+    session.send_message(**camera_message(view, 1, 0.05), refine="none")
+    frame_of_camera(session, 1)
+    session.edit(1, "/transport/show", "direct")  # colors would change the light of all probes
     session.send_message(type="renderer", renderer="client")
     until_fine(session, 1)
     turn, kinds = "/environment/rotation", []
@@ -407,12 +405,12 @@ def test_where_the_link_is_too_slow_for_tables_a_hand_gets_pictures_twice(
         kinds.append(first.header["kind"])
         if kinds[-1] == "picture" or first.header["fidelity"] == "preview":
             until_fine(session, revision)
-        session.send_message(**eye(view, revision, 0.1 * revision), refine="none")
+        session.send_message(**camera_message(view, revision, 0.1 * revision), refine="none")
         assert arrays_in(tables_of(session)) == {}
-    assert kinds == ["picture", "picture", "picture", "scene_update"]  # how small those of colours are it learns once
+    assert kinds == ["picture", "picture", "picture", "scene_update"]  # it measures once how small color tables are
 
 
-def test_tables_follow_a_picture_that_nothing_refines(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tables_follow_a_picture_without_refinement(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(FrameWindow, "is_slow_for", lambda self, num_bytes, *, was_slow: num_bytes > 100_000)
     session.edit(1, "/transport/show", "direct")
     session.send_message(type="renderer", renderer="client")
@@ -422,4 +420,4 @@ def test_tables_follow_a_picture_that_nothing_refines(session: Session, monkeypa
         while (first := session.frame()).header["revision"] != revision:
             pass
         assert first.header["kind"] == "picture"
-        assert arrays_in(tables_of(session)) == {}  # what multiplies all light is one number
+        assert arrays_in(tables_of(session)) == {}  # a factor on all light is one number

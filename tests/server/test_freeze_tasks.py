@@ -1,4 +1,4 @@
-"""The one freeze of a session: told, handed over, canceled, and nothing of it left behind."""
+"""The freeze of a session: status messages, handover, cancellation and cleanup."""
 
 import asyncio
 import gc
@@ -16,8 +16,8 @@ from relume_server.session.frames.precompute import Precomputer
 from relume_server.telemetry.metrics import Metrics
 
 
-class Told:
-    """Stands for the wire: keeps what was said."""
+class Recorder:
+    """A socket that records messages."""
 
     def __init__(self) -> None:
         self.states: list[str] = []
@@ -27,23 +27,23 @@ class Told:
 
 
 class Broken(FakeJob):
-    """Cannot be made."""
+    """A job that fails."""
 
     def run(self, progress: Any, is_canceled: Any) -> str:
         raise StoreError("damaged; bake again")
 
 
-class Gone(Told):
-    """A client that has left."""
+class DisconnectedClient(Recorder):
+    """A client that has disconnected."""
 
     async def send(self, message: Any) -> None:
         raise ProtocolError("nothing was read; reload the page", 4408)
 
 
-def run(scenario: Any, recorder: Told | None = None) -> tuple[list[str], list[str]]:
-    """Run a scenario (freezer, control, news) in a loop of its own; what was told, and what nobody retrieved."""
+def run(scenario: Any, recorder: Recorder | None = None) -> tuple[list[str], list[str]]:
+    """Run scenario(freezer, control, news) in an event loop; return the sent states and the unretrieved errors."""
     unhandled_errors: list[str] = []
-    recorder = recorder or Told()
+    recorder = recorder or Recorder()
 
     async def main() -> None:
         asyncio.get_running_loop().set_exception_handler(lambda _, context: unhandled_errors.append(context["message"]))
@@ -59,8 +59,8 @@ def run(scenario: Any, recorder: Told | None = None) -> tuple[list[str], list[st
 
 
 @pytest.mark.parametrize("state", ["precomputing", "shading"])
-def test_freeze_is_told_by_its_own_word_and_is_ready_once_handed_over(state: str) -> None:
-    recorder = Told()
+def test_freeze_sends_its_state_and_is_ready_after_handover(state: str) -> None:
+    recorder = Recorder()
 
     async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
@@ -82,7 +82,7 @@ def test_freeze_is_told_by_its_own_word_and_is_ready_once_handed_over(state: str
     assert unhandled_errors == []
 
 
-def test_cancelled_freeze_gives_nothing() -> None:
+def test_canceled_freeze_gives_nothing() -> None:
     async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
         freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
@@ -94,7 +94,7 @@ def test_cancelled_freeze_gives_nothing() -> None:
     assert run(scenario)[1] == []
 
 
-def test_freeze_that_fails_says_why() -> None:
+def test_failed_freeze_reports_its_reason() -> None:
     async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
         freezer.start(view, Broken(control, "/curves/theta_d"))  # type: ignore[arg-type]
@@ -105,7 +105,7 @@ def test_freeze_that_fails_says_why() -> None:
     assert run(scenario)[1] == []
 
 
-def test_client_that_leaves_during_a_freeze_ends_it() -> None:
+def test_disconnect_ends_the_freeze() -> None:
     async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
         freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
@@ -115,10 +115,10 @@ def test_client_that_leaves_during_a_freeze_ends_it() -> None:
         await freezer.end()
         assert control.num_cancelled == 1
 
-    assert run(scenario, Gone())[1] == []
+    assert run(scenario, DisconnectedClient())[1] == []
 
 
-def test_session_that_ends_during_a_freeze_leaves_no_thread_and_no_complaint() -> None:
+def test_session_end_during_a_freeze_leaves_no_thread_and_no_error() -> None:
     async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
         freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]
@@ -130,7 +130,7 @@ def test_session_that_ends_during_a_freeze_leaves_no_thread_and_no_complaint() -
     assert not [thread for thread in threading.enumerate() if thread.name.startswith("relume-long")]
 
 
-def test_end_that_is_cut_off_leaves_no_complaint() -> None:
+def test_canceled_session_end_leaves_no_error() -> None:
     async def scenario(freezer: Precomputer, control: Control, news: asyncio.Event) -> None:
         view: Any = SimpleNamespace(name="front")
         freezer.start(view, FakeJob(control, "/curves/theta_d"))  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""A client that a program writes from the API's description imports a scene, bakes it, and takes a picture away."""
+"""A client generated from the OpenAPI document imports a scene, bakes it and downloads an image."""
 
 import importlib
 import json
@@ -21,7 +21,7 @@ AS_BYTES = ("image/png", "image/webp", "image/jpeg", "image/x-exr", "video/mp4",
 
 @pytest.fixture
 def generated(client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
-    """The package that it has written."""
+    """The generated package."""
     from openapi_python_client.config import Config, ConfigFile, MetaType
 
     document = tmp_path / "openapi.json"
@@ -48,7 +48,7 @@ def model(name: str) -> Any:
     return getattr(importlib.import_module("relume_client.models"), name)
 
 
-def test_it_imports_a_scene_bakes_it_and_downloads_a_frame(generated: ModuleType, client: TestClient) -> None:
+def test_generated_client_imports_bakes_and_downloads(generated: ModuleType, client: TestClient) -> None:
     from relume_client.types import File  # type: ignore[import-not-found]
 
     api = generated.Client(base_url="http://testserver")
@@ -79,7 +79,7 @@ def test_it_imports_a_scene_bakes_it_and_downloads_a_frame(generated: ModuleType
     assert problem.type_ == "urn:relume:problem:not-found"
 
 
-def test_the_description_is_one_that_people_and_programs_read(client: TestClient) -> None:
+def test_description_suits_people_and_generators(client: TestClient) -> None:
     document = client.get("/api/openapi.json").json()
     operations = [operation for path in document["paths"].values() for operation in path.values()]
     names = [operation["operationId"] for operation in operations]

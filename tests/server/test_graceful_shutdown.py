@@ -1,4 +1,4 @@
-"""SIGTERM: sessions are told, nothing new begins, and the server is gone within a bound."""
+"""SIGTERM: sessions are notified, no new work starts, and the server exits within a bound."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from relume_server.settings import Settings
 
 @pytest.fixture(autouse=True)
 def _others_events_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a signal sets for every stream of events in this process is unset again."""
+    """Reset the flag that a signal sets for all event streams of this process."""
     monkeypatch.setattr(AppStatus, "should_exit", False)
 
 
@@ -45,7 +45,7 @@ def text(session: ClientConnection, kind: str) -> dict[str, Any]:
             return message
 
 
-def test_sessions_are_told_and_the_server_goes_when_they_have_left(running: Running) -> None:
+def test_sessions_are_notified_and_the_server_exits_after_they_leave(running: Running) -> None:
     url = running.baked_url()
     with open_socket(url) as session:
         text(session, "hello")
@@ -60,14 +60,14 @@ def test_sessions_are_told_and_the_server_goes_when_they_have_left(running: Runn
         assert (answer.status_code, json.loads(answer.body)["type"]) == (503, "urn:relume:problem:draining")
         edit = {"op": "replace", "path": "/materials/Paper/terms/1/params/sigma", "value": 0.3}
         session.send(json.dumps({"type": "edit", "revision": 1, "patch": [edit], "active_control": None}))
-        while not isinstance(session.recv(timeout=30), bytes):  # it goes on meanwhile
+        while not isinstance(session.recv(timeout=30), bytes):  # frames continue meanwhile
             pass
         assert running.thread.is_alive()
     running.thread.join(timeout=30)
     assert not running.thread.is_alive()
 
 
-def test_who_does_not_leave_is_left(settings: Settings, control: Control) -> None:
+def test_remaining_sessions_are_closed(settings: Settings, control: Control) -> None:
     settings.drain_seconds = 0.2
     with running_server(settings, control) as running, open_socket(running.baked_url()) as session:
         text(session, "hello")
@@ -80,7 +80,7 @@ def test_who_does_not_leave_is_left(settings: Settings, control: Control) -> Non
         assert not running.thread.is_alive()
 
 
-def test_a_second_signal_waits_for_nobody(running: Running) -> None:
+def test_second_signal_exits_immediately(running: Running) -> None:
     with open_socket(running.baked_url()) as session:
         text(session, "hello")
         running.process.handle_exit(signal.SIGTERM, None)
@@ -90,7 +90,7 @@ def test_a_second_signal_waits_for_nobody(running: Running) -> None:
 
 
 class Stubborn:
-    """A process whose app stops when `may_stop` says so; `ended`: it was ended by force."""
+    """A process whose app stops when `may_stop` is set; `ended`: it was killed."""
 
     def __init__(self) -> None:
         self.ended, self.may_stop = threading.Event(), threading.Event()
@@ -115,7 +115,7 @@ class Stubborn:
         await send({"type": "lifespan.shutdown.complete"})
 
 
-def test_what_does_not_stop_is_ended(caplog: pytest.LogCaptureFixture) -> None:
+def test_app_that_does_not_stop_is_killed(caplog: pytest.LogCaptureFixture) -> None:
     stubborn = Stubborn()
     stubborn.stop()
     assert stubborn.ended.wait(30)
@@ -124,7 +124,7 @@ def test_what_does_not_stop_is_ended(caplog: pytest.LogCaptureFixture) -> None:
     stubborn.thread.join()
 
 
-def test_what_stops_in_time_is_left_alone() -> None:
+def test_app_that_stops_in_time_is_not_killed() -> None:
     willing = Stubborn()
     willing.may_stop.set()
     willing.stop()
@@ -132,7 +132,7 @@ def test_what_stops_in_time_is_left_alone() -> None:
     assert not willing.ended.wait(0.4)
 
 
-def test_it_is_told_once_that_the_server_answers() -> None:
+def test_readiness_is_notified_once() -> None:
     notifications: list[bool] = []
 
     async def app(scope: Any, receive: Any, send: Any) -> None:
@@ -145,12 +145,12 @@ def test_it_is_told_once_that_the_server_answers() -> None:
     config = uvicorn.Config(app, port=0, interface="asgi3", lifespan="on", log_config=None)
     limits = {"drain_seconds": 5.0, "stop_seconds": 60.0}
 
-    def tell() -> None:
+    def notify() -> None:
         notifications.append(process.started)
         process.should_exit = True
 
-    process = ServerProcess(config, drain=DrainState(), num_sessions=lambda: 0, on_started=tell, **limits)
-    thread = threading.Thread(target=process.run)  # browser tests of the same process may have a loop in this one
+    process = ServerProcess(config, drain=DrainState(), num_sessions=lambda: 0, on_started=notify, **limits)
+    thread = threading.Thread(target=process.run)  # browser tests may run an event loop in this thread
     thread.start()
     thread.join(timeout=30)
     assert notifications == [True]

@@ -1,4 +1,4 @@
-"""A call with a key makes something once, whoever asks again and whatever answers."""
+"""A call with an idempotency key acts once, on repetition and across servers."""
 
 import threading
 from typing import Any
@@ -28,7 +28,7 @@ def render(baked: Baked) -> dict[str, Any]:
     return {"bake": baked.bake, "view": "front", "format": "png", "looks": [{}]}
 
 
-def test_the_same_call_again_is_answered_as_before(client: TestClient, render: dict[str, Any]) -> None:
+def test_repeated_call_gets_the_same_response(client: TestClient, render: dict[str, Any]) -> None:
     first, again = (client.post("/api/renders", json=render, headers=keyed("one")) for _ in range(2))
     assert (again.status_code, again.content, again.headers["location"]) == (
         first.status_code, first.content, first.headers["location"],
@@ -46,7 +46,7 @@ def test_the_same_call_again_is_answered_as_before(client: TestClient, render: d
     assert lines == 3
 
 
-def test_another_call_with_the_key_is_refused(client: TestClient, render: dict[str, Any], baked: Baked) -> None:
+def test_different_call_with_the_same_key_is_rejected(client: TestClient, render: dict[str, Any], baked: Baked) -> None:
     assert client.post("/api/renders", json=render, headers=keyed("one")).status_code == 202
     other = client.post("/api/renders", json={**render, "format": "exr"}, headers=keyed("one"))
     assert other.status_code == 422
@@ -56,21 +56,21 @@ def test_another_call_with_the_key_is_refused(client: TestClient, render: dict[s
     assert client.get("/api/comparisons").json() == []
 
 
-def test_what_was_refused_may_be_tried_again(client: TestClient, render: dict[str, Any]) -> None:
+def test_rejected_call_may_be_retried(client: TestClient, render: dict[str, Any]) -> None:
     wrong = {**render, "view": "back"}
     assert client.post("/api/renders", json=wrong, headers=keyed("one")).status_code == 422
     assert client.post("/api/renders", json=render, headers=keyed("one")).status_code == 202
 
 
 @pytest.mark.parametrize("key", ["", "with blank", "x" * 201, "\xe9"])
-def test_keys_that_are_none_are_refused(client: TestClient, render: dict[str, Any], key: str) -> None:
+def test_invalid_keys_are_rejected(client: TestClient, render: dict[str, Any], key: str) -> None:
     answer = client.post("/api/renders", json=render, headers={"Idempotency-Key": key.encode("latin-1")})
     assert answer.status_code == 422
     assert parse_problem(answer)["detail"].startswith("Idempotency-Key is ")
     assert client.get("/api/renders").json() == []
 
 
-def test_forms_are_the_same_whatever_stands_between_their_parts(client: TestClient) -> None:
+def test_forms_are_equal_under_any_boundary(client: TestClient) -> None:
     def send(content: bytes, boundary: str) -> Any:
         head = f'--{boundary}\r\nContent-Disposition: form-data; name="scene"; filename="a.obj"\r\n\r\n'
         body = head.encode() + content + f"\r\n--{boundary}--\r\n".encode()
@@ -85,7 +85,7 @@ def test_forms_are_the_same_whatever_stands_between_their_parts(client: TestClie
     assert send(OBJ + b"v 2 2 2\n", "another").status_code == 422
 
 
-def test_calls_without_a_body_and_with_one_that_nobody_reads(client: TestClient, baked: Baked) -> None:
+def test_calls_without_a_body_and_with_an_unread_body(client: TestClient, baked: Baked) -> None:
     for body in (None, b"{}"):
         url, key = f"/api/scenes/{baked.scene}/comments", keyed(f"a comment {body is None}".replace(" ", "-"))
         pin = {"bake": baked.bake, "view": "front", "x": 1, "y": 2, "size": [160, 96], "text": "a"}
@@ -96,7 +96,7 @@ def test_calls_without_a_body_and_with_one_that_nobody_reads(client: TestClient,
         assert all(parse_problem(answer)["type"].endswith("key-reused") for answer in resumed)
 
 
-def test_a_call_that_is_not_answered_yet_is_not_made_twice(
+def test_pending_call_is_not_repeated(
     client: TestClient, render: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     renders, is_at_it, may_go_on = client.app.state.services.renders, threading.Event(), threading.Event()
@@ -133,7 +133,7 @@ def store(client: TestClient) -> IdempotencyStore:
 ANSWER = Answer(201, "/api/scenes/0", "application/json", b"{}")
 
 
-def test_keys_are_each_clients_own_and_run_out(client: TestClient, store: IdempotencyStore) -> None:
+def test_keys_are_per_client_and_expire(client: TestClient, store: IdempotencyStore) -> None:
     assert store.claim("ann", "one", "a") is None
     store.end("ann", "one", ANSWER)
     assert store.claim("bob", "one", "b") is None
@@ -145,7 +145,7 @@ def test_keys_are_each_clients_own_and_run_out(client: TestClient, store: Idempo
     assert store.claim("ann", "one", "a") is None
 
 
-def test_a_call_whose_server_has_died_is_made_again(client: TestClient, store: IdempotencyStore) -> None:
+def test_call_of_a_dead_server_is_repeated(client: TestClient, store: IdempotencyStore) -> None:
     assert store.claim("ann", "one", "a") is None
     with client.app.state.services.bakes.ledger.sessions.begin() as session:
         host_id, _, nonce, number = session.scalars(select(IdempotencyRow.owner)).one().split("/")
@@ -156,7 +156,7 @@ def test_a_call_whose_server_has_died_is_made_again(client: TestClient, store: I
     assert store.claim("ann", "one", "a") is None
 
 
-def test_of_too_many_answers_the_oldest_go_and_large_ones_become_the_way_to_what_was_made(
+def test_oldest_responses_are_evicted_and_large_ones_become_redirects(
     client: TestClient, store: IdempotencyStore, monkeypatch: pytest.MonkeyPatch, render: dict[str, Any]
 ) -> None:
     monkeypatch.setattr(idempotency, "MAX_EACH", 3)
@@ -172,7 +172,7 @@ def test_of_too_many_answers_the_oldest_go_and_large_ones_become_the_way_to_what
     assert (again.status_code, again.headers["location"]) == (303, first.headers["location"])
 
 
-def test_a_forms_digest_is_the_same_however_its_bytes_come() -> None:
+def test_form_digest_does_not_depend_on_chunks() -> None:
     def digest(boundary: bytes, *parts: bytes) -> str:
         new_digest = _Digest(boundary)
         for chunk in parts:

@@ -1,4 +1,4 @@
-"""Processes that wait for imports: taken, replaced, ended; what they answer."""
+"""Import processes: started in advance, replaced and ended; their results."""
 
 import json
 import logging
@@ -102,7 +102,7 @@ def parent_of(waiting: Importers) -> int:
     return waiting._parent[0].pid
 
 
-def test_each_file_has_a_process_of_its_own_and_all_have_one_parent(waiting: Importers) -> None:
+def test_each_file_has_its_own_process_of_one_parent(waiting: Importers) -> None:
     waiting.start()
     parent = parent_of(waiting)
     first, second = (waiting.run(asked("it")).split()[0] for _ in range(2))
@@ -111,7 +111,7 @@ def test_each_file_has_a_process_of_its_own_and_all_have_one_parent(waiting: Imp
     assert resident_bytes(int(first)) == resident_bytes(int(second)) == 0
 
 
-def test_files_that_come_together_do_not_wait_for_each_other(waiting: Importers) -> None:
+def test_concurrent_files_do_not_wait_for_each_other(waiting: Importers) -> None:
     with ThreadPoolExecutor(1) as thread:
         hanging = thread.submit(waiting.run, asked("hang", 1))
         waiting.run(asked("it"))
@@ -119,7 +119,7 @@ def test_files_that_come_together_do_not_wait_for_each_other(waiting: Importers)
         assert isinstance(hanging.exception(), SceneError)
 
 
-def test_a_parent_that_has_ended_is_followed_by_another(waiting: Importers) -> None:
+def test_dead_parent_is_replaced(waiting: Importers) -> None:
     waiting.start()
     parent = parent_of(waiting)
     os.kill(parent, signal.SIGKILL)
@@ -128,14 +128,14 @@ def test_a_parent_that_has_ended_is_followed_by_another(waiting: Importers) -> N
     assert parent_of(waiting) != parent
 
 
-def test_nobody_waits_when_it_is_closed(waiting: Importers) -> None:
+def test_close_ends_all_processes(waiting: Importers) -> None:
     waiting.start()
     parent = parent_of(waiting)
     waiting.close()
     assert resident_bytes(parent) == 0
 
 
-def test_the_parent_ends_with_the_server(waiting: Importers) -> None:
+def test_parent_ends_with_the_server(waiting: Importers) -> None:
     waiting.run(asked("it"))
     assert waiting._parent is not None
     process, asking = waiting._parent
@@ -143,7 +143,7 @@ def test_the_parent_ends_with_the_server(waiting: Importers) -> None:
     assert process.wait(60) == 0
 
 
-def test_who_imports_ends_with_who_asked(waiting: Importers) -> None:
+def test_import_process_ends_with_its_caller(waiting: Importers) -> None:
     asker, theirs = socket.socketpair()
     with theirs, waiting._lock:
         socket.send_fds(waiting._ensure_running(), [b"."], [theirs.fileno()])
@@ -154,7 +154,7 @@ def test_who_imports_ends_with_who_asked(waiting: Importers) -> None:
 
 
 @pytest.mark.slow
-def test_what_is_forked_from_has_one_thread(tmp_path: Path) -> None:
+def test_forked_parent_has_one_thread(tmp_path: Path) -> None:
     with closing(Importers()) as importers:
         with pytest.raises(SceneError, match="cannot be read"):
             importers.run(replace(asked("it"), file=str(tmp_path / "none")))
@@ -175,7 +175,7 @@ def test_what_is_forked_from_has_one_thread(tmp_path: Path) -> None:
         ("swell", 60, SceneError, "or 4.3 GB"),
     ],
 )
-def test_what_it_answers_is_why_it_failed(
+def test_failed_import_reports_its_reason(
     waiting: Importers, name: str, seconds: int, kind: type[Exception], said: str
 ) -> None:
     with pytest.raises(kind, match=said) as failure:
@@ -183,7 +183,7 @@ def test_what_it_answers_is_why_it_failed(
     assert type(failure.value) is kind
 
 
-def test_a_defect_is_no_fault_of_the_file_and_leaves_one_line(
+def test_defect_is_not_blamed_on_the_file_and_logs_one_line(
     waiting: Importers, caplog: pytest.LogCaptureFixture
 ) -> None:
     with pytest.raises(RelumeError, match="not because of the file") as failure:
@@ -195,7 +195,7 @@ def test_a_defect_is_no_fault_of_the_file_and_leaves_one_line(
 
 
 @pytest.mark.skipif(bool(missing_features()), reason=f"this machine has no {' and no '.join(missing_features())}")
-def test_who_imports_reaches_its_own_files_and_nothing_else(waiting: Importers, tmp_path: Path) -> None:
+def test_import_process_can_access_only_its_files(waiting: Importers, tmp_path: Path) -> None:
     for name in ("file", "other"):
         (tmp_path / name).write_text(name)
     into = tmp_path / "made"
@@ -204,7 +204,7 @@ def test_who_imports_reaches_its_own_files_and_nothing_else(waiting: Importers, 
     assert done == "read its file, write its folder"
 
 
-def test_who_imports_is_given_no_password(waiting: Importers, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_import_process_gets_no_password(waiting: Importers, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("RELUME_DATABASE", "AWS_SECRET_ACCESS_KEY", "OTEL_EXPORTER_OTLP_HEADERS", "ANYTHING"):
         monkeypatch.setenv(name, "secret")
     names = waiting.run(asked("environment")).split()
@@ -212,15 +212,13 @@ def test_who_imports_is_given_no_password(waiting: Importers, monkeypatch: pytes
     assert not {"RELUME_DATABASE", "AWS_SECRET_ACCESS_KEY", "OTEL_EXPORTER_OTLP_HEADERS", "ANYTHING"} & {*names}
 
 
-def test_a_file_that_unpacks_to_more_than_it_may_is_stopped_while_it_does(waiting: Importers, tmp_path: Path) -> None:
+def test_unpacking_stops_at_its_limit(waiting: Importers, tmp_path: Path) -> None:
     with pytest.raises(ImportTooLargeError):
         waiting.run(replace(asked("write"), into=str(tmp_path), max_file_bytes=1 << 18))
     assert (tmp_path / "texels.npy").stat().st_size <= 1 << 18
 
 
-def test_a_machine_that_cannot_confine_says_so_once(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_missing_sandbox_is_logged_once(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
     monkeypatch.setattr(import_processes, "_COMMAND", [sys.executable, "-c", STAND_IN])
     monkeypatch.setattr(import_processes, "missing_features", lambda: ("Landlock",))
     with closing(Importers()) as importers:

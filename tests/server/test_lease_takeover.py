@@ -1,4 +1,4 @@
-"""A server that stood still for longer than its lease changes nothing of the work that another has taken over."""
+"""A server that stalled past its lease does not change a job that another server has taken over."""
 
 import logging
 import threading
@@ -46,7 +46,7 @@ def finishes(folder: Path) -> Mapping[str, Any]:
 
 
 class Server:
-    """A queue whose only step stands still until the test lets it go on."""
+    """A queue whose only step blocks until the test releases it."""
 
     def __init__(self, ledger: Ledger, data: Path, outcome: Outcome) -> None:
         self.has_begun, self.may_go_on, self.has_ended = (threading.Event() for _ in range(3))
@@ -58,7 +58,7 @@ class Server:
             lambda work: self.quotas.append(f"failed {work}"),
         )  # fmt: skip
 
-    def _run(self, step: Step, tell: object, is_wanted: Callable[[], bool]) -> Mapping[str, Any]:
+    def _run(self, step: Step, report: object, is_wanted: Callable[[], bool]) -> Mapping[str, Any]:
         self.is_wanted = is_wanted
         self.has_begun.set()
         assert self.may_go_on.wait(WAIT_S)
@@ -67,13 +67,13 @@ class Server:
 
 @pytest.fixture
 def ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Ledger]:
-    monkeypatch.setattr("relume_worker.lease.HEARTBEAT_S", 2 * WAIT_S)  # who stands still renews nothing
+    monkeypatch.setattr("relume_worker.lease.HEARTBEAT_S", 2 * WAIT_S)  # a stalled server renews no lease
     with closing(Ledger(open_database(f"sqlite:///{tmp_path / 'a.db'}"))) as opened:
         yield opened
 
 
 @pytest.mark.parametrize("outcome", [fails, breaks, notices, finishes])
-def test_the_files_quota_and_state_of_a_work_that_was_taken_over_stay(
+def test_files_quota_and_state_of_a_taken_over_job_remain(
     tmp_path: Path, ledger: Ledger, outcome: Outcome, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.WARNING)
@@ -90,7 +90,7 @@ def test_the_files_quota_and_state_of_a_work_that_was_taken_over_stay(
     assert second.has_begun.wait(WAIT_S)
     assert f"BTF {work} is taken over from" in caplog.text
 
-    first.queue._needed_until = "", 0.0  # what was asked before it stood still is old
+    first.queue._needed_until = "", 0.0  # the cached check is outdated
     assert not first.is_wanted()
     first.may_go_on.set()
     first.queue._closing.set()
@@ -118,11 +118,11 @@ def wait_until(is_reached: Callable[[], bool]) -> None:
     raise TimeoutError
 
 
-def test_a_step_whose_files_another_server_has_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_step_without_its_file_lock_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("relume_server.batch.step_claim._CHECK_INTERVAL_S", 0.0)
     canceled: list[bool] = []
 
-    def work(shop: Any, tell: Any, is_canceled: Callable[[], bool]) -> Mapping[str, Any]:
+    def work(shop: Any, report: Any, is_canceled: Callable[[], bool]) -> Mapping[str, Any]:
         canceled.append(is_canceled())
         claim(tmp_path, "the second")
         canceled.append(is_canceled())

@@ -1,4 +1,4 @@
-"""Lists: all are read in parts in the same way, filtered, and take nothing in their query that they do not know."""
+"""Lists: pagination, filters, and rejection of unknown query parameters."""
 
 from typing import Any
 
@@ -18,14 +18,14 @@ LOOK = {"display": {"exposure": 1.0}}
 
 
 def lists() -> list[str]:
-    """Addresses of all calls that answer a list."""
+    """Addresses of all calls that return a list."""
     routes = [route for group in ROUTE_GROUPS for route in group.router.routes if isinstance(route, APIRoute)]
     return [route.path for route in routes if "GET" in route.methods and "list[" in str(route.response_model)]
 
 
 @pytest.fixture
 def filled(client: TestClient, baked: Baked) -> Baked:
-    """At least three of each thing that is made without a file that is sent."""
+    """At least three entries of each kind that needs no uploaded file."""
     services = client.app.state.services
     for name in "bcd":
         register_scene(services.bakes.data_dir, services.bakes.ledger, tiny_scene(name))
@@ -50,7 +50,7 @@ def filled(client: TestClient, baked: Baked) -> Baked:
     return baked
 
 
-def in_parts(client: TestClient, url: str, limit: int) -> list[Any]:
+def in_pages(client: TestClient, url: str, limit: int) -> list[Any]:
     entries: list[Any] = []
     following: str | None = f"{url}?limit={limit}"
     while following is not None:
@@ -62,16 +62,16 @@ def in_parts(client: TestClient, url: str, limit: int) -> list[Any]:
     return entries
 
 
-def test_every_list_is_read_in_parts_that_are_all_of_it(client: TestClient, filled: Baked) -> None:
+def test_pages_of_every_list_are_complete(client: TestClient, filled: Baked) -> None:
     paths = lists()
     assert {"/api/scenes", "/api/bakes", "/api/renders", "/api/comparisons", "/api/looks", "/api/shares"} <= set(paths)
     for path in paths:
         url = path.replace("{scene}", filled.scene)
-        if "{" in url or path in ("/api/audit", "/api/materials/map/at"):  # by number; terms of one material
+        if "{" in url or path in ("/api/audit", "/api/materials/map/at"):  # paged by number; terms of one material
             continue
         whole = client.get(url).json()
         if whole:
-            assert in_parts(client, url, 2) == whole, url
+            assert in_pages(client, url, 2) == whole, url
         assert "link" not in client.get(url).headers
         for query, said in (("limit=0", "limit"), ("after=nonsense", "after"), ("limitt=1", "limitt")):
             answer = client.get(f"{url}?{query}")
@@ -81,7 +81,7 @@ def test_every_list_is_read_in_parts_that_are_all_of_it(client: TestClient, fill
         assert of_another.status_code in ((422,) if whole else (200, 422)), url
 
 
-def test_lists_are_stable_while_entries_are_deleted(client: TestClient, filled: Baked) -> None:
+def test_pages_are_stable_during_deletion(client: TestClient, filled: Baked) -> None:
     first = client.get("/api/looks?limit=2")
     names = [look["name"] for look in first.json()]
     assert client.delete(f"/api/looks/{names[-1]}", headers={"If-Match": "*"}).status_code == 204
@@ -108,7 +108,7 @@ def test_filters(client: TestClient, filled: Baked) -> None:
     assert parse_problem(client.get("/api/renders?state=done"))["detail"].startswith("state is 'done'; give 'queued'")
 
 
-def test_works_say_whose_they_are_and_when(client: TestClient, filled: Baked) -> None:
+def test_jobs_have_an_owner_and_times(client: TestClient, filled: Baked) -> None:
     render = client.get("/api/renders?name=a").json()[0]
     assert (render["user"], render["name"], render["state"]) == ("", "a", "ready")
     assert render["created"] <= render["started"] <= render["ended"]
@@ -119,7 +119,7 @@ def test_works_say_whose_they_are_and_when(client: TestClient, filled: Baked) ->
 
 
 @pytest.mark.parametrize("url", ["/api/bakes?stat=ready", "/api/me?x=1", "/api/color?limit=3"])
-def test_what_a_call_does_not_take_is_refused_by_name(client: TestClient, url: str) -> None:
+def test_unknown_query_parameters_are_rejected_by_name(client: TestClient, url: str) -> None:
     answer = client.get(url)
     problem = parse_problem(answer)
     assert answer.status_code == 422

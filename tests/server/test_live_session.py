@@ -1,4 +1,4 @@
-"""Live sessions over a picture whose pixels are known."""
+"""Live sessions with a picture whose pixels are known."""
 
 import asyncio
 import io
@@ -22,7 +22,7 @@ from relume_server.schemas.protocol import FrameHeader
 WIDTH, HEIGHT = SIZE
 
 
-def test_hello_comes_first_and_the_first_picture_is_whole_and_exact(client: TestClient, baked: Baked) -> None:
+def test_hello_precedes_a_complete_exact_picture(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         hello = session.receive()
         assert isinstance(hello, dict)
@@ -44,9 +44,7 @@ def test_hello_comes_first_and_the_first_picture_is_whole_and_exact(client: Test
         assert frame.header["exact"]
 
 
-def test_an_edit_is_answered_by_a_frame_of_its_revision_with_the_changed_tiles(
-    client: TestClient, baked: Baked
-) -> None:
+def test_edit_gives_a_frame_of_its_revision_with_the_changed_tiles(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.edit(1, SIGMA, 0.31)
@@ -68,16 +66,14 @@ def test_refinement_ends_in_an_exact_frame(client: TestClient, baked: Baked, con
         assert np.frombuffer(last.payload, "<u4")[0] == 1000
 
 
-def test_edits_without_acknowledgement_are_merged_into_the_newest(
-    client: TestClient, baked: Baked, control: Control
-) -> None:
+def test_unacknowledged_edits_are_merged_into_the_newest(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake, acknowledges=False) as session:
         first = session.frame()
         session.edit(1, SIGMA, 0.3)
         second = session.frame()
         for revision in range(2, 60):
             session.edit(revision, SIGMA, 0.3 + revision / 1000)
-        session.edit(60, SIGMA, 5.0)  # refused: its answer says that all before it were received
+        session.edit(60, SIGMA, 5.0)  # rejected: its response confirms that all earlier edits arrived
         assert session.text("problem")["revision"] == 60
         num_looks = control.num_looks
         session.send_message(type="ack", frame=second.header["frame"])
@@ -87,9 +83,7 @@ def test_edits_without_acknowledgement_are_merged_into_the_newest(
         assert control.num_looks == num_looks + 1
 
 
-def test_a_frame_that_waits_for_others_shows_what_is_newest_when_its_turn_comes(
-    client: TestClient, baked: Baked, control: Control
-) -> None:
+def test_delayed_frame_shows_the_newest_state(client: TestClient, baked: Baked, control: Control) -> None:
     turns = client.app.state.services.threads.short_slots  # type: ignore[attr-defined]
     assert client.portal is not None
     with open_session(client, baked.bake) as session:
@@ -106,7 +100,7 @@ def test_a_frame_that_waits_for_others_shows_what_is_newest_when_its_turn_comes(
         assert control.num_looks == num_looks + 1
 
 
-def test_a_ping_is_answered_while_frames_wait(client: TestClient, baked: Baked) -> None:
+def test_ping_is_answered_while_frames_wait(client: TestClient, baked: Baked) -> None:
     turns = client.app.state.services.threads.short_slots  # type: ignore[attr-defined]
     assert client.portal is not None
     with open_session(client, baked.bake) as session:
@@ -120,7 +114,7 @@ def test_a_ping_is_answered_while_frames_wait(client: TestClient, baked: Baked) 
         assert session.exact(1).header["revision"] == 1
 
 
-def test_the_next_frame_is_painted_while_one_goes_out(
+def test_next_frame_is_rendered_while_one_is_sent(
     client: TestClient, baked: Baked, control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with open_session(client, baked.bake) as session:
@@ -144,7 +138,7 @@ def test_the_next_frame_is_painted_while_one_goes_out(
 
 
 @impatient
-def test_a_client_that_never_acknowledges_gets_two_frames_and_a_word(client: TestClient, baked: Baked) -> None:
+def test_client_without_acknowledgements_gets_two_frames_and_an_error(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake, acknowledges=False) as session:
         session.text("hello")
         session.frame()
@@ -157,7 +151,7 @@ def test_a_client_that_never_acknowledges_gets_two_frames_and_a_word(client: Tes
         assert "acknowledged" in closed.value.args[1]
 
 
-def test_a_look_that_the_bake_cannot_follow_is_taken_back(client: TestClient, baked: Baked) -> None:
+def test_unsupported_look_is_undone(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.edit(1, "/environment/rotation", 30.0)
@@ -168,9 +162,7 @@ def test_a_look_that_the_bake_cannot_follow_is_taken_back(client: TestClient, ba
         session.exact(2)
 
 
-def test_what_the_hand_is_on_travels_with_its_edit_to_the_picture(
-    client: TestClient, baked: Baked, control: Control
-) -> None:
+def test_active_control_reaches_the_picture_with_its_edit(client: TestClient, baked: Baked, control: Control) -> None:
     patch = [{"op": "replace", "path": SIGMA, "value": 0.31}]
     with open_session(client, baked.bake) as session:
         session.exact(0)
@@ -184,7 +176,7 @@ def test_what_the_hand_is_on_travels_with_its_edit_to_the_picture(
 
 
 @pytest.mark.parametrize("hand", ["/display/exposure", "/lights/Nobody", SIGMA.replace("Paper", "Nobody")])
-def test_edit_by_a_hand_on_nothing_is_refused_whole(client: TestClient, baked: Baked, hand: str) -> None:
+def test_edit_with_an_invalid_active_control_is_rejected(client: TestClient, baked: Baked, hand: str) -> None:
     patch = [{"op": "replace", "path": SIGMA, "value": 0.31}]
     with open_session(client, baked.bake) as session:
         session.exact(0)
@@ -196,9 +188,7 @@ def test_edit_by_a_hand_on_nothing_is_refused_whole(client: TestClient, baked: B
         assert frame.header["tiles"] == []
 
 
-def test_solo_stays_until_an_edit_says_otherwise_and_is_no_part_of_the_look(
-    client: TestClient, baked: Baked, control: Control
-) -> None:
+def test_solo_persists_and_is_not_part_of_the_look(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake) as session:
         hello = session.text("hello")
         assert hello["solo"] is None
@@ -220,7 +210,7 @@ def test_solo_stays_until_an_edit_says_otherwise_and_is_no_part_of_the_look(
         assert control.solos[-1] is None
 
 
-def test_solo_of_an_edit_that_is_taken_back_is_taken_back(client: TestClient, baked: Baked, control: Control) -> None:
+def test_solo_of_an_undone_edit_is_undone(client: TestClient, baked: Baked, control: Control) -> None:
     turn = [{"op": "replace", "path": "/environment/rotation", "value": 30.0}]
     with open_session(client, baked.bake) as session:
         session.exact(0)
@@ -234,14 +224,14 @@ def test_solo_of_an_edit_that_is_taken_back_is_taken_back(client: TestClient, ba
 @pytest.mark.parametrize(
     "fields", [{}, {"active_control": SIGMA}, {"solo": []}, {"solo": ["Lamp"] * 100}, {"solo": "Lamp"}]
 )
-def test_edit_of_nothing_is_refused(client: TestClient, baked: Baked, fields: dict[str, object]) -> None:
+def test_empty_edit_is_rejected(client: TestClient, baked: Baked, fields: dict[str, object]) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.send_message(type="edit", revision=1, patch=[], **fields)
         assert session.text("problem")["problem"]["type"] == "urn:relume:problem:invalid-request"
 
 
-def test_probe_and_brush_are_answered(client: TestClient, baked: Baked) -> None:
+def test_pixel_probe_and_brush_get_responses(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.send_message(type="inspect", view="front", x=3, y=4)
@@ -257,7 +247,7 @@ def test_probe_and_brush_are_answered(client: TestClient, baked: Baked) -> None:
         assert frame.payload == bytes([128]) * (WIDTH * HEIGHT)
 
 
-def test_view_switches_and_sends_the_whole_picture(client: TestClient, baked: Baked) -> None:
+def test_view_switch_sends_the_complete_picture(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.edit(1, SIGMA, 0.4)
@@ -268,7 +258,7 @@ def test_view_switches_and_sends_the_whole_picture(client: TestClient, baked: Ba
         assert len(frame.payload) == 4 * WIDTH * HEIGHT
 
 
-def test_jpeg_stream_sends_whole_images(client: TestClient, baked: Baked) -> None:
+def test_jpeg_stream_sends_complete_images(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.send_message(type="encoding", format="jpeg", quality=70)
@@ -289,7 +279,7 @@ def test_jpeg_stream_sends_whole_images(client: TestClient, baked: Baked) -> Non
         (None, SIZE),
     ],
 )
-def test_jpeg_is_no_larger_than_the_space_that_the_client_has(
+def test_jpeg_fits_the_display_size(
     client: TestClient, baked: Baked, space: list[int] | None, sent: tuple[int, int]
 ) -> None:
     with open_session(client, baked.bake) as session:
@@ -302,7 +292,7 @@ def test_jpeg_is_no_larger_than_the_space_that_the_client_has(
         assert frame.header["tiles"] == [[0, 0, WIDTH, HEIGHT]]
 
 
-def test_space_is_of_one_view_until_views_are_shown_otherwise(client: TestClient, baked: Baked) -> None:
+def test_display_size_applies_until_the_view_layout_changes(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         session.send_message(type="encoding", format="jpeg")
         session.send_message(type="view", name="left", size=[80, 80])
@@ -311,7 +301,7 @@ def test_space_is_of_one_view_until_views_are_shown_otherwise(client: TestClient
         assert Image.open(io.BytesIO(session.exact(1).payload)).size == SIZE
 
 
-def test_space_says_nothing_of_hdr_frames(client: TestClient, baked: Baked) -> None:
+def test_display_size_does_not_affect_hdr_frames(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         session.send_message(type="view", name="left", size=[8, 8])
         session.edit(1, SIGMA, 0.4)
@@ -322,7 +312,7 @@ def test_space_says_nothing_of_hdr_frames(client: TestClient, baked: Baked) -> N
         assert len(frame.payload) == 4 * sum(width * height for _, _, width, height in frame.header["tiles"])
 
 
-def test_slow_link_gets_jpeg_while_moving_and_one_hdr_still(
+def test_slow_link_gets_jpeg_during_drags_and_one_hdr_frame_after(
     client: TestClient, baked: Baked, control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     control.max_step = 3
@@ -338,7 +328,7 @@ def test_slow_link_gets_jpeg_while_moving_and_one_hdr_still(
         assert np.frombuffer(still.payload, "<u4").size == WIDTH * HEIGHT
 
 
-def test_finer_bake_of_the_scene_is_announced(client: TestClient, baked: Baked) -> None:
+def test_finer_bake_is_announced(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         finer = {"scene": baked.scene, "size": [WIDTH, HEIGHT], "lights": 50}
@@ -350,7 +340,7 @@ def test_finer_bake_of_the_scene_is_announced(client: TestClient, baked: Baked) 
         assert (news["bake"], news["replaces"]) == (bake, baked.bake)
 
 
-def test_resume_brings_look_and_revision_back_once(client: TestClient, baked: Baked) -> None:
+def test_resume_restores_look_and_revision_once(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         token = session.text("hello")["resume"]
         session.edit(7, SIGMA, 0.4)
@@ -375,14 +365,14 @@ def test_whole_look_can_be_replaced(client: TestClient, baked: Baked) -> None:
         session.exact(1)
 
 
-def test_sessions_share_one_opened_store(client: TestClient, baked: Baked, control: Control) -> None:
+def test_sessions_share_one_open_store(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake) as first, open_session(client, baked.bake) as second:
         first.exact(0)
         second.exact(0)
     assert control.num_opened == 1
 
 
-def test_more_sessions_than_allowed_are_told_so(client: TestClient, baked: Baked) -> None:
+def test_excess_sessions_are_rejected_with_a_reason(client: TestClient, baked: Baked) -> None:
     with (
         open_session(client, baked.bake),
         open_session(client, baked.bake),

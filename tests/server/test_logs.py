@@ -1,4 +1,4 @@
-"""Lines of the log: what they are about, as text and as JSON."""
+"""Log lines and their context, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ def _as_it_was() -> Iterator[None]:
     yield
     root.handlers = before
     for logger, level in zip((root, *others), levels, strict=True):
-        logger.setLevel(level)  # which forgets what loggers remember of it
+        logger.setLevel(level)  # clears the loggers' level caches
 
 
 def logged(capsys: pytest.CaptureFixture[str], form: Format, say: Any) -> str:
-    set_up(form, "warning")  # asyncio has something to say below that
+    set_up(form, "warning")  # asyncio logs below that level
     say()
     return capsys.readouterr().err
 
 
-def test_json_lines_say_what_they_are_about(capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_lines_have_context(capsys: pytest.CaptureFixture[str]) -> None:
     def say() -> None:
         REQUEST.set("r1")
         BAKE.set("b1")
@@ -58,14 +58,14 @@ def test_json_lines_say_what_they_are_about(capsys: pytest.CaptureFixture[str]) 
     assert line == {"message": "it “failed”\nfor Ann", "request": "r1", "bake": "b1"}
 
 
-def test_where_a_server_listens_is_a_line_of_the_log_where_machines_read_it(capsys: pytest.CaptureFixture[str]) -> None:
+def test_listening_address_is_logged_in_json(capsys: pytest.CaptureFixture[str]) -> None:
     said = logged(capsys, "json", lambda: announce("relume listens on http://127.0.0.1:8420/", "json"))
     assert json.loads(said)["message"] == "relume listens on http://127.0.0.1:8420/"
     said = logged(capsys, "plain", lambda: announce("relume listens on http://127.0.0.1:8420/", "plain"))
     assert said == "relume listens on http://127.0.0.1:8420/\n"
 
 
-def test_plain_lines_say_it_at_their_end(capsys: pytest.CaptureFixture[str]) -> None:
+def test_plain_lines_end_with_context(capsys: pytest.CaptureFixture[str]) -> None:
     def say() -> None:
         log.warning("nothing is known")
         USER.set("Ann")
@@ -75,7 +75,7 @@ def test_plain_lines_say_it_at_their_end(capsys: pytest.CaptureFixture[str]) -> 
     assert said == "WARNING server.somewhere: nothing is known\nWARNING server.somewhere: the user is [user=Ann]\n"
 
 
-def test_nobody_writes_lines_of_their_own(client: TestClient, capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_library_bypasses_the_log_format(client: TestClient, capsys: pytest.CaptureFixture[str]) -> None:
     set_up("plain", "info")
     client.get("/%0aERROR%20server%3a%20all%20is%20lost%1b[2J%e2%80%ae")
     said = [line for line in capsys.readouterr().err.splitlines() if "all" in line]
@@ -83,7 +83,7 @@ def test_nobody_writes_lines_of_their_own(client: TestClient, capsys: pytest.Cap
     assert all(line.startswith("INFO ") and line.isprintable() for line in said)
 
 
-def test_a_trace_shows_what_is_in_it_and_is_set_in(capsys: pytest.CaptureFixture[str]) -> None:
+def test_traceback_is_complete_and_indented(capsys: pytest.CaptureFixture[str]) -> None:
     def say() -> None:
         try:
             raise ValueError("why\nERROR server: all is lost\x1b[2J")
@@ -96,16 +96,16 @@ def test_a_trace_shows_what_is_in_it_and_is_set_in(capsys: pytest.CaptureFixture
     assert r"    ERROR server: all is lost\x1b[2J" in trace
 
 
-def test_warnings_of_libraries_are_lines_like_others(capsys: pytest.CaptureFixture[str]) -> None:
+def test_library_warnings_use_the_log_format(capsys: pytest.CaptureFixture[str]) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("always")
-        logging.captureWarnings(False)  # as in a process that has not been set up
+        logging.captureWarnings(False)  # as in a process before set_up
         said = logged(capsys, "json", lambda: warnings.warn("overflow", RuntimeWarning, stacklevel=1))
         logging.captureWarnings(False)
     assert "overflow" in json.loads(said)["message"]
 
 
-def test_requests_and_sessions_are_lines_without_their_tokens(
+def test_requests_and_sessions_are_logged_without_tokens(
     client: TestClient, baked: Baked, capsys: pytest.CaptureFixture[str]
 ) -> None:
     set_up("json", "info")
@@ -113,7 +113,7 @@ def test_requests_and_sessions_are_lines_without_their_tokens(
     with open_session(client, baked.bake, opening={"resume": "secret"}, headers={"X-Request-ID": "r8"}) as session:
         hello = session.text("hello")
         session.exact(0)
-    # not the test client's own
+    # without the test client's lines
     said = [line for line in capsys.readouterr().err.splitlines() if '"relume_server.' in line]
     assert "secret" not in "".join(said)
     lines = {line["request"]: line for line in map(json.loads, said)}
@@ -122,10 +122,10 @@ def test_requests_and_sessions_are_lines_without_their_tokens(
 
 
 @pytest.mark.parametrize("level", ["debug", "info"])
-def test_no_logger_writes_down_what_opens_anything(
+def test_no_logger_writes_secrets(
     settings: Settings, control: Control, capsys: pytest.CaptureFixture[str], level: str
 ) -> None:
-    """Of the real server, whose libraries have much to say of connections."""
+    """With the real server, whose libraries log connections."""
     set_up("json", level)
     settings.login = True
     secret = "s3cret" * 4

@@ -1,4 +1,4 @@
-"""The library of materials over REST."""
+"""The material library over REST."""
 
 import io
 
@@ -21,18 +21,18 @@ def test_thumbnail_shows_a_ball(client: TestClient) -> None:
     assert client.get("/api/materials/low_cooktorrance_E2/nothing/thumbnail.png").status_code == 404
 
 
-def test_thumbnails_made_ahead_are_those_of_the_materials_as_they_are_rendered_now() -> None:
-    """Of the first material of each model and of the last: fits or lighting that change make all of them due again."""
+def test_stored_thumbnails_equal_new_renders() -> None:
+    """The first material of each model and the last one: changed fits or lighting require all thumbnails again."""
     by_model = {preset.model: preset for preset in reversed(presets())}
     for preset in (*by_model.values(), presets()[-1]):
         png = library_preview_png(preset.id)
         assert png is not None
         ahead = np.asarray(Image.open(io.BytesIO(png)), int)
         difference = np.abs(ahead - render(preset).astype(int))
-        assert difference.mean() < 2, preset.id  # what lossy packing changes, of 255
+        assert difference.mean() < 2, preset.id  # the error of lossy encoding, in units of 1/255
 
 
-def test_point_of_the_map_between_materials_is_a_material(client: TestClient) -> None:
+def test_map_point_between_materials_is_a_material(client: TestClient) -> None:
     points = client.get("/api/materials/map").json()["points"]
     f0, sigma = (float(np.median([point[axis] for point in points])) for axis in ("f0", "sigma"))
     terms = client.get("/api/materials/map/at", params={"f0": f0, "sigma": sigma}).json()
@@ -43,5 +43,5 @@ def test_point_of_the_map_between_materials_is_a_material(client: TestClient) ->
 
 
 @pytest.mark.parametrize(("f0", "sigma"), [("nan", "0.1"), ("2", "0.1"), ("0.1", "0"), ("0.1", "inf"), ("x", "0.1")])
-def test_point_that_is_none_is_refused(client: TestClient, f0: str, sigma: str) -> None:
+def test_invalid_map_point_is_rejected(client: TestClient, f0: str, sigma: str) -> None:
     assert client.get("/api/materials/map/at", params={"f0": f0, "sigma": sigma}).status_code == 422

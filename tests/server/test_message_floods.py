@@ -1,4 +1,4 @@
-"""Sessions that send as much as they can: others go on, and who does not stop is told to go."""
+"""Sessions that send too many messages: other sessions continue, and persistent senders are disconnected."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from relume_server.settings import Settings
 
 
 class Clock:
-    """Seconds that pass while something sleeps, or works."""
+    """A clock that advances during sleep and work."""
 
     def __init__(self) -> None:
         self.now_s = self.worked_s = 0.0
@@ -49,7 +49,7 @@ class Clock:
 
 
 def after(clock: Clock, num: int, work_s: float = 0.0, rest_s: float = 0.0, are_due: Sequence[bool] = (False,)) -> None:
-    """Take so many messages, each of `estimated_work`, each `convergence_s` after the one before was taken."""
+    """Handle `num` messages of equal work, each `rest_s` after the previous one; return the clock."""
     pace = Pace(clock, lambda: clock.worked_s, clock.sleep)
 
     async def take() -> None:
@@ -60,47 +60,47 @@ def after(clock: Clock, num: int, work_s: float = 0.0, rest_s: float = 0.0, are_
             clock.worked_s += work_s
             await pace.pause(is_due=are_due[k % len(are_due)])
 
-    with pytest.raises(StopIteration):  # it waits for nothing but the clock
+    with pytest.raises(StopIteration):  # it only waits for the clock
         take().send(None)
 
 
-def test_a_burst_is_taken_at_once_and_others_have_a_turn_after_each_message() -> None:
+def test_burst_is_handled_immediately_and_yields_after_each_message() -> None:
     clock = Clock()
     after(clock, MESSAGE_BURST)
     assert clock.sleeps == [0.0] * MESSAGE_BURST
 
 
-def test_more_than_that_waits() -> None:
+def test_messages_beyond_the_burst_wait() -> None:
     clock = Clock()
     after(clock, MESSAGE_BURST + 1000)
     assert clock.now_s == pytest.approx(1000 / MESSAGES_PER_SECOND, rel=0.01)
 
 
-def test_hands_that_move_at_each_frame_never_wait() -> None:
+def test_drags_at_frame_rate_never_wait() -> None:
     clock = Clock()
     after(clock, 20_000, rest_s=1 / 199)
     assert set(clock.sleeps) == {0.0}
 
 
-def test_what_acknowledges_a_frame_is_not_counted_and_allows_an_edit() -> None:
+def test_acknowledgements_are_not_counted_and_allow_an_edit() -> None:
     clock = Clock()
     after(clock, 20_000, are_due=(True, False))
     assert set(clock.sleeps) == {0.0}
 
 
-def test_messages_that_take_long_have_a_share_of_the_loop() -> None:
+def test_slow_messages_get_a_fraction_of_the_loop() -> None:
     clock = Clock()
     after(clock, 1000, work_s=0.01)
     assert clock.now_s == pytest.approx((1000 * 0.01 - WORK_BURST_S) / CPU_FRACTION, rel=0.01)
 
 
-def test_a_hand_that_moves_in_a_large_scene_never_waits() -> None:
+def test_drags_in_a_large_scene_never_wait() -> None:
     clock = Clock()
     after(clock, 20_000, work_s=0.002, rest_s=1 / 60)
     assert set(clock.sleeps) == {0.0}
 
 
-def test_who_goes_on_sending_too_much_is_told_to_go() -> None:
+def test_persistent_flood_is_disconnected() -> None:
     clock = Clock()
     with pytest.raises(ProtocolError, match="more than 200 a second for 10 s") as ended:
         after(clock, 1_000_000)
@@ -108,9 +108,7 @@ def test_who_goes_on_sending_too_much_is_told_to_go() -> None:
     assert MAX_BUSY_S <= clock.now_s < MAX_BUSY_S + 2
 
 
-def test_messages_that_are_refused_count_as_well(
-    client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_rejected_messages_count(client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in (("MESSAGES_PER_SECOND", 50.0), ("MESSAGE_BURST", 10), ("MAX_BUSY_S", 0.1)):
         monkeypatch.setattr(pacing, name, value)
     with open_session(client, baked.bake) as session:
@@ -122,10 +120,10 @@ def test_messages_that_are_refused_count_as_well(
     assert "too many messages" in ended.value.args[1]
 
 
-def test_another_sessions_message_is_taken_before_a_flood_is(
+def test_other_sessions_are_served_before_a_flood(
     settings: Settings, control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of what came to the server while it was at something else."""
+    """The messages arrive while the server is busy."""
     taken: list[str] = []
     take, is_held = MessageReceiver._dispatch, False
 
@@ -134,7 +132,7 @@ def test_another_sessions_message_is_taken_before_a_flood_is(
         taken.append(message.type)
         if not is_held:
             is_held = True
-            time.sleep(0.5)  # all that the test sends is there then
+            time.sleep(0.5)  # all messages of the test have arrived
         take(self, message, received_s)
 
     monkeypatch.setattr(MessageReceiver, "_dispatch", take_late)
@@ -151,7 +149,7 @@ def test_another_sessions_message_is_taken_before_a_flood_is(
     assert "focus" in taken[:200]
 
 
-# in a process of its own: in this one, it would keep the server from its processor time, and that from its clock
+# in a separate process: here it would compete with the server for processor time
 FLOOD = """
 import json, sys
 from websockets.exceptions import ConnectionClosed
@@ -166,7 +164,9 @@ with connect(sys.argv[1], subprotocols=["relume.v2"], max_size=None, proxy=None)
 """
 
 
-def test_a_flood_over_a_real_socket_ends(settings: Settings, control: Control, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_flood_over_a_real_socket_is_disconnected(
+    settings: Settings, control: Control, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(pacing, "MAX_BUSY_S", 0.3)
     with running_server(settings, control) as running:
         command = [sys.executable, "-c", FLOOD, running.baked_url()]
@@ -174,7 +174,7 @@ def test_a_flood_over_a_real_socket_ends(settings: Settings, control: Control, m
     assert done.stdout == "closed\n"
 
 
-def test_what_one_task_has_to_say_after_another_has_lost_the_client_is_no_defect() -> None:
+def test_sending_after_a_disconnect_is_not_an_error() -> None:
     gone = SimpleNamespace(application_state=WebSocketState.DISCONNECTED)
     with pytest.raises(WebSocketDisconnect):
         ClientSocket(cast("Any", gone), 1.0).send(PongMessage()).send(None)

@@ -1,4 +1,4 @@
-"""What a new bake shows first is made before anybody opens it, by one server, and never against somebody's hand."""
+"""Prewarming: one server computes the first picture of a new bake without competing with open sessions."""
 
 import fcntl
 import os
@@ -34,7 +34,7 @@ AWAY = pg8000.InterfaceError("refused")
 
 
 class Steps:
-    """Does steps here and remembers them; `before` is called first."""
+    """Run steps in this process and record them; `before` is called first."""
 
     def __init__(self, data: Path) -> None:
         self._here = InThreadBatches(Settings(data=data), open_library(1 << 28, 0))
@@ -66,13 +66,13 @@ def bake(bakes: BakeService, num_lights: int = 40) -> str:
     return identity
 
 
-def looking(bakes: BakeService, steps: Steps, is_used: Callable[[str], bool] = lambda bake: False) -> Prewarmer:
+def prewarmer_of(bakes: BakeService, steps: Steps, is_used: Callable[[str], bool] = lambda bake: False) -> Prewarmer:
     thumbnails = Thumbnails(bakes.data_dir / "thumbnails", steps.run)
     return Prewarmer(bakes.data_dir, bakes.ledger, steps.run, thumbnails, is_used)
 
 
-def settled(bakes: BakeService, identity: str) -> np.ndarray:
-    """The exact picture of a bake that nothing is in memory of. (height, width, 3)"""
+def exact_image(bakes: BakeService, identity: str) -> np.ndarray:
+    """Exact image of a bake with an empty cache. (height, width, 3)"""
     path, memory = bake_path(bakes.data_dir, identity), Cache(1 << 28)
     picture = Picture(open_bake(path, memory), "front", memory)
     while not picture.advance(None).exact or picture.next_job() is not None:
@@ -80,45 +80,45 @@ def settled(bakes: BakeService, identity: str) -> np.ndarray:
     return picture.image()
 
 
-def test_a_bake_opens_with_its_exact_picture(bakes: BakeService, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_new_bake_opens_with_its_exact_picture(bakes: BakeService, monkeypatch: pytest.MonkeyPatch) -> None:
     before, steps = bake(bakes), Steps(bakes.data_dir)
-    ahead = looking(bakes, steps)
-    ahead.start()
+    prewarmer = prewarmer_of(bakes, steps)
+    prewarmer.start()
     assert steps.is_done.wait(60)
     steps.is_done.clear()
     later = bake(bakes, num_lights=50)
     assert steps.is_done.wait(60)
-    ahead.close()
+    prewarmer.close()
     assert [bake for _, bake in steps.asked] == [before, before, later, later]
     assert len(list((bakes.data_dir / "thumbnails").iterdir())) == 2
 
     with monkeypatch.context() as patched:
-        patched.setattr("relume.operators.shade.shade_rows", refuse)
-        kept_picture = settled(bakes, later)
+        patched.setattr("relume.operators.shade.shade_rows", fail_if_shaded)
+        stored_picture = exact_image(bakes, later)
     for file in bake_path(bakes.data_dir, later).glob("derived/*/*.npy"):
         file.unlink()
-    np.testing.assert_array_equal(kept_picture, settled(bakes, later))
+    np.testing.assert_array_equal(stored_picture, exact_image(bakes, later))
 
 
-def kept(bakes: BakeService, identity: str) -> dict[str, np.ndarray]:
+def stored_arrays(bakes: BakeService, identity: str) -> dict[str, np.ndarray]:
     files = bake_path(bakes.data_dir, identity).glob("derived/*/*.npy")
     return {file.name: np.load(file) for file in files}
 
 
-def refuse(*args: object, **named: object) -> None:
-    raise AssertionError("nothing is to be shaded")
+def fail_if_shaded(*args: object, **named: object) -> None:
+    raise AssertionError("nothing may be shaded")
 
 
-def test_what_somebody_has_open_is_left_to_them(bakes: BakeService) -> None:
+def test_open_bakes_are_not_prewarmed(bakes: BakeService) -> None:
     mine, other, steps = bake(bakes), bake(bakes, num_lights=50), Steps(bakes.data_dir)
-    ahead = looking(bakes, steps, lambda bake: bake == mine)
-    ahead.start()
+    prewarmer = prewarmer_of(bakes, steps, lambda bake: bake == mine)
+    prewarmer.start()
     assert steps.is_done.wait(60)
-    ahead.close()
+    prewarmer.close()
     assert {bake for _, bake in steps.asked} == {other}
 
 
-def test_who_opens_a_bake_or_closes_the_server_stops_it(bakes: BakeService) -> None:
+def test_opening_the_bake_or_closing_the_server_stops_prewarming(bakes: BakeService) -> None:
     used: set[str] = set()
     identity, steps, asked = bake(bakes), Steps(bakes.data_dir), threading.Event()
 
@@ -132,16 +132,16 @@ def test_who_opens_a_bake_or_closes_the_server_stops_it(bakes: BakeService) -> N
             threading.Event().wait(0.01)
 
     steps.before = wait
-    ahead = looking(bakes, steps, used.__contains__)
-    ahead.start()
+    prewarmer = prewarmer_of(bakes, steps, used.__contains__)
+    prewarmer.start()
     assert asked.wait(60)
-    ahead.close()
-    assert kept(bakes, identity) == {}
+    prewarmer.close()
+    assert stored_arrays(bakes, identity) == {}
 
 
 @contextmanager
 def closing_lock(path: Path) -> Iterator[None]:
-    """Another server has it meanwhile."""
+    """Another server holds the lock meanwhile."""
     lock = open_lock_file(path, fcntl.LOCK_EX)
     try:
         yield
@@ -149,16 +149,16 @@ def closing_lock(path: Path) -> Iterator[None]:
         os.close(lock)
 
 
-def test_one_server_of_several_does_it(bakes: BakeService) -> None:
+def test_one_of_several_servers_prewarms(bakes: BakeService) -> None:
     identity, first, second = bake(bakes), Steps(bakes.data_dir), Steps(bakes.data_dir)
     is_held, may_go = threading.Event(), threading.Event()
 
-    def hold(is_wanted: IsNeeded) -> None:
+    def wait_until_released(is_wanted: IsNeeded) -> None:
         is_held.set()
         assert may_go.wait(60)
 
-    first.before = hold
-    servers = [looking(bakes, first), looking(bakes, second)]
+    first.before = wait_until_released
+    servers = [prewarmer_of(bakes, first), prewarmer_of(bakes, second)]
     servers[0].start()
     assert is_held.wait(60)
     servers[1].start()
@@ -169,10 +169,10 @@ def test_one_server_of_several_does_it(bakes: BakeService) -> None:
     for server in servers:
         server.close()
     assert second.asked == []
-    assert kept(bakes, identity)
+    assert stored_arrays(bakes, identity)
 
 
-def test_a_bake_that_is_deleted_under_it_leaves_nothing(bakes: BakeService, caplog: pytest.LogCaptureFixture) -> None:
+def test_bake_deleted_during_prewarming_leaves_no_files(bakes: BakeService, caplog: pytest.LogCaptureFixture) -> None:
     identity, steps, is_over = bake(bakes), Steps(bakes.data_dir), threading.Event()
 
     def delete(is_wanted: IsNeeded) -> None:
@@ -180,9 +180,9 @@ def test_a_bake_that_is_deleted_under_it_leaves_nothing(bakes: BakeService, capl
         is_over.set()
 
     steps.before = delete
-    ahead = looking(bakes, steps)
-    ahead.start()
+    prewarmer = prewarmer_of(bakes, steps)
+    prewarmer.start()
     assert is_over.wait(60)
-    ahead.close()
+    prewarmer.close()
     assert not bake_path(bakes.data_dir, identity).exists()
     assert [record for record in caplog.records if record.levelname in ("WARNING", "ERROR")] == []

@@ -1,4 +1,4 @@
-"""docker/replicas/nginx.conf, run: everybody of a room comes to one server, and so does everybody on a bake."""
+"""docker/replicas/nginx.conf in use: all members of a room, and all sessions of a bake, reach one server."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NUM_SERVERS = 3
 
 @pytest.fixture(scope="module")
 def proxy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
-    """Port of nginx before servers that say which of them they are, and what they were told."""
+    """Port of nginx in front of servers that answer with their number and the request headers."""
     folder = tmp_path_factory.mktemp("nginx")
     with ExitStack() as stack:
         ports = [stack.enter_context(_server(number)) for number in range(NUM_SERVERS)]
@@ -31,7 +31,7 @@ def proxy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
 
 
 class _server:  # noqa: N801  (a context)
-    """A stand-in for relume: answers with its number, as HTTP and as WebSocket, or refuses with a status."""
+    """A fake server: answers with its number over HTTP and WebSocket, or rejects with a status."""
 
     def __init__(self, number: int, address: str = "127.0.0.1", port: int = 0, refusal: int | None = None) -> None:
         self._number, self._at, self._refusal = str(number), (address, port), refusal
@@ -59,7 +59,7 @@ def session(port: int, bake: str, query: str) -> str:
         return str(opened.recv())
 
 
-def test_all_of_a_room_come_to_one_server_whatever_their_bakes(proxy: int) -> None:
+def test_members_of_a_room_reach_one_server_for_any_bake(proxy: int) -> None:
     rooms = [secrets.token_hex(16) for _ in range(12)]
     servers = {}
     for k, room in enumerate(rooms):
@@ -70,7 +70,7 @@ def test_all_of_a_room_come_to_one_server_whatever_their_bakes(proxy: int) -> No
     assert len(set(servers.values())) > 1
 
 
-def test_all_of_a_room_come_to_one_server_where_one_name_means_all_of_them(tmp_path: Path) -> None:
+def test_members_of_a_room_reach_one_server_behind_a_shared_name(tmp_path: Path) -> None:
     addresses = [f"127.0.0.{2 + number}" for number in range(NUM_SERVERS)]
     with ExitStack() as stack:
         port = stack.enter_context(_server(0, addresses[0]))
@@ -84,7 +84,7 @@ def test_all_of_a_room_come_to_one_server_where_one_name_means_all_of_them(tmp_p
     assert len(set.union(*answering)) > 1
 
 
-def test_all_on_a_bake_come_to_one_server(proxy: int) -> None:
+def test_sessions_of_a_bake_reach_one_server(proxy: int) -> None:
     bakes = [f"{k:016x}" for k in range(12)]
     server_of_bake = {}
     for bake in bakes:
@@ -95,15 +95,15 @@ def test_all_on_a_bake_come_to_one_server(proxy: int) -> None:
     assert len(set(server_of_bake.values())) > 1
 
 
-def test_whom_a_leaving_server_refuses_another_has_at_once(tmp_path: Path) -> None:
+def test_sessions_rejected_by_a_draining_server_reach_another_immediately(tmp_path: Path) -> None:
     with ExitStack() as stack:
         ports = [stack.enter_context(_server(number, refusal=503 if number else None)) for number in range(NUM_SERVERS)]
         port = stack.enter_context(proxy_to_ports(tmp_path, ports))
         assert {session(port, "b", f"?room_prefix={secrets.token_hex(4)}") for _ in range(12)} == {"0"}
 
 
-def test_a_room_is_found_on_the_server_that_has_it_and_the_others_are_none_the_worse(tmp_path: Path) -> None:
-    """They answer 404 whatever is asked: calls that are none of sessions still come to them."""
+def test_room_is_found_on_its_server_and_others_stay_available(tmp_path: Path) -> None:
+    """The other servers answer 404 to everything; calls without a session still reach them."""
     with ExitStack() as stack:
         ports = [stack.enter_context(_server(number, refusal=404 if number else None)) for number in range(NUM_SERVERS)]
         port = stack.enter_context(proxy_to_ports(tmp_path, ports))
@@ -111,14 +111,14 @@ def test_a_room_is_found_on_the_server_that_has_it_and_the_others_are_none_the_w
         assert _answers(port) == {"0", "404"}
 
 
-def test_a_call_that_is_refused_is_not_made_again_elsewhere(tmp_path: Path) -> None:
+def test_rejected_calls_are_not_repeated_elsewhere(tmp_path: Path) -> None:
     with ExitStack() as stack:
         ports = [stack.enter_context(_server(number, refusal=503 if number else None)) for number in range(NUM_SERVERS)]
         port = stack.enter_context(proxy_to_ports(tmp_path, ports))
         assert _answers(port) == {"0", "503"}
 
 
-def test_other_calls_go_to_any_server_and_say_where_they_come_from(proxy: int) -> None:
+def test_other_calls_reach_any_server_with_the_client_address(proxy: int) -> None:
     answers = [_get(f"http://127.0.0.1:{proxy}/api/scenes").split() for _ in range(12)]
     assert len({number for number, *_ in answers}) > 1
     assert len({request for _, _, request, _ in answers}) == 12
@@ -126,7 +126,7 @@ def test_other_calls_go_to_any_server_and_say_where_they_come_from(proxy: int) -
 
 
 def _answers(port: int) -> set[str]:
-    """Of many calls that go to any server: its number, or the status that it refuses them with."""
+    """The server numbers or rejection statuses of many calls that go to any server."""
     answers = set()
     for _ in range(40):
         try:
@@ -141,7 +141,7 @@ def _get(url: str) -> str:
         return str(answer.read().decode())
 
 
-def test_what_opens_a_room_to_watch_says_its_place_and_no_more() -> None:
+def test_viewer_link_reveals_only_the_server_of_its_room() -> None:
     room = "a" * MIN_ROOM
     assert derive_view_token(room)[:ROOM_PREFIX] == room[:ROOM_PREFIX]
     assert derive_view_token(room)[ROOM_PREFIX] != "a"

@@ -1,4 +1,4 @@
-"""What is the same, and what deleting does: as docs/api.md says."""
+"""Identity and deletion of resources, as docs/api.md describes them."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ def imported(client: TestClient, name: str, content: bytes = OBJ) -> Any:
     return answer.json()
 
 
-def test_the_same_file_under_the_same_name_is_the_same_scene_and_under_another_another(client: TestClient) -> None:
+def test_scene_identity_is_file_and_name(client: TestClient) -> None:
     first, again, other = imported(client, "A"), imported(client, "A"), imported(client, "B")
     assert first["id"] == again["id"] != other["id"]
     assert imported(client, "A", OBJ + b"v 2 2 2\nf 1 2 4\n")["id"] not in (first["id"], other["id"])
@@ -23,14 +23,14 @@ def test_the_same_file_under_the_same_name_is_the_same_scene_and_under_another_a
     assert client.get("/api/scenes?name=B").json() == [other]
 
 
-def test_the_same_recipe_is_the_same_bake(client: TestClient, baked: Baked) -> None:
+def test_equal_recipes_are_the_same_bake(client: TestClient, baked: Baked) -> None:
     recipe = {"scene": baked.scene, "views": ["front"], "size": [160, 96], "lights": 10}
     first, again = (client.post("/api/bakes", json=recipe).json()["id"] for _ in range(2))
     assert first == again
     assert client.post("/api/bakes", json={**recipe, "lights": 11}).json()["id"] != first
 
 
-def test_a_ready_bake_is_deleted_only_where_that_is_said(client: TestClient, baked: Baked) -> None:
+def test_finished_bake_is_deleted_only_if_requested(client: TestClient, baked: Baked) -> None:
     url = f"/api/bakes/{baked.bake}"
     refused = client.delete(url)
     assert refused.status_code == 409

@@ -1,4 +1,4 @@
-"""The REST calls, end to end over a fake bake method."""
+"""REST calls end to end with a fake bake method."""
 
 import io
 import json
@@ -41,7 +41,7 @@ def wait_until_done(client: TestClient, url: str) -> dict[str, Any]:
     raise TimeoutError(url)
 
 
-def test_scenes_of_other_formats_are_told_apart_by_content_and_files_come_with_them(client: TestClient) -> None:
+def test_scene_formats_are_detected_by_content_and_may_have_more_files(client: TestClient) -> None:
     obj = b"mtllib gone.mtl\nmtllib looks/m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl Red\nf 1 2 3\n"
     beside = ("leaf/looks/m.mtl", b"newmtl Red\nKd 1 0 0\n")
     created = client.post("/api/scenes", files=[("scene", ("leaf/Leaf.obj", obj)), ("companions", beside)])
@@ -56,7 +56,7 @@ def test_scenes_of_other_formats_are_told_apart_by_content_and_files_come_with_t
     assert "outside the scene" in refused.json()["detail"]
 
 
-def test_built_in_scenes_are_listed_and_taken_by_name(client: TestClient) -> None:
+def test_built_in_scenes_are_listed_and_imported_by_name(client: TestClient) -> None:
     listed = client.get("/api/example-scenes").json()
     assert [each["name"] for each in listed][:2] == ["still_life", "cornell_box"]
     assert all(each["description"] and each["method"] == "gather" for each in listed)
@@ -102,7 +102,7 @@ def test_scene_is_imported_listed_baked_and_deleted(client: TestClient, glb: byt
     assert client.get("/api/bakes").json() == []
 
 
-def test_the_thumbnail_is_of_the_coarsest_bake_that_has_its_pixels(client: TestClient, baked: Baked) -> None:
+def test_thumbnail_uses_the_coarsest_sufficient_bake(client: TestClient, baked: Baked) -> None:
     for size, is_shown in (([640, 480], True), ([400, 300], True), ([64, 48], False), ([500, 400], False)):
         queued = client.post("/api/bakes", json={"scene": baked.scene, "size": size, "lights": 100})
         assert wait_until_done(client, queued.headers["location"])["state"] == "ready"
@@ -110,7 +110,7 @@ def test_the_thumbnail_is_of_the_coarsest_bake_that_has_its_pixels(client: TestC
         assert shown["thumbnail"].endswith(f"bake={queued.json()['id']}") == is_shown
 
 
-def test_a_view_has_the_shape_of_its_camera_and_a_preset_takes_any(client: TestClient) -> None:
+def test_views_have_the_aspect_of_their_camera_and_presets_accept_any(client: TestClient) -> None:
     glb = Glb().quad()
     glb.document["cameras"] = [{"type": "perspective", "perspective": {"yfov": 0.6, "aspectRatio": 16 / 9}}]
     glb.document["nodes"] += [{"camera": 0, "translation": [0, 1, 4]}]
@@ -127,7 +127,7 @@ def test_a_view_has_the_shape_of_its_camera_and_a_preset_takes_any(client: TestC
     client.delete(f"/api/scenes/{scene['id']}")
 
 
-def test_same_recipe_twice_is_the_same_bake(client: TestClient, baked: Baked) -> None:
+def test_repeated_recipe_is_the_same_bake(client: TestClient, baked: Baked) -> None:
     request = {"scene": baked.scene, "size": [64, 48], "lights": 20}
     first, second = (client.post("/api/bakes", json=request).json() for _ in range(2))
     assert first["id"] == second["id"]
@@ -142,7 +142,7 @@ def test_bake_events_end_with_the_bake(client: TestClient, baked: Baked) -> None
     assert len(lines) == 2
 
 
-def test_a_finished_bake_cannot_be_cancelled_and_is_forgotten_where_that_is_said(
+def test_finished_bake_cannot_be_canceled_and_is_deleted_on_request(
     client: TestClient, settings: Settings, baked: Baked
 ) -> None:
     refused = client.delete(f"/api/bakes/{baked.bake}")
@@ -158,7 +158,7 @@ def test_a_finished_bake_cannot_be_cancelled_and_is_forgotten_where_that_is_said
     assert len(client.get("/api/scenes").json()) == 1
 
 
-def test_a_disk_that_is_nearly_full_takes_nothing_new_and_lets_go(
+def test_nearly_full_disk_rejects_new_work_and_allows_deletion(
     client: TestClient, settings: Settings, baked: Baked
 ) -> None:
     settings.min_free_bytes = 1 << 60
@@ -185,7 +185,7 @@ def test_material_ids_are_16_bit_png(client: TestClient, baked: Baked) -> None:
     assert client.get(f"/api/bakes/{baked.bake}/views/none/materials.png").status_code == 404
 
 
-def test_what_moving_views_make_of_terms_is_told(client: TestClient) -> None:
+def test_free_camera_warnings_of_terms_are_reported(client: TestClient) -> None:
     terms = [{"model": "lambert"}, {"model": "phong", "params": {"exponent": 400.0}}]
     diffuse, sharp = client.post("/api/models/zernike-fit", json={"terms": terms}).json()
     assert (diffuse["required_functions"], diffuse["is_mirror"]) == (1, False)
@@ -198,7 +198,7 @@ def test_what_moving_views_make_of_terms_is_told(client: TestClient) -> None:
         assert len(answer.json()["detail"]) > 10
 
 
-def test_what_a_material_sends_back_is_told(client: TestClient) -> None:
+def test_albedo_of_a_material_is_reported(client: TestClient) -> None:
     grey = {"model": "lambert", "color": [0.2, 0.5, 0.3]}
     albedo = client.post("/api/models/albedo", json={"terms": [grey]}).json()
     assert albedo["mean"] == pytest.approx(grey["color"], rel=1e-3)
@@ -211,7 +211,7 @@ def test_what_a_material_sends_back_is_told(client: TestClient) -> None:
         assert client.post("/api/models/albedo", json={"terms": bad}).status_code == 422
 
 
-def test_a_server_without_a_colour_config_has_no_views(client: TestClient, baked: Baked) -> None:
+def test_server_without_a_color_config_has_no_display_views(client: TestClient, baked: Baked) -> None:
     color_settings = client.get("/api/color").json()
     assert not any(color_settings.values())
     assert client.get(f"/api/color/{'0' * 16}/lut", params={"display": "a", "view": "b"}).status_code == 404
@@ -227,7 +227,7 @@ def test_models_are_listed(client: TestClient) -> None:
     assert (models["ggx"]["specular_below"], models["lambert"]["specular_below"]) == (0.06, None)
 
 
-def test_library_materials_are_listed_and_can_be_put_into_a_look(client: TestClient, baked: Baked) -> None:
+def test_library_materials_are_listed_and_usable_in_looks(client: TestClient, baked: Baked) -> None:
     listed = {entry["id"]: entry for entry in client.get("/api/materials").json()}
     nickel = listed["low_cooktorrance_E2/nickel"]
     assert (nickel["name"], nickel["group"], nickel["model"]) == ("Nickel", "metal", "cook_torrance")
@@ -238,7 +238,7 @@ def test_library_materials_are_listed_and_can_be_put_into_a_look(client: TestCli
     assert wait_until_done(client, queued.headers["location"])["state"] == "ready"
 
 
-def test_the_map_of_materials_has_points_of_the_library(client: TestClient) -> None:
+def test_material_map_has_points_of_the_library(client: TestClient) -> None:
     listed = {entry["id"]: entry for entry in client.get("/api/materials").json()}
     plane = client.get("/api/materials/map").json()
     for point in plane["points"]:
@@ -248,7 +248,7 @@ def test_the_map_of_materials_has_points_of_the_library(client: TestClient) -> N
     assert {k for triangle in plane["triangles"] for k in triangle} == set(range(len(plane["points"])))
 
 
-def test_render_batch_gives_frames_and_archive(client: TestClient, baked: Baked) -> None:
+def test_render_batch_produces_frames_and_archive(client: TestClient, baked: Baked) -> None:
     looks = [{}, {"materials": {"Paper": {"terms": [{"model": "lambert", "color": [0.25, 0, 0]}] * 2}}}]
     looks[1]["materials"]["Paper"]["terms"][1] = {"model": "cook_torrance", "params": {"sigma": 0.5}}
     request = {"bake": baked.bake, "view": "front", "looks": looks, "format": "png", "size": [32, 16]}
@@ -270,13 +270,13 @@ def test_render_batch_gives_frames_and_archive(client: TestClient, baked: Baked)
     assert client.get(url).status_code == 404
 
 
-def test_render_continues_after_a_restart(settings: Settings, client: TestClient, baked: Baked) -> None:
+def test_render_resumes_after_a_restart(settings: Settings, client: TestClient, baked: Baked) -> None:
     request = {"bake": baked.bake, "view": "front", "looks": [{}, {}], "format": "exr"}
     url = client.post("/api/renders", json=request).headers["location"]
     assert wait_until_done(client, url)["state"] == "ready"
     services = client.app.state.services
     identity = url.rsplit("/", 1)[1]
-    services.renders._update(identity, ("ready",), state="running", done=1)  # as a killed server leaves it
+    services.renders._update(identity, ("ready",), state="running", done=1)  # the state after a killed server
     status = services.renders.get(url.rsplit("/", 1)[1])
     services.renders.frame_path(status, 1).unlink()
     services.renders.archive_path(status).unlink()
@@ -288,14 +288,14 @@ def test_render_continues_after_a_restart(settings: Settings, client: TestClient
     assert services.renders.frame_path(status, 0).stat().st_mtime_ns == untouched
 
 
-def test_look_with_everything_that_looks_have_is_saved(client: TestClient) -> None:
+def test_complete_look_is_saved(client: TestClient) -> None:
     whole = {section: {} for section in Look.model_fields}
     assert client.put("/api/looks/Whole", json=whole, headers={"If-None-Match": "*"}).status_code == 201
     assert client.get("/api/looks/Whole").json() == whole
     assert client.put("/api/looks/Other", json={"mood": {}}, headers={"If-None-Match": "*"}).status_code == 422
 
 
-def test_look_is_saved_and_changed_only_by_who_knows_its_version(client: TestClient) -> None:
+def test_look_changes_need_its_current_version(client: TestClient) -> None:
     url = "/api/looks/Red%20teapot"
     look = {"display": {"exposure": 1.5}}
     created = client.put(url, json=look, headers={"If-None-Match": "*"})

@@ -1,4 +1,4 @@
-"""A batch that has failed goes on: what was painted stays, can be had, and single pictures are painted again."""
+"""A failed batch resumes: finished images remain and can be downloaded, and single images are rendered again."""
 
 import io
 import zipfile
@@ -16,7 +16,7 @@ from relume.image_io.write_image import write_image
 
 
 class Painting:
-    """Paints, but for one frame while `fails` is set; `painted` are those that it has painted."""
+    """Render all frames except one while `fails` is set; `painted` lists the rendered frames."""
 
     def __init__(self) -> None:
         self.fails = True
@@ -38,7 +38,7 @@ def painting(monkeypatch: pytest.MonkeyPatch) -> Painting:
 
 @pytest.fixture
 def failed(client: TestClient, baked: Baked, painting: Painting) -> str:
-    """The address of a batch of four that has failed at its third."""
+    """The address of a batch of four that failed at its third image."""
     request = {"bake": baked.bake, "view": "front", "looks": [{}] * 4, "format": "png", "name": "a"}
     url = client.post("/api/renders", json=request).headers["location"]
     assert wait_until(client, url, is_done)["state"] == "failed"
@@ -51,7 +51,7 @@ def names_in(answer: Any) -> list[str]:
         return archive.namelist()
 
 
-def test_a_batch_that_has_failed_goes_on_where_it_stopped(client: TestClient, failed: str, painting: Painting) -> None:
+def test_failed_batch_resumes(client: TestClient, failed: str, painting: Painting) -> None:
     body = client.get(failed).json()
     assert (body["completed"], body["problem"]) == (2, "the process was killed; try again")
     assert body["ended"] is not None
@@ -65,7 +65,7 @@ def test_a_batch_that_has_failed_goes_on_where_it_stopped(client: TestClient, fa
     assert parse_problem(client.post(f"{failed}/resume"))["type"].endswith("not-ready")
 
 
-def test_what_there_is_of_a_batch_can_be_had(client: TestClient, failed: str) -> None:
+def test_finished_images_of_a_batch_can_be_downloaded(client: TestClient, failed: str) -> None:
     refused = client.get(f"{failed}/archive.zip")
     assert refused.status_code == 409
     assert "?partial=true" in parse_problem(refused)["detail"]
@@ -78,7 +78,7 @@ def test_what_there_is_of_a_batch_can_be_had(client: TestClient, failed: str) ->
     assert not list((client.app.state.services.settings.data / "renders").rglob("*.zip"))
 
 
-def test_single_pictures_are_painted_again(client: TestClient, failed: str, painting: Painting) -> None:
+def test_single_images_are_rendered_again(client: TestClient, failed: str, painting: Painting) -> None:
     painting.fails = False
     assert client.post(f"{failed}/frames/4/retry").status_code == 404
     assert client.post(f"{failed}/frames/1/retry").status_code == 202

@@ -1,4 +1,4 @@
-"""Two servers on one ledger: a room is on one of them, whoever comes to the other, and goes over with its people."""
+"""Two servers on one ledger: a room is on one server; others redirect to it, and it moves with its members."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from relume_server.settings import Settings
 
 WATCH = {"view_token": derive_view_token(ROOM_FIELDS["room"])}
 RESTART = 1012
-LEASE_S = 600.0  # rounds are made by tests, however long those take
+LEASE_S = 600.0  # tests run the rounds themselves
 
 
 @pytest.fixture(autouse=True)
@@ -51,7 +51,7 @@ def services(server: TestClient) -> Any:
 
 
 def look_around(server: TestClient) -> None:
-    """A round of what keeps rooms, at once."""
+    """Run one round of the room leases."""
     assert server.portal is not None
     server.portal.call(services(server).live.room_lease.refresh)
 
@@ -67,7 +67,7 @@ def created(session: Session) -> bool:
 
 
 def expire(server: TestClient) -> None:
-    """The database has not heard of who has rooms for too long."""
+    """Let the room leases expire in the database."""
     with services(server).bakes.ledger.sessions.begin() as session:
         session.execute(update(RoomRow).values(heartbeat=RoomRow.heartbeat - 2 * LEASE_S))
 
@@ -87,9 +87,7 @@ def emptied(*servers: TestClient) -> None:
     assert rooms(servers[0]) == []
 
 
-def test_a_room_of_one_server_is_nowhere_else_until_nobody_is_in_it(
-    client: TestClient, other: TestClient, baked: Baked
-) -> None:
+def test_room_is_on_one_server_until_it_is_empty(client: TestClient, other: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake, opening=ROOM_FIELDS) as ann:
         assert created(ann)
         look_around(client)
@@ -106,9 +104,7 @@ def test_a_room_of_one_server_is_nowhere_else_until_nobody_is_in_it(
         assert rooms(client) == [ROOM_FIELDS["room"][:8]]
 
 
-def test_who_is_in_a_room_that_another_server_has_taken_is_sent_there(
-    client: TestClient, other: TestClient, baked: Baked
-) -> None:
+def test_members_follow_a_room_that_another_server_took(client: TestClient, other: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake, opening=ROOM_FIELDS) as ann:
         assert created(ann)
         expire(client)
@@ -124,14 +120,12 @@ def test_who_is_in_a_room_that_another_server_has_taken_is_sent_there(
                 hello = again.text("hello")
                 assert not hello["room"]["is_new"]
                 assert hello["look"]["materials"]["Paper"]["terms"][1]["params"]["sigma"] == 0.31
-            with pytest.raises(ConnectionError) as ended:  # who does not go is sent away
+            with pytest.raises(ConnectionError) as ended:  # remaining members are disconnected
                 ann.text("never")
             assert ended.value.args[0] == RESTART
 
 
-def test_a_server_that_takes_leave_gives_up_its_rooms_at_once(
-    client: TestClient, other: TestClient, baked: Baked
-) -> None:
+def test_draining_server_releases_its_rooms_immediately(client: TestClient, other: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake, opening=ROOM_FIELDS) as ann:
         ann.text("hello")
         assert client.portal is not None
@@ -143,7 +137,7 @@ def test_a_server_that_takes_leave_gives_up_its_rooms_at_once(
             assert created(again)
 
 
-def test_a_session_is_opened_at_the_address_of_its_room(client: TestClient, baked: Baked) -> None:
+def test_session_opens_at_the_address_of_its_room(client: TestClient, baked: Baked) -> None:
     for query in ("", "?room_prefix=elsewher", "?room_prefix=together-on"):
         path = f"/api/bakes/{baked.bake}/session{query}"
         with client.websocket_connect(path, ["relume.v2"]) as websocket:
@@ -155,7 +149,7 @@ def test_a_session_is_opened_at_the_address_of_its_room(client: TestClient, bake
         assert "together, the first characters of the room's id" in ended.value.args[1]
 
 
-def test_a_name_that_is_none_is_refused_as_ever(client: TestClient, baked: Baked) -> None:
+def test_invalid_room_name_is_rejected(client: TestClient, baked: Baked) -> None:
     none = {"room": "!" * 24}
     with open_session(client, baked.bake, opening=none) as session, pytest.raises(ConnectionError) as ended:
         session.receive()

@@ -1,4 +1,4 @@
-"""Saved looks: their order, that of what is in them, and their thumbnails."""
+"""Saved looks: order of looks, order of their entries, and thumbnails."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def picture(color: str) -> str:
     return base64.b64encode(written.getvalue()).decode()
 
 
-def test_looks_keep_their_place_when_they_are_changed_renamed_or_brought_back(client: TestClient) -> None:
+def test_looks_keep_their_order_when_changed_renamed_or_restored(client: TestClient) -> None:
     night = put(client, "Night", {"display": {"exposure": 1.0}})
     put(client, "Studio", {})
     put(client, "Dawn", {})
@@ -47,7 +47,7 @@ NEVER = "yesterday", "2999-01-01T00:00:00+00:00", "0001-01-01T00:00:00+14:00", "
 
 
 @pytest.mark.parametrize("created", NEVER)
-def test_a_look_is_of_a_time_that_has_been(client: TestClient, created: str) -> None:
+def test_creation_time_must_be_in_the_past(client: TestClient, created: str) -> None:
     assert client.put("/api/looks/Odd", json={}, headers=NEW, params={"created": created}).status_code == 422
     assert client.get("/api/looks").json() == []
 
@@ -58,7 +58,7 @@ def test_lights_of_a_look_keep_their_order(client: TestClient) -> None:
     assert list(client.get("/api/looks/Lit").json()["lights"]) == ["Key", "Softbox", "Back"]
 
 
-def test_a_thumbnail_is_of_one_version(client: TestClient) -> None:
+def test_thumbnail_belongs_to_one_version(client: TestClient) -> None:
     entry = put(client, "Night & day", {})
     url = "/api/looks/Night%20%26%20day/thumbnail"
     assert entry["thumbnail"] is None
@@ -80,7 +80,7 @@ def test_a_thumbnail_is_of_one_version(client: TestClient) -> None:
 
 
 @pytest.mark.parametrize("bad", ["", "AAAA", "x" * 350_001])
-def test_what_is_no_small_picture_is_refused(client: TestClient, bad: str) -> None:
+def test_invalid_thumbnails_are_rejected(client: TestClient, bad: str) -> None:
     entry = put(client, "Night", {})
     refused = client.put("/api/looks/Night/thumbnail", json={"picture": bad}, headers={"If-Match": entry["etag"]})
     assert refused.status_code == 422

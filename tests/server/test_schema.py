@@ -1,4 +1,4 @@
-"""The app keeps what its OpenAPI document promises, whatever is sent."""
+"""Responses conform to the OpenAPI document for generated requests."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ from relume_server.settings import Settings
 
 CHECKS = [not_a_server_error, status_code_conformance, content_type_conformance, response_schema_conformance]
 SCHEMA = schemathesis.openapi.from_dict(create_app(Settings()).openapi())
-# importing a scene starts a process each time, and forms of files are streamed: tests/hostile tries these by hand
+# scene imports start a process each and file forms are streamed: tests/hostile covers them
 UPLOADS = ["/api/scenes", "/api/materials/measured", "/api/environments", "/api/images"]
 UPLOADS += ["/api/materials/btf/jobs", "/api/materials/btf/jobs/geometry"]
 OPERATIONS = [result.ok() for result in SCHEMA.exclude(path=UPLOADS, method="POST").get_all_operations()]
@@ -35,7 +35,7 @@ def send(client: TestClient, case: Any) -> Any:
 
 
 @pytest.mark.parametrize("operation", OPERATIONS, ids=lambda operation: f"{operation.method} {operation.path}")
-def test_answers_are_as_described(client: TestClient, operation: Any) -> None:
+def test_responses_conform_to_the_schema(client: TestClient, operation: Any) -> None:
     @given(case=operation.as_strategy())
     @settings(
         max_examples=15,

@@ -1,4 +1,4 @@
-"""What a session says, and the log, when what it stands on fails: one line, and one sentence."""
+"""A session's message and the log when its storage fails: one sentence and one line."""
 
 import errno
 import logging
@@ -11,7 +11,7 @@ from session_client import SIGMA, Baked, open_session
 
 
 def fails_with(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
-    """From now on pictures cannot be painted."""
+    """Make every picture fail from now on."""
 
     def advance(*_: object) -> None:
         raise error
@@ -26,7 +26,7 @@ def fails_with(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
         (OSError(errno.EIO, os.strerror(errno.EIO)), 1011, "Input/output error; free some space"),
     ],
 )
-def test_a_disk_that_fails_is_one_line_and_one_sentence(
+def test_disk_failure_is_one_log_line_and_one_sentence(
     client: TestClient,
     baked: Baked,
     monkeypatch: pytest.MonkeyPatch,

@@ -1,4 +1,4 @@
-"""Live sessions while something is frozen: what goes on, what waits and what is canceled."""
+"""Live sessions during a freeze: edits that continue, wait or cancel it."""
 
 import time
 
@@ -9,7 +9,7 @@ from server_fakes import Control
 from session_client import IOR, SIGMA, THETA_D, THETA_H, Baked, Frame, open_session
 
 
-def test_touch_freezes_ahead_says_so_and_sends_the_curve(client: TestClient, baked: Baked, control: Control) -> None:
+def test_prepare_freezes_and_sends_the_curve(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.send_message(type="prepare", curve=THETA_D)
@@ -28,9 +28,7 @@ def test_touch_freezes_ahead_says_so_and_sends_the_curve(client: TestClient, bak
         assert session.text("curve")["revision"] == 1
 
 
-def test_slider_in_hand_freezes_ahead_and_leaves_the_open_curve_open(
-    client: TestClient, baked: Baked, control: Control
-) -> None:
+def test_active_slider_freezes_and_keeps_the_open_curve(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.send_message(type="prepare", curve=THETA_H)
@@ -44,7 +42,7 @@ def test_slider_in_hand_freezes_ahead_and_leaves_the_open_curve_open(
         assert session.text("curve")["curve"] == THETA_H
 
 
-def test_a_curve_that_is_opened_again_is_sent_again(client: TestClient, baked: Baked, control: Control) -> None:
+def test_reopened_curve_is_sent_again(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         control.freeze_gate.set()
@@ -60,7 +58,7 @@ def test_a_curve_that_is_opened_again_is_sent_again(client: TestClient, baked: B
         assert second["bands"] == first["bands"]
 
 
-def test_rotation_in_hand_is_no_error(client: TestClient, baked: Baked, control: Control) -> None:
+def test_active_rotation_is_not_an_error(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         control.freeze_gate.set()
@@ -82,7 +80,7 @@ def test_rotation_in_hand_is_no_error(client: TestClient, baked: Baked, control:
         {"parameter": "/environment"},
     ],
 )
-def test_touch_of_nothing_is_refused(client: TestClient, baked: Baked, touch: dict[str, str]) -> None:
+def test_invalid_prepare_is_rejected(client: TestClient, baked: Baked, touch: dict[str, str]) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.send_message(type="prepare", **touch)
@@ -91,7 +89,7 @@ def test_touch_of_nothing_is_refused(client: TestClient, baked: Baked, touch: di
         session.exact(1)
 
 
-def test_what_only_refines_a_picture_waits_for_the_hand_to_rest(
+def test_refinement_waits_for_the_end_of_the_drag(
     client: TestClient, baked: Baked, control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("relume_server.session.frames.frame_loop.BACKGROUND_DELAY_S", 3600.0)
@@ -105,7 +103,7 @@ def test_what_only_refines_a_picture_waits_for_the_hand_to_rest(
         assert not control.freeze_started.is_set()
 
 
-def test_a_hand_whose_newest_edit_waits_for_room_does_not_rest(
+def test_drag_with_a_pending_edit_is_not_idle(
     client: TestClient, baked: Baked, control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("relume_server.session.frames.frame_loop.BACKGROUND_DELAY_S", 0.5)
@@ -123,7 +121,7 @@ def test_a_hand_whose_newest_edit_waits_for_room_does_not_rest(
         control.freeze_gate.set()
 
 
-def test_what_refines_a_picture_is_made_at_rest(client: TestClient, baked: Baked, control: Control) -> None:
+def test_refinement_runs_when_idle(client: TestClient, baked: Baked, control: Control) -> None:
     control.is_refinement = True
     control.freeze_gate.set()
     with open_session(client, baked.bake) as session:
@@ -132,7 +130,7 @@ def test_what_refines_a_picture_is_made_at_rest(client: TestClient, baked: Baked
         session.exact(1)
 
 
-def test_moving_on_to_another_curve_cancels_the_freeze_and_is_no_fault(
+def test_another_curve_cancels_the_freeze_without_error(
     client: TestClient, baked: Baked, control: Control, caplog: pytest.LogCaptureFixture
 ) -> None:
     with open_session(client, baked.bake) as session:
@@ -146,9 +144,7 @@ def test_moving_on_to_another_curve_cancels_the_freeze_and_is_no_fault(
     assert [line for line in caplog.records if line.name.startswith("relume_server.session")] == []
 
 
-def test_edits_that_need_no_freeze_are_painted_while_one_runs(
-    client: TestClient, baked: Baked, control: Control
-) -> None:
+def test_edits_without_freeze_are_shown_during_one(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.send_message(type="prepare", curve=THETA_D)
@@ -161,7 +157,7 @@ def test_edits_that_need_no_freeze_are_painted_while_one_runs(
         assert control.num_cancelled == 0
 
 
-def test_edit_that_needs_a_freeze_keeps_the_last_frame_and_others_go_on(
+def test_edit_that_needs_a_freeze_keeps_the_last_frame_and_others_continue(
     client: TestClient, baked: Baked, control: Control
 ) -> None:
     with open_session(client, baked.bake) as session:
@@ -169,16 +165,14 @@ def test_edit_that_needs_a_freeze_keeps_the_last_frame_and_others_go_on(
         session.edit(1, IOR, 2.0)
         assert session.text("status")["label"] == "Paper, theta_d"
         session.edit(2, SIGMA, 0.3)
-        frame = session.frame()  # the first since: revision 1 had nothing to show
+        frame = session.frame()  # the first one: revision 1 had no frame
         assert (frame.header["revision"], frame.header["exact"]) == (2, False)
         assert np.frombuffer(frame.payload, "<u4")[0] == 800
         control.freeze_gate.set()
         assert np.frombuffer(session.exact(2).payload, "<u4")[0] == 1300
 
 
-def test_look_that_only_shows_otherwise_is_answered_while_a_freeze_is_awaited(
-    client: TestClient, baked: Baked, control: Control
-) -> None:
+def test_display_edit_gets_a_frame_during_a_freeze(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.edit(1, IOR, 2.0)
@@ -192,9 +186,7 @@ def test_look_that_only_shows_otherwise_is_answered_while_a_freeze_is_awaited(
         session.exact(2)
 
 
-def test_edit_that_goes_back_ends_the_freeze_it_does_not_need(
-    client: TestClient, baked: Baked, control: Control
-) -> None:
+def test_reverted_edit_cancels_the_freeze(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.edit(1, IOR, 2.0)
@@ -206,7 +198,7 @@ def test_edit_that_goes_back_ends_the_freeze_it_does_not_need(
         assert control.num_cancelled == 1
 
 
-def test_editing_the_curve_that_is_frozen_does_not_cancel_it(
+def test_edit_of_the_frozen_curve_does_not_cancel_the_freeze(
     client: TestClient, baked: Baked, control: Control
 ) -> None:
     with open_session(client, baked.bake) as session:
@@ -220,7 +212,7 @@ def test_editing_the_curve_that_is_frozen_does_not_cancel_it(
         assert control.num_cancelled == 0
 
 
-def test_another_view_does_not_wait_for_a_freeze(client: TestClient, baked: Baked, control: Control) -> None:
+def test_other_views_do_not_wait_for_a_freeze(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.send_message(type="prepare", curve=THETA_D)

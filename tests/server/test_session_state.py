@@ -1,4 +1,4 @@
-"""The parts of a session that need neither picture nor network."""
+"""Parts of a session without pictures or network."""
 
 import asyncio
 from concurrent.futures import ThreadPoolExecutor
@@ -32,7 +32,7 @@ ALONE = VisibleViews(["front"], "front")
 TERM = "/materials/a~1b/terms"
 
 
-def test_window_opens_by_acknowledgement_and_an_ack_counts_for_all_before_it() -> None:
+def test_acknowledgement_opens_the_window_for_all_earlier_frames() -> None:
     window = FrameWindow(ack_seconds=10)
     for _ in range(2):
         assert window.has_room("front", ALONE)
@@ -44,7 +44,7 @@ def test_window_opens_by_acknowledgement_and_an_ack_counts_for_all_before_it() -
     assert window.next_frame == 4
 
 
-def test_view_under_the_pointer_has_a_slot_of_its_own_and_the_others_share_one() -> None:
+def test_focused_view_has_its_own_slot_and_others_share_one() -> None:
     window, shown = FrameWindow(ack_seconds=10), VisibleViews(["front", "left", "top"], "left")
     assert all(window.has_room(name, shown) for name in shown.names)
     window.on_sent("top", 100, now_s=1.0)
@@ -55,7 +55,7 @@ def test_view_under_the_pointer_has_a_slot_of_its_own_and_the_others_share_one()
     assert [window.has_room(name, shown) for name in shown.names] == [True, False, True]
 
 
-def test_shown_views_keep_the_focus_where_they_can() -> None:
+def test_shown_views_keep_the_focus_if_possible() -> None:
     shown = VisibleViews(["front"], "front")
     shown.show(["left", "front", "left"])
     assert (shown.names, shown.focus) == (("left", "front"), "front")
@@ -66,7 +66,7 @@ def test_shown_views_keep_the_focus_where_they_can() -> None:
     assert (shown.names, shown.focus) == (("front",), "front")
 
 
-def test_window_refuses_what_was_never_sent_and_loses_patience() -> None:
+def test_window_rejects_unknown_frames_and_times_out() -> None:
     window = FrameWindow(ack_seconds=10)
     window.on_sent("front", 100, now_s=1.0)
     with pytest.raises(ProtocolError, match="never sent"):
@@ -78,7 +78,7 @@ def test_window_refuses_what_was_never_sent_and_loses_patience() -> None:
 
 
 def stream(window: FrameWindow, num_frames: int, num_bytes: int, bytes_per_s: float, start_s: float) -> float:
-    """Send frames one after another over a link of 10 ms round trip; returns the time after them."""
+    """Send frames sequentially over a link with 10 ms round trip; return the end time."""
     now_s = start_s
     for _ in range(num_frames):
         frame = window.next_frame
@@ -88,7 +88,7 @@ def stream(window: FrameWindow, num_frames: int, num_bytes: int, bytes_per_s: fl
     return now_s
 
 
-def test_link_is_slow_where_a_moving_picture_would_stutter_and_recovers() -> None:
+def test_link_is_slow_if_frames_would_stutter_and_recovers() -> None:
     window = FrameWindow(ack_seconds=10)
     assert not window.is_slow_for(1_000_000, was_slow=False)
     now_s = stream(window, 5, 1_000_000, 100e6, 0.0)
@@ -97,12 +97,12 @@ def test_link_is_slow_where_a_moving_picture_would_stutter_and_recovers() -> Non
     assert window.is_slow_for(1_000_000, was_slow=False)
     almost = 300_000  # takes 60 ms
     assert not window.is_slow_for(almost, was_slow=False)
-    assert window.is_slow_for(almost, was_slow=True)  # hysteresis: not quick yet
+    assert window.is_slow_for(almost, was_slow=True)  # hysteresis: not fast yet
     stream(window, 20, 1_000_000, 100e6, now_s)
     assert not window.is_slow_for(1_000_000, was_slow=True)
 
 
-def test_pace_settles_where_steps_take_the_target() -> None:
+def test_pace_converges_to_the_target_duration() -> None:
     budget = CoefficientBudget()
     ms_per_coefficient = 0.05
     for _ in range(30):
@@ -110,7 +110,7 @@ def test_pace_settles_where_steps_take_the_target() -> None:
     assert budget.max_coefficients == pytest.approx(TARGET_MS / ms_per_coefficient, rel=0.1)
 
 
-def test_pace_spends_less_where_exact_steps_take_too_long() -> None:
+def test_pace_decreases_if_exact_steps_are_too_slow() -> None:
     budget = CoefficientBudget()
     for _ in range(20):
         budget.learn(0.1, exact=True)
@@ -129,7 +129,7 @@ def test_pace_is_bounded() -> None:
     assert budget.max_coefficients == MAX_COEFFICIENTS
 
 
-def test_resume_is_bounded_in_number_and_time_and_belongs_to_its_bake() -> None:
+def test_resume_is_limited_in_number_and_time_and_to_its_bake() -> None:
     store = ResumeStore(resume_seconds=600)
     tokens = [store.open("bake", LookState({}, {"k": k}, k), ALONE) for k in range(MAX_SAVED + 5)]
     assert len(set(tokens)) == len(tokens)
@@ -144,7 +144,7 @@ def test_resume_is_bounded_in_number_and_time_and_belongs_to_its_bake() -> None:
     assert store.take(tokens[6], "bake", 601.0) is None
 
 
-def test_session_that_the_server_believes_alive_can_be_resumed_once() -> None:
+def test_session_that_seems_alive_can_be_resumed_once() -> None:
     store = ResumeStore(resume_seconds=600)
     token = store.open("bake", LookState({}, {"k": 1}, 3), ALONE)
     resumed = store.take(token, "bake", 0.0)
@@ -154,7 +154,7 @@ def test_session_that_the_server_believes_alive_can_be_resumed_once() -> None:
     assert store.take(token, "bake", 2.0) is None
 
 
-def test_curve_pointers_are_resolved_or_refused() -> None:
+def test_curve_pointers_are_resolved_or_rejected() -> None:
     term, curve = find_curve(f"{TERM}/2/curves/alpha", DOCUMENT)
     assert (term["model"], curve.name) == ("ashikhmin_shirley", "alpha")
     for pointer in (f"{TERM}/0/curves/theta_h", f"{TERM}/3/curves/alpha", f"{TERM}/02/curves/alpha", "/x"):
@@ -162,16 +162,16 @@ def test_curve_pointers_are_resolved_or_refused() -> None:
             find_curve(pointer, DOCUMENT)
 
 
-def test_what_a_hand_may_hold_is_of_this_look() -> None:
-    document = {**DOCUMENT, "lights": {"Desk / lamp": {}}}
-    for pointer in (f"{TERM}/2/params/nu", "/lights/Desk ~1 lamp", "/environment/intensity"):
+def test_active_control_must_be_in_the_look() -> None:
+    document = {**DOCUMENT, "lights": {"Desk / bulb": {}}}
+    for pointer in (f"{TERM}/2/params/nu", "/lights/Desk ~1 bulb", "/environment/intensity"):
         check_parameter(pointer, document)
     for pointer in (f"{TERM}/2/curves/alpha", f"{TERM}/2/params/sigma", "/lights/Desk", "/environment/size"):
         with pytest.raises(ParameterError):
             check_parameter(pointer, document)
 
 
-def test_a_hand_may_be_on_a_curve_or_on_what_may_be_held() -> None:
+def test_active_control_is_a_curve_or_a_draggable_value() -> None:
     document = {**DOCUMENT, "lights": {"Lamp": {}}}
     for pointer in (f"{TERM}/2/curves/alpha", f"{TERM}/2/params/nu", "/lights/Lamp", "/environment/rotation"):
         check_active_pointer(pointer, document)
@@ -180,7 +180,7 @@ def test_a_hand_may_be_on_a_curve_or_on_what_may_be_held() -> None:
             check_active_pointer(pointer, document)
 
 
-def test_of_a_ground_that_only_catches_shadows_there_is_nothing_to_hold() -> None:
+def test_shadow_catcher_has_no_active_controls() -> None:
     for is_catcher in (False, True):
         document = {"materials": {"a/b": {**DOCUMENT["materials"]["a/b"], "shadow_catcher": is_catcher}}}
         for find, pointer in ((find_curve, f"{TERM}/1/curves/theta_h"), (check_parameter, f"{TERM}/1/params/sigma")):
@@ -191,7 +191,7 @@ def test_of_a_ground_that_only_catches_shadows_there_is_nothing_to_hold() -> Non
                 find(pointer, document)
 
 
-def test_transfers_are_opened_once_kept_while_used_and_tried_again_after_a_failure() -> None:
+def test_transfers_are_opened_once_kept_while_used_and_retried_after_a_failure() -> None:
     opened: list[str] = []
 
     def open_transfer(path: Path) -> Any:
@@ -223,7 +223,7 @@ def test_transfers_are_opened_once_kept_while_used_and_tried_again_after_a_failu
     assert opened == ["broken", "broken", "b0", "b1", "b2", "b3", "b0"]
 
 
-def test_sessions_on_one_scene_look_into_the_ledger_together() -> None:
+def test_sessions_of_one_scene_share_ledger_queries() -> None:
     asked: list[str] = []
 
     def bakes(scene: str) -> list[BakeStatus]:
@@ -237,7 +237,7 @@ def test_sessions_on_one_scene_look_into_the_ledger_together() -> None:
             asyncio.create_task(news.send_updates(socket, "b", scene)) for scene in ("one", "one", "other", "one")
         ]
         await asyncio.sleep(0.1)
-        telling[0].cancel()  # whoever asked first and goes takes nothing from others
+        telling[0].cancel()  # cancellation of the first caller does not affect others
         await asyncio.sleep(3.2 * POLL_S)
         assert not any(task.done() for task in telling[1:])
         for task in telling:

@@ -1,4 +1,4 @@
-"""Several views of one bake side by side: every edit changes all, the one under the pointer goes first."""
+"""Several views of one bake side by side: each edit changes all, the focused one first."""
 
 import time
 
@@ -11,7 +11,7 @@ from session_client import IOR, SIGMA, THETA_D, THETA_H, Baked, Frame, Session, 
 
 
 def exact_of_all(session: Session, revision: int, num_views: int = 2) -> list[Frame]:
-    """Read until every view has an exact frame of a revision; those frames in the order of their coming."""
+    """Read until each view has an exact frame of a revision; return the frames in order of arrival."""
     frame_by_view: dict[str, Frame] = {}
     while len(frame_by_view) < num_views:
         frame = session.exact(revision)
@@ -27,7 +27,7 @@ def show_both(session: Session, focus: str = "left") -> None:
 
 
 @pytest.mark.parametrize("focus", ["front", "left"])
-def test_every_edit_changes_all_views_the_focused_one_first(client: TestClient, baked: Baked, focus: str) -> None:
+def test_edits_change_all_views_the_focused_one_first(client: TestClient, baked: Baked, focus: str) -> None:
     with open_session(client, baked.bake) as session:
         show_both(session, focus)
         for revision in range(1, 4):
@@ -39,9 +39,7 @@ def test_every_edit_changes_all_views_the_focused_one_first(client: TestClient, 
 
 
 @impatient
-def test_client_that_does_not_acknowledge_gets_one_frame_of_the_focus_and_one_of_the_rest(
-    client: TestClient, baked: Baked
-) -> None:
+def test_client_without_acknowledgements_gets_one_focused_and_one_other_frame(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake, acknowledges=False) as session:
         session.send_message(type="ack", frame=session.frame().header["frame"])
         session.send_message(type="views", names=["front", "left"])
@@ -53,7 +51,7 @@ def test_client_that_does_not_acknowledge_gets_one_frame_of_the_focus_and_one_of
         assert closed.value.args[0] == 4408
 
 
-def test_freezes_go_in_the_same_order_and_name_their_view(client: TestClient, baked: Baked, control: Control) -> None:
+def test_freezes_follow_the_same_order_and_name_their_view(client: TestClient, baked: Baked, control: Control) -> None:
     with open_session(client, baked.bake) as session:
         show_both(session)
         session.edit(1, IOR, 2.0)
@@ -67,7 +65,7 @@ def test_freezes_go_in_the_same_order_and_name_their_view(client: TestClient, ba
         exact_of_all(session, 2)
 
 
-def test_touch_reaches_all_views_and_a_brush_is_answered_by_each(client: TestClient, baked: Baked) -> None:
+def test_prepare_reaches_all_views_and_each_answers_a_brush(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         show_both(session)
         session.send_message(type="highlight_curve_range", curve=THETA_H, **{"from": 9.0, "to": 54.0})
@@ -76,7 +74,7 @@ def test_touch_reaches_all_views_and_a_brush_is_answered_by_each(client: TestCli
         assert [frame.header["view"] for frame in frames] == ["left", "front"]
 
 
-def test_probe_is_of_the_view_it_names_or_of_the_focused_one(client: TestClient, baked: Baked) -> None:
+def test_pixel_probe_uses_the_named_or_the_focused_view(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         show_both(session)
         session.send_message(type="inspect", x=1, y=1)
@@ -85,7 +83,7 @@ def test_probe_is_of_the_view_it_names_or_of_the_focused_one(client: TestClient,
         assert session.text("inspect")["view"] == "front"
 
 
-def test_view_that_has_no_room_for_the_open_curve_is_shown_without(
+def test_view_without_memory_for_the_open_curve_is_shown_without_it(
     client: TestClient, baked: Baked, control: Control
 ) -> None:
     control.views_over_budget = {"left"}
@@ -99,7 +97,7 @@ def test_view_that_has_no_room_for_the_open_curve_is_shown_without(
         assert session.exact(1).header["view"] == "left"
 
 
-def test_one_view_again_is_alone(client: TestClient, baked: Baked) -> None:
+def test_single_view_after_several(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         show_both(session)
         session.send_message(type="view", name="front")
@@ -111,7 +109,7 @@ def test_one_view_again_is_alone(client: TestClient, baked: Baked) -> None:
         assert session.text("problem")["problem"]["parameter"] == "view"
 
 
-def test_resume_brings_the_views_back(client: TestClient, baked: Baked) -> None:
+def test_resume_restores_the_views(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         hello = session.text("hello")
         assert (hello["visible_views"], hello["focused_view"]) == (["front"], "front")
@@ -124,9 +122,7 @@ def test_resume_brings_the_views_back(client: TestClient, baked: Baked) -> None:
         assert exact_of_all(session, 1)[0].header["view"] == "left"
 
 
-def test_look_that_cannot_be_followed_is_taken_back_in_all_views(
-    client: TestClient, baked: Baked, control: Control
-) -> None:
+def test_unsupported_look_is_undone_in_all_views(client: TestClient, baked: Baked, control: Control) -> None:
     control.freeze_gate.set()
     with open_session(client, baked.bake) as session:
         show_both(session)
@@ -150,7 +146,7 @@ def test_look_that_cannot_be_followed_is_taken_back_in_all_views(
         {"type": "focus"},
     ],
 )
-def test_views_that_cannot_be_shown_are_refused(client: TestClient, baked: Baked, message: dict[str, object]) -> None:
+def test_invalid_views_are_rejected(client: TestClient, baked: Baked, message: dict[str, object]) -> None:
     with open_session(client, baked.bake) as session:
         session.exact(0)
         session.send_message(**message)
@@ -159,7 +155,7 @@ def test_views_that_cannot_be_shown_are_refused(client: TestClient, baked: Baked
         assert session.exact(1).header["view"] == "front"
 
 
-def test_what_is_on_the_screen_comes_first_and_the_rest_when_the_hand_rests(
+def test_visible_region_comes_first_and_the_rest_after_the_drag(
     client: TestClient, baked: Baked, control: Control
 ) -> None:
     control.num_tiles_per_step = 100
@@ -181,7 +177,7 @@ def test_what_is_on_the_screen_comes_first_and_the_rest_when_the_hand_rests(
             assert "a region of the image" in session.text("problem")["problem"]["detail"]
 
 
-def test_what_is_out_of_sight_does_not_come_while_the_picture_is_on_its_way(
+def test_hidden_region_is_not_sent_while_a_picture_is_pending(
     client: TestClient, baked: Baked, control: Control
 ) -> None:
     control.num_tiles_per_step = 100

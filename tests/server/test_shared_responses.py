@@ -1,4 +1,4 @@
-"""Large answers, small pictures and news: what many ask for at once is made once, and nobody waits for what is slow."""
+"""Large responses, thumbnails and events: concurrent requests share one computation, and slow clients delay nobody."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class TestAnswers:
         with closing(Answers(tmp_path)) as new_answers:
             yield new_answers
 
-    def test_those_who_read_slowly_share_one_file_that_goes_with_them(self, answers: Answers, tmp_path: Path) -> None:
+    def test_slow_readers_share_one_file_that_is_deleted_after_them(self, answers: Answers, tmp_path: Path) -> None:
         made: list[int] = []
         content = np.arange(10_000, dtype="<f4").reshape(-1, 4)
 
@@ -53,10 +53,10 @@ class TestAnswers:
             assert await sent(again) == content.tobytes()
 
         run_in_thread(scenario())
-        assert len(made) == 2  # nobody was left to keep the first
+        assert len(made) == 2  # the first was deleted with its last reader
         assert list(tmp_path.iterdir()) == []
 
-    def test_those_who_ask_before_it_is_there_wait_for_the_same(self, answers: Answers) -> None:
+    def test_early_requests_wait_for_the_same_computation(self, answers: Answers) -> None:
         made: list[int] = []
         may_end = threading.Event()
 
@@ -75,7 +75,7 @@ class TestAnswers:
         assert run_in_thread(scenario()) == [b"it"] * 5
         assert made == [1]
 
-    def test_what_cannot_be_made_is_said_and_tried_again(self, answers: Answers) -> None:
+    def test_failures_are_reported_and_retried(self, answers: Answers) -> None:
         async def scenario() -> bytes:
             with pytest.raises(ZeroDivisionError):
                 await answers.stream("it", lambda: bytes(1 // 0), "text/plain", {})
@@ -85,7 +85,7 @@ class TestAnswers:
 
 
 class TestOnce:
-    def test_who_goes_away_does_not_end_it_for_others(self) -> None:
+    def test_canceled_request_does_not_cancel_the_others(self) -> None:
         may_end, made = threading.Event(), list[int]()
 
         def work() -> int:
@@ -106,7 +106,7 @@ class TestOnce:
 
         assert (run_in_thread(scenario()), made) == (7, [1])
 
-    def test_a_failure_that_nobody_waits_for_is_no_warning(self, caplog: pytest.LogCaptureFixture) -> None:
+    def test_failure_without_waiters_logs_no_warning(self, caplog: pytest.LogCaptureFixture) -> None:
         async def scenario() -> None:
             once, begun = SingleFlight(1, "test"), threading.Event()
             asking = asyncio.create_task(once.run("it", lambda: begun.wait() and 1 // 0))
@@ -122,7 +122,7 @@ class TestOnce:
 
 
 class TestThumbnails:
-    def test_eight_who_ask_have_it_painted_once_and_whoever_enters_a_room_waits_for_none_of_it(
+    def test_eight_requests_render_one_thumbnail_and_do_not_delay_joining_a_room(
         self, client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         services: Any = client.app.state.services  # type: ignore[attr-defined]
@@ -148,10 +148,10 @@ class TestThumbnails:
             assert [each.result().content for each in asking] == [b"it"] * 8
         assert painted == [baked.bake]
 
-    def test_leases_have_threads_of_their_own(
+    def test_leases_have_their_own_threads(
         self, client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        """Every thread that slow work may take is taken, those of the loop and of the routes too."""
+        """All threads for slow work are busy, and so are those of the loop and of the routes."""
         services: Any = client.app.state.services  # type: ignore[attr-defined]
         may_end = threading.Event()
 
@@ -173,7 +173,7 @@ async def _enter(rooms: Any) -> bool:
         return True
 
 
-def test_what_is_larger_than_the_memory_is_made_once_for_those_who_wait_for_it_together() -> None:
+def test_result_larger_than_the_cache_is_computed_once_for_concurrent_requests() -> None:
     memory, made = Cache(10), list[int]()
     begun, may_end = threading.Event(), threading.Event()
 
@@ -188,10 +188,10 @@ def test_what_is_larger_than_the_memory_is_made_once_for_those_who_wait_for_it_t
         begun.wait()
         while len(threads._threads) < 4 or memory._state.computations[("scene", "finder")] is None:
             pass
-        threading.Event().wait(0.2)  # all have come to the lock; where one is late it makes it again, as it may
+        threading.Event().wait(0.2)  # all wait at the lock; a late one may compute it again
         may_end.set()
         identities = {id(each.result()) for each in asking}
     assert len(identities) == 1
     assert made == [1]
     memory.get_value(("scene", "finder"), make)
-    assert made == [1, 1]  # it was not kept
+    assert made == [1, 1]  # it was not cached

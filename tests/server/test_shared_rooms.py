@@ -1,4 +1,4 @@
-"""Several people on one look: what one edits the others see, each in their own picture."""
+"""Shared rooms: edits of one participant reach the pictures of all."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def joined(client: TestClient, baked: Baked) -> AbstractContextManager[Session]:
     return open_session(client, baked.bake, opening=ROOM_FIELDS)
 
 
-def told(session: Session, path: str) -> dict[str, Any]:
-    """Wait for the message that tells what has become of a path."""
+def wait_for_update(session: Session, path: str) -> dict[str, Any]:
+    """Wait for the update of a path."""
     while True:
         message = session.text("room_update")
         for operation in message["patch"]:
@@ -42,14 +42,14 @@ def told(session: Session, path: str) -> dict[str, Any]:
 
 
 def people(session: Session, done: Any) -> list[dict[str, Any]]:
-    """Wait until who is here is as it should be."""
+    """Wait until the participants satisfy a condition."""
     while not done(participants := session.text("room")["people"]):
         pass
     return participants
 
 
 def picture(session: Session, revision: int, value: int) -> int:
-    """Wait for an exact picture of that value; which change of the look it shows."""
+    """Wait for an exact picture with this value and return its room revision."""
     while value not in np.frombuffer((frame := session.exact(revision)).payload, "<u4")[:1]:
         pass
     return int(frame.header["room_revision"])
@@ -61,7 +61,7 @@ def refused(client: TestClient, baked: Baked, opening: Mapping[str, Any]) -> tup
     return ended.value.args
 
 
-def test_an_edit_of_one_is_in_the_picture_of_the_other_and_of_nobody_else(client: TestClient, baked: Baked) -> None:
+def test_edit_reaches_the_room_and_no_other_session(client: TestClient, baked: Baked) -> None:
     with ExitStack() as stack:
         contexts = joined(client, baked), joined(client, baked), open_session(client, baked.bake)
         opened = (stack.enter_context(each) for each in contexts)
@@ -80,11 +80,11 @@ def test_an_edit_of_one_is_in_the_picture_of_the_other_and_of_nobody_else(client
             "edited_by": [1],
         }
         bob.edit(1, EXTINCTION, 1.7)
-        assert told(ann, EXTINCTION)["revision"] == 1
+        assert wait_for_update(ann, EXTINCTION)["revision"] == 1
         alone.edit(1, EXTINCTION, 1.2)
         alone.exact(1)
         ann.edit(2, SIGMA, 0.4)
-        news = told(bob, SIGMA)
+        news = wait_for_update(bob, SIGMA)
         assert (news["revision"], news["room_revision"], news["edited_by"], news["value"]) == (1, 3, [1], 0.4)
         with joined(client, baked) as late:
             hello = late.text("hello")
@@ -96,7 +96,7 @@ def test_an_edit_of_one_is_in_the_picture_of_the_other_and_of_nobody_else(client
             assert (own["sigma"], own["extinction"]) == (0.2, 0.0)
 
 
-def test_of_one_path_all_have_what_came_last(client: TestClient, baked: Baked) -> None:
+def test_last_edit_of_a_path_wins_for_all(client: TestClient, baked: Baked) -> None:
     with joined(client, baked) as ann, joined(client, baked) as bob:
         ann.text("hello")
         bob.text("hello")
@@ -117,7 +117,7 @@ def test_of_one_path_all_have_what_came_last(client: TestClient, baked: Baked) -
 
 
 def _sigma_after(session: Session, own: float, revision: int) -> float:
-    """What a client has when all its edits, which count up from `own`, are known to be in the room's look."""
+    """The client's value once all its edits, numbered from `own`, are confirmed in the room's look."""
     while True:
         message = session.text("room_update")
         sigma = next((each["value"] for each in message["patch"]), own + message["revision"] / 100)
@@ -125,18 +125,18 @@ def _sigma_after(session: Session, own: float, revision: int) -> float:
             return round(sigma, 6)
 
 
-def test_each_has_their_own_exposure_and_who_comes_begins_with_the_last(client: TestClient, baked: Baked) -> None:
+def test_exposure_is_per_participant_and_newcomers_start_with_the_last(client: TestClient, baked: Baked) -> None:
     with joined(client, baked) as ann, joined(client, baked) as bob:
         ann.text("hello")
         bob.text("hello")
         ann.edit(1, EXPOSURE, 2.0)
         ann.edit(2, SIGMA, 0.31)
-        assert [each["path"] for each in told(bob, SIGMA)["patch"]] == [SIGMA]
+        assert [each["path"] for each in wait_for_update(bob, SIGMA)["patch"]] == [SIGMA]
         with joined(client, baked) as late:
             assert late.text("hello")["look"]["display"]["exposure"] == 2.0
 
 
-def test_who_is_here_is_told(client: TestClient, baked: Baked) -> None:
+def test_participants_are_announced(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake, opening={**ROOM_FIELDS, "name": "Ann"}) as ann:
         (first,) = ann.text("hello")["room"]["people"]
         assert (first["name"], first["role"], first["online"], first["material"]) == ("Ann", "admin", True, None)
@@ -152,12 +152,12 @@ def test_who_is_here_is_told(client: TestClient, baked: Baked) -> None:
             bob.send_message(type="presence", name="\u202e\n")
             assert "printable" in bob.text("problem")["problem"]["detail"]
             bob.websocket.close(LOST)
-        # both may be told at once
+        # one message may contain both
         participants = people(ann, lambda them: len(them) == 1 or not them[1]["online"])
         assert len(participants) == 1 or len(people(ann, lambda them: len(them) == 1)) == 1
 
 
-def test_who_comes_is_told_while_frames_wait(client: TestClient, baked: Baked) -> None:
+def test_newcomers_are_announced_while_frames_wait(client: TestClient, baked: Baked) -> None:
     turns = client.app.state.services.threads.short_slots  # type: ignore[attr-defined]
     assert client.portal is not None
     with joined(client, baked) as ann:
@@ -170,7 +170,7 @@ def test_who_comes_is_told_while_frames_wait(client: TestClient, baked: Baked) -
             client.portal.call(turns.release)
 
 
-def test_who_says_goodbye_leaves_at_once(client: TestClient, baked: Baked) -> None:
+def test_goodbye_removes_a_participant_immediately(client: TestClient, baked: Baked) -> None:
     with joined(client, baked) as ann:
         ann.text("hello")
         with joined(client, baked) as bob:
@@ -188,19 +188,19 @@ def test_who_says_goodbye_leaves_at_once(client: TestClient, baked: Baked) -> No
                     assert participants[1]["online"]
 
 
-def test_presence_is_of_no_use_to_one_alone(client: TestClient, baked: Baked) -> None:
+def test_presence_without_a_room_is_rejected(client: TestClient, baked: Baked) -> None:
     with open_session(client, baked.bake) as session:
         session.send_message(type="presence", name="Ann")
         assert "with a room" in session.text("problem")["problem"]["detail"]
 
 
-class TestComingBack:
+class TestReconnect:
     @pytest.fixture
     def settings(self, settings: Settings) -> Settings:
         settings.reconnect_seconds, settings.max_people = 60.0, 2
         return settings
 
-    def test_a_place_is_kept_and_the_room_with_it(self, client: TestClient, baked: Baked) -> None:
+    def test_participant_and_room_survive_a_reconnect(self, client: TestClient, baked: Baked) -> None:
         with joined(client, baked) as ann:
             participant_token = ann.text("hello")["room"]["participant_token"]
             ann.send_message(type="presence", name="Ann")
@@ -213,16 +213,14 @@ class TestComingBack:
             assert [each["name"] for each in hello["room"]["people"]] == ["Ann"]
             assert hello["look"]["materials"]["Paper"]["terms"][1]["params"]["sigma"] == 0.31
 
-    def test_a_lost_session_has_its_own_exposure_and_the_look_that_the_room_has_now(
-        self, client: TestClient, baked: Baked
-    ) -> None:
+    def test_resumed_session_has_its_exposure_and_the_current_look(self, client: TestClient, baked: Baked) -> None:
         with joined(client, baked) as ann, ExitStack() as stack:
-            ann.text("hello")  # who comes later is not told what they begin with
+            ann.text("hello")  # later participants get it in hello
             bob = stack.enter_context(joined(client, baked))
             hello = bob.text("hello")
             bob.edit(1, EXPOSURE, 1.0)
             bob.edit(2, SIGMA, 0.5)
-            told(ann, SIGMA)
+            wait_for_update(ann, SIGMA)
             bob.websocket.close(LOST)
             stack.close()
             ann.edit(1, EXTINCTION, 1.9)
@@ -238,7 +236,7 @@ class TestComingBack:
                 assert (back["resumed"], back["revision"], back["look"]["display"]["exposure"]) == (True, 2, 1.0)
                 assert (params["sigma"], params["extinction"]) == (0.5, 1.9)
 
-    def test_more_people_than_may_be_are_refused(self, client: TestClient, baked: Baked) -> None:
+    def test_excess_participants_are_rejected(self, client: TestClient, baked: Baked) -> None:
         with joined(client, baked) as ann, joined(client, baked) as bob:
             ann.text("hello")
             bob.text("hello")
@@ -246,7 +244,7 @@ class TestComingBack:
             assert (code, reason) == (1013, "2 people are in this room, its limit; wait until one leaves")
 
 
-def test_who_watches_follows_and_cannot_edit(client: TestClient, baked: Baked) -> None:
+def test_viewers_follow_and_cannot_edit(client: TestClient, baked: Baked) -> None:
     assert refused(client, baked, WATCH)[0] == 1013
     with ExitStack() as stack:
         ann = stack.enter_context(joined(client, baked))
@@ -271,7 +269,7 @@ def test_names_are_bounded(client: TestClient, baked: Baked) -> None:
 
 
 class Person:
-    """What an editor keeps of a shared look: what is confirmed, and its own edits that are not."""
+    """An editor's state of a shared look: the confirmed look and its own unconfirmed edits."""
 
     def __init__(self, session: Session) -> None:
         self.session, self.last = session, 0
@@ -284,7 +282,7 @@ class Person:
         self.session.edit(self.last, path, value, control=path)
 
     def hear(self) -> None:
-        """The next word on what the look has become, on top of one's own edits up to its revision."""
+        """Apply the next room update, with own edits up to its revision."""
         message = self.session.text("room_update")
         own = [patch for revision, patch in self._sent if revision <= message["revision"]]
         self._sent = self._sent[len(own) :]
@@ -296,14 +294,14 @@ class Person:
         return not self._sent
 
 
-def test_all_drag_at_once_and_all_have_the_same_look_in_the_end(client: TestClient, baked: Baked) -> None:
+def test_concurrent_drags_converge_to_one_look(client: TestClient, baked: Baked) -> None:
     rng = np.random.default_rng(4)
     with ExitStack() as stack:
         opened = [stack.enter_context(joined(client, baked)) for _ in range(2)]
         people = [Person(session) for session in opened]
         for _ in range(60):
             for person, own in zip(people, (EXTINCTION, IOR), strict=True):
-                path = own if rng.random() < 0.6 else SIGMA  # which everybody pulls at, too
+                path = own if rng.random() < 0.6 else SIGMA  # everybody edits this one, too
                 person.edit(path, round(float(rng.uniform(1.2, 2.0) if path != SIGMA else rng.uniform(0.1, 0.4)), 3))
         for person in people:
             while not person.is_confirmed:
@@ -315,7 +313,7 @@ def test_all_drag_at_once_and_all_have_the_same_look_in_the_end(client: TestClie
                 person.hear()
 
 
-def test_rooms_are_bounded_and_end_with_the_last_who_leaves(client: TestClient, baked: Baked) -> None:
+def test_rooms_are_limited_and_end_with_their_last_member(client: TestClient, baked: Baked) -> None:
     with (
         open_session(client, baked.bake, opening={"room": "a" * 24}) as first,
         open_session(client, baked.bake, opening={"room": "b" * 24}) as second,
@@ -324,15 +322,15 @@ def test_rooms_are_bounded_and_end_with_the_last_who_leaves(client: TestClient, 
         second.text("hello")
         code, reason = refused(client, baked, {"room": "c" * 24})
         assert (code, reason) == (1013, "2 rooms are open, the limit; wait until one is closed")
-    while True:  # those who have left have their place for a moment
+    while True:  # members who left stay for a moment
         with open_session(client, baked.bake, opening={"room": "c" * 24}) as third:
             message = third.websocket.receive()
             if message["type"] != "websocket.close":
                 break
 
 
-def test_an_edit_that_cannot_be_shown_is_taken_back_for_all(client: TestClient, baked: Baked) -> None:
-    rotation = "/environment/rotation"  # the bake cannot follow that
+def test_edit_that_cannot_be_shown_is_undone_for_all(client: TestClient, baked: Baked) -> None:
+    rotation = "/environment/rotation"  # the bake does not support it
     with joined(client, baked) as ann, joined(client, baked) as bob:
         ann.exact(0)
         bob.exact(0)

@@ -1,4 +1,4 @@
-"""Links that carry a look: what one shows is checked, bounded and never changes."""
+"""Share links: the look is validated, bounded and immutable."""
 
 import re
 from typing import Any
@@ -21,7 +21,7 @@ def body(baked: Baked, **more: Any) -> dict[str, Any]:
     return {"bake": baked.bake, "view": "left", "views": ["front", "left"], "look": LOOK, **more}
 
 
-def test_a_link_shows_what_was_shared(client: TestClient, baked: Baked) -> None:
+def test_link_returns_the_shared_look(client: TestClient, baked: Baked) -> None:
     made = client.post("/api/shares", json=body(baked, solo="Paper", solo_light="", paths=PATHS))
     assert made.status_code == 201
     entry = made.json()
@@ -41,7 +41,7 @@ def test_a_link_shows_what_was_shared(client: TestClient, baked: Baked) -> None:
     assert (plain["solo"], plain["solo_light"], plain["paths"]) == (None, None, None)
 
 
-def test_a_link_keeps_the_order_in_which_lights_were_added(client: TestClient, baked: Baked) -> None:
+def test_link_keeps_the_order_of_lights(client: TestClient, baked: Baked) -> None:
     light = {"kind": "point", "position": [0.0, 1.0, 0.0], "emission": [1.0, 1.0, 1.0]}
     for names in (["Key", "Softbox", "Back"], ["Softbox", "Back", "Key"]):
         made = client.post("/api/shares", json=body(baked, look={"lights": dict.fromkeys(names, light)}))
@@ -49,7 +49,7 @@ def test_a_link_keeps_the_order_in_which_lights_were_added(client: TestClient, b
         assert list(response.json()["look"]["lights"]) == names
 
 
-def test_a_link_keeps_where_eyes_are(client: TestClient, baked: Baked) -> None:
+def test_link_keeps_cameras(client: TestClient, baked: Baked) -> None:
     cameras = {"left": {"to_world": [1.0, 0, 0, 2, 0, 1, 0, 3, 0, 0, 1, 4, 0, 0, 0, 1], "yfov": 40.0}}
     made = client.post("/api/shares", json=body(baked, cameras=cameras, sizes={"left": [90, 60]}))
     shared = client.get(made.headers["location"]).json()
@@ -67,7 +67,7 @@ def test_a_link_keeps_where_eyes_are(client: TestClient, baked: Baked) -> None:
         assert client.post("/api/shares", json=body(baked, **refused)).status_code == 422, refused
 
 
-def test_the_same_again_is_the_same_link_and_another_look_another(client: TestClient, baked: Baked) -> None:
+def test_equal_looks_have_the_same_link(client: TestClient, baked: Baked) -> None:
     first = client.post("/api/shares", json=body(baked))
     again = client.post("/api/shares", json=body(baked))
     assert (first.status_code, again.status_code) == (201, 200)
@@ -77,10 +77,10 @@ def test_the_same_again_is_the_same_link_and_another_look_another(client: TestCl
     assert client.get(f"/api/shares/{first.json()['id']}").json()["look"]["display"]["exposure"] == 0.0
 
 
-def test_ids_that_begin_alike_grow(client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ids_with_equal_prefixes_grow(client: TestClient, baked: Baked, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(share_store, "ID_LENGTH", 1)
     ids = set()
-    for number in range(40):  # more than a character can tell apart
+    for number in range(40):  # more than one character can distinguish
         look = {"display": {"exposure": number / 10}}
         ids.add(client.post("/api/shares", json=body(baked, look=look)).json()["id"])
         assert client.post("/api/shares", json=body(baked, look=look)).json()["id"] in ids
@@ -107,7 +107,7 @@ def test_ids_that_begin_alike_grow(client: TestClient, baked: Baked, monkeypatch
         ({"more": 1}, 422),
     ],
 )
-def test_what_does_not_fit_is_refused(client: TestClient, baked: Baked, wrong: dict[str, Any], status: int) -> None:
+def test_invalid_shares_are_rejected(client: TestClient, baked: Baked, wrong: dict[str, Any], status: int) -> None:
     answer = client.post("/api/shares", json=body(baked, **wrong))
     assert answer.status_code == status
     parse_problem(answer)
@@ -128,7 +128,7 @@ def test_links_are_bounded(client: TestClient, baked: Baked, monkeypatch: pytest
     assert client.post("/api/shares", json=another).status_code == 201
 
 
-def test_a_link_says_what_is_gone(client: TestClient, baked: Baked) -> None:
+def test_link_lists_missing_assets(client: TestClient, baked: Baked) -> None:
     made = client.post("/api/shares", json=body(baked)).json()["id"]
     bakes = client.app.state.services.bakes
     delete_scene(bakes.data_dir, bakes.ledger, baked.scene)

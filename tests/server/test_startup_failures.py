@@ -1,4 +1,4 @@
-"""A server that cannot be opened closes what it has opened so far."""
+"""A server that fails to start closes everything it has opened."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from relume_server.app import create_app
 from relume_server.settings import Settings
 
 
-def test_what_was_opened_is_closed_where_something_cannot_be(tmp_path):
+def test_opened_services_are_closed_if_startup_fails(tmp_path):
     closed = []
 
     def bakes(settings):

@@ -1,4 +1,4 @@
-"""What a server answers, and logs, while its disk or its database fails."""
+"""Responses and log lines of a server while its disk or database fails."""
 
 import errno
 import logging
@@ -19,20 +19,20 @@ from relume_server.settings import Settings
 
 
 class Usage(NamedTuple):
-    """As `shutil.disk_usage` tells it."""
+    """The result of `shutil.disk_usage`."""
 
     total: int
     used: int
     free: int
 
 
-def test_a_damaged_database_is_said_in_one_sentence_and_one_line(
+def test_damaged_database_is_one_sentence_and_one_log_line(
     client: TestClient, settings: Settings, caplog: pytest.LogCaptureFixture
 ) -> None:
     for file in (settings.data / "relume.db", settings.data / "relume.db-wal"):
-        with file.open("r+b") as opened:  # as long as it was: it is mapped into memory
+        with file.open("r+b") as opened:  # keep its size: it is memory-mapped
             opened.write(bytes(range(256)) * (file.stat().st_size // 256))
-    client.app.state.services.bakes.ledger.close()  # type: ignore[attr-defined]  # what was read is read again
+    client.app.state.services.bakes.ledger.close()  # type: ignore[attr-defined]  # drop cached pages
     caplog.clear()
     with caplog.at_level(logging.ERROR):
         for path in ("/api/bakes", "/readyz"):
@@ -45,7 +45,7 @@ def test_a_damaged_database_is_said_in_one_sentence_and_one_line(
     assert not any(record.exc_info or "\n" in record.getMessage() for record in caplog.records)
 
 
-def test_a_disk_that_is_nearly_full_is_not_ready_and_said_once(
+def test_nearly_full_disk_is_not_ready_and_logged_once(
     client: TestClient, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr("shutil.disk_usage", lambda path: Usage(1 << 40, 1 << 40, 12_000_000))
@@ -63,20 +63,20 @@ def test_a_disk_that_is_nearly_full_is_not_ready_and_said_once(
 
 
 @pytest.mark.parametrize("error", [DiskFullError("a.webp"), OSError(errno.ENOSPC, "No space left on device")])
-def test_a_disk_that_a_step_finds_full_is_no_failure_of_its_process(error: Exception) -> None:
+def test_full_disk_in_a_step_is_not_a_process_failure(error: Exception) -> None:
     problem = make_problem(error)
     with pytest.raises(DiskFullError, match=r"disk is full; free some space") as raised:
         _answer({"problem": problem.detail, "kind": problem.type.rpartition(":")[2]})
     assert make_problem(raised.value) == problem.model_copy(update={"title": "Disk is full"})
 
 
-def test_probes_of_a_server_that_is_stopped_are_no_lines(client: TestClient, caplog: pytest.LogCaptureFixture) -> None:
+def test_health_checks_while_draining_are_not_logged(client: TestClient, caplog: pytest.LogCaptureFixture) -> None:
     client.app.state.drain.start()  # type: ignore[attr-defined]
     assert [client.get("/readyz").status_code for _ in range(2)] == [503, 503]
     assert [record for record in caplog.records if record.levelno >= logging.WARNING] == []
 
 
-def test_the_process_of_an_import_tells_a_full_disk_from_a_bad_file(
+def test_import_process_distinguishes_a_full_disk_from_a_bad_file(
     settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(_: object) -> str:
@@ -97,7 +97,7 @@ def test_the_process_of_an_import_tells_a_full_disk_from_a_bad_file(
         (OSError(errno.ENOMEM, os.strerror(errno.ENOMEM)), "problem"),
     ],
 )
-def test_the_process_of_an_import_tells_faults_of_the_service_from_those_of_the_file(
+def test_import_process_distinguishes_service_errors_from_file_errors(
     settings: Settings, monkeypatch: pytest.MonkeyPatch, failure: Exception, key: str
 ) -> None:
     def fail(_: object) -> str:
@@ -107,7 +107,7 @@ def test_the_process_of_an_import_tells_faults_of_the_service_from_those_of_the_
     assert run_import(ImportRequest.create(settings, "built_in", None, "cornell_box")).keys() == {key}
 
 
-def test_an_import_whose_scene_cannot_be_listed_says_why_and_leaves_nothing_half_there(
+def test_import_that_cannot_be_listed_fails_with_a_reason_and_leaves_no_files(
     client: TestClient, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:

@@ -1,4 +1,4 @@
-"""Traces: what a collector is sent of an edit, a refused one and a freeze; nothing where they are off."""
+"""Tracing: spans of an edit, a rejected edit and a freeze; none if tracing is off."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from relume_server.telemetry.collector import TraceExporter
 
 @pytest.fixture
 def sent() -> list[ExportTraceServiceRequest]:
-    """What a collector was sent."""
+    """Requests to the collector."""
     return []
 
 
@@ -60,11 +60,11 @@ def spans_of(sent: list[ExportTraceServiceRequest]) -> list[Any]:
     ]
 
 
-def about(span: Any) -> dict[str, Any]:
+def attributes_of(span: Any) -> dict[str, Any]:
     return {each.key: getattr(each.value, each.value.WhichOneof("value")) for each in span.attributes}
 
 
-def test_an_edit_is_traced_from_the_socket_to_the_frame(
+def test_edit_is_traced_from_the_socket_to_the_frame(
     client: TestClient, baked: Baked, control: Control, sent: list[ExportTraceServiceRequest]
 ) -> None:
     with open_session(client, baked.bake, headers={"X-Request-ID": "r-1"}) as session:
@@ -85,7 +85,7 @@ def test_an_edit_is_traced_from_the_socket_to_the_frame(
     } >= {"relume"}
     spans = spans_of(sent)
     (root,) = (span for span in spans if span.name == "edit" and not span.status.code)
-    attributes = about(root)
+    attributes = attributes_of(root)
     assert attributes["relume.session"] == hello["session"]
     assert (attributes["relume.request"], attributes["relume.bake"]) == ("r-1", baked.bake)
     assert (attributes["relume.revision"], attributes["relume.view"], attributes["relume.active_control"]) == (
@@ -103,10 +103,10 @@ def test_an_edit_is_traced_from_the_socket_to_the_frame(
     assert (times[0], times[-1]) == (root.start_time_unix_nano, root.end_time_unix_nano)
     (refused,) = (span for span in spans if span.name == "edit" and span.status.code)
     assert "old revision" in refused.status.message
-    assert {about(span)["relume.label"] for span in spans if span.name == "freeze"} == {status["label"]}
+    assert {attributes_of(span)["relume.label"] for span in spans if span.name == "freeze"} == {status["label"]}
 
 
-def test_a_collector_that_is_away_is_said_once_and_that_it_is_back(
+def test_collector_outage_and_recovery_are_logged_once(
     settings: Settings, sent: list[ExportTraceServiceRequest], caplog: pytest.LogCaptureFixture
 ) -> None:
     exporter = OTLPSpanExporter(timeout=1)

@@ -1,4 +1,4 @@
-"""The editor's types are those of the server, and what it knows of looks is what the server checks."""
+"""The editor's generated types and value ranges agree with the server."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +16,7 @@ from relume_server.schemas import protocol
 
 
 @pytest.mark.parametrize("path", typescript.TARGETS, ids=lambda path: path.name)
-def test_generated_file_is_up_to_date(path: Path) -> None:
+def test_generated_file_is_current(path: Path) -> None:
     assert path.read_text(encoding="utf-8") == typescript.TARGETS[path](), "run python -m relume_server.typescript"
 
 
@@ -35,7 +35,7 @@ def test_defaults_are_optional_in_inputs_only() -> None:
     assert "  max_degrees: number;" in text
 
 
-def test_look_is_typed_whole() -> None:
+def test_look_type_is_complete() -> None:
     text = typescript.generate_look()
     assert "  lights: Record<string, PointLook | SpotLook | DirectionalLook | RectangleLook | MeshLook>;" in text
     assert "  texture: string | null;" in text
@@ -52,11 +52,11 @@ def first(start: Any, number: float) -> Any:
 
 
 def every(start: Any, number: float) -> Any:
-    """A field of another number alone."""
+    """A field with another number everywhere."""
     return [number] * len(start) if isinstance(start, list) else number
 
 
-def check_ends(given: Callable[[Any], dict[str, Any]], start: Any, minimum: float, maximum: float) -> None:
+def check_bounds(given: Callable[[Any], dict[str, Any]], start: Any, minimum: float, maximum: float) -> None:
     for field in (first(start, minimum), every(start, maximum)):
         complete(given(field), DEFAULT)
     for field in (first(start, minimum - 1), every(start, maximum + 1)):
@@ -65,11 +65,11 @@ def check_ends(given: Callable[[Any], dict[str, Any]], start: Any, minimum: floa
 
 
 @pytest.mark.parametrize(("section", "name"), [(section, name) for section in RANGES for name in RANGES[section]])
-def test_numbers_of_a_look_end_where_the_editor_is_told(section: str, name: str) -> None:
-    check_ends(lambda field: {section: {name: field}}, DEFAULT[section][name], *RANGES[section][name])
+def test_ranges_of_look_values_agree_with_the_editor(section: str, name: str) -> None:
+    check_bounds(lambda field: {section: {name: field}}, DEFAULT[section][name], *RANGES[section][name])
 
 
 @pytest.mark.parametrize(("kind", "name"), LIGHTS)
-def test_numbers_of_lights_end_where_the_editor_is_told(kind: str, name: str) -> None:
+def test_ranges_of_light_values_agree_with_the_editor(kind: str, name: str) -> None:
     light = default_light(kind)
-    check_ends(lambda field: {"lights": {"L": {**light, name: field}}}, light[name], *LIGHT_RANGES[name])
+    check_bounds(lambda field: {"lights": {"L": {**light, name: field}}}, light[name], *LIGHT_RANGES[name])

@@ -1,4 +1,4 @@
-"""The server as uvicorn runs it, over a real socket."""
+"""The server under uvicorn, over a real socket."""
 
 import json
 import logging
@@ -19,7 +19,7 @@ from relume_server.telemetry.logs.setup import set_up
 
 @pytest.fixture
 def url(settings: Settings, control: Control) -> Iterator[str]:
-    """Address of the session of a bake that is ready."""
+    """Address of the session of a finished bake."""
     with running_server(settings, control) as running:
         yield running.baked_url()
 
@@ -39,14 +39,12 @@ def test_session_runs_without_compression(url: str) -> None:
     ("headers", "status"),
     [({"Cookie": "a=" + "x" * 9000}, 431), ({f"X-{number}": "" for number in range(130)}, 431)],
 )
-def test_request_with_more_than_is_read_is_refused_and_does_not_wait(
-    url: str, headers: dict[str, str], status: int
-) -> None:
+def test_oversized_handshake_is_rejected_immediately(url: str, headers: dict[str, str], status: int) -> None:
     with pytest.raises(InvalidStatus, match=str(status)):
         connect(url, subprotocols=["relume.v2"], additional_headers=headers)
 
 
-def test_request_that_is_none_is_refused(url: str) -> None:
+def test_invalid_request_is_rejected(url: str) -> None:
     host, _, path = url.removeprefix("ws://").partition("/")
     name, _, port = host.partition(":")
     sent = f"POST /{path} HTTP/1.1\r\nHost: {host}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\r\n"
@@ -64,14 +62,14 @@ def test_message_beyond_the_limit_closes_1009(url: str) -> None:
         assert closed.value.rcvd.code == 1009
 
 
-def test_page_of_another_site_is_refused_in_the_handshake(
+def test_foreign_origin_is_rejected_in_the_handshake(
     url: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("handlers", "level"):
-        monkeypatch.setattr(root := logging.getLogger(), name, getattr(root, name))  # as it is until now
+        monkeypatch.setattr(root := logging.getLogger(), name, getattr(root, name))  # restored after the test
     set_up("plain", "warning")
     with pytest.raises(InvalidStatus, match="403"):
         connect(url, subprotocols=["relume.v2"], origin="https://evil.example")
-    with pytest.raises(InvalidStatus, match="403"):  # then all of the first has been said
+    with pytest.raises(InvalidStatus, match="403"):  # by then the first is logged
         connect(url, subprotocols=["relume.v2"], origin="https://evil.example")
     assert capsys.readouterr().err == ""

@@ -65,7 +65,7 @@ def test_first_change_shades_one_source_and_later_ones_nothing(transfer, lit, fi
     for scale in (0.3, 0.0, 5.0):
         look = look_with(transfer, changed("Panel", intensity=scale))
         lit.set_look(look)
-        assert lit.advance(None).exact, "no glimpse, no wait"
+        assert lit.advance(None).exact, "no preview, no wait"
         assert lit.next_job() is None
         np.testing.assert_allclose(lit.image(), exact_image(transfer, look), rtol=1e-4, atol=1e-5)
 
