@@ -1,4 +1,4 @@
-"""A program of its own that bakes the fake method and can be killed.
+"""A separate program that bakes the fake method and can be killed.
 
 bake_process.py DATA_DIR LEDGER_URL METHOD_JSON WORKERS
 """

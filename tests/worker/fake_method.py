@@ -1,4 +1,4 @@
-"""A transfer method that computes nothing real, quickly, and misbehaves on demand; and a scene of one triangle."""
+"""A fast transfer method with fake results and configurable failures, and a scene of one triangle."""
 
 import errno
 import os
@@ -35,9 +35,9 @@ class FakeMethod:
     """Each view has width × height + 10 view samples; each sample, one byte per light.
 
     Attributes:
-        num_rays: claimed by the plan; decides between this process and the cluster.
+        num_rays: claimed by the plan; selects this process or the cluster.
         delay_s: how long a task takes. log: a file that gets one line per task computed.
-        kill: task index whose process dies: "once" (a marker beside `log` says that it did) or "always".
+        kill: task index whose process dies: "once" (recorded by a marker beside `log`) or "always".
         problem: raised by the third task: "disk full", "defect", "memory".
     """
 

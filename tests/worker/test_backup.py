@@ -1,4 +1,4 @@
-"""What is backed up comes back, from and to either database; what is interrupted is never taken for whole."""
+"""Backup and restore for both databases; an interrupted backup or restore is never taken as complete."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SCENE = tiny_scene()
 
 
 @pytest.fixture
-def shelf(tmp_path: Path) -> BackupRepository:
+def repository(tmp_path: Path) -> BackupRepository:
     return BackupRepository(tmp_path / "backups")
 
 
@@ -49,7 +49,7 @@ def bake(service: BakeService) -> BakeStatus:
 
 
 def fill(data: Path, url: str) -> None:
-    """Make a scene, a finished bake, a saved look, a render's picture, and what stays behind."""
+    """Create a scene, a finished bake, a saved look, the image of a render, and files that are not backed up."""
     service = open_service(data, url)
     register_scene(data, service.ledger, SCENE)
     LookStore(service.ledger.sessions).put("red", "{}", None, None)
@@ -63,15 +63,15 @@ def fill(data: Path, url: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def beside_sqlite(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """A filled data directory and its ledger, which every test copies."""
+def filled_sqlite(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A filled data directory and its ledger, for tests to copy."""
     folder = tmp_path_factory.mktemp("filled")
     fill(folder / "data", url := f"sqlite:///{folder / 'relume.db'}")
     return folder, url
 
 
 @pytest.fixture(scope="module")
-def beside_postgresql(tmp_path_factory: pytest.TempPathFactory, postgresql: Cluster) -> tuple[Path, str]:
+def filled_postgresql(tmp_path_factory: pytest.TempPathFactory, postgresql: Cluster) -> tuple[Path, str]:
     folder = tmp_path_factory.mktemp("filled")
     fill(folder / "data", url := postgresql.new_database())
     return folder, url
@@ -79,8 +79,8 @@ def beside_postgresql(tmp_path_factory: pytest.TempPathFactory, postgresql: Clus
 
 @pytest.fixture(params=["sqlite", "postgresql"])
 def ledger_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
-    """A copy of a filled ledger; one of its data directory lies in `tmp_path`."""
-    folder, url = request.getfixturevalue(f"beside_{request.param}")
+    """A copy of a filled ledger; its data directory is copied into `tmp_path`."""
+    folder, url = request.getfixturevalue(f"filled_{request.param}")
     shutil.copytree(folder / "data", tmp_path / "data")
     if request.param == "postgresql":
         return str(request.getfixturevalue("postgresql").new_database(like=url))
@@ -91,14 +91,16 @@ def ledger_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
 
 @pytest.fixture
 def data(tmp_path: Path, ledger_url: str) -> Path:
-    """A data directory of the test's own."""
+    """A data directory for one test."""
     return tmp_path / "data"
 
 
-def take(data: Path, url: str, shelf: BackupRepository, **options: Callable[[int], Callable[[int], None]]) -> str:
+def back_up(
+    data: Path, url: str, repository: BackupRepository, **options: Callable[[int], Callable[[int], None]]
+) -> str:
     engine = open_database(url)
     try:
-        snapshot = create_backup(data, engine, shelf, **options)
+        snapshot = create_backup(data, engine, repository, **options)
     finally:
         engine.dispose()
     assert snapshot.left_out == ()
@@ -106,13 +108,13 @@ def take(data: Path, url: str, shelf: BackupRepository, **options: Callable[[int
 
 
 @pytest.mark.parametrize("into", ["sqlite", "postgresql"])
-def test_all_comes_back_into_either_database(
-    data: Path, ledger_url: str, shelf: BackupRepository, tmp_path: Path, postgresql: Cluster, into: str
+def test_everything_is_restored_into_either_database(
+    data: Path, ledger_url: str, repository: BackupRepository, tmp_path: Path, postgresql: Cluster, into: str
 ) -> None:
-    take(data, ledger_url, shelf)
+    back_up(data, ledger_url, repository)
     elsewhere = tmp_path / "elsewhere"
     url = f"sqlite:///{elsewhere / 'relume.db'}" if into == "sqlite" else postgresql.new_database()
-    restore(shelf, None, elsewhere, url)
+    restore(repository, None, elsewhere, url)
     with closing(open_service(data, ledger_url)) as old, closing(open_service(elsewhere, url)) as new:
         assert new.bakes() == old.bakes()
         (status,) = new.bakes()
@@ -132,27 +134,27 @@ def read(path: Path) -> bytes:
     return path.read_bytes() if path.is_file() else b""
 
 
-def test_the_second_backup_copies_only_what_is_new(data: Path, ledger_url: str, shelf: BackupRepository) -> None:
-    first = take(data, ledger_url, shelf)
-    before = {path: path.stat().st_mtime_ns for path in (shelf.folder / "files").rglob("*") if path.is_file()}
+def test_second_backup_copies_only_new_files(data: Path, ledger_url: str, repository: BackupRepository) -> None:
+    first = back_up(data, ledger_url, repository)
+    before = {path: path.stat().st_mtime_ns for path in (repository.folder / "files").rglob("*") if path.is_file()}
     with closing(open_service(data, ledger_url)) as service:
         register_scene(data, service.ledger, other := tiny_scene("another"))
-    second = take(data, ledger_url, shelf)
-    after = {path: path.stat().st_mtime_ns for path in (shelf.folder / "files").rglob("*") if path.is_file()}
-    new = {file.sha256 for file in shelf.read(second).all} - {file.sha256 for file in shelf.read(first).all}
+    second = back_up(data, ledger_url, repository)
+    after = {path: path.stat().st_mtime_ns for path in (repository.folder / "files").rglob("*") if path.is_file()}
+    new = {file.sha256 for file in repository.read(second).all} - {file.sha256 for file in repository.read(first).all}
     assert {path.name for path in set(after) - set(before)} == new
     assert before.items() <= after.items()
-    paths = {file.path for file in shelf.read(second).files} - {file.path for file in shelf.read(first).files}
+    paths = {file.path for file in repository.read(second).files} - {file.path for file in repository.read(first).files}
     assert paths == {f"scenes/{other.id}/scene.json", f"scenes/{other.id}/arrays.npz"}
 
 
-def test_scenes_that_come_and_go_meanwhile_leave_it_whole(
-    data: Path, ledger_url: str, shelf: BackupRepository, tmp_path: Path
+def test_backup_is_complete_despite_concurrent_changes(
+    data: Path, ledger_url: str, repository: BackupRepository, tmp_path: Path
 ) -> None:
     ended = threading.Event()
     with closing(open_service(data, ledger_url)) as service:
 
-        def come_and_go() -> None:
+        def add_and_delete() -> None:
             k = 0
             while not ended.is_set():
                 k += 1
@@ -160,15 +162,15 @@ def test_scenes_that_come_and_go_meanwhile_leave_it_whole(
                 if k % 2:
                     delete_scene(data, service.ledger, tiny_scene(f"scene {k}").id)
 
-        thread = threading.Thread(target=come_and_go)
+        thread = threading.Thread(target=add_and_delete)
         thread.start()
         try:
-            snapshot = create_backup(data, service.ledger._engine, shelf)
+            snapshot = create_backup(data, service.ledger._engine, repository)
         finally:
             ended.set()
             thread.join()
     elsewhere, url = tmp_path / "elsewhere", f"sqlite:///{tmp_path / 'elsewhere.db'}"
-    restore(shelf, None, elsewhere, url)
+    restore(repository, None, elsewhere, url)
     with closing(Ledger(open_database(url))) as ledger:
         for record in list_scenes(ledger):
             if not any(record.id in sentence for sentence in snapshot.left_out):
@@ -190,50 +192,50 @@ def tell(done):
     if count[0] == 12:
         os.kill(os.getpid(), signal.SIGKILL)
 
-what, data, url, shelf = sys.argv[1], Path(sys.argv[2]), sys.argv[3], BackupRepository(Path(sys.argv[4]))
+what, data, url, repository = sys.argv[1], Path(sys.argv[2]), sys.argv[3], BackupRepository(Path(sys.argv[4]))
 if what == "backup":
-    create_backup(data, open_database(url), shelf, lambda total: tell)
+    create_backup(data, open_database(url), repository, lambda total: tell)
 else:
-    restore(shelf, None, data, url, lambda total: tell)
+    restore(repository, None, data, url, lambda total: tell)
 """
 
 
-def kill(action: str, data: Path, url: str, shelf: BackupRepository) -> None:
-    """Run it in a process of its own that is killed in the middle of a file."""
-    done = subprocess.run([sys.executable, "-c", KILLED, action, str(data), url, str(shelf.folder)], check=False)
+def kill(action: str, data: Path, url: str, repository: BackupRepository) -> None:
+    """Run an action in a separate process that is killed in the middle of a file."""
+    done = subprocess.run([sys.executable, "-c", KILLED, action, str(data), url, str(repository.folder)], check=False)
     assert done.returncode == -signal.SIGKILL
 
 
-def test_a_backup_that_is_killed_is_none_and_the_next_goes_on(
-    data: Path, ledger_url: str, shelf: BackupRepository
+def test_killed_backup_leaves_no_snapshot_and_the_next_reuses_its_files(
+    data: Path, ledger_url: str, repository: BackupRepository
 ) -> None:
-    kill("backup", data, ledger_url, shelf)
-    assert shelf.names() == []
+    kill("backup", data, ledger_url, repository)
+    assert repository.names() == []
     with pytest.raises(BackupError, match="contains no backup"):
-        shelf.read()
-    copied = {path.name for path in (shelf.folder / "files").rglob("*") if path.is_file() and path.name[0] != "."}
+        repository.read()
+    copied = {path.name for path in (repository.folder / "files").rglob("*") if path.is_file() and path.name[0] != "."}
     assert len(copied) > 5
-    assert list((shelf.folder / "files").rglob(".unfinished-*"))
-    take(data, ledger_url, shelf)
-    snapshot = shelf.read()
-    assert list(shelf.find_damaged(snapshot, lambda done: None)) == []
+    assert list((repository.folder / "files").rglob(".unfinished-*"))
+    back_up(data, ledger_url, repository)
+    snapshot = repository.read()
+    assert list(repository.find_damaged(snapshot, lambda done: None)) == []
     reused = copied & {file.sha256 for file in snapshot.files}
-    assert len(reused) == len(copied) - 1  # all but the ledger's copy of before
-    assert not [path for path in shelf.folder.rglob("*") if path.name.startswith(".")]
+    assert len(reused) == len(copied) - 1  # all except the earlier copy of the ledger
+    assert not [path for path in repository.folder.rglob("*") if path.name.startswith(".")]
 
 
-def test_a_restore_that_is_killed_cannot_be_worked_on_and_goes_on(
-    data: Path, ledger_url: str, shelf: BackupRepository, tmp_path: Path
+def test_killed_restore_is_unusable_and_resumes(
+    data: Path, ledger_url: str, repository: BackupRepository, tmp_path: Path
 ) -> None:
-    first = take(data, ledger_url, shelf)
-    take(data, ledger_url, shelf)
+    first = back_up(data, ledger_url, repository)
+    back_up(data, ledger_url, repository)
     elsewhere, url = tmp_path / "elsewhere", f"sqlite:///{tmp_path / 'elsewhere.db'}"
-    kill("restore", elsewhere, url, shelf)
+    kill("restore", elsewhere, url, repository)
     with pytest.raises(BackupError, match="run relume restore again, which resumes"):
         open_service(elsewhere, url)
     with pytest.raises(BackupError, match="resume that one"):
-        restore(shelf, first, elsewhere, url)
-    restore(shelf, None, elsewhere, url)
+        restore(repository, first, elsewhere, url)
+    restore(repository, None, elsewhere, url)
     with closing(open_service(elsewhere, url)) as service:
         (status,) = service.bakes()
         store = f"bakes/{status.id}.zarr"
@@ -243,76 +245,80 @@ def test_a_restore_that_is_killed_cannot_be_worked_on_and_goes_on(
     assert not list(elsewhere.rglob(".unfinished-*"))
 
 
-def test_what_is_damaged_is_left_out_and_said(data: Path, ledger_url: str, shelf: BackupRepository) -> None:
+def test_damaged_files_are_omitted_and_reported(data: Path, ledger_url: str, repository: BackupRepository) -> None:
     (store,) = (data / "bakes").glob("*.zarr")
     shard = store / "views" / "0" / "visibility" / "c" / "3" / "0"
     shard.write_bytes(bytes(shard.stat().st_size))
     with closing(Ledger(engine := open_database(ledger_url))):
-        snapshot = create_backup(data, engine, shelf)
+        snapshot = create_backup(data, engine, repository)
     assert f"bakes/{store.name} is damaged; delete it, and bake or import it again" in snapshot.left_out
     assert not any("bakes/" in file.path for file in snapshot.files)
     assert any("scenes/" in file.path for file in snapshot.files)
 
 
-def test_a_damaged_backup_is_found_and_the_next_is_whole(data: Path, ledger_url: str, shelf: BackupRepository) -> None:
-    take(data, ledger_url, shelf)
-    file = next(file for file in shelf.read().files if file.path.startswith("scenes/"))
-    shelf.content_path(file.sha256).write_bytes(bytes(file.num_bytes))
-    assert list(shelf.find_damaged(shelf.read(), lambda done: None)) == [file]
-    shelf.quarantine(file)
-    take(data, ledger_url, shelf)
-    assert list(shelf.find_damaged(shelf.read(), lambda done: None)) == []
-
-
-def test_a_damaged_bake_costs_no_other_of_a_backup(
-    data: Path, ledger_url: str, shelf: BackupRepository, tmp_path: Path
+def test_damaged_backup_is_detected_and_the_next_is_complete(
+    data: Path, ledger_url: str, repository: BackupRepository
 ) -> None:
-    take(data, ledger_url, shelf)
-    file = next(file for file in shelf.read().files if "/visibility/c/" in file.path)
-    shelf.content_path(file.sha256).write_bytes(bytes(file.num_bytes))
+    back_up(data, ledger_url, repository)
+    file = next(file for file in repository.read().files if file.path.startswith("scenes/"))
+    repository.content_path(file.sha256).write_bytes(bytes(file.num_bytes))
+    assert list(repository.find_damaged(repository.read(), lambda done: None)) == [file]
+    repository.quarantine(file)
+    back_up(data, ledger_url, repository)
+    assert list(repository.find_damaged(repository.read(), lambda done: None)) == []
+
+
+def test_damaged_bake_does_not_affect_others_in_a_backup(
+    data: Path, ledger_url: str, repository: BackupRepository, tmp_path: Path
+) -> None:
+    back_up(data, ledger_url, repository)
+    file = next(file for file in repository.read().files if "/visibility/c/" in file.path)
+    repository.content_path(file.sha256).write_bytes(bytes(file.num_bytes))
     elsewhere, url = tmp_path / "elsewhere", f"sqlite:///{tmp_path / 'elsewhere.db'}"
-    _, damaged = restore(shelf, None, elsewhere, url)
+    _, damaged = restore(repository, None, elsewhere, url)
     assert damaged == [f"{file.content_key} is damaged in the backup: bake or import it again"]
     assert not (elsewhere / file.content_key).exists()
     assert load_scene(scene_path(elsewhere, SCENE.id)).id == SCENE.id
     with closing(open_service(elsewhere, url)) as service:
         (status,) = service.bakes()
         assert service.submit(SCENE.id, RECIPE) == status.id
-        assert service.get(status.id).state == "queued"  # what is asked for again is made again
+        assert service.get(status.id).state == "queued"  # a new request bakes it again
 
 
-def test_a_damaged_ledger_is_not_restored(data: Path, ledger_url: str, shelf: BackupRepository, tmp_path: Path) -> None:
-    take(data, ledger_url, shelf)
-    ledger = shelf.read().ledger
-    shelf.content_path(ledger.sha256).write_bytes(bytes(ledger.num_bytes))
+def test_damaged_ledger_is_not_restored(
+    data: Path, ledger_url: str, repository: BackupRepository, tmp_path: Path
+) -> None:
+    back_up(data, ledger_url, repository)
+    ledger = repository.read().ledger
+    repository.content_path(ledger.sha256).write_bytes(bytes(ledger.num_bytes))
     elsewhere = tmp_path / "elsewhere"
     with pytest.raises(BackupError, match=r"the database is damaged in the backup"):
-        restore(shelf, None, elsewhere, f"sqlite:///{elsewhere / 'relume.db'}")
+        restore(repository, None, elsewhere, f"sqlite:///{elsewhere / 'relume.db'}")
     assert (elsewhere / "restoring.json").exists()
 
 
-def test_nothing_is_overwritten(data: Path, ledger_url: str, shelf: BackupRepository, tmp_path: Path) -> None:
-    take(data, ledger_url, shelf)
+def test_nothing_is_overwritten(data: Path, ledger_url: str, repository: BackupRepository, tmp_path: Path) -> None:
+    back_up(data, ledger_url, repository)
     with pytest.raises(BackupError, match="is not empty"):
-        restore(shelf, None, data, f"sqlite:///{tmp_path / 'new.db'}")
+        restore(repository, None, data, f"sqlite:///{tmp_path / 'new.db'}")
     empty = tmp_path / "empty"
     with pytest.raises(BackupError, match="is not empty"):
-        restore(shelf, None, empty, ledger_url)
+        restore(repository, None, empty, ledger_url)
     assert list(empty.iterdir()) == []
     with pytest.raises(BackupError, match="something other than relume backups"):
-        take(data, ledger_url, BackupRepository(data))
+        back_up(data, ledger_url, BackupRepository(data))
 
 
 @pytest.mark.parametrize("ledger_url", ["sqlite"], indirect=True)
-def test_a_snapshot_that_names_places_outside_is_refused(
-    data: Path, ledger_url: str, shelf: BackupRepository, tmp_path: Path
+def test_snapshot_with_outside_paths_is_rejected(
+    data: Path, ledger_url: str, repository: BackupRepository, tmp_path: Path
 ) -> None:
-    name = take(data, ledger_url, shelf)
-    file = shelf.folder / "snapshots" / f"{name}.json"
+    name = back_up(data, ledger_url, repository)
+    file = repository.folder / "snapshots" / f"{name}.json"
     document = json.loads(file.read_text())
     for path in ("../out", "/etc/out", "scenes/../../out", "a//b", "", "a\0b"):
         document["files"][0]["path"] = path
         file.write_text(json.dumps(document))
         with pytest.raises(BackupError, match="not a snapshot of relume"):
-            restore(shelf, None, tmp_path / "elsewhere", f"sqlite:///{tmp_path / 'new.db'}")
+            restore(repository, None, tmp_path / "elsewhere", f"sqlite:///{tmp_path / 'new.db'}")
         assert not (tmp_path / "elsewhere").exists(), path

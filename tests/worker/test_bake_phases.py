@@ -1,4 +1,4 @@
-"""People see what a bake is at: behind whom it waits, what its processes do before they trace, when it is published."""
+"""Users see the phase of a bake: queue position, preparation before tracing, and publication."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -22,16 +22,16 @@ LARGE = TINY_BAKE_RAYS + 1
 
 @pytest.fixture
 def entered(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Every phase that is told to the ledger, in order, each once."""
+    """Each phase recorded in the ledger, in order, once each."""
     phases: list[str] = []
     beat = Ledger.heartbeat
 
-    def noted(self: Ledger, identity: str, owner: str, **progress: Any) -> bool:
+    def record(self: Ledger, identity: str, owner: str, **progress: Any) -> bool:
         if not phases or phases[-1] != progress["phase"]:
             phases.append(progress["phase"])
         return beat(self, identity, owner, **progress)
 
-    monkeypatch.setattr(Ledger, "heartbeat", noted)
+    monkeypatch.setattr(Ledger, "heartbeat", record)
     return phases
 
 
@@ -52,11 +52,11 @@ def test_phases_of_a_bake(tmp_path: Path, entered: list[str], num_rays: int) -> 
     assert not list((tmp_path / "bakes" / "staging").iterdir())
 
 
-def test_how_many_wait_before_a_bake(tmp_path: Path) -> None:
+def test_queue_position_of_a_bake(tmp_path: Path) -> None:
     service = BakeService(tmp_path, methods={"fake": FakeMethod()})
     register_scene(service.data_dir, service.ledger, tiny_scene())
     recipes = [replace(RECIPE, num_lights=lights) for lights in (8, 16, 24, 32)]
-    plans = [Plan(1, rays, 1, 1) for rays in (LARGE, 1000, LARGE, LARGE)]  # the tiny one has a lane of its own
+    plans = [Plan(1, rays, 1, 1) for rays in (LARGE, 1000, LARGE, LARGE)]  # the tiny one has its own lane
     ids = [service.ledger.submit(tiny_scene().id, *arguments) for arguments in zip(recipes, plans, strict=True)]
     assert [service.get(identity).queue_position for identity in ids] == [0, 0, 1, 2]
     assert {status.id: status.queue_position for status in service.bakes()} == dict(zip(ids, [0, 0, 1, 2], strict=True))
@@ -66,32 +66,32 @@ def test_how_many_wait_before_a_bake(tmp_path: Path) -> None:
     service.close()
 
 
-def test_kernels_that_are_compiled_are_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_kernel_compilation_is_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     written: list[str] = []
     write = TaskNotes._write
 
-    def noted(self: TaskNotes, note: Any) -> None:
+    def record(self: TaskNotes, note: Any) -> None:
         write(self, note)
         written.append(read_note(tmp_path / "one.zarr") or "")
 
-    monkeypatch.setattr(TaskNotes, "_write", noted)
+    monkeypatch.setattr(TaskNotes, "_write", record)
     notes = TaskNotes(tmp_path / "one.zarr")
     kernel = nb.njit(lambda x: x + 1)
     with notes.watching_compiler():
         notes.note("working")
         assert kernel(1) == kernel(1) == 2
-    assert kernel(1.0) == 2.0  # compiled again, and nobody is told
+    assert kernel(1.0) == 2.0  # compiled again without a note
     assert written == ["working", "compiling", "working"]
 
 
-def test_note_that_cannot_be_kept_costs_the_words_alone(tmp_path: Path) -> None:
+def test_note_that_cannot_be_written_does_not_fail_the_bake(tmp_path: Path) -> None:
     TaskNotes(tmp_path / "nowhere" / "one.zarr").note("working")
     assert read_note(tmp_path / "nowhere" / "one.zarr") is None
     note_path(tmp_path / "one.zarr").write_text("something else")
     assert read_note(tmp_path / "one.zarr") is None
 
 
-def test_command_line_says_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_command_line_prints_the_same_phases(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("relume_cli.bake_progress.time.time", lambda: 1012.0)
     plan, none = Plan(1, 1, 1, 1), {"rays_per_second": None, "bytes": 0, "problem": None, "created": 0.0, "code": None}
 
@@ -107,7 +107,7 @@ def test_command_line_says_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert detail(status("running", "tracing", 41.4)) == "tracing, 41 s left"
 
 
-def test_stages_are_known_from_bakes_of_the_same_scene_where_there_are_any(tmp_path: Path) -> None:
+def test_stage_times_come_from_bakes_of_the_same_scene_if_there_are_any(tmp_path: Path) -> None:
     service = BakeService(tmp_path, methods={"fake": FakeMethod()})
     scenes = [tiny_scene(name) for name in ("one", "two", "three")]
     for scene, seconds in zip(scenes[:2], (3.0, 5.0), strict=True):

@@ -1,4 +1,4 @@
-"""Progress never falls, ends at one, and the time left comes true when tasks take as long as those before."""
+"""Progress is monotonic and ends at one; the estimate of the remaining time is accurate for equal tasks."""
 
 from itertools import pairwise
 
@@ -22,7 +22,7 @@ class Clock:
 
 
 def run(seconds: float, done_before: int = 0) -> list[dict[str, float | None]]:
-    """Fields after each second; each of ten tasks takes `seconds`, one at a time."""
+    """Fields after each second; each of ten tasks takes `seconds`, sequentially."""
     clock = Clock()
     progress = Progress(PLAN, clock=clock)
     progress.begin_stage([Task(0, 0, "front", 0, 0)], last=False)
@@ -48,7 +48,7 @@ def test_progress_never_falls_and_ends_at_one() -> None:
 
 
 @pytest.mark.parametrize("done_before", [0, 5])
-def test_time_left_comes_true(done_before: int) -> None:
+def test_remaining_time_is_accurate(done_before: int) -> None:
     samples = run(4, done_before)
     assert [fields["seconds_left"] for fields in samples[:4]] == [None] * 4
     for elapsed, fields in enumerate(samples[4:], start=4):
@@ -62,10 +62,12 @@ def test_bake_without_rows_has_progress() -> None:
     assert progress.fields() == {"progress": 0.0, "rays_per_second": None, "seconds_left": None}
 
 
-def lefts_of(true_s: float, prior_s: float | None, parallel: int = 1, num_tasks: int = 100) -> list[tuple[float, ...]]:
-    """(share done, seconds left as said, seconds left in truth) each time that a task has ended.
+def remaining_times(
+    true_s: float, prior_s: float | None, parallel: int = 1, num_tasks: int = 100
+) -> list[tuple[float, ...]]:
+    """Return (fraction done, estimated and actual seconds left) after each task.
 
-    Two stages, a tenth and nine tenths of the work; a run of `parallel` processes, whose tasks differ by a tenth.
+    Two stages, with a tenth and nine tenths of the work, on `parallel` processes; task durations differ by up to 10 %.
     """
     clock, random = Clock(), np.random.default_rng(1)
     expected = ExpectedWork(prior_s, (0.1, 0.9), parallel)
@@ -96,16 +98,16 @@ def lefts_of(true_s: float, prior_s: float | None, parallel: int = 1, num_tasks:
 
 @pytest.mark.parametrize("slower", [0.1, 0.3, 1.0, 3.0, 10.0])
 @pytest.mark.parametrize("parallel", [1, 2, 8])
-@pytest.mark.parametrize("is_foretold", [True, False])
-def test_a_tenth_of_the_work_tells_the_rest(slower: float, parallel: int, is_foretold: bool) -> None:
-    estimates = lefts_of(100.0 * slower, 100.0 if is_foretold else None, parallel)
+@pytest.mark.parametrize("has_prior", [True, False])
+def test_first_tenth_of_the_work_predicts_the_rest(slower: float, parallel: int, has_prior: bool) -> None:
+    estimates = remaining_times(100.0 * slower, 100.0 if has_prior else None, parallel)
     for done, said, true in estimates:
         if 0.1 < done < 0.95:
             assert said == pytest.approx(true, rel=0.25), done
 
 
 def expected_alone(prior_s: float | None) -> tuple[Progress, Clock]:
-    """A stage of ten tasks that has just begun."""
+    """A stage of ten tasks that has just begun, without estimates of other bakes."""
     clock = Clock()
     progress = Progress(PLAN, expected_work=ExpectedWork(prior_s, (0.0, 1.0)), clock=clock)
     progress.begin_stage([], last=False)
@@ -114,16 +116,16 @@ def expected_alone(prior_s: float | None) -> tuple[Progress, Clock]:
     return progress, clock
 
 
-def test_nothing_is_said_without_evidence() -> None:
+def test_no_estimate_without_evidence() -> None:
     progress, clock = expected_alone(None)
     for _ in range(50):
         assert progress.fields()["seconds_left"] is None
         clock.now += 1
 
 
-def test_what_others_took_is_said_of_a_bake_that_goes_on_until_it_cannot_be_true() -> None:
+def test_resumed_bake_uses_the_prior_until_it_is_impossible() -> None:
     progress, clock = expected_alone(20.0)
-    assert progress.fields()["seconds_left"] is None  # in the first tenth others' bakes tell nothing
+    assert progress.fields()["seconds_left"] is None  # other bakes give no estimate in the first tenth
     progress.add(TASKS[0], TaskCost(1000, 1, 1), is_local=False)
     assert progress.fields()["seconds_left"] == pytest.approx(18.0)
     clock.now += 1
@@ -132,7 +134,7 @@ def test_what_others_took_is_said_of_a_bake_that_goes_on_until_it_cannot_be_true
     assert progress.fields()["seconds_left"] >= 80.0
 
 
-def test_no_time_is_said_in_the_first_tenth_whatever_others_took() -> None:
+def test_first_tenth_has_no_estimate_despite_a_prior() -> None:
     clock = Clock()
     progress = Progress(PLAN, expected_work=ExpectedWork(3.0, (1.0,)), clock=clock)
     tasks = [Task(0, i, "front", i, i + 1) for i in range(40)]
@@ -147,7 +149,7 @@ def test_no_time_is_said_in_the_first_tenth_whatever_others_took() -> None:
     assert said[3:] == [pytest.approx(left) for left in range(36, -1, -1)]
 
 
-def test_stages_count_by_the_time_they_took_before() -> None:
+def test_stages_are_weighted_by_their_earlier_time() -> None:
     progress = Progress(PLAN, expected_work=ExpectedWork(10.0, (0.25, 0.75)), clock=Clock())
     tasks = [Task(0, i, "front", 0, 0) for i in range(4)]
     progress.begin_stage(tasks, last=False)
@@ -161,8 +163,8 @@ def test_stages_count_by_the_time_they_took_before() -> None:
     assert progress.fields()["progress"] == pytest.approx(0.325)
 
 
-def test_a_stage_that_cannot_be_shared_counts_as_long_as_it_took() -> None:
-    """One task of a fifth, then twenty of the rest by two processes: the first tells what the others will take."""
+def test_sequential_stage_counts_with_its_full_time() -> None:
+    """One task with a fifth of the work, then twenty tasks on two processes: the first predicts the others."""
     clock = Clock()
     progress = Progress(PLAN, expected_work=ExpectedWork(None, (0.2, 0.8), 2), clock=clock)
     progress.begin_stage([Task(0, 0, "front", 0, 0)], last=False)

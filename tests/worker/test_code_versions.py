@@ -1,4 +1,4 @@
-"""A bake is of one code: what other code has made stays usable and says so, what it has begun starts again."""
+"""Code versions of bakes: those of another version stay usable and report it, and partial ones restart."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ OLD, NEW = "0123456789abcdef", "fedcba9876543210"
 
 @pytest.fixture
 def running(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
-    """Run other code from now on."""
+    """Switch to another code version."""
 
     def run(code: str) -> None:
         for module in (
@@ -59,7 +59,7 @@ def interrupt(service: BakeService, identity: str) -> None:
             pass
 
 
-def test_a_bake_of_other_code_stays_usable_and_says_so(tmp_path: Path, running: Callable[[str], None]) -> None:
+def test_bake_of_other_code_stays_usable_and_reports_it(tmp_path: Path, running: Callable[[str], None]) -> None:
     running(OLD)
     with open_service(tmp_path) as service:
         old = service.submit(SCENE.id, RECIPE)
@@ -76,13 +76,13 @@ def test_a_bake_of_other_code_stays_usable_and_says_so(tmp_path: Path, running: 
         ]
         assert service.get(new).rank > service.get(old).rank
         moving = replace(service.get(new), recipe=replace(RECIPE, method="probes", size=(4096, 4096)))
-        assert moving.rank < service.get(old).rank  # however fine, it never becomes exact
+        assert moving.rank < service.get(old).rank  # at any resolution it never becomes exact
         assert service.get(old).state == "ready"
         assert open_store(service.store_path(old)).attributes["code"] == OLD
 
 
 @pytest.mark.parametrize("how", ["closed", "canceled"])
-def test_a_bake_that_other_code_has_begun_starts_again_and_says_why(
+def test_partial_bake_of_other_code_restarts_with_a_reason(
     tmp_path: Path, running: Callable[[str], None], how: str
 ) -> None:
     log = tmp_path / "log"
@@ -110,14 +110,14 @@ def test_a_bake_that_other_code_has_begun_starts_again_and_says_why(
     assert len(log.read_text().split()) == num_old + NUM_TASKS
 
 
-def test_a_process_of_other_code_computes_nothing(tmp_path: Path) -> None:
+def test_process_of_other_code_computes_nothing(tmp_path: Path) -> None:
     job = Job(tmp_path, "0" * 16, SCENE.id, RECIPE, FakeMethod(), OLD)
     with pytest.raises(StoreError, match="another version of relume"):
         run_task(job, None)  # type: ignore[arg-type]
     assert not list(tmp_path.iterdir())
 
 
-def test_a_store_from_before_codes_were_written_down_is_of_none(tmp_path: Path) -> None:
+def test_store_without_a_code_version_has_none(tmp_path: Path) -> None:
     (tmp_path / "zarr.json").write_text('{"attributes": {"schema_version": 7}}')
     assert read_code(tmp_path) is None
     assert read_code(tmp_path / "nothing") is None

@@ -1,4 +1,4 @@
-"""What memory there is for a process in a container: the control group's, of either version."""
+"""Memory available to a process in a container, from control groups v1 and v2."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def write(folder: Path, **files: str) -> None:
         (folder / name.replace("__", ".")).write_text(text)
 
 
-def test_a_machine_without_groups_has_all_of_it(groups: Path) -> None:
+def test_machine_without_control_groups_has_all_memory(groups: Path) -> None:
     assert budget.machine_bytes() == 64 * GIB
     write(groups, own="0::/\n1:cpu:/\n")
     write(groups / "cgroup", memory__max="max\n", memory__current="5")
@@ -35,13 +35,15 @@ def test_a_machine_without_groups_has_all_of_it(groups: Path) -> None:
     ("own", "folder", "limit", "used"),
     [
         ("0::/\n", "cgroup", "memory__max", "memory__current"),
-        ("0::/docker/0123\n", "cgroup", "memory__max", "memory__current"),  # the group is the root of what is seen
-        ("0::/user/relume\n", "cgroup/user", "memory__max", "memory__current"),  # one above has the limit
+        ("0::/docker/0123\n", "cgroup", "memory__max", "memory__current"),  # the group is the visible root
+        ("0::/user/relume\n", "cgroup/user", "memory__max", "memory__current"),  # an ancestor has the limit
         ("4:cpu,memory:/docker/0123\n0::/\n", "cgroup/memory", "memory__limit_in_bytes", "memory__usage_in_bytes"),
         ("4:memory:/slice\n", "cgroup/memory/slice", "memory__limit_in_bytes", "memory__usage_in_bytes"),
     ],
 )
-def test_a_container_has_what_its_group_allows(groups: Path, own: str, folder: str, limit: str, used: str) -> None:
+def test_container_has_the_memory_of_its_control_group(
+    groups: Path, own: str, folder: str, limit: str, used: str
+) -> None:
     write(groups, own=own)
     write(groups / folder, **{limit: str(8 * GIB), used: str(7 * GIB)})
     assert budget.machine_bytes() == 8 * GIB

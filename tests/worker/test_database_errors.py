@@ -1,4 +1,4 @@
-"""Databases that fail say so in words, and loops that go on say it once."""
+"""Database failures are readable messages, and retry loops log them once."""
 
 import logging
 import time
@@ -18,25 +18,25 @@ from relume_worker.scenes import register_scene
 GARBAGE = bytes(range(256)) * 64
 
 
-def test_a_damaged_database_is_refused_when_it_is_opened(tmp_path: Path) -> None:
+def test_damaged_database_is_rejected_on_open(tmp_path: Path) -> None:
     (tmp_path / "relume.db").write_bytes(GARBAGE)
     with pytest.raises(DatabaseDamagedError, match=r"move relume.db, .* away"):
         open_database(f"sqlite:///{tmp_path / 'relume.db'}")
     assert (tmp_path / "relume.db").read_bytes() == GARBAGE
 
 
-def test_one_that_is_damaged_while_it_is_open_says_so(tmp_path: Path) -> None:
+def test_damage_while_open_is_reported(tmp_path: Path) -> None:
     engine = open_database(f"sqlite:///{tmp_path / 'relume.db'}")
     ledger = Ledger(engine)
     assert ledger.bakes() == []
-    engine.dispose()  # what was read is read again
+    engine.dispose()  # drop cached pages
     for file in tmp_path.glob("relume.db*"):
         file.write_bytes(GARBAGE)
     with pytest.raises(DatabaseDamagedError):
         ledger.bakes()
 
 
-def test_a_database_without_room_says_so_and_goes_on_when_there_is_some(tmp_path: Path) -> None:
+def test_full_database_reports_it_and_recovers(tmp_path: Path) -> None:
     engine = open_database(f"sqlite:///{tmp_path / 'relume.db'}")
     is_full = [True]
 
@@ -52,16 +52,16 @@ def test_a_database_without_room_says_so_and_goes_on_when_there_is_some(tmp_path
     register_scene(tmp_path, ledger, scene)
 
 
-def test_calls_that_overlap_a_change_say_nothing_new(caplog: pytest.LogCaptureFixture) -> None:
+def test_calls_that_overlap_a_state_change_are_ignored(caplog: pytest.LogCaptureFixture) -> None:
     outage, away = Outage(logging.getLogger("outage"), "it"), Exception("away")
     with caplog.at_level(logging.WARNING, "outage"):
         slow = time.monotonic()
         outage.report_failure(away, time.monotonic())
         outage.report_failure(away, time.monotonic())
-        outage.report_recovered(slow)  # it was answered before the server went away
+        outage.report_recovered(slow)  # answered before the outage
         late = time.monotonic()
         outage.report_recovered(time.monotonic())
-        outage.report_failure(away, late)  # it was refused before the server came back
+        outage.report_failure(away, late)  # failed before the recovery
         outage.report_failure(away, time.monotonic())
     assert [record.getMessage() for record in caplog.records] == [
         "it does not answer (away); trying again",
@@ -70,7 +70,7 @@ def test_calls_that_overlap_a_change_say_nothing_new(caplog: pytest.LogCaptureFi
     ]
 
 
-def test_a_loop_says_each_fault_once_and_that_it_is_over(caplog: pytest.LogCaptureFixture) -> None:
+def test_loop_logs_each_error_and_its_end_once(caplog: pytest.LogCaptureFixture) -> None:
     error = DatabaseError(logging.getLogger("loop"), "it cannot be read")
     with caplog.at_level(logging.WARNING, "loop"):
         for _ in range(3):

@@ -1,4 +1,4 @@
-"""A PostgreSQL that is away for some seconds: one line, a clear answer, and all goes on."""
+"""A PostgreSQL outage of some seconds: one log line, clear errors, and recovery."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from relume_worker.service import BakeService
 
 @pytest.fixture
 def own_cluster() -> Iterator[Cluster]:
-    """One that no other test uses: it is stopped."""
+    """A cluster for one test: it is stopped."""
     cluster = Cluster()
     yield cluster
     cluster.remove()
 
 
-def test_a_bake_outlives_a_database_that_is_away(
+def test_bake_survives_a_database_outage(
     tmp_path: Path, own_cluster: Cluster, caplog: pytest.LogCaptureFixture
 ) -> None:
     log = tmp_path / "log"
@@ -42,23 +42,23 @@ def test_a_bake_outlives_a_database_that_is_away(
         with service.subscribe(service.submit(tiny_scene().id, RECIPE)) as changes:
             while (status := changes.get(60)) is not None and not 0.2 < status.progress < 1:
                 pass
-            caplog.clear()  # an outage that another test left is over now
+            caplog.clear()  # the end of another test's outage
             own_cluster.stop()
             with pytest.raises(OperationalError) as failure:
                 service.bakes()
             assert is_unavailable(failure.value)
             assert make_problem(failure.value).status == 503
             assert "try again later" in str(make_problem(failure.value).detail)
-            time.sleep(1.5)  # every loop has met it
+            time.sleep(1.5)  # every loop has failed once
             own_cluster.start()
             assert list(changes)[-1].state == "ready"
         assert [status.state for status in service.bakes()] == ["ready"]
-    assert len(log.read_text().split()) == len(set(log.read_text().split()))  # no task was done twice
+    assert len(log.read_text().split()) == len(set(log.read_text().split()))  # no task ran twice
     said = [record.getMessage().split(" (")[0] for record in caplog.records if record.name.startswith("relume_worker")]
     assert said == ["the database does not answer", "the database answers again"]
 
 
-def test_failures_of_statements_are_no_absence(ledger_url: str) -> None:
+def test_statement_errors_are_not_an_outage(ledger_url: str) -> None:
     with closing(Ledger(engine := open_database(ledger_url))), engine.connect() as connection:
         with pytest.raises(DBAPIError) as failure:
             connection.execute(text("SELECT nothing FROM nowhere"))
@@ -71,26 +71,26 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("impatient")
-def test_a_server_that_accepts_and_says_nothing_is_away() -> None:
+def test_server_that_accepts_and_stays_silent_is_unavailable() -> None:
     with socket.create_server(("127.0.0.1", 0)) as mute, pytest.raises(OperationalError, match="timed out") as failure:
         open_database(f"postgresql://relume@127.0.0.1:{mute.getsockname()[1]}/relume")
     assert is_unavailable(failure.value)
 
 
 @pytest.mark.usefixtures("impatient")
-def test_a_server_that_falls_silent_is_away_and_asked_anew(own_cluster: Cluster) -> None:
+def test_server_that_stops_responding_is_unavailable_and_reconnected(own_cluster: Cluster) -> None:
     with closing(Ledger(engine := open_database(own_cluster.new_database()))):
         with pytest.raises(OperationalError) as failure, engine.connect() as connection:
             connection.execute(text("SELECT pg_sleep(2)"))
         assert is_unavailable(failure.value)
         assert failure.value.connection_invalidated
         own_cluster.stop()
-        own_cluster.start()  # connections that are kept were ended
+        own_cluster.start()  # pooled connections were closed
         with engine.connect() as connection:
             assert connection.scalar(text("SELECT 1")) == 1
 
 
-def test_what_a_server_says_of_a_failure_is_told(own_cluster: Cluster) -> None:
+def test_error_message_of_the_server_is_reported(own_cluster: Cluster) -> None:
     url = own_cluster.new_database()
     with pytest.raises(DBAPIError) as failure:
         open_database(f"{url}_of_nobody")
@@ -98,7 +98,7 @@ def test_what_a_server_says_of_a_failure_is_told(own_cluster: Cluster) -> None:
     assert not is_unavailable(failure.value)
 
 
-def test_rows_of_what_is_not_there_are_refused(ledger_url: str) -> None:
+def test_rows_with_missing_references_are_rejected(ledger_url: str) -> None:
     ledger = Ledger(engine := open_database(ledger_url))
     with closing(ledger), pytest.raises(IntegrityError), engine.begin() as connection:
         connection.execute(text("INSERT INTO cameras VALUES ('nowhere', 'one', '{}')"))

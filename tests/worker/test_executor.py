@@ -1,4 +1,4 @@
-"""What becomes of tasks and processes when a cluster misbehaves; clusters here are stand-ins."""
+"""Tasks and processes when a cluster fails; the clusters here are fakes."""
 
 import asyncio
 import concurrent.futures
@@ -21,7 +21,7 @@ from relume_worker.executor import BAKE_NICE, Executors
 
 
 class FakeTask:
-    """A Dask future: awaited, it gives its outcome or raises it."""
+    """A Dask future: awaiting it returns its outcome or raises it."""
 
     def __init__(self, outcome: object) -> None:
         self.outcome = outcome
@@ -50,7 +50,7 @@ class FakeClient:
 
 
 class FakeCluster:
-    """One worker process is running; the other is only just starting, so closing fails as Dask's does."""
+    """One worker process runs and another is starting, so closing fails as in Dask."""
 
     def __init__(self, **_: object) -> None:
         self.log: list[str] = []
@@ -67,7 +67,7 @@ class FakeCluster:
 class FakeNanny:
     def __init__(self, log: list[str]) -> None:
         self.log = log
-        self.process = self  # a nanny has a keeper of its process, which has the process
+        self.process = self  # Dask's nanny holds the process through a wrapper
         self.close_gracefully = lambda: log.append("no restart")
 
     async def kill(self) -> None:
@@ -84,7 +84,7 @@ def test_future_has_the_result_or_the_error_of_its_task() -> None:
         submit(ZeroDivisionError()).result(0)
 
 
-def test_what_a_worker_foresees_comes_back_as_a_result_which_dask_does_not_log(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_expected_errors_return_as_results_that_dask_does_not_log(monkeypatch: pytest.MonkeyPatch) -> None:
     handed: list[object] = []
 
     def full() -> None:
@@ -97,13 +97,13 @@ def test_what_a_worker_foresees_comes_back_as_a_result_which_dask_does_not_log(m
     assert handed
 
 
-def test_future_of_a_task_that_went_away_wakes_those_who_wait() -> None:
+def test_future_of_a_lost_task_wakes_its_waiters() -> None:
     future = submit(concurrent.futures.CancelledError())
     assert concurrent.futures.wait([future], timeout=0).done == {future}
     assert future.cancelled()
 
 
-def test_cluster_that_does_not_close_in_order_loses_its_processes_and_stops_nobody(
+def test_cluster_that_fails_to_close_is_killed_without_blocking(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     clusters: list[FakeCluster] = []
@@ -131,8 +131,8 @@ finally:
 
 
 @pytest.mark.slow
-def test_the_cluster_of_this_machine_runs_nothing_for_who_has_no_key_of_it() -> None:
-    """Every local account reaches its ports; each of them, of the scheduler and of the workers, asks for the key."""
+def test_local_cluster_rejects_clients_without_its_key() -> None:
+    """Every local account can reach its ports; scheduler and workers require the key on each."""
     executors = Executors(num_workers=1)
     try:
         assert executors.cluster().submit(sum, [1, 2]).result() == 3
@@ -152,12 +152,12 @@ def test_the_cluster_of_this_machine_runs_nothing_for_who_has_no_key_of_it() -> 
         executors.close()
 
 
-def test_a_cluster_of_somebody_else_says_what_it_lacks_where_tls_is_not_set_up() -> None:
+def test_external_cluster_without_tls_reports_the_missing_settings() -> None:
     with pytest.raises(PlanError, match="DASK_DISTRIBUTED__COMM__TLS__CA_FILE"):
         Executors("tls://127.0.0.1:1").cluster()
 
 
-def test_worker_processes_yield_to_what_somebody_waits_for() -> None:
+def test_worker_processes_have_low_priority() -> None:
     executors = Executors(num_workers=1)
     assert not executors.has_cluster
     try:

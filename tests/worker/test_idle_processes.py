@@ -1,4 +1,4 @@
-"""What a process keeps between tasks is forgotten when no task comes, and never during one."""
+"""Caches of a process are cleared when it is idle, and never during a task."""
 
 import threading
 import weakref
@@ -19,7 +19,7 @@ WAIT_S = 60
 
 
 class Timers:
-    """Stands in for `threading.Timer`; time goes on when a test says so."""
+    """A fake `threading.Timer`; the test advances the time."""
 
     def __init__(self) -> None:
         self.running: list[Timers.One] = []
@@ -30,7 +30,7 @@ class Timers:
                 self.call, self.daemon = call, False
 
             def start(self) -> None:
-                assert self.daemon  # it must not keep the process from ending
+                assert self.daemon  # it must not block process exit
                 timers.running.append(self)
 
             def cancel(self) -> None:
@@ -43,7 +43,7 @@ class Timers:
             timer.call()
 
 
-def test_nothing_is_forgotten_while_a_task_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_is_cleared_while_a_task_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     timers, forgotten = Timers(), []
     monkeypatch.setattr(threading, "Timer", timers.Timer)
     idle_timer = IdleTimer(lambda: 60.0, lambda: forgotten.append(True))
@@ -59,7 +59,9 @@ def test_nothing_is_forgotten_while_a_task_runs(monkeypatch: pytest.MonkeyPatch)
     assert forgotten == [True]
 
 
-def test_scene_and_what_was_built_for_it_go_after_a_bake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_scene_and_its_acceleration_data_are_released_after_a_bake(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("RELUME_IDLE_SECONDS", "1")
     forgotten = threading.Event()
     monkeypatch.setattr(tasks, "trim_heap", forgotten.set)
@@ -77,7 +79,7 @@ def test_scene_and_what_was_built_for_it_go_after_a_bake(tmp_path: Path, monkeyp
     assert tasks.cached_bytes() == 0
 
 
-def test_idle_seconds_are_those_of_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_idle_seconds_come_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("RELUME_IDLE_SECONDS", raising=False)
     assert idle_seconds() == DEFAULT_IDLE_S
     for text, seconds in (("5", 5.0), ("0", 1.0), ("soon", DEFAULT_IDLE_S)):
@@ -85,7 +87,7 @@ def test_idle_seconds_are_those_of_the_environment(monkeypatch: pytest.MonkeyPat
         assert idle_seconds() == seconds
 
 
-def test_pyramid_of_a_texture_goes_with_it() -> None:
+def test_texture_pyramid_is_released_with_its_texture() -> None:
     texture = Texture(np.zeros((4, 4, 3), np.float32))
     pyramid = weakref.ref(MipMap.for_texture(texture))
     assert MipMap.for_texture(texture) is pyramid()

@@ -1,4 +1,4 @@
-"""The ledger names each bake once, lets one owner run it, and keeps what was finished."""
+"""The ledger identifies each bake once, lets one owner run it, and keeps finished bakes."""
 
 import os
 import threading
@@ -84,7 +84,7 @@ def test_only_one_of_many_claims_a_bake(ledger: Ledger) -> None:
     assert ledger.bake(identity).progress == 0.5
 
 
-def test_lease_ends_when_it_is_not_renewed(ledger: Ledger, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_lease_expires_without_renewal(ledger: Ledger, monkeypatch: pytest.MonkeyPatch) -> None:
     identity, first, second = ledger.submit(SCENE.id, RECIPE, PLAN), lease.new_owner(), lease.new_owner()
     assert ledger.claim(identity, first)
     monkeypatch.setattr(lease, "LEASE_S", -1.0)
@@ -96,7 +96,7 @@ def test_lease_ends_when_it_is_not_renewed(ledger: Ledger, monkeypatch: pytest.M
     assert ledger.bake(identity).state == "running"
 
 
-def test_lease_of_a_dead_process_ends_at_once() -> None:
+def test_lease_of_a_dead_process_ends_immediately() -> None:
     host, _, nonce, number = lease.new_owner().split("/")
     assert lease.is_alive(lease.new_owner(), 100.0, 101.0)
     assert not lease.is_alive(f"{host}/{2**22 + 1}/{nonce}/{number}", 100.0, 101.0)
@@ -105,7 +105,7 @@ def test_lease_of_a_dead_process_ends_at_once() -> None:
     assert not lease.is_alive(f"{host}/{pid}/another-run-of-this-container/0", 100.0, 101.0)
 
 
-def test_places_are_told_apart_by_more_than_a_host_name(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_machines_are_distinguished_by_more_than_a_host_name(monkeypatch: pytest.MonkeyPatch) -> None:
     host_id, _, nonce, number = lease.new_owner().split("/")
     host, rest = host_id.split(":", 1)
     gone = 2**22 + 1
@@ -115,7 +115,7 @@ def test_places_are_told_apart_by_more_than_a_host_name(monkeypatch: pytest.Monk
     assert lease.owner_text(lease.new_owner()).startswith(f"{host}, process ")
 
 
-def test_who_has_lost_the_lease_of_a_bake_records_and_forgets_nothing(
+def test_owner_without_its_lease_records_and_deletes_nothing(
     ledger: Ledger, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     identity, first, second = ledger.submit(SCENE.id, RECIPE, PLAN), lease.new_owner(), lease.new_owner()
@@ -136,7 +136,7 @@ def test_who_has_lost_the_lease_of_a_bake_records_and_forgets_nothing(
     assert ledger.finish(identity, second, "ready")
 
 
-def test_cancelled_bake_keeps_its_tasks_and_can_be_queued_again(ledger: Ledger) -> None:
+def test_canceled_bake_keeps_its_tasks_and_can_be_queued_again(ledger: Ledger) -> None:
     identity, owner = ledger.submit(SCENE.id, RECIPE, PLAN), lease.new_owner()
     ledger.claim(identity, owner)
     assert ledger.finish_task(identity, owner, Task(0, 1, "left", 0, 8), TaskCost(5, 0.1, 0.2), 1)
@@ -149,7 +149,7 @@ def test_cancelled_bake_keeps_its_tasks_and_can_be_queued_again(ledger: Ledger) 
     assert ledger.finished_tasks(identity) == {(0, 1): TaskCost(5, 0.1, 0.2)}
 
 
-def test_finished_bake_cannot_be_cancelled_and_stays_ready(ledger: Ledger) -> None:
+def test_finished_bake_cannot_be_canceled_and_stays_ready(ledger: Ledger) -> None:
     identity, owner = ledger.submit(SCENE.id, RECIPE, PLAN), lease.new_owner()
     ledger.claim(identity, owner)
     ledger.finish(identity, owner, "ready", num_bytes=77)
@@ -186,7 +186,7 @@ def test_malformed_ids_are_not_found(tmp_path: Path, ledger: Ledger) -> None:
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="the system does not list open files")
-def test_open_files_are_bounded_by_the_most_connections_at_once(tmp_path: Path) -> None:
+def test_open_files_are_bounded_by_the_connection_limit(tmp_path: Path) -> None:
     engine, counts = open_database(f"sqlite:///{tmp_path / 'relume.db'}"), []
     for num_at_once in (5, 15, 15, 3, 15):
         with ExitStack() as stack:
@@ -205,7 +205,7 @@ def _long_leases(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("_long_leases")
-def test_a_room_is_of_one_server_until_that_gives_it_up_or_is_dead(ledger: Ledger) -> None:
+def test_room_belongs_to_one_server_until_it_releases_it_or_dies(ledger: Ledger) -> None:
     first, second = RoomLeases(ledger.sessions), RoomLeases(ledger.sessions)
     assert first.take("a")
     assert not second.take("a")
@@ -229,7 +229,7 @@ def test_a_room_is_of_one_server_until_that_gives_it_up_or_is_dead(ledger: Ledge
 
 
 @pytest.mark.usefixtures("_long_leases")
-def test_of_many_servers_that_open_a_room_one_has_it(ledger: Ledger) -> None:
+def test_one_of_many_servers_that_open_a_room_gets_it(ledger: Ledger) -> None:
     servers = [RoomLeases(ledger.sessions) for _ in range(4)]
     with ThreadPoolExecutor(4) as threads:
         assert sum(threads.map(lambda each: each.take("a"), servers)) == 1

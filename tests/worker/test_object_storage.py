@@ -1,4 +1,4 @@
-"""Scenes and bakes in object storage: one machine bakes, another opens, and keeps what there is room for."""
+"""Scenes and bakes in object storage: one machine bakes, another opens, and local copies respect the cache limit."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ SCENE = tiny_scene()
 
 @pytest.fixture(scope="module")
 def s3() -> Iterator[str]:
-    """An endpoint that speaks as S3 does."""
+    """An S3-compatible endpoint."""
     server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
     server.start()
     host, port = server.get_host_and_port()
@@ -50,7 +50,7 @@ def s3() -> Iterator[str]:
 
 @pytest.fixture(params=["s3", pytest.param("a shared folder", marks=pytest.mark.slow)])
 def storage(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ObjectStorage:
-    """The storage that `RELUME_STORAGE` names, empty."""
+    """The storage of `RELUME_STORAGE`, empty."""
     url = f"file://{tmp_path / 'shared'}"
     if request.param == "s3":
         keys = {"AWS_ENDPOINT_URL": request.getfixturevalue("s3"), "AWS_REGION": "us-east-1"}
@@ -66,35 +66,35 @@ def storage(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.
 
 
 @pytest.fixture
-def ledger_of_all(tmp_path: Path) -> str:
-    """A ledger that is beside no data folder."""
+def shared_ledger(tmp_path: Path) -> str:
+    """A ledger outside all data folders."""
     return f"sqlite:///{tmp_path / 'ledger.db'}"
 
 
 def machine(tmp_path: Path, name: str, url: str) -> BakeService:
-    """A machine with a data folder of its own."""
+    """A machine with its own data folder."""
     return BakeService(tmp_path / name, url, methods={"fake": FakeMethod()})
 
 
 def bake(service: BakeService, recipe: Recipe = RECIPE) -> Path:
-    """Bake, and the path of the store."""
+    """Bake and return the path of the store."""
     with service.subscribe(service.submit(SCENE.id, recipe)) as changes:
         assert list(changes)[-1].state == "ready"
     return service.store_path(service.submit(SCENE.id, recipe))
 
 
 def test_one_machine_imports_another_bakes_and_the_first_opens_it(
-    tmp_path: Path, storage: ObjectStorage, ledger_of_all: str
+    tmp_path: Path, storage: ObjectStorage, shared_ledger: str
 ) -> None:
     with (
-        closing(machine(tmp_path, "server", ledger_of_all)) as server,
-        machine(tmp_path, "worker", ledger_of_all) as far,
+        closing(machine(tmp_path, "server", shared_ledger)) as server,
+        machine(tmp_path, "worker", shared_ledger) as far,
     ):
         register_scene(server.data_dir, server.ledger, SCENE)
         path = bake(far)
         here = server.store_path(path.stem)
         assert (path.exists(), here.exists()) == (True, False)
-        assert server.submit(SCENE.id, RECIPE) == path.stem  # it is not baked again
+        assert server.submit(SCENE.id, RECIPE) == path.stem  # not baked again
         assert server.get(path.stem).state == "ready"
         reader = open_cached(here, open_store)
         assert reader.path == here
@@ -103,8 +103,8 @@ def test_one_machine_imports_another_bakes_and_the_first_opens_it(
         assert not list(server.data_dir.rglob(".unfinished-*"))
 
 
-def half(tmp_path: Path, name: str, url: str) -> tuple[BakeStatus, int]:
-    """A machine that bakes some tasks and is stopped; how the bake is then, and how many tasks it began."""
+def bake_half(tmp_path: Path, name: str, url: str) -> tuple[BakeStatus, int]:
+    """A machine that bakes some tasks and is stopped: the bake's status and the number of its started tasks."""
     log = tmp_path / f"{name}.log"
     with BakeService(tmp_path / name, url, methods={"fake": FakeMethod(delay_s=0.2, log=str(log))}) as service:
         register_scene(service.data_dir, service.ledger, SCENE)
@@ -118,12 +118,10 @@ def is_as_expected(path: Path, tmp_path: Path) -> bool:
     return tree_hash(path) == tree_hash(bake_in_process(FakeMethod(), SCENE, RECIPE, tmp_path / "expected.zarr"))
 
 
-def test_a_bake_that_another_machine_had_begun_goes_on_elsewhere(
-    tmp_path: Path, storage: ObjectStorage, ledger_of_all: str
-) -> None:
-    half(tmp_path, "first", ledger_of_all)
+def test_partial_bake_resumes_on_another_machine(tmp_path: Path, storage: ObjectStorage, shared_ledger: str) -> None:
+    bake_half(tmp_path, "first", shared_ledger)
     log = tmp_path / "second.log"
-    with BakeService(tmp_path / "second", ledger_of_all, methods={"fake": FakeMethod(log=str(log))}) as second:
+    with BakeService(tmp_path / "second", shared_ledger, methods={"fake": FakeMethod(log=str(log))}) as second:
         done = len(second.ledger.finished_tasks(second.bakes()[0].id))
         assert done >= 2
         path = bake(second)
@@ -134,20 +132,18 @@ def test_a_bake_that_another_machine_had_begun_goes_on_elsewhere(
     assert not [item for page in obstore.list(storage._store, "parts/") for item in page]
 
 
-def test_where_the_storage_lacks_parts_the_bake_starts_again_and_says_so(
-    tmp_path: Path, storage: ObjectStorage, ledger_of_all: str
+def test_bake_restarts_with_a_message_if_parts_are_missing(
+    tmp_path: Path, storage: ObjectStorage, shared_ledger: str
 ) -> None:
-    status, _ = half(tmp_path, "first", ledger_of_all)
+    status, _ = bake_half(tmp_path, "first", shared_ledger)
     storage.delete(f"parts/{status.id}")
-    assert half(tmp_path, "second", ledger_of_all)[0].problem == TAKEN_OVER_MESSAGE
-    with machine(tmp_path, "first", ledger_of_all) as service:  # what it has of its own is not what the ledger counts
+    assert bake_half(tmp_path, "second", shared_ledger)[0].problem == TAKEN_OVER_MESSAGE
+    with machine(tmp_path, "first", shared_ledger) as service:  # its local parts do not match the ledger
         assert is_as_expected(bake(service), tmp_path)
 
 
-def test_what_is_stored_is_a_zarr_store_that_others_can_open(
-    tmp_path: Path, storage: ObjectStorage, ledger_of_all: str
-) -> None:
-    with machine(tmp_path, "one", ledger_of_all) as service:
+def test_stored_bake_is_a_readable_zarr_store(tmp_path: Path, storage: ObjectStorage, shared_ledger: str) -> None:
+    with machine(tmp_path, "one", shared_ledger) as service:
         register_scene(service.data_dir, service.ledger, SCENE)
         path = bake(service)
     object_store = ObjectStore(storage._store, read_only=True)
@@ -155,10 +151,10 @@ def test_what_is_stored_is_a_zarr_store_that_others_can_open(
     assert (opened[:] == open_store(path).read("views/0/visibility")).all()
 
 
-def test_bakes_that_are_not_open_make_room(
-    tmp_path: Path, storage: ObjectStorage, ledger_of_all: str, monkeypatch: pytest.MonkeyPatch
+def test_closed_bakes_are_evicted_from_the_local_cache(
+    tmp_path: Path, storage: ObjectStorage, shared_ledger: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with machine(tmp_path, "one", ledger_of_all) as service:
+    with machine(tmp_path, "one", shared_ledger) as service:
         register_scene(service.data_dir, service.ledger, SCENE)
         recipes = [replace(RECIPE, num_lights=lights) for lights in (24, 25, 26)]
         first = bake(service, recipes[0])
@@ -175,34 +171,34 @@ def test_bakes_that_are_not_open_make_room(
         assert [path.exists() for path in (first, second, third)] == [False, True, True]
 
 
-def test_what_was_baked_before_there_was_a_storage_is_stored_at_start(
-    tmp_path: Path, storage: ObjectStorage, ledger_of_all: str, monkeypatch: pytest.MonkeyPatch
+def test_earlier_local_bakes_are_uploaded_at_start(
+    tmp_path: Path, storage: ObjectStorage, shared_ledger: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     url = os.environ["RELUME_STORAGE"]
     monkeypatch.delenv("RELUME_STORAGE")
-    with machine(tmp_path, "one", ledger_of_all) as service:
+    with machine(tmp_path, "one", shared_ledger) as service:
         register_scene(service.data_dir, service.ledger, SCENE)
         path = bake(service)
     assert not storage.has(f"bakes/{path.name}")
     monkeypatch.setenv("RELUME_STORAGE", url)
-    with machine(tmp_path, "one", ledger_of_all) as service:
+    with machine(tmp_path, "one", shared_ledger) as service:
         (storing,) = [thread for thread in service._threads if thread.name == "relume-storage"]
         storing.join(60)
     assert storage.has(f"bakes/{path.name}")
     assert storage.has(f"scenes/{SCENE.id}")
 
 
-def test_what_is_half_stored_or_damaged_is_not_opened(
-    tmp_path: Path, storage: ObjectStorage, ledger_of_all: str
+def test_incomplete_or_damaged_uploads_are_not_opened(
+    tmp_path: Path, storage: ObjectStorage, shared_ledger: str
 ) -> None:
-    with machine(tmp_path, "one", ledger_of_all) as service:
+    with machine(tmp_path, "one", shared_ledger) as service:
         register_scene(service.data_dir, service.ledger, SCENE)
         path = bake(service)
     name, files = f"bakes/{path.name}", ["zarr.json", "missing"]
     shutil.copytree(path, tmp_path / "copy")
     storage.delete(name)
     with pytest.raises(StorageError):
-        storage.put(name, path, files)  # ends before it is whole
+        storage.put(name, path, files)  # ends before it is complete
     assert not storage.has(name)
     changed = tmp_path / "copy" / "zarr.json"
     storage.put(name, path, ["zarr.json"])
@@ -214,14 +210,14 @@ def test_what_is_half_stored_or_damaged_is_not_opened(
     assert not path.exists()
 
 
-def test_a_storage_that_does_not_answer_is_said_and_the_bake_can_go_on(
-    tmp_path: Path, ledger_of_all: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+def test_unavailable_storage_is_reported_and_the_bake_can_resume(
+    tmp_path: Path, shared_ledger: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
         monkeypatch.setenv(name, "key")
     monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
     monkeypatch.setattr("relume_worker.storage.remote.MAX_RETRIES", 0)
-    with machine(tmp_path, "one", ledger_of_all) as service:
+    with machine(tmp_path, "one", shared_ledger) as service:
         register_scene(service.data_dir, service.ledger, SCENE)
         monkeypatch.setenv("RELUME_STORAGE", "s3://away/team")
         with service.subscribe(service.submit(SCENE.id, RECIPE)) as changes:
@@ -240,10 +236,8 @@ def test_a_storage_that_does_not_answer_is_said_and_the_bake_can_go_on(
     assert "answers again" in caplog.text
 
 
-def test_a_scene_that_is_deleted_is_deleted_there_too(
-    tmp_path: Path, storage: ObjectStorage, ledger_of_all: str
-) -> None:
-    with machine(tmp_path, "one", ledger_of_all) as service:
+def test_deleted_scene_is_deleted_from_the_storage(tmp_path: Path, storage: ObjectStorage, shared_ledger: str) -> None:
+    with machine(tmp_path, "one", shared_ledger) as service:
         register_scene(service.data_dir, service.ledger, SCENE)
         path = bake(service)
         assert storage.has(f"scenes/{SCENE.id}")
@@ -253,10 +247,8 @@ def test_a_scene_that_is_deleted_is_deleted_there_too(
     assert not storage.fetch(f"bakes/{path.name}", tmp_path / "nothing")
 
 
-def test_a_backup_lacks_nothing_that_the_storage_has(
-    tmp_path: Path, storage: ObjectStorage, ledger_of_all: str
-) -> None:
-    with machine(tmp_path, "one", ledger_of_all) as service:
+def test_backup_includes_everything_in_the_storage(tmp_path: Path, storage: ObjectStorage, shared_ledger: str) -> None:
+    with machine(tmp_path, "one", shared_ledger) as service:
         register_scene(service.data_dir, service.ledger, SCENE)
         shutil.rmtree(bake(service))
         snapshot = create_backup(service.data_dir, service.ledger._engine, BackupRepository(tmp_path / "backups"))
@@ -264,7 +256,7 @@ def test_a_backup_lacks_nothing_that_the_storage_has(
 
 
 @pytest.mark.parametrize("path", ["../out", "/out", "a//b", ""])
-def test_lists_that_name_places_outside_are_refused(tmp_path: Path, path: str) -> None:
+def test_file_lists_with_outside_paths_are_rejected(tmp_path: Path, path: str) -> None:
     (tmp_path / "shared" / "whole" / "scenes").mkdir(parents=True)
     document = {"files": [{"path": path, "bytes": 1, "sha256": "0" * 64}]}
     (tmp_path / "shared" / "whole" / "scenes" / "one.json").write_text(json.dumps(document))
@@ -274,6 +266,6 @@ def test_lists_that_name_places_outside_are_refused(tmp_path: Path, path: str) -
 
 
 @pytest.mark.parametrize("url", ["ftp://host/folder", "bucket", "s3://"])
-def test_other_storages_are_refused_in_words(url: str) -> None:
+def test_unsupported_storages_are_rejected_with_a_reason(url: str) -> None:
     with pytest.raises(ParameterError, match="RELUME_STORAGE"):
         ObjectStorage(url)

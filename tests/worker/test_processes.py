@@ -1,4 +1,4 @@
-"""Real processes, really killed: the store that comes out is the same, bit for bit."""
+"""Real processes that are really killed: the resulting store is bit-identical."""
 
 import gc
 import hashlib
@@ -106,7 +106,7 @@ def test_worker_killed_during_a_task_is_replaced_and_a_task_that_kills_all_fails
     ],
     indirect=["ledger_url"],
 )
-def test_everything_killed_resumes_where_the_ledger_stands(
+def test_bake_resumes_from_the_ledger_after_all_processes_are_killed(
     tmp_path: Path, ledger_url: str, expected: str, num_rays: int
 ) -> None:
     log, data_dir = tmp_path / "log", tmp_path / "data"
@@ -137,7 +137,7 @@ def test_two_processes_bake_one_recipe_once(tmp_path: Path, ledger_url: str, exp
 
 
 @pytest.mark.slow
-def test_workers_that_have_nothing_to_do_end_and_others_start_for_the_next_bake(
+def test_idle_workers_exit_and_new_ones_start_for_the_next_bake(
     tmp_path: Path, expected: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("RELUME_IDLE_SECONDS", "1")
@@ -158,7 +158,7 @@ def test_workers_that_have_nothing_to_do_end_and_others_start_for_the_next_bake(
 
 @pytest.mark.slow
 def test_scheduler_is_disposable(tmp_path: Path, expected: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Scheduler and workers of a real cluster die in the middle; with new ones the bake goes on where it stopped."""
+    """Scheduler and workers of a real cluster are killed during a bake; the bake resumes on new ones."""
     monkeypatch.setenv("PYTHONPATH", str(PROGRAM.parent))
     log = tmp_path / "log"
     method = FakeMethod(num_rays=LARGE, delay_s=0.1, log=str(log))
@@ -182,7 +182,7 @@ def test_scheduler_is_disposable(tmp_path: Path, expected: str, monkeypatch: pyt
 
 
 @pytest.mark.slow
-def test_a_cluster_of_ones_own_speaks_tls_with_certificates_by_settings(
+def test_external_cluster_uses_tls_certificates_of_the_settings(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = Security.temporary()
@@ -196,7 +196,9 @@ def test_a_cluster_of_ones_own_speaks_tls_with_certificates_by_settings(
         monkeypatch.setenv(COMM + name.upper().replace(".", "__").replace("-", "_"), value)
     with Cluster("tls") as cluster:
         executors = Executors(cluster.address)
-        ours = {f"distributed.comm.{name}": value for name, value in settings.items()}  # this process runs already
+        ours = {
+            f"distributed.comm.{name}": value for name, value in settings.items()
+        }  # this process has already started
         with dask.config.set(ours), closing(executors):
             assert executors.cluster().submit(sum, [1, 2]).result(60) == 3
         with pytest.raises(PlanError, match=f"{COMM}TLS__CA_FILE"):
@@ -248,6 +250,6 @@ class Cluster:
 
     def __exit__(self, *_: object) -> None:
         self.kill()
-        with warnings.catch_warnings():  # Dask's client leaves its socket to a killed scheduler to the collector
+        with warnings.catch_warnings():  # Dask's client leaves its socket to a killed scheduler open
             warnings.simplefilter("ignore", ResourceWarning)
             gc.collect()

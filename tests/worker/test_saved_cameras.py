@@ -1,4 +1,4 @@
-"""Cameras that people placed: kept, listed, deleted with their scene, and part of recipes."""
+"""Saved cameras: stored, listed, deleted with their scene, and part of recipes."""
 
 import math
 from pathlib import Path
@@ -32,8 +32,8 @@ def scene() -> Scene:
     return still_life()
 
 
-def alike(scene: Scene, name: str, yfov: float | None = None) -> CustomCamera:
-    """Where the scene's first camera is, under another name."""
+def renamed_camera(scene: Scene, name: str, yfov: float | None = None) -> CustomCamera:
+    """The scene's first camera under another name."""
     first = scene.cameras[0]
     return make_custom_camera(name, first.to_world.ravel().tolist(), yfov or math.degrees(first.yfov))
 
@@ -50,12 +50,12 @@ def record(ledger: Ledger, scene: Scene) -> SceneRecord:
     return get_scene(ledger, scene.id)
 
 
-def test_cameras_are_kept_replaced_and_deleted_with_their_scene(tmp_path: Path, ledger: Ledger, scene: Scene) -> None:
-    wide, narrow = alike(scene, "Hero", 60), alike(scene, "Hero", 20)
+def test_cameras_are_saved_replaced_and_deleted_with_their_scene(tmp_path: Path, ledger: Ledger, scene: Scene) -> None:
+    wide, narrow = renamed_camera(scene, "Hero", 60), renamed_camera(scene, "Hero", 20)
     assert store_camera(ledger, scene.id, wide)
     assert not store_camera(ledger, scene.id, narrow)
-    store_camera(ledger, scene.id, alike(scene, "Behind"))
-    assert list_cameras(ledger, scene.id) == [alike(scene, "Behind"), narrow]
+    store_camera(ledger, scene.id, renamed_camera(scene, "Behind"))
+    assert list_cameras(ledger, scene.id) == [renamed_camera(scene, "Behind"), narrow]
     assert camera_names_by_scene(ledger) == {scene.id: ["Behind", "Hero"]}
     delete_camera(ledger, scene.id, "Behind")
     with pytest.raises(NotFoundError):
@@ -64,44 +64,44 @@ def test_cameras_are_kept_replaced_and_deleted_with_their_scene(tmp_path: Path, 
     assert camera_names_by_scene(ledger) == {}
 
 
-def test_names_of_the_scene_itself_and_too_many_are_refused(
+def test_names_of_scene_cameras_and_excess_cameras_are_rejected(
     ledger: Ledger, scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     own = scene.cameras[0].name
     with pytest.raises(ParameterError, match="camera of the scene's file"):
-        store_camera(ledger, scene.id, alike(scene, own))
+        store_camera(ledger, scene.id, renamed_camera(scene, own))
     with pytest.raises(ParameterError, match="camera of the scene's file"):
         delete_camera(ledger, scene.id, own)
     monkeypatch.setattr(cameras, "MAX_CAMERAS", 1)
-    store_camera(ledger, scene.id, alike(scene, "Hero"))
-    store_camera(ledger, scene.id, alike(scene, "Hero", 60))
+    store_camera(ledger, scene.id, renamed_camera(scene, "Hero"))
+    store_camera(ledger, scene.id, renamed_camera(scene, "Hero", 60))
     with pytest.raises(ParameterError, match="or delete one"):
-        store_camera(ledger, scene.id, alike(scene, "Behind"))
+        store_camera(ledger, scene.id, renamed_camera(scene, "Behind"))
     with pytest.raises(NotFoundError):
-        store_camera(ledger, "0" * 16, alike(scene, "Hero"))
+        store_camera(ledger, "0" * 16, renamed_camera(scene, "Hero"))
 
 
-def test_views_are_chosen_by_name_or_as_they_are(ledger: Ledger, scene: Scene, record: SceneRecord) -> None:
-    own, hero, behind = scene.cameras[0].name, alike(scene, "Hero"), alike(scene, "Behind")
+def test_views_are_chosen_by_name_or_inline(ledger: Ledger, scene: Scene, record: SceneRecord) -> None:
+    own, hero, behind = scene.cameras[0].name, renamed_camera(scene, "Hero"), renamed_camera(scene, "Behind")
     store_camera(ledger, scene.id, hero)
     assert resolve_views(ledger, record, []) == (record.views, ())
     assert resolve_views(ledger, record, ["Hero", own, behind, own]) == (("Hero", own, "Behind"), (hero, behind))
     with pytest.raises(ParameterError, match="Hero"):
         resolve_views(ledger, record, ["Nobody"])
     with pytest.raises(ParameterError, match="a different name for each camera"):
-        resolve_views(ledger, record, ["Hero", alike(scene, "Hero", 60)])
+        resolve_views(ledger, record, ["Hero", renamed_camera(scene, "Hero", 60)])
     with pytest.raises(ParameterError, match="camera of the scene's file"):
-        resolve_views(ledger, record, [alike(scene, own)])
+        resolve_views(ledger, record, [renamed_camera(scene, own)])
 
 
-def test_a_recipe_with_cameras_is_the_same_after_it_was_written_down(scene: Scene) -> None:
-    recipe = Recipe("direct", ("Hero",), (64, 48), 100, cameras=(alike(scene, "Hero", 31.7),))
+def test_recipe_with_cameras_survives_json(scene: Scene) -> None:
+    recipe = Recipe("direct", ("Hero",), (64, 48), 100, cameras=(renamed_camera(scene, "Hero", 31.7),))
     assert recipe_from_json(recipe_json(recipe)) == recipe
 
 
-def test_view_of_a_placed_camera_is_what_the_scenes_own_gives_there(scene: Scene, tmp_path: Path) -> None:
+def test_view_of_a_saved_camera_equals_that_of_the_scene_camera(scene: Scene, tmp_path: Path) -> None:
     own = Recipe("direct", (scene.cameras[0].name,), (32, 24), 50)
-    placed = Recipe("direct", ("Hero",), (32, 24), 50, cameras=(alike(scene, "Hero"),))
+    placed = Recipe("direct", ("Hero",), (32, 24), 50, cameras=(renamed_camera(scene, "Hero"),))
     stores = [
         open_store(bake_in_process(METHOD, scene, recipe, tmp_path / f"{recipe.views[0]}.zarr"))
         for recipe in (own, placed)
@@ -113,12 +113,12 @@ def test_view_of_a_placed_camera_is_what_the_scenes_own_gives_there(scene: Scene
     assert stores[1].attributes["views"][0]["name"] == "Hero"
 
 
-def test_view_of_a_camera_that_the_recipe_does_not_bring_is_refused(scene: Scene) -> None:
+def test_view_without_a_camera_in_the_recipe_is_rejected(scene: Scene) -> None:
     with pytest.raises(PlanError, match="Hero"):
         METHOD.plan(scene, Recipe("direct", ("Hero",), (32, 24), 50))
 
 
-def test_a_camera_of_a_scene_that_is_deleted_in_this_moment_is_none(
+def test_camera_of_a_concurrently_deleted_scene_is_not_saved(
     tmp_path: Path, ledger: Ledger, scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     count = cameras._count
@@ -130,4 +130,4 @@ def test_a_camera_of_a_scene_that_is_deleted_in_this_moment_is_none(
 
     monkeypatch.setattr(cameras, "_count", deleted_meanwhile)
     with pytest.raises(NotFoundError):
-        store_camera(ledger, scene.id, alike(scene, "Hero"))
+        store_camera(ledger, scene.id, renamed_camera(scene, "Hero"))

@@ -1,4 +1,4 @@
-"""Databases of every age become what the code works with, once, and newer ones are refused."""
+"""Databases of every version are upgraded once to the current schema; newer ones are rejected."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ TABLES = (LookRow, ShareRow, CommentRow, RoomRow, RenderRow, BtfRow, ComparisonR
 
 
 @pytest.fixture
-def old(tmp_path: Path) -> Path:
-    """A ledger that relume 0.1 made before there were revisions, with rows in every table."""
+def old_ledger(tmp_path: Path) -> Path:
+    """A ledger that relume 0.1 created before revisions, with rows in every table."""
     path = tmp_path / "old.db"
     with closing(sqlite3.connect(path)) as connection:
         connection.executescript(BEFORE)
@@ -52,7 +52,7 @@ def old(tmp_path: Path) -> Path:
 
 
 def differences(engine: Engine) -> object:
-    """What the code's tables have and a database lacks, or the other way round."""
+    """Differences between the tables in the code and in a database."""
     with engine.connect() as connection:
         return compare_metadata(MigrationContext.configure(connection), Base.metadata)
 
@@ -63,36 +63,38 @@ def revision(engine: Engine) -> str | None:
 
 
 def rows(engine: Engine) -> dict[str, list[Any]]:
-    """Everything that a database holds."""
+    """All rows of a database."""
     with engine.connect() as connection:
         tables = sorted(set(inspect(connection).get_table_names()) - {"alembic_version"})
         return {table: list(connection.execute(text(f"SELECT * FROM {table}")).all()) for table in tables}
 
 
 def pairs(now: dict[str, list[Any]], before: dict[str, list[Any]]) -> list[tuple[Any, Any]]:
-    """Rows as they are and as they were; columns that were added are the last, and tables that were are empty."""
+    """Rows after and before; added columns come last, and new tables are empty."""
     expected = {table: len(before.get(table, [])) for table in now}
     assert {table: len(rows) for table, rows in now.items()} == expected
     assert before.keys() <= now.keys()
-    return [(row, old) for table in before for row, old in zip(now[table], before[table], strict=True)]
+    return [(row, old_ledger) for table in before for row, old_ledger in zip(now[table], before[table], strict=True)]
 
 
-def test_revisions_make_the_tables_of_the_code(ledger_url: str) -> None:
+def test_revisions_produce_the_tables_of_the_code(ledger_url: str) -> None:
     with closing(Ledger(engine := open_database(ledger_url))):
         assert differences(engine) == []
         assert revision(engine) == latest_revision()
 
 
-def test_a_ledger_from_before_revisions_becomes_a_new_one_with_its_rows(old: Path) -> None:
-    before = connect(f"sqlite:///{old}")
+def test_ledger_from_before_revisions_is_upgraded_with_its_rows(old_ledger: Path) -> None:
+    before = connect(f"sqlite:///{old_ledger}")
     assert revision(before) is None
     old_rows = rows(before)
     before.dispose()
-    with closing(Ledger(engine := open_database(f"sqlite:///{old}"))) as ledger:
+    with closing(Ledger(engine := open_database(f"sqlite:///{old_ledger}"))) as ledger:
         assert (revision(engine), differences(engine)) == (latest_revision(), [])
         assert all(old_rows.values())
         now = rows(engine)
-        assert [row[: len(old)] for row, old in pairs(now, old_rows)] == [old for _, old in pairs(now, old_rows)]
+        assert [row[: len(old_ledger)] for row, old_ledger in pairs(now, old_rows)] == [
+            old_ledger for _, old_ledger in pairs(now, old_rows)
+        ]
         (scene,), (bake,) = list_scenes(ledger), ledger.bakes()
         assert (bake.scene, bake.state, len(ledger.finished_tasks(bake.id))) == (scene.id, "ready", 20)
         assert [camera.name for camera in list_cameras(ledger, scene.id)] == ["kept"]
@@ -104,20 +106,20 @@ def test_a_ledger_from_before_revisions_becomes_a_new_one_with_its_rows(old: Pat
         assert states == ["ready", "failed", "queued"]
 
 
-def test_older_ones_get_the_columns_and_tables_that_they_lack(old: Path) -> None:
-    with sqlite3.connect(old) as connection:
+def test_older_ledgers_get_missing_columns_and_tables(old_ledger: Path) -> None:
+    with sqlite3.connect(old_ledger) as connection:
         for column in ("phase", "phase_since", "crowding"):
             connection.execute(f"ALTER TABLE bakes DROP COLUMN {column}")
-        connection.execute("DROP TABLE shares")  # only the command line was used
+        connection.execute("DROP TABLE shares")  # the state if only the command line was used
     with ThreadPoolExecutor(4) as threads:  # a server and the command line may start at once
-        engines = list(threads.map(open_database, [f"sqlite:///{old}"] * 4))
+        engines = list(threads.map(open_database, [f"sqlite:///{old_ledger}"] * 4))
     assert differences(engines[0]) == []
     assert Ledger(engines[0]).bakes()[0].phase is None
     for engine in engines:
         engine.dispose()
 
 
-def test_many_processes_make_the_tables_once(ledger_url: str) -> None:
+def test_concurrent_processes_create_the_tables_once(ledger_url: str) -> None:
     with ThreadPoolExecutor(4) as threads:
         engines = list(threads.map(open_database, [ledger_url] * 4))
     assert {revision(engine) for engine in engines} == {latest_revision()}
@@ -125,7 +127,7 @@ def test_many_processes_make_the_tables_once(ledger_url: str) -> None:
         engine.dispose()
 
 
-def test_a_ledger_of_a_newer_relume_is_refused_and_stays_as_it_is(ledger_url: str) -> None:
+def test_ledger_of_a_newer_version_is_rejected_unchanged(ledger_url: str) -> None:
     engine = open_database(ledger_url)
     with engine.begin() as connection:
         connection.execute(text("UPDATE alembic_version SET version_num = '9999'"))
@@ -148,8 +150,8 @@ def upgrade() -> None:
 
 
 @pytest.fixture
-def another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[SimpleNamespace]:
-    """Write a revision after the newest, in a copy of their folder."""
+def new_revision(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[SimpleNamespace]:
+    """Write a revision after the newest one, in a copy of the revision folder."""
     folder = tmp_path / "revisions"
     (folder / "versions").mkdir(parents=True)
     for file in upgrading.REVISIONS.rglob("*.*"):
@@ -167,13 +169,11 @@ def another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[SimpleN
     upgrading._scripts.cache_clear()
 
 
-def test_what_adds_is_made_at_start_and_what_does_not_waits_for_a_word(
-    ledger_url: str, another: SimpleNamespace
-) -> None:
+def test_additive_revisions_run_at_start_and_others_on_request(ledger_url: str, new_revision: SimpleNamespace) -> None:
     open_database(ledger_url).dispose()
-    another.write('op.add_column("looks", sa.Column("note", sa.Text()))', True)
+    new_revision.write('op.add_column("looks", sa.Column("note", sa.Text()))', True)
     open_database(ledger_url).dispose()
-    another.write('op.drop_column("looks", "note")', False)
+    new_revision.write('op.drop_column("looks", "note")', False)
     with pytest.raises(LedgerVersionError, match="run: relume backup FOLDER, then: relume db upgrade"):
         open_database(ledger_url)
     engine = connect(ledger_url)
@@ -184,9 +184,9 @@ def test_what_adds_is_made_at_start_and_what_does_not_waits_for_a_word(
     open_database(ledger_url).dispose()
 
 
-def test_a_revision_that_fails_changes_nothing(ledger_url: str, another: SimpleNamespace) -> None:
+def test_failed_revision_changes_nothing(ledger_url: str, new_revision: SimpleNamespace) -> None:
     open_database(ledger_url).dispose()
-    another.write('op.add_column("looks", sa.Column("note", sa.Text())); raise ZeroDivisionError', True)
+    new_revision.write('op.add_column("looks", sa.Column("note", sa.Text())); raise ZeroDivisionError', True)
     with pytest.raises(ZeroDivisionError):
         open_database(ledger_url)
     engine = connect(ledger_url)
@@ -195,13 +195,15 @@ def test_a_revision_that_fails_changes_nothing(ledger_url: str, another: SimpleN
     engine.dispose()
 
 
-def test_a_draft_has_what_the_tables_of_the_code_have_and_the_ledger_lacks(old: Path, another: SimpleNamespace) -> None:
-    with closing(Ledger(engine := open_database(f"sqlite:///{old}"))):
+def test_drafted_revision_contains_the_missing_tables_and_columns(
+    old_ledger: Path, new_revision: SimpleNamespace
+) -> None:
+    with closing(Ledger(engine := open_database(f"sqlite:///{old_ledger}"))):
         with engine.begin() as connection:
             connection.execute(text("DROP TABLE shares"))
         with engine.begin() as connection:
             path = draft_revision(connection, Base.metadata, "links of looks")
-    assert path.parent == another.folder / "versions"
+    assert path.parent == new_revision.folder / "versions"
     assert path.name == f"{int(latest_revision()) + 1:04d}_links_of_looks.py"
     assert "op.create_table('shares'" in path.read_text()
 
@@ -217,7 +219,7 @@ def test_a_draft_has_what_the_tables_of_the_code_have_and_the_ledger_lacks(old: 
         "postgresql://me@host/name?sslmode=require&options=secret",
     ],
 )
-def test_other_databases_are_refused_in_words(url: str) -> None:
+def test_unsupported_databases_are_rejected_with_a_reason(url: str) -> None:
     with pytest.raises(ParameterError, match=r"postgresql://user:password@host/name|sslmode=prefer") as refusal:
         open_database(url)
     assert "secret" not in str(refusal.value)
@@ -225,7 +227,7 @@ def test_other_databases_are_refused_in_words(url: str) -> None:
 
 @pytest.mark.parametrize("ledger_url", ["postgresql"], indirect=True)
 @pytest.mark.parametrize("mode", ["require", "verify-full"])
-def test_a_server_without_tls_is_not_talked_to_where_it_is_demanded(ledger_url: str, mode: str) -> None:
+def test_server_without_tls_is_rejected_if_tls_is_required(ledger_url: str, mode: str) -> None:
     with pytest.raises(SQLAlchemyError, match="refuses SSL"):
         open_database(f"{ledger_url}?sslmode={mode}")
     open_database(f"{ledger_url}?sslmode=prefer").dispose()

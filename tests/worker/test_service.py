@@ -1,4 +1,4 @@
-"""Bakes through the service, in this process, with a quick method: progress, cancel, resume, refusal, damage."""
+"""Bakes through the service in this process with a fast method: progress, cancellation, resume, rejection, damage."""
 
 import hashlib
 import re
@@ -57,7 +57,7 @@ def tree_hash(folder: Path) -> str:
 
 @pytest.fixture(scope="module")
 def expected(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Hash of the store that an undisturbed bake gives."""
+    """Hash of the store of an undisturbed bake."""
     return tree_hash(bake_in_process(FakeMethod(), SCENE, RECIPE, tmp_path_factory.mktemp("expected") / "s.zarr"))
 
 
@@ -77,7 +77,7 @@ def test_bake_is_followed_to_the_end_and_published(tmp_path: Path, expected: str
         assert service.get(identity).state == "ready"
 
 
-def test_how_long_a_bake_takes_is_known_once_one_has_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_duration_is_estimated_after_the_first_bake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for module in ("ledger", "service"):
         monkeypatch.setattr(f"relume_worker.{module}.machine_load", lambda: 0.0)
     with open_service(tmp_path) as service:
@@ -89,7 +89,7 @@ def test_how_long_a_bake_takes_is_known_once_one_has_ended(tmp_path: Path, monke
         assert not list((tmp_path / "bakes" / "staging").iterdir())
 
 
-def test_cancelled_bake_resumes_without_repeating_finished_tasks(tmp_path: Path, expected: str) -> None:
+def test_canceled_bake_resumes_without_repeating_finished_tasks(tmp_path: Path, expected: str) -> None:
     log = tmp_path / "log"
     with open_service(tmp_path, delay_s=0.02, log=str(log)) as service:
         identity = service.submit(SCENE.id, RECIPE)
@@ -115,7 +115,7 @@ def stop_half_way(service: BakeService) -> str:
     return identity
 
 
-def test_what_a_stopped_bake_has_is_kept_for_a_week(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_partial_data_of_a_stopped_bake_is_kept_for_a_week(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_service(tmp_path, delay_s=0.02) as service:
         identity = stop_half_way(service)
     service = open_service(tmp_path)
@@ -130,19 +130,17 @@ def test_what_a_stopped_bake_has_is_kept_for_a_week(tmp_path: Path, monkeypatch:
     service.close()
 
 
-def test_a_stopped_bake_is_forgotten_with_what_it_has(tmp_path: Path) -> None:
+def test_stopped_bake_is_deleted_with_its_partial_data(tmp_path: Path) -> None:
     with open_service(tmp_path, delay_s=0.02) as service:
         identity = stop_half_way(service)
-    service = open_service(tmp_path)  # no task of it runs any more
+    service = open_service(tmp_path)  # none of its tasks is running
     service.delete(identity)
     assert service.bakes() == []
     assert not list((tmp_path / "bakes" / "staging").iterdir())
     service.close()
 
 
-def test_where_the_ledger_has_no_room_to_delete_stores_make_some(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_stores_are_deleted_if_the_ledger_has_no_disk_space(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_service(tmp_path) as service:
         identity = follow(service, service.submit(SCENE.id, RECIPE)).id
         store, cancel = service.store_path(identity), service.ledger.cancel
@@ -158,7 +156,7 @@ def test_where_the_ledger_has_no_room_to_delete_stores_make_some(
         assert not store.exists()
 
 
-def test_a_bake_leaves_the_rest_of_the_disk_to_the_ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bake_leaves_disk_space_for_the_ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_service(tmp_path) as service:
         with monkeypatch.context() as patch:
             patch.setattr("relume.store.room.RESERVE_BYTES", 1 << 60)
@@ -168,7 +166,7 @@ def test_a_bake_leaves_the_rest_of_the_disk_to_the_ledger(tmp_path: Path, monkey
         assert follow(service, service.submit(SCENE.id, RECIPE)).state == "ready"
 
 
-def test_closed_service_leaves_the_bake_for_the_next_start(tmp_path: Path, expected: str) -> None:
+def test_closed_service_leaves_the_bake_to_the_next_start(tmp_path: Path, expected: str) -> None:
     with open_service(tmp_path, delay_s=0.05) as service:
         identity = service.submit(SCENE.id, RECIPE)
         with service.subscribe(identity) as changes:
@@ -183,7 +181,7 @@ def test_closed_service_leaves_the_bake_for_the_next_start(tmp_path: Path, expec
     ("problem", "sentence"),
     [("disk full", "disk full; free .* MB, then bake again; finished tasks are saved"), ("memory", "out of memory")],
 )
-def test_failure_is_one_sentence_and_a_second_try_finishes(
+def test_failure_is_one_sentence_and_a_retry_finishes(
     tmp_path: Path, expected: str, problem: str, sentence: str
 ) -> None:
     with open_service(tmp_path, problem=problem) as service:
@@ -200,7 +198,7 @@ def test_failure_is_one_sentence_and_a_second_try_finishes(
         assert tree_hash(service.store_path(identity)) == expected
 
 
-def test_a_lane_that_cannot_go_on_says_so_once_while_the_other_is_well(
+def test_failing_lane_is_logged_once_while_the_other_continues(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr("relume_worker.service.POLL_S", 0.02)
@@ -223,7 +221,7 @@ def test_a_lane_that_cannot_go_on_says_so_once_while_the_other_is_well(
     assert "resolved" not in caplog.text
 
 
-def test_a_bake_that_the_ledger_cannot_be_told_of_says_why_it_waits(
+def test_bake_that_the_ledger_cannot_record_reports_why_it_waits(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("relume_worker.service.POLL_S", 0.02)
@@ -246,7 +244,9 @@ def test_a_bake_that_the_ledger_cannot_be_told_of_says_why_it_waits(
         assert service.bakes()[0].problem is None
 
 
-def test_defect_of_a_method_is_named_and_the_service_lives_on(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_defect_of_a_method_is_reported_and_the_service_continues(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     with open_service(tmp_path, problem="defect") as service:
         status = follow(service, service.submit(SCENE.id, RECIPE))
         assert status.state == "failed"
@@ -256,7 +256,7 @@ def test_defect_of_a_method_is_named_and_the_service_lives_on(tmp_path: Path, ca
         assert follow(service, service.submit(SCENE.id, smaller)).state == "ready"
 
 
-def test_plan_that_does_not_fit_is_refused_before_anything_is_computed(tmp_path: Path) -> None:
+def test_plan_over_the_budget_is_rejected_before_any_computation(tmp_path: Path) -> None:
     error_of_field: dict[str, type[BudgetError]] = {"peak_bytes": MemoryBudgetError, "store_bytes": DiskBudgetError}
     for cost, refusal in error_of_field.items():
         with open_service(tmp_path, **{cost: 1 << 60}) as service:
@@ -267,7 +267,7 @@ def test_plan_that_does_not_fit_is_refused_before_anything_is_computed(tmp_path:
             assert service.bakes() == []
 
 
-def test_what_one_process_takes_at_a_time_counts_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_memory_of_single_process_steps_counts_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("relume_worker.budget.available_bytes", lambda: 10 << 30)
     monkeypatch.setattr("relume_worker.service.is_tiny", lambda plan: False)
     alone = 5 << 30
@@ -277,9 +277,7 @@ def test_what_one_process_takes_at_a_time_counts_once(tmp_path: Path, monkeypatc
         service.plan(SCENE.id, RECIPE)
 
 
-def test_processes_that_a_bake_has_to_start_are_part_of_its_time(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_process_start_is_part_of_the_estimate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_service(tmp_path) as service:
         follow(service, service.submit(SCENE.id, RECIPE))
         plan = service.plan(SCENE.id, RECIPE)
@@ -292,7 +290,7 @@ def test_processes_that_a_bake_has_to_start_are_part_of_its_time(
     assert cold_s == pytest.approx(warm_s + START_S)
 
 
-def test_unknown_names_are_refused(tmp_path: Path) -> None:
+def test_unknown_names_are_rejected(tmp_path: Path) -> None:
     with open_service(tmp_path) as service:
         with pytest.raises(ParameterError, match="fake"):
             service.plan(SCENE.id, type(RECIPE)("magic", ("front",), (8, 8), 3))
@@ -314,9 +312,7 @@ def test_damaged_store_is_baked_again(tmp_path: Path, expected: str) -> None:
         assert tree_hash(service.store_path(identity)) == expected
 
 
-def test_shard_damaged_before_publishing_fails_the_bake_and_the_next_starts_afresh(
-    tmp_path: Path, expected: str
-) -> None:
+def test_shard_damaged_before_publication_fails_the_bake_and_the_next_restarts(tmp_path: Path, expected: str) -> None:
     with open_service(tmp_path, problem="disk full") as service:
         identity = service.submit(SCENE.id, RECIPE)
         follow(service, identity)
@@ -332,7 +328,7 @@ def test_shard_damaged_before_publishing_fails_the_bake_and_the_next_starts_afre
         assert tree_hash(service.store_path(identity)) == expected
 
 
-def test_lost_staging_store_starts_the_bake_afresh(tmp_path: Path, expected: str) -> None:
+def test_lost_staging_store_restarts_the_bake(tmp_path: Path, expected: str) -> None:
     with open_service(tmp_path, problem="disk full") as service:
         identity = service.submit(SCENE.id, RECIPE)
         follow(service, identity)
@@ -368,17 +364,17 @@ def test_scene_deleted_during_its_bake_ends_it(tmp_path: Path) -> None:
         assert follow(service, service.submit(SCENE.id, RECIPE)).state == "ready"
 
 
-def test_a_bake_that_another_process_has_taken_over_is_left_to_it(
+def test_bake_taken_over_by_another_process_is_left_to_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     has_begun, may_go_on = threading.Event(), threading.Event()
 
-    def stand_still(job: Job, task: Task) -> TaskCost:
+    def stall(job: Job, task: Task) -> TaskCost:
         has_begun.set()
         assert may_go_on.wait(30)
         return run_task(job, task)
 
-    monkeypatch.setattr("relume_worker.runner.run_task", stand_still)
+    monkeypatch.setattr("relume_worker.runner.run_task", stall)
     with open_service(tmp_path) as service:
         identity = service.submit(SCENE.id, RECIPE)
         assert has_begun.wait(30)
@@ -397,7 +393,7 @@ def test_a_bake_that_another_process_has_taken_over_is_left_to_it(
         assert not service.store_path(identity).exists()
 
 
-def test_a_bake_that_is_deleted_as_a_task_of_it_ends_is_no_failure(
+def test_bake_deleted_at_the_end_of_a_task_is_not_a_failure(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     finish, deleted = Ledger.finish_task, threading.Event()
@@ -414,7 +410,7 @@ def test_a_bake_that_is_deleted_as_a_task_of_it_ends_is_no_failure(
     assert [record.message for record in caplog.records if "failed" in record.message] == []
 
 
-def test_a_bake_that_is_deleted_in_the_middle_of_a_task_is_no_defect(
+def test_bake_deleted_during_a_task_is_not_a_defect(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     met = threading.Event()
@@ -422,7 +418,7 @@ def test_a_bake_that_is_deleted_in_the_middle_of_a_task_is_no_defect(
     def run_deleted(job: Job, task: Task) -> TaskCost:
         delete_bakes(service.data_dir, service.ledger, [job.bake_id])
         met.set()
-        raise KeyError("lights/irradiance")  # as zarr says of an array whose folder is gone
+        raise KeyError("lights/irradiance")  # zarr's error for an array without its folder
 
     monkeypatch.setattr("relume_worker.runner.run_task", run_deleted)
     with open_service(tmp_path) as service:
@@ -431,7 +427,7 @@ def test_a_bake_that_is_deleted_in_the_middle_of_a_task_is_no_defect(
     assert [record.message for record in caplog.records if "failed" in record.message] == []
 
 
-def test_what_is_left_of_a_deleted_bake_is_of_no_other_version(
+def test_leftovers_of_a_deleted_bake_are_not_attributed_to_another_version(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     with open_service(tmp_path) as service:
@@ -440,19 +436,17 @@ def test_what_is_left_of_a_deleted_bake_is_of_no_other_version(
     assert "relume was updated" not in caplog.text
 
 
-def test_bakes_that_are_asked_for_while_their_scene_is_deleted_go_with_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_bakes_requested_during_scene_deletion_are_deleted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_service(tmp_path, delay_s=0.05) as service:
         recipes = [replace(RECIPE, num_lights=RECIPE.num_lights + k) for k in range(3)]
         struck = scenes.delete_bakes
 
-        def asked_again(data_dir: Path, ledger: Ledger, ids: Sequence[str]) -> None:
+        def request_again(data_dir: Path, ledger: Ledger, ids: Sequence[str]) -> None:
             struck(data_dir, ledger, ids)
             if recipes:
                 service.submit(SCENE.id, recipes.pop())
 
-        monkeypatch.setattr(scenes, "delete_bakes", asked_again)
+        monkeypatch.setattr(scenes, "delete_bakes", request_again)
         delete_scene(service.data_dir, service.ledger, SCENE.id)
         assert recipes == []
         assert service.bakes() == []
@@ -460,9 +454,7 @@ def test_bakes_that_are_asked_for_while_their_scene_is_deleted_go_with_it(
             service.submit(SCENE.id, RECIPE)
 
 
-def test_stores_that_nobody_will_finish_are_removed_at_the_start(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_abandoned_stores_are_removed_at_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     stray = staging_path(tmp_path, "0" * 16)
     stray.mkdir(parents=True)
     service = open_service(tmp_path)
@@ -483,7 +475,7 @@ def test_stores_that_nobody_will_finish_are_removed_at_the_start(
     assert begun[0].exists()
 
 
-def test_published_store_of_a_killed_service_is_taken_as_it_is(tmp_path: Path) -> None:
+def test_published_store_of_a_killed_service_is_used_unchanged(tmp_path: Path) -> None:
     service = open_service(tmp_path)
     identity = service.submit(SCENE.id, RECIPE)
     service.ledger.claim(identity, "elsewhere/1/nonce/0")
