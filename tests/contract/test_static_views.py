@@ -289,5 +289,5 @@ def test_indirect_light_is_added_to_a_static_view_begun_without_it(free_bake, pi
 
 def test_moving_camera_has_no_highlight_brush(picture):
     picture.advance(None)
-    with pytest.raises(ResultUnavailableError, match="after the camera stops"):
+    with pytest.raises(ResultUnavailableError, match="when the camera stops"):
         picture.highlight_pixels("/materials/Floor/terms/0/curves/theta_i", 0.0, 9.0)
