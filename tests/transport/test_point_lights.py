@@ -44,7 +44,7 @@ def ball(size=16):
     normal = np.stack([x, -y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))], axis=-1)[inside]
     tangent = ref.unit(np.cross([0.0, 1.0, 0.0], normal))
     wo = np.tile([0.0, 0.0, 1.0], (len(normal), 1))
-    return ref.make_receivers_at_origin(wo, normal, tangent, np.zeros((0, 0), np.uint8))
+    return ref.make_receivers_at_origin(wo, normal, tangent, np.zeros((len(wo), 0), np.uint8))
 
 
 @pytest.fixture(scope="module")
