@@ -98,7 +98,7 @@ class IncrementalLight:
             return []
         images, material, live = target
         num_bytes = row_bytes(material.num_samples, num_channels(live.term, live.target_bands))
-        label, key = f"{target.name}, reflected light", self._key(target)
+        label, key = f"{target.name}, indirect light", self._key(target)
         return [PrecomputeRows(label, key, images, material.index, live.term, live.target_bands, light, num_bytes)]
 
     def evaluate(self, target: TermTarget, light: Illumination) -> None:
