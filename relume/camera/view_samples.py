@@ -1,4 +1,4 @@
-"""View samples: the surface points of a view whose radiance makes its pixels.
+"""View sampling: choose the surface points of a view whose weighted radiances sum to its pixels.
 
 Pixels have one sample, or more where material, normal or depth change (docs/direct-light.md#algorithm): eight positions
 of such a pixel are traced, and rays that hit the same surface with similar normals are merged into the most central

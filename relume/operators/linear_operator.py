@@ -35,7 +35,7 @@ F32 = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class LinearOperator(Operator):
-    """The linear operator from one curve to the image of one term.
+    """Wavelet linear operator from one curve to the image of one term.
 
     Attributes:
         transport: wavelet coefficients, samples padded with zeros to whole tiles.

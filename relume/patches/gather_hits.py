@@ -1,4 +1,4 @@
-"""Gather hits: the patch that each gather ray of a point hits. Points belong to pixels, probes or patches."""
+"""Final gathering, hits: the patch that each gather ray of a pixel, probe or patch point hits."""
 
 from __future__ import annotations
 

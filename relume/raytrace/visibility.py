@@ -1,4 +1,4 @@
-"""Visibility of light triangles from points: one bit per pair, traced in packets of 16 neighboring points per light."""
+"""Visibility tracing from points to light triangles: one bit per pair, packets of 16 neighboring points per light."""
 
 from __future__ import annotations
 

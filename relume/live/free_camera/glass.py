@@ -64,7 +64,7 @@ def find_glass_layers(
 
 
 def composite_glass(glass: GlassLayers, values: Shaped[F32, " rows *channels"]) -> Shaped[F32, " rays *channels"]:
-    """Add the radiance of glass to the light behind it.
+    """Composite glass over the light behind it: attenuate that light and add the reflection of the glass.
 
     Args:
         glass: in front of some rays. values: of the rays, then of the glass; overwritten.

@@ -1,10 +1,9 @@
 """Interpolation weights of lattice nodes.
 
-A mesh may be much finer than the probe spacing: its corners interpolate a few nearby probes by Shepard's weights
-((R − d) / (R d))², where R is the distance of the first probe that is left out, minimally corrected so that light
-linear
-in the tangent plane is reproduced. A corner that is a probe itself takes its own value. Nodes inside a face whose
-probes are farther apart than its nodes are interpolated along edges.
+A mesh may be much finer than the probe spacing. Its corners interpolate a few nearby probes with Shepard's weights
+((R − d) / (R d))², where R is the distance to the nearest excluded probe. The weights are then corrected as little as
+possible to reproduce light that varies linearly in the tangent plane. A corner that is a probe takes its own value.
+Nodes inside a face whose probes are farther apart than its nodes are interpolated along edges.
 """
 
 from __future__ import annotations
