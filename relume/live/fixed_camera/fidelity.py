@@ -11,11 +11,10 @@ class Fidelity(IntEnum):
     """Exactness of an image with respect to its curves and its light, worst first.
 
     NOTHING: not computed yet. PREVIEW: interpolated between few samples. INCREMENTAL: an exact image plus an
-    approximate
-    update of changed light. COARSE: an exact image plus the update of a changed curve, computed from some of its
-    samples
-    or from merged lights. NEARLY_EXACT: a sum along the few nodes of a parameter, or of quantized columns. EXACT: the
-    complete sum.
+    approximate update of changed light. COARSE: an exact image plus the update of a changed curve, computed from some
+    of its samples or from merged lights. NEARLY_EXACT: a sum along the few nodes of a parameter, or of quantized
+    columns.
+    EXACT: the complete sum.
     """
 
     NOTHING = 0

@@ -37,8 +37,7 @@ class Illumination(NamedTuple):
         reflectances: of all materials, for indirect illumination; empty if that is not shown.
         paths: the light paths that are shown; indirect ones only if they were baked.
         local: the lights with a gain above zero. environment_gain: per channel; 1 if there are no local lights, since
-            the
-            gain then multiplies the finished image (`picture_gain`).
+            the gain then multiplies the finished image (`picture_gain`).
     """
 
     environment: EnvironmentKey
@@ -215,8 +214,7 @@ def illumination_from_look(
     Args:
         material_names: in the scene's order. has_bounces: indirect light was baked.
         solo: names of the only sources that are shown, even if the look disables them; all others get gain zero. None,
-            or
-            names of which the look has none (as after one was removed): all enabled sources.
+            or names of which the look has none (as after one was removed): all enabled sources.
     """
     paths = look.transport.paths
     if not has_bounces:

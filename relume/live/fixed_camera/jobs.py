@@ -64,8 +64,7 @@ class Job(Protocol):
 
         Raises:
             ResultUnavailableError: the displayed image can stay. CancelledError: `is_canceled`, polled regularly,
-                returned
-                true.
+                returned true.
         """
         ...
 
@@ -167,8 +166,7 @@ class PrecomputeOperator:
         """See `Job`; used only if the fixed curves of the operator are still those of the target.
 
         If the image shows other curves, or the operator is more exact, the image is summed anew. An operator that is
-        not exact
-        continues from the current image, if that differs in nothing else.
+        not exact continues from the current image, if that differs in nothing else.
         """
         images, material, live = self.target
         is_merged_light = self.form.is_merged_light

@@ -103,8 +103,7 @@ class LiveTerm:
 
         Args:
             is_solo: it is of some sources alone. The image of all sources is stored until the solo ends; mixing it
-                again
-                would need the image of every other source.
+                again would need the image of every other source.
         """
         self.light = light
         current = self.ready.reset_for_new_light()
@@ -166,8 +165,7 @@ class LiveTerm:
         """Return whether a preview shows the target, so that shading may wait for the end of the drag.
 
         After a change of light each step of a drag brings a new preview. The first preview of a newly opened picture is
-        never
-        repeated, and does not show curves that changed since.
+        never repeated, and does not show curves that changed since.
         """
         ready = self.ready
         is_preview = ready.fidelity > Fidelity.NOTHING and not ready.is_converged

@@ -339,8 +339,7 @@ class StrategyScheduler:
         priority.
 
         The direct image is subtracted when the light moves; the complete image serves changes of its gain. None if the
-        light
-        has moved already, or if the memory budget is used up.
+        light has moved already, or if the memory budget is used up.
         """
         images = self._images
         dragged = control.dragged_light(look)

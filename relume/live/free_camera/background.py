@@ -35,8 +35,7 @@ class ShadowCatcher(NamedTuple):
     Attributes:
         is_shadow_catcher: per material.
         unoccluded: outgoing radiance of a white surface at each lattice node of a catcher, in unoccluded light; empty
-            if
-            there is no catcher.
+            if there is no catcher.
     """
 
     is_shadow_catcher: Shaped[NDArray[np.bool_], " materials"]

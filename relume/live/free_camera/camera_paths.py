@@ -24,8 +24,8 @@ def pivot_of(transfer: FreeCameraTransfer, camera: Camera) -> Shaped[F64, " 3"]:
 
     Its depth is that of the center of all geometry with the material at the image center, which is close to an object's
     axis rather than its front; a scene's table or backdrop is often far larger than the object. If the image center
-    shows
-    nothing, it is the depth of the scene's center; if that center is behind the camera, the pivot is the center itself.
+    shows nothing, it is the depth of the scene's center; if that center is behind the camera, the pivot is the center
+    itself.
 
     Args:
         transfer: of a bake. camera: any.

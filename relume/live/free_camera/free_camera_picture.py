@@ -59,8 +59,7 @@ class FreeCameraPicture:
 
     Attributes:
         renders_pixels: its pixels are needed at every step; otherwise a browser renders from `array_blocks`, and pixels
-            are
-            rendered on request.
+            are rendered on request.
     """
 
     def __init__(self, transfer: FreeCameraTransfer, view_name: str, *, is_watched: bool = False) -> None:

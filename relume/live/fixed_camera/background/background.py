@@ -104,8 +104,7 @@ class Background:
 
         Args:
             for_display: the image will be composited with display values (sRGB), where a shadow that transmits half of
-                the
-                light keeps three quarters of the value; otherwise with linear values.
+                the light keeps three quarters of the value; otherwise with linear values.
         """
         if for_display not in self._coverage:
             catcher_opacity = self._display_shadow_opacity if for_display else self._shadow_opacity

@@ -122,8 +122,7 @@ class IncrementalLight:
 
     def _outgoing_change(self, before: Illumination, after: Illumination) -> tuple[F32, MirrorLightsDelta | None]:
         """Return the Haar coefficients of the change of patch radiance, (padded patches, 3) float32, and the change of
-        mirror
-        lights; equal for all terms.
+        mirror lights; equal for all terms.
         """
         reflected = self._reflected
         assert reflected is not None

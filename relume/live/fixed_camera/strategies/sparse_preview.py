@@ -4,8 +4,7 @@ If the environment is rotated or replaced, or reflectances for indirect light ch
 invalid at once, and shading all samples takes seconds. The same holds for a newly opened view, and for a term whose
 fixed parameter changes. A preview costs a few thousand samples at any image size, needs no operator, and shows
 where the light moves; colors and textures multiply it at full resolution. It is never labeled exact: when the drag
-ends,
-all samples are shaded. In large images finer previews come first, each with eight times as many samples.
+ends, all samples are shaded. In large images finer previews come first, each with eight times as many samples.
 """
 
 from __future__ import annotations

@@ -32,8 +32,7 @@ MAX_TEXELS = 1 << 24  # of textures, all levels; the finest levels are omitted f
 
 def constants(transfer: FreeCameraTransfer) -> dict[str, Any]:
     """Return the constants of shaders: the recurrence of the Zernike basis, its gradients for mapped normals, and sizes
-    of
-    tables and light lists.
+    of tables and light lists.
 
     `first_probes`: index of the first probe of each material, and the total at the end. `has_alpha_test`: surfaces have
     alpha masks, which shaders do not support.
@@ -101,8 +100,7 @@ class NodeArrays(NamedTuple):
     """Slots of lattice nodes in shader arrays.
 
     The nodes of a grid have consecutive slots, so that no lookup is needed. Faces with one row, frequent in fine
-    meshes,
-    share the slots of their corners.
+    meshes, share the slots of their corners.
 
     Attributes:
         sides: of each side of a face; the last entry is the number of its rows. One row: the slots of its corners.

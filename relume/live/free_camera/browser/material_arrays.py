@@ -167,8 +167,7 @@ def _highlight_blocks(transfer: FreeCameraTransfer, state: FrameRequestState) ->
 
 def _lobes(lobes: Lobes) -> F32:
     """Per row of each lobe: albedos by groups, with `max_ratio`, σ_2, √(1 − R) as fourth components; then both cosines,
-    s_1
-    and σ_1. (lobes · rows · (groups + 1), 4)
+    s_1 and σ_1. (lobes · rows · (groups + 1), 4)
     """
     num, rows = lobes.first.shape
     out = np.zeros((num, rows, NUM_GROUPS + 1, 4), np.float32)
@@ -184,8 +183,7 @@ def _lobes(lobes: Lobes) -> F32:
 
 def _lobe_light_arrays(lobe_lights: LobeLightLists) -> dict[str, Texels]:
     """Lights in lobes, two texels each; lists with four lights per texel, −1 after the last; the first list of each
-    width;
-    lights and weights of each bright light.
+    width; lights and weights of each bright light.
     """
     lights = np.zeros((len(lobe_lights.lights), 8), np.float32)
     lights[:, :5] = lobe_lights.lights
@@ -206,8 +204,7 @@ def _material_rows(
     """Rows of each material; −1 for none. (materials · (2 groups + 2), 4) int32
 
     Per group: its isotropic and anisotropic table, 1 if it reflects, its texture. Then its lobe, its normal map, 1 for
-    a
-    shadow catcher, −1. Then the bits of its emission, and its emission texture. Then per group both tables of the
+    a shadow catcher, −1. Then the bits of its emission, and its emission texture. Then per group both tables of the
     environment in highlights, and both of other light.
     """
     tables, lobes, is_reflective = materials.tables, materials.lobes, materials.is_reflective
@@ -229,8 +226,7 @@ def needed_function_counts(
     materials: MaterialState, has_map: Shaped[NDArray[np.bool_], " materials"]
 ) -> tuple[Shaped[NDArray[np.int64], " materials"], Shaped[NDArray[np.int64], " materials"]]:
     """Return the number of functions of incident coefficients per material: at least up to the degree of its tables,
-    all with
-    a normal map.
+    all with a normal map.
 
     Args:
         materials: of the look. has_map: materials with a normal map.
@@ -272,8 +268,7 @@ def _degrees(tables: F32, function_degrees: NDArray[np.int64]) -> NDArray[np.int
 
 def _vector_arrays(name: str, vectors: F32, num: int) -> dict[str, Texels]:
     """Pack coefficients of probes in half precision, channel by channel, each probe in whole texels; and their scale
-    and
-    number of functions.
+    and number of functions.
     """
     largest = float(max(vectors.max(initial=0), -vectors.min(initial=0), 1e-30))
     scale = 2.0 ** np.ceil(np.log2(largest / _MAX_SCALED))

@@ -25,8 +25,7 @@ class PrefilteredEnvironment(NamedTuple):
     Attributes:
         environment: its levels; blurred ones exclude bright lights.
         bright_lights: small bright regions: direction, world space, ∫ L dω, and 1 − |Σ ω L / Σ L|, the variance of
-            their
-            own width; at most `MAX_BRIGHT_LIGHTS`.
+            their own width; at most `MAX_BRIGHT_LIGHTS`.
         rotation: of the levels, from `rotation_of`. gain: per channel.
     """
 
@@ -109,8 +108,7 @@ def add_environment_in_lobe(environment, visibility, direction, sigma, gain, out
 
     Args:
         environment: a `PrefilteredEnvironment`. visibility: of the environment without bright lights, and of each
-            bright
-            light, a tuple.
+            bright light, a tuple.
         direction: of the lobe, a tuple. sigma: of the blur, radians. gain: a factor.
         out: added to, radiance. (3,)
     """

@@ -1,8 +1,8 @@
 """Adaptive spacing of surface probes: finer near cameras, at shadow borders and where surfaces curve.
 
 Radiance between probes is interpolated; the error is proportional to the difference between neighbors over their
-spacing
-s. If g is the gradient, Σ A g² s² over areas A is least for s ∝ 1 / √g. But g is estimated from probes that may be
+spacing s. If g is the gradient, Σ A g² s² over areas A is least for s ∝ 1 / √g. But g is estimated from probes that may
+be
 farther apart than a shadow border is wide, and is then too small: a slightly larger power gives less error
 (docs/free-camera.md#surface-probes).
 """
@@ -182,8 +182,7 @@ def _light_gradient(
     """Mean difference of incident light between each probe and its neighbors, per meter. (n,)
 
     A direction that one of a pair does not see counts with the smaller cosine. One that both see counts with the
-    squared
-    difference of the cosines, since linear interpolation covers most of that.
+    squared difference of the cosines, since linear interpolation covers most of that.
     """
     directions, weight = _choose_directions(geometry, probes, lights)
     is_visible = _visibility(geometry, probes, directions)

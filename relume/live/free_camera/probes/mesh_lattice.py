@@ -146,8 +146,7 @@ def paired_faces_of(geometry: SceneBuffers, edges: Shaped[F64, "faces 3"]) -> Sh
     """Return the other half of the quad strip of each narrow face; the face itself for all others.
 
     Both halves of a long narrow strip need equal grids: if only one half had nodes in a shadow, neighboring strips
-    would show
-    a net.
+    would show a net.
 
     Args:
         edges: lengths, each from a face's corner to the next.

@@ -97,8 +97,7 @@ class Textures(NamedTuple):
 
     Attributes:
         levels: first texel, height and width of each level, finest first. first: first level of each texture; one more
-            at
-            the end. wraps: of u and v: repeat, mirror, clamp.
+            at the end. wraps: of u and v: repeat, mirror, clamp.
         material_textures: texture of each material in each of `TEXTURES`, its normal map, its emission image; −1 for
             none.
     """
@@ -117,8 +116,8 @@ class StoredScene:
     Attributes:
         lattice_nodes: interpolated from probes. probes: where light is stored. material: of each probe.
         uvs: texture coordinates of triangle corners. tangents: of the corners, with the sign of the bitangent; empty if
-            no
-            material has a normal map. face_material: of each triangle. uv_faces: corners of the triangles among `uvs`.
+            no material has a normal map. face_material: of each triangle. uv_faces: corners of the triangles among
+            `uvs`.
         face_normal: unit, on the side from which the corners are counterclockwise. uv_scale: texture units per meter.
     """
 

@@ -137,8 +137,7 @@ def _fetch_texels(levels, direction_grid, weights, columns, num_rays, ray_buffer
 
     Args:
         ray_buffers: scratch of one ray. batch_buffers: of all rays: 8 texels a ray, their weights, 4 view directions a
-            ray,
-            their weights; written. counts: texels of each ray, written.
+            ray, their weights; written. counts: texels of each ray, written.
     """
     texel, texel_weight, view, view_weight = ray_buffers
     texels, texel_weights, views, view_weights = batch_buffers

@@ -66,8 +66,7 @@ def face_placements(positions: Shaped[F32, "corners 3"], stored_scene: StoredSce
     Returns:
         Texture x axis along the triangle, unit; handedness of its axes, 1 if y is to the left of x about the normal of
         counterclockwise corners, else −1, 0 without texture coordinates; coordinates of the first corner; from there to
-        the
-        second and to the third; face normal; texture units per meter; see `relume.raytrace.surface_interaction`.
+        the second and to the third; face normal; texture units per meter; see `relume.raytrace.surface_interaction`.
     """
     p, uv = positions[stored_scene.faces], stored_scene.uvs[stored_scene.faces]
     e1, e2, to1, to2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
