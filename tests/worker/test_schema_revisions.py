@@ -119,6 +119,19 @@ def test_older_ledgers_get_missing_columns_and_tables(old_ledger: Path) -> None:
         engine.dispose()
 
 
+def test_values_get_their_new_names(old_ledger: Path) -> None:
+    with closing(Ledger(engine := open_database(f"sqlite:///{old_ledger}"))) as ledger:
+        (bake,) = ledger.bakes()
+        with engine.begin() as connection:
+            connection.execute(text("UPDATE bakes SET state = 'cancelled'"))
+            connection.execute(text("INSERT INTO owned VALUES ('btf-work', 'a', 'Ann', 7), ('btf', 'b', 'Ann', 8)"))
+            connection.execute(text("UPDATE alembic_version SET version_num = '0009'"))
+        upgrade(engine, is_requested=False)
+        assert ledger.bake(bake.id).state == "canceled"
+        with ledger.sessions() as session:
+            assert set(session.scalars(select(OwnedRow.kind))) == {"btf-job", "btf"}
+
+
 def test_concurrent_processes_create_the_tables_once(ledger_url: str) -> None:
     with ThreadPoolExecutor(4) as threads:
         engines = list(threads.map(open_database, [ledger_url] * 4))
