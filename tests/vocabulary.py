@@ -27,7 +27,7 @@ RETIRED_PHRASES = re.compile(
     r"\b("
     r"(?:an|the|moving|each|fixed|free) eyes?|eyes|lamps?|the sky|skies|glimpses?|truths?|finder|leant|suns|caretaker"
     r"|shelf|shelves|oracles?|rungs?|ladder|dormant|untold|parted|panes|rims|moving (?:view|picture|image)s?"
-    r"|straight light|at rest|in hand|at hand|passed on|sent on|thrown by|is told|are told"
+    r"|straight light|light between surfaces|at rest|in hand|at hand|passed on|sent on|thrown by|is told|are told"
     r")\b",
     re.IGNORECASE,
 )

@@ -1,4 +1,4 @@
-"""Reflectance of materials in the hemispherical basis, for light between surfaces.
+"""Reflectance of materials in the hemispherical basis, for indirect light.
 
     L_j = Σ_k F_jk t_k,   F_jk = ∫∫ f(ωi, ωo) h_j(ωo) h_k(ωi) cos θi cos θo dωi dωo
 

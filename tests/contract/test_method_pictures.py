@@ -234,7 +234,7 @@ def test_indirect_light_of_highlights_is_close_to_the_reference(scene, transfer,
     """Highlights reflect uniformly, so one seventh may go elsewhere; without them a third would be missing."""
     skip_without_reference(transfer)
     if not has_bounces(transfer):
-        pytest.skip(f"{transfer.method} has no light between surfaces")
+        pytest.skip(f"{transfer.method} has no indirect light")
     lights = edit_light("Panel", enabled=False), off, edit_transport(show="first_bounce")
     look = make_look(transfer, add_lights(*lights))
     (expected, deviation), (sent_by_matt, _) = (

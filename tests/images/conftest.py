@@ -30,5 +30,5 @@ def image_file(tmp_path_factory):
 @pytest.fixture(scope="session")
 def named(image_file, tmp_path_factory):
     """The name of the image in looks."""
-    with IMAGES.with_search_folder(tmp_path_factory.mktemp("shelf") / "images") as library_folder:
+    with IMAGES.with_search_folder(tmp_path_factory.mktemp("library") / "images") as library_folder:
         yield store(library_folder, image_file, "Stripes").texture

@@ -70,15 +70,15 @@ def png(width, height):
 def test_invalid_and_oversized_images_leave_no_files(content, message, tmp_path):
     (tmp_path / "x.png").write_bytes(content)
     with pytest.raises(SceneError, match=message):
-        store(tmp_path / "shelf", tmp_path / "x.png", "x")
-    assert not (tmp_path / "shelf").exists()
+        store(tmp_path / "library", tmp_path / "x.png", "x")
+    assert not (tmp_path / "library").exists()
 
 
 def test_a_large_image_is_downsampled_with_a_warning(tmp_path):
     texels = np.zeros((4, MAX_SIDE + 2, 3), np.uint8)
     texels[:, 1::2] = 100
     Image.fromarray(texels).save(tmp_path / "wide.png")
-    with IMAGES.with_search_folder(tmp_path / "shelf") as library:
+    with IMAGES.with_search_folder(tmp_path / "library") as library:
         record = store(library, tmp_path / "wide.png", "wide")
         pixels = load_texture(record.texture).pixels
     assert record.size == (MAX_SIDE // 2 + 1, 2) == pixels.shape[1::-1]
@@ -87,8 +87,8 @@ def test_a_large_image_is_downsampled_with_a_warning(tmp_path):
 
 
 def test_uploading_the_same_image_again_takes_the_new_name(image_file, tmp_path):
-    first, again = (store(tmp_path / "shelf", image_file, name) for name in ("One", "Two"))
-    assert (again.id, again.name, len(records(tmp_path / "shelf"))) == (first.id, "Two", 1)
+    first, again = (store(tmp_path / "library", image_file, name) for name in ("One", "Two"))
+    assert (again.id, again.name, len(records(tmp_path / "library"))) == (first.id, "Two", 1)
 
 
 def test_an_exr_keeps_its_reflectances_and_reports_clamping(tmp_path):
@@ -98,7 +98,7 @@ def test_an_exr_keeps_its_reflectances_and_reports_clamping(tmp_path):
     assert out.open(path, OpenImageIO.ImageSpec(2, 1, 3, OpenImageIO.FLOAT))
     assert out.write_image(pixels)
     assert out.close()
-    with IMAGES.with_search_folder(tmp_path / "shelf") as library:
+    with IMAGES.with_search_folder(tmp_path / "library") as library:
         record = store(library, tmp_path / "map.exr", "map")
         stored = load_texture(record.texture).pixels.astype(np.float32)
         IMAGES.remove(library, record.id)

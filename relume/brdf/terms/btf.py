@@ -1,6 +1,6 @@
 """measured_btf: a bidirectional texture function, with a BRDF for each texel (Müller 2004).
 
-As a BRDF it is the mean of its texels, which is used for light between surfaces. At visible surfaces,
+As a BRDF it is the mean of its texels, which is used for indirect light. At visible surfaces,
 `relume.transport.btf_kernel` evaluates the BRDF of each texel.
 """
 

@@ -14,6 +14,6 @@ def dusk_file(tmp_path_factory):
 @pytest.fixture(scope="session")
 def library(dusk_file, tmp_path_factory):
     """A library folder with one imported environment, in use."""
-    with STORE.with_search_folder(tmp_path_factory.mktemp("shelf") / "environments") as folder:
+    with STORE.with_search_folder(tmp_path_factory.mktemp("library") / "environments") as folder:
         store_environment(folder, dusk_file, "Dusk")
         yield folder

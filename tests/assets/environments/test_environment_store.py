@@ -34,28 +34,28 @@ def test_an_import_is_listed_and_found_by_its_name(library):
 
 
 def test_importing_the_same_file_again_takes_the_new_name(dusk_file, tmp_path):
-    first = store_environment(tmp_path / "shelf", dusk_file, "One")
-    again = store_environment(tmp_path / "shelf", dusk_file, "Two")
+    first = store_environment(tmp_path / "library", dusk_file, "One")
+    again = store_environment(tmp_path / "library", dusk_file, "Two")
     assert (again.id, again.name, again.created) == (first.id, "Two", first.created)
-    assert len(records(tmp_path / "shelf")) == 1
+    assert len(records(tmp_path / "library")) == 1
 
 
 def test_a_bad_file_leaves_nothing_behind(tmp_path):
     (tmp_path / "bad.hdr").write_bytes(b"#?RADIANCE\n\n-Y 4 +X 8\n")
     with pytest.raises(SceneError, match="bad"):
-        store_environment(tmp_path / "shelf", tmp_path / "bad.hdr", "bad")
-    assert not (tmp_path / "shelf").exists()
+        store_environment(tmp_path / "library", tmp_path / "bad.hdr", "bad")
+    assert not (tmp_path / "library").exists()
 
 
 def test_leftovers_of_a_killed_import_are_overwritten(tmp_path):
     def killed(made):
-        (stray,) = (tmp_path / "shelf").iterdir()
+        (stray,) = (tmp_path / "library").iterdir()
         shutil.copytree(stray, tmp_path / "left" / stray.name)
         raise SceneError("killed")
 
     (tmp_path / "some.hdr").write_bytes(b"some")
     with pytest.raises(SceneError, match="killed"):
-        STORE.store(tmp_path / "shelf", tmp_path / "some.hdr", "Some", killed)
+        STORE.store(tmp_path / "library", tmp_path / "some.hdr", "Some", killed)
     remove_strays(tmp_path, older_than_s=-1)
     assert not list((tmp_path / "left").iterdir())
 
@@ -64,7 +64,7 @@ def test_large_maps_are_downsampled_and_keep_their_brightness(tmp_path, monkeypa
     monkeypatch.setattr(environment_store, "MAX_WIDTH", 32)
     pixels = np.random.default_rng(1).uniform(0, 4, (48, 96, 3)).astype(np.float32)
     path = write_map(tmp_path / "large.exr", pixels)
-    with STORE.with_search_folder(tmp_path / "shelf") as folder:
+    with STORE.with_search_folder(tmp_path / "library") as folder:
         record = store_environment(folder, path, "Large")
         assert record.warnings == ("HDRI “Large” was scaled from 96×48 to 32×16.",)
         radiance = environments.load_environment(record.map).radiance

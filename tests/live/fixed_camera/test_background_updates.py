@@ -22,7 +22,7 @@ COLORS = np.eye(3)
 def maps(tmp_path_factory):
     """A red, a green and a blue environment: a picture of one light has one color."""
     folder = tmp_path_factory.mktemp("maps")
-    with STORE.with_search_folder(tmp_path_factory.mktemp("shelf")) as library:
+    with STORE.with_search_folder(tmp_path_factory.mktemp("library")) as library:
         white = dusk() / [1.0, 0.4, 0.2]
         paths = [write_map(folder / f"{name}.exr", white * c) for name, c in zip("rgb", COLORS, strict=True)]
         yield [store_environment(library, path, path.stem).map for path in paths]

@@ -43,7 +43,7 @@ def plain(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory):
-    with STORE.with_search_folder(tmp_path_factory.mktemp("shelf")) as folder:
+    with STORE.with_search_folder(tmp_path_factory.mktemp("library")) as folder:
         yield folder
 
 

@@ -36,7 +36,7 @@ def scene():
 def free_bake(tmp_path_factory):
     recipe = Recipe("probes", ("front",), SIZE, 100, num_probes=500)
     return open_bake(
-        bake_in_process(METHODS["probes"], scene(), recipe, tmp_path_factory.mktemp("parted") / "s.zarr"),
+        bake_in_process(METHODS["probes"], scene(), recipe, tmp_path_factory.mktemp("occluded") / "s.zarr"),
         Cache(1 << 30),
     )
 
