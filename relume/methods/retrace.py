@@ -90,7 +90,7 @@ class NormalRetracer:
             raise
         except StoreError:
             raise StoreError("this bake is too old to show normal map overrides; bake the scene again") from None
-        empty = np.empty((0, 3), np.float32)
+        normals, tangents, uvs = (np.empty((0, k), np.float32) for k in (3, 4, 2))
         return SceneBuffers(
-            positions, empty, empty, empty, faces, material, mesh, self._local.embree, offset_point(positions)
+            positions, normals, tangents, uvs, faces, material, mesh, self._local.embree, offset_point(positions)
         )

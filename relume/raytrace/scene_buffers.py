@@ -27,6 +27,7 @@ class SceneBuffers:
 
     Attributes:
         positions, normals, tangents, uvs: of the vertices; tangents have the sign of the bitangent.
+            All but positions may be empty, for rays that only need the geometry.
         faces: vertex indices of the corners.
         face_material: index into the scene's materials.
         face_mesh: index into the scene's meshes.
@@ -34,9 +35,9 @@ class SceneBuffers:
     """
 
     positions: Shaped[F32, "vertices 3"]
-    normals: Shaped[F32, "vertices 3"]
-    tangents: Shaped[F32, "vertices 4"]
-    uvs: Shaped[F32, "vertices 2"]
+    normals: Shaped[F32, "shaded 3"]
+    tangents: Shaped[F32, "shaded 4"]
+    uvs: Shaped[F32, "shaded 2"]
     faces: Shaped[NDArray[np.uint32], "faces 3"]
     face_material: Shaped[NDArray[np.int32], " faces"]
     face_mesh: Shaped[NDArray[np.int32], " faces"]
