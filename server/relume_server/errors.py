@@ -115,8 +115,8 @@ class KeyReusedError(RelumeError):
     """The idempotency key was used for a different call."""
 
 
-class OpennessError(RelumeError):
-    """The settings would let in more people than they suggest."""
+class UnsafeAccessError(RelumeError):
+    """The settings would give access to more people than they suggest."""
 
 
 class RateError(RelumeError):

@@ -65,7 +65,7 @@ def origin_is_allowed(headers: Headers, allowed_origins: Sequence[str]) -> bool:
     return origin_url.scheme in ("http", "https") and origin_url.netloc.lower() == headers.get("host", "").lower()
 
 
-class Guard:
+class RequestLimits:
     """The outermost middleware."""
 
     def __init__(

@@ -42,7 +42,7 @@ _STORES: Mapping[str, tuple[AssetStore, Callable[[Path], Path], OwnedKind]] = {
 }
 
 
-class Intake:
+class ImportQueue:
     """Imports for routes.
 
     Attributes:

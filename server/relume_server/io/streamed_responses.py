@@ -46,7 +46,7 @@ class _File:
             yield piece
 
 
-class Answers:
+class StreamedResponses:
     """Large responses of one server. Event loop only.
 
     Args:

@@ -33,4 +33,4 @@ async def store_upload(
         path = save_upload(file, folder / kind)
         return ImportRequest.create(services.settings, kind, path, called, scene=plain_name(file.filename))
 
-    return await services.intake.import_file(reservation, make_request)
+    return await services.import_queue.import_file(reservation, make_request)
