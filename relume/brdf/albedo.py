@@ -24,7 +24,7 @@ from relume.brdf.registry import TERMS
 from relume.brdf.specular import specular_albedo
 from relume.brdf.symmetry import is_isotropic, rotational_symmetry
 from relume.brdf.texture_slots import TEXTURES, Images, NormalMap, texture_slot, user_images
-from relume.math.zernike import OUTGOING_DEGREE, project, recurrence
+from relume.math.zernike import OUTGOING_DEGREE, basis_functions, recurrence
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -275,7 +275,10 @@ def _mirror_quadrature() -> _QuadraturePoints:
     weight = (weight_o * cos_o)[:, None] * solid_angle * np.maximum(above, 0)
     table = recurrence(OUTGOING_DEGREE)
     azimuth_norm = np.where(table.order > 0, np.pi, 2 * np.pi)
-    h_i, h_o = weight[..., None] * project(wi)[..., table.cosine], azimuth_norm * project(wo[:, 0])[:, table.cosine]
+    h_i, h_o = (
+        weight[..., None] * basis_functions(wi)[..., table.cosine],
+        azimuth_norm * basis_functions(wo[:, 0])[:, table.cosine],
+    )
     return _QuadraturePoints(wi, wo, h_i, h_o, weight_o * cos_o)
 
 

@@ -24,7 +24,7 @@ _MAX_LIGHTS_PER_GROUP = 12
 _MIN_GROUPED_LIGHTS = 200  # with fewer lights groups save nothing
 
 
-class TriangleSubset(NamedTuple):
+class MergedParts(NamedTuple):
     """Parts of merged triangles: M triangles of a finer division, with their own visibility.
 
     Attributes:
@@ -55,7 +55,7 @@ class TriangleLights:
     nodes: Shaped[F32, "3 6 M"]
     direction: Shaped[F32, "M 3"]
     irradiance: Shaped[F32, "M 3"]
-    parts: TriangleSubset | None = None
+    parts: MergedParts | None = None
     codes: Shaped[NDArray[np.uint64], " M"] | None = None
 
     @property
@@ -90,14 +90,14 @@ class TriangleLights:
         return np.asarray(np.square(middles - middles.mean(axis=1, keepdims=True)).sum(axis=(0, 1)))
 
     @cached_property
-    def groups(self) -> LightGroups | None:
+    def groups(self) -> LightClusters | None:
         """Groups of adjacent lights; None for few lights."""
         if self.codes is None or self.num_lights < _MIN_GROUPED_LIGHTS:
             return None
-        return _group_lights(self, self.codes, _MAX_LIGHTS_PER_GROUP)
+        return _cluster_lights(self, self.codes, _MAX_LIGHTS_PER_GROUP)
 
 
-class LightGroups(NamedTuple):
+class LightClusters(NamedTuple):
     """Adjacent lights, merged for points that see all lights of a group.
 
     Attributes:
@@ -168,7 +168,7 @@ def match_moments(
     return matched_corners, mean
 
 
-def merge_groups(
+def merge_clusters(
     lights: TriangleLights, group: Shaped[NDArray[np.integer[Any]], " M"], codes: Shaped[NDArray[np.uint64], " G"]
 ) -> TriangleLights:
     """Merge the lights of each group into one with the same light, mean direction and spread.
@@ -189,7 +189,7 @@ def merge_groups(
     return TriangleLights(pack_nodes(merged_corners), mean.astype(np.float32), irradiance.astype(np.float32))
 
 
-def _group_lights(lights: TriangleLights, codes: NDArray[np.uint64], max_lights: int) -> LightGroups:
+def _cluster_lights(lights: TriangleLights, codes: NDArray[np.uint64], max_lights: int) -> LightClusters:
     """Group 2 to `max_lights` lights below a common node. codes: of their tiles. (M,)"""
     inner, (num_below,) = sum_inner_nodes(codes, np.ones((1, len(codes))))
     group_codes, group, group_size = np.unique(
@@ -200,7 +200,7 @@ def _group_lights(lights: TriangleLights, codes: NDArray[np.uint64], max_lights:
     light_index = light_index[group_size[group[light_index]] > 1]
     group_index = group_number[group[light_index]]
     members = lights.select(light_index, lights.irradiance[light_index])
-    group_lights = merge_groups(members, group_index, group_codes[group_size > 1])
+    group_lights = merge_clusters(members, group_index, group_codes[group_size > 1])
     first, luminous = (
         np.searchsorted(group_index, np.arange(group_number[-1] + 2)),
         luminance(members.irradiance).astype(float),
@@ -209,7 +209,7 @@ def _group_lights(lights: TriangleLights, codes: NDArray[np.uint64], max_lights:
     total = _sum_by_index(group_index, luminous, group_lights.num_lights) * group_lights.variance
     within_fraction = np.divide(within_variance, total, out=np.ones_like(within_variance), where=total > 0)
     between_variance = np.clip(1 - within_fraction, 0, 1).astype(np.float32)
-    return LightGroups(group_lights, first.astype(np.int64), light_index.astype(np.int64), between_variance)
+    return LightClusters(group_lights, first.astype(np.int64), light_index.astype(np.int64), between_variance)
 
 
 def pack_nodes(corners: Shaped[F64, "M 3 3"]) -> Shaped[F32, "3 6 M"]:
@@ -219,7 +219,7 @@ def pack_nodes(corners: Shaped[F64, "M 3 3"]) -> Shaped[F32, "3 6 M"]:
 
 
 @dataclass(frozen=True)
-class RotatedEnvironment:
+class EnvironmentTexels:
     """The texels of an unrotated environment, computed once for all rotations.
 
     Attributes:
@@ -242,7 +242,7 @@ class RotatedEnvironment:
         return cls(light, luminous, directions, texel_angles)
 
 
-def integrate_environment(tiles: Tiles, environment: RotatedEnvironment, rotation: float = 0.0) -> TriangleLights:
+def integrate_environment(tiles: Tiles, environment: EnvironmentTexels, rotation: float = 0.0) -> TriangleLights:
     """Integrate the light of an environment in each tile; the tiles may be chosen for another environment.
 
     O(texels · depth) time.
@@ -262,4 +262,4 @@ def integrate_environment(tiles: Tiles, environment: RotatedEnvironment, rotatio
 
 def tessellate_environment(radiance: Shaped[F32, "height width 3"], num_lights: int) -> TriangleLights:
     """Divide an environment into about `num_lights` triangles. Raises as `choose_tiles` does."""
-    return integrate_environment(choose_tiles(radiance, num_lights), RotatedEnvironment.from_radiance(radiance))
+    return integrate_environment(choose_tiles(radiance, num_lights), EnvironmentTexels.from_radiance(radiance))

@@ -67,7 +67,7 @@ class SceneBuffers:
         return is_front(self.embree, self.positions, self.faces, origin, points)
 
 
-def offset_point(positions: Shaped[F32, "n 3"]) -> float:
+def ray_epsilon(positions: Shaped[F32, "n 3"]) -> float:
     """Offset of ray origins from surfaces with these vertices, meters."""
     # the rounding error of float32 grows with the distance from the world's origin, so that counts besides the size
     return 1e-5 * float(np.abs(positions).max() + np.linalg.norm(np.ptp(positions, axis=0)))
@@ -118,5 +118,5 @@ def build_scene_buffers(scene: Scene) -> SceneBuffers:
         face_material=face_material,
         face_mesh=np.repeat(np.arange(len(scene.meshes)), counts).astype(np.int32),
         embree=EmbreeScene.build(mesh_buffers.positions, mesh_buffers.faces, alpha_test),
-        epsilon=offset_point(mesh_buffers.positions),
+        epsilon=ray_epsilon(mesh_buffers.positions),
     )

@@ -19,7 +19,7 @@ from zarr.storage import LocalStore
 
 from relume.core.errors import ChunkDamagedError, StoreDeletedError, StoreError, StoreNotFoundError
 from relume.store.bake_protocol import ArraySpec
-from relume.store.room import scratch_file
+from relume.store.disk_space import scratch_file
 from relume.store.schema import (
     MANIFEST_NAME,
     check_path,

@@ -20,7 +20,7 @@ from zarr.storage import LocalStore
 
 from relume.core.errors import StoreError
 from relume.store.bake_protocol import ArraySpec, RowSource
-from relume.store.room import check_disk_space
+from relume.store.disk_space import check_disk_space
 from relume.store.schema import SCHEMA_VERSION, check_spec, default_layout, spec_from_metadata
 from relume.store.small_files import read_json
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from relume.core.errors import DiskBudgetError, MemoryBudgetError
 from relume.store.bake_protocol import Plan
-from relume.store.room import RESERVE_BYTES
+from relume.store.disk_space import RESERVE_BYTES
 
 REMEDY = "give fewer lights, a smaller size or fewer views"
 

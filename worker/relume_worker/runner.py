@@ -33,7 +33,7 @@ from relume.core.folder_size import folder_bytes
 from relume.scene.model import Scene
 from relume.store import open_store, publish, read_code, run_bake
 from relume.store.bake_protocol import Task
-from relume.store.room import check_disk_space
+from relume.store.disk_space import check_disk_space
 from relume_worker.database.retry import Given, Result, with_retry
 from relume_worker.lease import HEARTBEAT_S, LeaseRenewer, log_lost_lease
 from relume_worker.ledger import Ledger
