@@ -1,4 +1,4 @@
-"""Operator from the outgoing light of patches to the image of one term, in few wavelet coefficients.
+"""Wavelet operator of indirect light: from the radiance of patches to the image of one term, in few Haar coefficients.
 
     R(x) = c(γ) · Tʷ(x) · Lʷ                                        eq. 9, Nguyen 2010
 

@@ -1,4 +1,4 @@
-"""Precomputed linear operators: a term's transport along one free curve, all others fixed, in the wavelet basis.
+"""Wavelet operator of a curve: a term's transport along one free curve, all others fixed, in a Daubechies basis.
 
 T_D4 = T_box · S, with S the orthonormal Daubechies-4 synthesis (appendix B, Ben-Artzi 2006).
 """
