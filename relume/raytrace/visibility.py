@@ -1,4 +1,4 @@
-"""Visibility of light triangles from any points: one bit per pair, traced in packets of 16 neighboring points per light.
+"""Visibility of light triangles from any points: one bit per pair, traced in packets of 16 points per light.
 
 `relume.raytrace.visibility_masks` traces the bits of a bake's view samples, with fewer rays;
 `relume.raytrace.local_light_visibility` traces those of local lights.
