@@ -60,7 +60,7 @@ def pack_reflectance(terms: Sequence[Mapping[str, Any]], normals: NormalMap | No
     """Pack a material's F, summed over terms per texture slot, its image names, mirrors, narrow lobes and normal map.
 
     Args:
-        terms: of a complete look. normals: the image that the look uses instead of the material's normal map.
+        terms: terms of a complete look. normals: the image that the look uses instead of the material's normal map.
     Returns:
         Bytes for `unpack_reflectance`, `unpack_images`, `unpack_mirrors`, `unpack_lobes` and `unpack_normal_map`.
     """
@@ -227,7 +227,7 @@ def directional_albedo(terms: Sequence[Mapping[str, Any]]) -> tuple[Shaped[F64, 
         a(θo) = ∫ f(ωi, ωo) cos θi dωi
 
     Args:
-        terms: of a complete look.
+        terms: terms of a complete look.
     Returns:
         θo in radians, ascending, and a(θo).
     """

@@ -24,7 +24,8 @@ class LightTexels(NamedTuple):
     """The texels of an environment, or other small areas, and their tiles.
 
     Attributes:
-        tile: of each texel. luminous: luminance × solid angle. directions: unit. solid_angles: of the texels, sr.
+        tile: tile index of each texel. luminous: luminance × solid angle. directions: unit.
+        solid_angles: solid angles of the texels, sr.
     """
 
     tile: Shaped[NDArray[np.int32], " n"]

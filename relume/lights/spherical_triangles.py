@@ -268,5 +268,5 @@ def integrate_environment(tiles: Tiles, environment: EnvironmentTexels, rotation
 
 
 def tessellate_environment(radiance: Shaped[F32, "height width 3"], num_lights: int) -> TriangleLights:
-    """Divide an environment into about `num_lights` triangles. Raises as `choose_tiles` does."""
+    """Divide an environment into about `num_lights` triangles. Raises PlanError if it is outside [8, 65536]."""
     return integrate_environment(choose_tiles(radiance, num_lights), EnvironmentTexels.from_radiance(radiance))

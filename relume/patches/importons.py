@@ -47,7 +47,7 @@ class Importons:
     """Hits of paths from the camera, without the first visible surface.
 
     Attributes:
-        hits: on triangles. directions: of the incoming rays.
+        hits: hits on triangles. directions: directions of the incoming rays.
         width: width of the lobe, radians; times the distance it is the footprint that one ray does not resolve.
     """
 
@@ -82,7 +82,7 @@ def trace_importons(
     """Trace importons, seeded by the scene's id.
 
     Args:
-        scene: of the views. geometry: its triangles.
+        scene: scene of the views. geometry: its triangles.
         views: names of the cameras that paths start from. size: width and height of their images, pixels.
         num_importons: requested; there are fewer if paths leave the scene too soon.
     """

@@ -22,7 +22,8 @@ class SurfacePoints(NamedTuple):
         normal: unit shading normals, on the visible side.
         tangent: unit, orthogonal to the normals; n × t completes the shading frame.
         seed: index of each point in its set; it determines the shift of ray patterns.
-        alpha_sample: for rays at blended surfaces, see `relume.raytrace.alpha_filter`; one each, or one for all.
+        alpha_sample: alpha samples for rays at blended surfaces, see `relume.raytrace.alpha_filter`; one each, or one
+            for all.
     """
 
     position: Shaped[F32, "n 3"]

@@ -104,7 +104,7 @@ def trace_visibility(
         origins: off the surface.
         normals: shading normals; lights below their horizon are not traced and count as occluded.
         directions: unit, toward the lights.
-        alpha_sample: for the rays at blended surfaces; see `SurfacePoints`.
+        alpha_sample: alpha samples for the rays at blended surfaces; see `SurfacePoints`.
         excluded_normals: other normals; lights above their horizon are not traced and count as occluded too.
     Cost: O(n · m · log triangles) time.
     """
@@ -143,7 +143,7 @@ def select_visibility(
     """Select visibility bits of some points and some lights.
 
     Args:
-        visible: of all points and lights, as in `VisibilityBits`. rows: the points. lights: the lights.
+        visible: visibility bits of all points and lights, as in `VisibilityBits`. rows: the points. lights: the lights.
     Returns:
         Their bits, renumbered; ceil(N / 8) bytes
     """

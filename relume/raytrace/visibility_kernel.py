@@ -55,7 +55,7 @@ class _Block(NamedTuple):
 
     Attributes:
         facing_bits, traced_bits, visibility_bits: above the horizon; traced; unoccluded.
-        alpha_sample: for the rays of each sample at blended surfaces. Its size is `BLOCK`.
+        alpha_sample: alpha samples for the rays of each sample at blended surfaces. Its size is `BLOCK`.
     """
 
     facing_bits: Shaped[U64, " lights"]
@@ -68,7 +68,7 @@ class _Level(NamedTuple):
     """State of a level in its region.
 
     Attributes:
-        prediction: for untraced samples.
+        prediction: prediction for untraced samples.
         is_queued: the light was traced here. is_doubtful: the next level traces it.
         queue, samples: lights in the order of tracing, and masks of the samples to trace.
     """
@@ -360,7 +360,7 @@ def trace_blocks(  # type: ignore[no-untyped-def]
         occluded: `occluded`. scene: `EmbreeScene.handle`. arguments: address of `packet_arguments`.
         coherent_arguments: address of those for rays from all samples of a quarter to one light.
         origins: off the surface. normals: shading normals. (n, 3) float32
-        alpha_sample: for the rays of each sample, or for all, at blended surfaces. (n,) or (1,) float32
+        alpha_sample: alpha samples for the rays of each sample, or for all, at blended surfaces. (n,) or (1,) float32
         lights: directions, the two arrays of `relume.lights.neighbors`, and the strong lights, which are always traced.
         start, stop: the samples. bits: output, light m at bit m & 7 of byte m >> 3. (n, bytes) uint8
         counts: traced rays, rays of a full trace, checked predictions, wrong predictions: added to. (4,)

@@ -41,7 +41,7 @@ class Estimate:
     """Sums of reference passes in batches: pass k is in batch k modulo their number.
 
     Attributes:
-        sums: per batch.
+        sums: sums per batch.
         passes: number of passes.
     """
 
@@ -78,8 +78,8 @@ class Comparison:
     """Errors of a frame, relative to the root mean square of the reference over pixels and channels.
 
     Attributes:
-        rmse: of the difference, noise included. noise: of the estimate.
-        error: of the frame, without noise; None if it cannot be separated from the noise.
+        rmse: RMS error of the difference, noise included. noise: noise of the estimate.
+        error: error of the frame, without noise; None if it cannot be separated from the noise.
         standard_error: of `error`, one standard deviation over other passes; None if `error` is.
         error_upper_bound: two standard deviations above the error.
         significant_pixel_fraction: fraction of pixels that differ by more than noise explains; at most
@@ -142,7 +142,7 @@ def error_map(
     """Map of too bright (orange) and too dark (blue) pixels, in full color from a quarter of a stop, in sRGB.
 
     Args:
-        frame: linear radiance. estimate: of the reference.
+        frame: linear radiance. estimate: estimate of the reference.
         differs: pixels from `compare`; all others are gray.
     """
     mean = luminance(estimate.mean).astype(np.float64)

@@ -50,7 +50,8 @@ class ReferencePoints:
         textures: factors of terms by channel, "diffuse" and "specular". (n, 3) float32 each
         roughness: see `relume.raytrace.surface_interaction.SurfaceInteraction`.
         uv: see there; None to use the mean of BTFs.
-        alpha_sample: for shadow rays at blended surfaces; see `relume.raytrace.surface_points.SurfacePoints`.
+        alpha_sample: alpha sample for shadow rays at blended surfaces; see
+            `relume.raytrace.surface_points.SurfacePoints`.
     """
 
     position: Shaped[F32, "n 3"]

@@ -83,7 +83,7 @@ def surface_textures(
     """Factors of terms by texture channel, at surface points.
 
     Args:
-        scene: with its materials. look: the look. surface: the points.
+        scene: scene with its materials. look: the look. surface: the points.
         material: index of each into the scene's materials; other values keep their textures.
     Returns:
         (n, 3) float32 each

@@ -50,7 +50,8 @@ class Recipe:
         relightable: choose them for any environment, not for the scene's own.
         cameras: those of `views` that users placed; the others belong to the scene.
         num_probes: surface probes for a free camera; methods with fixed cameras have none.
-        num_patches: surface patches for indirect light. gather_rays: per view sample or probe. None: the method
+        num_patches: surface patches for indirect light.
+        gather_rays: gather rays per view sample or probe. None: the method
             chooses; `direct` has none.
     """
 
@@ -109,8 +110,9 @@ class Plan:
 
     Attributes:
         num_rays: shadow and camera rays.
-        store_bytes: on disk, uncompressed.
-        disk_bytes: on disk, extrapolated from a compressed sample; no bound. 0 without a sample: use `store_bytes`.
+        store_bytes: bytes on disk, uncompressed.
+        disk_bytes: bytes on disk, extrapolated from a compressed sample; no bound. 0 without a sample: use
+            `store_bytes`.
         scratch_bytes: temporary files during the bake.
         peak_bytes: memory of one worker process.
         lone_bytes: part of it that only one process needs at a time: for a step with a single task.

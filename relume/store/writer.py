@@ -81,8 +81,8 @@ class StoreWriter:
         """Write rows [start, start + len(rows)) of an array: whole shards, or up to the array's end.
 
         Args:
-            path: of the array, which must exist.
-            rows: with the array's type and shape except for their number.
+            path: path of the array, which must exist.
+            rows: rows with the array's type and shape except for their number.
             start: index of the first row.
         Raises:
             StoreError: there is no such array, or the rows do not fit it or split a shard.

@@ -52,14 +52,15 @@ class RayTracer(Protocol):
         """Find the lights that are visible from points.
 
         Args:
-            points: with overridden normals. baked_normals: before the override. baked_bits: visibility above those.
+            points: points with overridden normals. baked_normals: before the override.
+            baked_bits: visibility above those.
         """
         ...
 
     def gather_hits(
         self, points: SurfacePoints, wo: Shaped[F32, "n 3"], pattern: RayPattern
     ) -> Shaped[NDArray[np.uint16], "n rays"]:
-        """Find the patches that gather rays of points hit. wo: toward the viewer. pattern: of the rays"""
+        """Find the patches that gather rays of points hit. wo: toward the viewer. pattern: pattern of the rays"""
         ...
 
     def mirror_lights(self, points: SurfacePoints) -> Shaped[NDArray[np.uint8], "n bytes"]:
@@ -104,9 +105,9 @@ class MapOverrideStore:
 
     Args:
         store: the other store. view: index of the view. rows: row of each sample there. (surface samples,)
-        level: of each sample here. (surface samples,) uint8. ratios: of each material's levels.
+        level: roughness level of each sample here. (surface samples,) uint8. ratios: ratios of each material's levels.
         perturbed: samples with overridden normals, by the first row of their material; in the order here.
-        materials: index of each of those materials. tracer: for their rays. cache, key: for traced rays.
+        materials: index of each of those materials. tracer: tracer for their rays. cache, key: for traced rays.
     """
 
     def __init__(
@@ -155,7 +156,7 @@ class MapOverrideStore:
         """Read some rows of an array of the view, of one material's samples; rays are traced only for those.
 
         Args:
-            path: of the array. rows: in any order. (k,)
+            path: path of the array. rows: in any order. (k,)
         """
         if len(rows) == 0:
             return self.read(path, 0, 0)

@@ -101,7 +101,7 @@ def unproject(vector: Shaped[F32, "n 3"], normal: Shaped[F32, "n 3"], smooth: Sh
     """Invert a projection to mapped tangent planes: move vectors along `normal` into the planes orthogonal to `smooth`.
 
     Args:
-        vector: orthogonal to `normal`. normal: mapped, unit. smooth: without normal mapping, unit.
+        vector: orthogonal to `normal`. normal: mapped, unit. smooth: normal without normal mapping, unit.
     """
     cosine = _dot(normal, smooth)
     safe_cosine = np.where(np.abs(cosine) < _MIN_FACING, _MIN_FACING, cosine)

@@ -34,7 +34,7 @@ class DirectionGrid(NamedTuple):
     """Rings of directions, indexed from the pole outward and by ascending φ.
 
     Attributes:
-        theta: of each ring, ascending from 0, radians.
+        theta: θ of each ring, ascending from 0, radians.
         first: index of the first direction of each ring, then the number of directions.
         shift: φ of the first direction of each ring, in steps between its directions, [0, 1).
     """

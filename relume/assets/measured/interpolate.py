@@ -132,7 +132,7 @@ def measured_over_model(
     Args:
         kind: one of these.
         table: the material, from `build_table`.
-        curves: at their knots, positive.
+        curves: curves at their knots, positive.
         directions: x, y, z of wi and of wo, local frame, unit, z = normal; they broadcast. (...) each
     Returns:
         1/sr for `WHOLE`, without the cosine, in the type of the directions; zero at and below the horizon.

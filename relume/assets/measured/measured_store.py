@@ -67,10 +67,10 @@ def store_material(folder: Path, source: Path, name: str, file_name: str | None 
     """Import a MERL file; takes some seconds and 0.5 GB. An existing one with this content gets the new name.
 
     Args:
-        folder: of the asset store.
+        folder: folder of the asset store.
         source: the file to import.
         name: shown to users.
-        file_name: in errors; None for the name in the path.
+        file_name: file name in errors; None for the name in the path.
     Raises:
         MaterialError: the file is unusable, or the store is full.
     """

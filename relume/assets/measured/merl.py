@@ -33,7 +33,7 @@ def read_merl(path: Path, file_name: str | None = None) -> Shaped[F64, "3 90 90 
     """Read the planes of a file without conversion.
 
     Args:
-        file_name: in errors; None for the name in the path.
+        file_name: file name in errors; None for the name in the path.
     Returns:
         Finite values, negative if not measured.
     Raises:

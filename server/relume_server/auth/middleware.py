@@ -44,7 +44,8 @@ class AuthMiddleware:
     """Middleware between the guard, which knows no callers, and the routes.
 
     Args:
-        app: of the routes. settings: of the server. access: called for each request, because it is opened after the app
+        app: application of the routes. settings: of the server.
+        access: called for each request, because it is opened after the app
             is created. clock: monotonic seconds.
     """
 

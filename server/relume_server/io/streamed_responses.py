@@ -50,7 +50,7 @@ class StreamedResponses:
     """Large responses of one server. Event loop only.
 
     Args:
-        folder: on the disk for the files.
+        folder: folder on the disk for the files.
     """
 
     def __init__(self, folder: Path) -> None:
