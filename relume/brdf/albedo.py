@@ -45,7 +45,7 @@ _REFLECTANCE_BYTES = 4 * (1 + len(TEXTURES)) * 3 * len(PAIRS)
 _NUM_COSINES, _NUM_AZIMUTHS = 24, 24
 _NUM_OUT, _NUM_RADII, _NUM_AROUND = 10, 32, 12
 _STEPS = 128  # quantization steps of a highlight's F, from 0 to 1
-_STEPS_PER_OCTAVE = 64  # quantization steps of a sharp highlight's parameters
+_STEPS_PER_OCTAVE = 64  # quantization steps per octave of a sharp highlight's parameters
 # least F_00 of a highlight that matters; least F_66 / F_00 of a highlight that the basis does not represent
 _MIN_REFLECTANCE, _MIN_RESIDUAL_RATIO = 0.15, 0.03
 _LAST_PAIR = PAIRS.index((OUTGOING_DEGREE // 2, OUTGOING_DEGREE // 2))  # both of the highest degree, of order 0
@@ -101,7 +101,7 @@ def narrow_lobes(highlights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]
     Args:
         highlights: terms of a complete look.
     Returns:
-        Their documents, for `relume.brdf.highlight_tables`; empty if the basis suffices.
+        Documents of the highlights, for `relume.brdf.highlight_tables`; empty if the basis suffices.
     """
     if any(map(_is_textured, highlights)) or not any(map(_is_narrow, highlights)):
         return []
@@ -160,7 +160,7 @@ def unpack_normal_map(packed_material: bytes) -> NormalMap | None:
 
 
 def drop_normal_map(packed_material: bytes) -> bytes:
-    """Remove the look's normal map, so that the material uses the baked one. packed_material: likewise"""
+    """Remove the look's normal map, so that the material uses the baked one. packed_material: from `pack_reflectance`"""
     image_names, mirrors, lobes, normals = _unpack_text(packed_material)
     return (
         packed_material[:_REFLECTANCE_BYTES] + _pack_text(image_names, mirrors, lobes, [])
@@ -244,7 +244,7 @@ class _QuadraturePoints(NamedTuple):
 
     Attributes:
         wi, wo: local directions. (o, n, 3), (o, 1, 3)
-        h_i: basis functions of ωi, weighted. (o, n, rows). h_o: of ωo, times ∫ cos² mφ dφ. (o, rows)
+        h_i: weighted basis functions at ωi. (o, n, rows). h_o: basis functions at ωo, times ∫ cos² mφ dφ. (o, rows)
         weight_o: weights of ωo with the cosine; h_i contains them. (o,)
     """
 

@@ -148,7 +148,7 @@ def compute_alpha_beta(scale, ix, iy, iz, ox, oy, oz, alpha, beta):  # type: ign
 
     Args:
         scale: scale of each angle. (2,) float32. ix, iy, iz: local wi. (n,) float32
-        ox, oy, oz: local wo, scalars. alpha, beta: output. (n,) float32
+        ox, oy, oz: local wo, scalars. alpha, beta: γα and γβ, written. (n,) float32
     """
     along, across = scale[0], scale[1]
     for k in range(ix.shape[0]):

@@ -38,7 +38,7 @@ class EdgePixels:
 
     Attributes:
         is_edge: true if a pixel needs more rays than the one through its center.
-        num_single_samples: total samples of the other pixels. num_rays: rays that were traced for this.
+        num_single_samples: total samples of the other pixels. num_rays: rays traced to find edges.
     """
 
     is_edge: Shaped[NDArray[np.bool_], " pixels"]

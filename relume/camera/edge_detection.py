@@ -17,7 +17,7 @@ from relume.raytrace.scene_buffers import SceneBuffers
 F32 = NDArray[np.float32]
 
 COS_NORMAL_EDGE = np.cos(np.radians(4.0))  # at larger angles one sample would alias sharp reflections
-_COS_CREASE = np.cos(np.radians(20.0))  # a crease
+_COS_CREASE = np.cos(np.radians(20.0))
 _DEPTH_EDGE = 0.02  # distance off the neighbor's plane, relative to the ray length
 NO_RAY_KEY = -2  # the key of pixels without a ray in a layer
 _RADIANCE_EDGE_FACTOR = 1.0  # relative to the mean radiance; smaller steps are left to texture filtering
@@ -61,8 +61,8 @@ def is_depth_edge(
 
     Args:
         normal, distance, direction: normal and distance of a hit, and direction of its ray. (…, 3), (…), (…, 3)
-        neighbor_distance, neighbor_direction: neighbor distance and neighbor direction of the other hit, and of its
-            ray, with the same origin. (…), (…, 3)
+        neighbor_distance, neighbor_direction: distance of the other hit, and direction of its ray, which has the same
+            origin. (…), (…, 3)
     """
     with np.errstate(invalid="ignore", divide="ignore"):  # background is infinitely far
         slope = np.vecdot(direction, normal) / np.vecdot(neighbor_direction, normal)

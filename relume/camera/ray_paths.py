@@ -66,7 +66,7 @@ class RayPaths(NamedTuple):
     Attributes:
         ray: index of the camera ray, ascending.
         origins: one for all or one each. directions: unit.
-        transmittance: from the origin of the ray back to the camera.
+        transmittance: transmittance between the camera and the ray's origin.
         length: length of the path up to the origin.
         num_glass: number of glass surfaces since the camera.
         chain: mirrors on the path; None without mirrors. path_key: distinguishes paths over different mirrors.

@@ -37,7 +37,7 @@ class TransparencyLayer(NamedTuple):
         ray: index of the camera ray, ascending.
         hits: hits of the rays; distances are along the whole path.
         directions: directions of the last path segment, unit.
-        transmittance: from the hit back to the camera, without the reflectance of mirrors.
+        transmittance: transmittance between the camera and the hit, without the reflectance of mirrors.
         is_visible: the surface itself is shown; false if the path only continues there.
         origins: origins of the last path segment: the camera, or the last surface that changed the direction.
         chain: mirrors on the path; None without mirrors.

@@ -277,7 +277,7 @@ def _split_tinted(
     """Split samples that light reaches through tinted glass; return no columns if the limit is exceeded.
 
     Args:
-        camera_setup: the camera. columns: of its samples. sample_limit: maximum number of samples of the plan.
+        camera_setup: the camera. columns: columns of its samples. sample_limit: maximum number of samples of the plan.
         by_channel: see `sample_view`.
     Returns:
         Columns that replace the given ones; and the number of traced rays.

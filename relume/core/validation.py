@@ -47,7 +47,7 @@ def check_number(pointer: Pointer, value: Any, minimum: float, maximum: float) -
 
     Args:
         pointer: location in the document. value: value of any type.
-        minimum, maximum: both allowed.
+        minimum, maximum: inclusive bounds.
     Raises:
         ParameterError: the value is not allowed.
     """
@@ -60,7 +60,7 @@ def check_number_or_rgb(pointer: Pointer, value: Any, minimum: float, maximum: f
 
     Args:
         pointer: location in the document. value: value of any type.
-        minimum, maximum: of each number, both allowed.
+        minimum, maximum: inclusive bounds of each number.
     Raises:
         ParameterError: the value is not allowed.
     """
@@ -75,7 +75,7 @@ def check_triple(pointer: Pointer, value: Any, minimum: float, maximum: float, l
 
     Args:
         pointer: location in the document. value: value of any type.
-        minimum, maximum: of each number, both allowed.
+        minimum, maximum: inclusive bounds of each number.
         label: name of the allowed values in the message.
     Raises:
         ParameterError: the value is not allowed.

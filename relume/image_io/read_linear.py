@@ -55,7 +55,7 @@ def read_pixels(data: bytes, suffix: str, label: str, check_size: CheckSize) -> 
     """Decode an image with OpenImageIO from a private temporary file; the size is checked before pixels are read.
 
     Args:
-        data: contents of the file. suffix: according to its first bytes. label: name in messages.
+        data: contents of the file. suffix: format, determined from the first bytes. label: name in messages.
         check_size: raises SceneError if width and height are not allowed.
     Returns:
         The first R, G and B, or one channel for all

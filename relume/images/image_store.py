@@ -69,7 +69,7 @@ class ImageRecord:
 
     Attributes:
         created: seconds since 1970. size: width and height. warnings: warnings about the import, one sentence each.
-        roughness: mean, as a roughness map. recipe: inputs of a derived image; None for an uploaded one.
+        roughness: mean roughness, if it is used as a roughness map. recipe: inputs of a derived image; None for an uploaded one.
     """
 
     id: str
@@ -109,7 +109,7 @@ def store_derived(folder: Path, name: str, recipe: ImageRecipe, compute: Callabl
         folder: folder of the asset store. name: shown to users. recipe: its inputs.
         compute: returns its texels, as bytes.
     Raises:
-        SceneError: the store is full. And what `compute` raises.
+        SceneError: the store is full. Errors of `compute` propagate.
     """
 
     def fill(staged_folder: Path) -> dict[str, Any]:

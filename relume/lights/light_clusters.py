@@ -34,7 +34,8 @@ def cluster_lights(lights: TriangleLights, tiles: Tiles, num_clusters: int) -> T
     """Merge the light of tiles into about `num_clusters` triangles, with their parts.
 
     Args:
-        lights: lights of the tiles. tiles: M tiles. num_clusters: rounded down to 8 + 3k; not above M.
+        lights: lights of the tiles. tiles: M tiles. num_clusters: number of merged triangles, at most M;
+            rounded down to the form 8 + 3k.
     """
     luminous = luminance(lights.irradiance).astype(np.float64)
     codes, group = np.unique(_coarser_codes(tiles, luminous, num_clusters), return_inverse=True)

@@ -68,7 +68,7 @@ def compute_moments(
     """Return m and S of some tiles.
 
     Args:
-        texels: of all tiles. total: luminous light of each fitted tile. mean: its direction n.
+        texels: texels of all tiles. total: luminous light of each fitted tile. mean: mean direction n of each.
         frames: the two tangents t. fitted: indices of the tiles.
     """
     fitted_index = np.full(int(max(texels.tile.max(initial=-1), fitted.max(initial=-1))) + 1, -1, np.int32)

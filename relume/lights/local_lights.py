@@ -49,7 +49,7 @@ class LocalLight(NamedTuple):
 
     Attributes:
         kind: `POINT` (spots too), `DIRECTIONAL` or `SURFACE`.
-        position: position of point lights. axis: unit, of spots, and the direction in which directional light travels.
+        position: position of point lights. axis: unit axis of spots; direction of travel of directional light.
         cone_scale, cone_offset: s = clamp(cone_scale · cos θ + cone_offset, 0, 1).
         corner, edges, normal: corner, edges and normals of parallelograms or triangles; unit normals.
         power_cdf: cumulative power of the pieces. area: area of all pieces, m², weighted by their relative radiance.
@@ -89,7 +89,7 @@ def num_samples(geometry: LightGeometry, num_rectangle_samples: int) -> int:
 
 
 def make_light_strata(light: LocalLight, num_rectangle_samples: int) -> LightStrata:
-    """Create the samples of a light. num_rectangle_samples: of a rectangle, a power of four"""
+    """Create the samples of a light. num_rectangle_samples: samples of a rectangle, a power of four"""
     factor = _SAMPLE_FACTORS["rectangle" if light.is_rectangle else "mesh"]
     num_light_samples = factor * num_rectangle_samples if light.kind == SURFACE else 1
     return make_strata(split_axes(len(light.power_cdf), num_light_samples), _SEED)
@@ -130,7 +130,7 @@ def prepare_local_lights(geometry: LightGeometry, triangles: LightTriangles | No
 
 
 def emitter_geometry(geometry: LightGeometry) -> LightGeometry:
-    """Reduce a light to the geometry of its shadows: a spot has those of a point light."""
+    """Reduce a light to the geometry of its shadows: a spot casts those of a point light."""
     return LightGeometry("point", geometry.position) if geometry.kind == "spot" else geometry
 
 

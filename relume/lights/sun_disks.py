@@ -31,7 +31,7 @@ class SunBounds(NamedTuple):
     """Criteria of a sun disk.
 
     Attributes:
-        inner_angle, outer_angle: from the brightest direction: of the disk, and of the dark ring around it; degrees.
+        inner_angle, outer_angle: radius of the disk, and of the dark ring around it, degrees.
         max_spread: root mean square of the angles to the disk's center, degrees.
     """
 
@@ -49,7 +49,7 @@ class SunDisk(NamedTuple):
 
     Attributes:
         irradiance: ∫ L dω, per channel.
-        mean: Σ ω L / Σ L, luminous; its length is below one by the disk's spread.
+        mean: mean direction Σ ω L / Σ L, weighted by luminance; the wider the disk, the shorter the vector.
         directions: unit directions with equal fractions of the light.
     """
 

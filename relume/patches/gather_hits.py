@@ -40,8 +40,8 @@ class GatherHits:
     """Hits of the gather rays of n points.
 
     Attributes:
-        patch: that each ray hits, `NO_PATCH` if it leaves the scene or was not traced.
-        num_rays: traced. trace_s: wall time of the tracing alone.
+        patch: index of the patch that each ray hits, `NO_PATCH` if it leaves the scene or was not traced.
+        num_rays: number of traced rays. trace_s: wall time of the tracing alone.
     """
 
     patch: Shaped[NDArray[np.uint16], "n rays"]

@@ -23,9 +23,9 @@ class FacePoints(NamedTuple):
 
     Attributes:
         is_hit: false if a ray hits nothing; the other fields are then of the first triangle.
-        p, uvs: corners.
+        p, uvs: positions and UV coordinates of the triangles' corners.
         face_normal: toward the visible side.
-        position: off the surface. normal: shading normals.
+        position: positions, offset from the surface. normal: shading normals.
         tangents: tangents with the sign of the bitangent.
         uv: texture coordinates.
     """

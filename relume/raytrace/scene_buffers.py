@@ -70,7 +70,7 @@ class SceneBuffers:
 
 def ray_epsilon(positions: Shaped[F32, "n 3"]) -> float:
     """Offset of ray origins from surfaces with these vertices, meters."""
-    # the rounding error of float32 grows with the distance from the world's origin, so that counts besides the size
+    # rounding of float32 grows with the distance from the world's origin, so the offset depends on it and on the size
     return 1e-5 * float(np.abs(positions).max() + np.linalg.norm(np.ptp(positions, axis=0)))
 
 

@@ -18,7 +18,7 @@ class SurfacePoints(NamedTuple):
     """n points on surfaces, for kernels.
 
     Attributes:
-        position: off the surface, so that rays can start there; meters.
+        position: positions, meters, offset from the surface so that rays can start there.
         normal: unit shading normals, on the visible side.
         tangent: unit, orthogonal to the normals; n × t completes the shading frame.
         seed: index of each point in its set; it determines the shift of ray patterns.

@@ -101,7 +101,7 @@ def trace_visibility(
 
     Args:
         scene: the occluding triangles.
-        origins: off the surface.
+        origins: positions, offset from the surface.
         normals: shading normals; lights below their horizon are not traced and count as occluded.
         directions: unit, toward the lights.
         alpha_sample: alpha samples for the rays at blended surfaces; see `SurfacePoints`.

@@ -35,8 +35,8 @@ class RayCounts:
 
     Attributes:
         num_traced: traced shadow rays. num_full: rays of a full trace, all pairs above the horizon.
-        num_checked: predicted bits that were traced as a check, uniformly distributed. num_wrong: wrong ones among
-            them.
+        num_checked: predicted bits that were also traced, uniformly distributed.
+        num_wrong: wrong predictions among the checked bits.
     """
 
     num_traced: int
@@ -100,7 +100,7 @@ def trace_visibility_masks(
 
     Args:
         scene: the occluding triangles.
-        origins: off the surface, mostly ordered by neighborhood in the image.
+        origins: positions, offset from the surface, mostly ordered by neighborhood in the image.
         normals: shading normals; lights below their horizon are not traced and count as occluded.
         targets: the lights, from `make_light_targets`.
         alpha_sample: alpha samples for the rays at blended surfaces; see `SurfacePoints`.

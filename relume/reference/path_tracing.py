@@ -50,7 +50,7 @@ class IndirectReference(NamedTuple):
     """Radiance of points by indirect light.
 
     Attributes:
-        mean, variance: over paths; the variance of the mean.
+        mean: mean over paths. variance: variance of this mean.
     """
 
     mean: Shaped[F64, "light_paths n 3"]
@@ -72,11 +72,11 @@ def reference_indirect(
     """Radiance of points by indirect light, for several selections of light paths at once.
 
     Args:
-        scene: its materials and lights.
+        scene: the scene, with its materials and lights.
         geometry: triangles of the scene.
-        texels: of the environment, with its gain in the look.
+        texels: texels of the environment, with its gain in the look.
         look: terms and lights.
-        points: n of them. material: index into the scene's materials.
+        points: n points. material: index into the scene's materials.
         light_paths: selections; `direct` selects direct light in mirrors.
         num_paths: number of paths per point. spp: environment texels per path vertex.
         seed: seed of the paths; other seeds are independent.

@@ -84,7 +84,7 @@ def surface_textures(
 
     Args:
         scene: scene with its materials. look: the look. surface: the points.
-        material: index of each into the scene's materials; other values keep their textures.
+        material: index of each point's material in the scene; other values keep their textures.
     Returns:
         (n, 3) float32 each
     """

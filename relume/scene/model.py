@@ -94,7 +94,7 @@ class Mesh:
         normals: unit, world space.
         tangents: unit, world space, with handedness in w; zero if the file has none.
         uvs: UV coordinates, v from the top as in glTF; zero if the file has none.
-        faces: counter-clockwise from outside.
+        faces: counterclockwise from outside.
         material: index into `Scene.materials`.
     """
 

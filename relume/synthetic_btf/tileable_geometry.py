@@ -20,7 +20,7 @@ class Tile(NamedTuple):
     Triangles may extend over the square's sides, as do those of the neighboring periods.
 
     Attributes:
-        normals: unit. faces: counter-clockwise from outside.
+        normals: unit. faces: counterclockwise from outside.
         material: material index of each face.
         materials: terms of each, as in look documents; isotropic.
     """

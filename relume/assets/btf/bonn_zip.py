@@ -44,7 +44,7 @@ class ZippedBtf:
     Args:
         path: path of the file.
     Raises:
-        MaterialError: it is no such file, or images are missing, duplicate, or of different sizes.
+        MaterialError: the file is not a zip of such images; or images are missing, duplicate, or of different sizes.
     """
 
     def __init__(self, path: Path) -> None:

@@ -64,7 +64,7 @@ class BtfRecord:
         return STORE.prefix + self.id
 
     def terms(self) -> list[dict[str, Any]]:
-        """Its terms in a look; they use no texture of the scene."""
+        """Terms of the BTF in a look; they use no texture of the scene."""
         return [{"model": "measured_btf", "data": self.data, "texture": None}]
 
 

@@ -34,8 +34,8 @@ def import_btf(
         partial_folder: folder of partial results; by default in `folder`, named by the file's content.
         images: images of the file, if the caller reads it.
     Raises:
-        MaterialError: it is no such file, or the store is full. CancelledError: `is_canceled` is true; partial results
-            stay.
+        MaterialError: the file is of neither kind, or the store is full. CancelledError: `is_canceled` is true; partial
+            results stay.
     """
     images = images or open_images(file)
     partial_folder = partial_folder or folder / "making" / STORE.content_id(file)

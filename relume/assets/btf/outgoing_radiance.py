@@ -143,7 +143,7 @@ def outgoing_radiance(
     Args:
         btf: the BTF. values_by_light: from `sample_btf`.
         axes: axes of the texture, in the frames of the points.
-        point_index: point of each direction. wi: in the frames of their points, unit.
+        point_index: point of each direction. wi: unit directions in the frames of their points.
     Returns:
         Radiance per unit of irradiance perpendicular to `wi`, including the cosine.
     """

@@ -1,6 +1,6 @@
 """Parallax between view directions of a BTF, from the height of its relief.
 
-A ray toward w that crosses the plane at x has at height z the position x + z s(w), s(w) = (w_x, w_y) / w_z. If it
+A ray toward w that crosses the plane at x is at x + z s(w) at height z, s(w) = (w_x, w_y) / w_z. If it
 meets the relief at height h, the ray toward v that meets the same point crosses the plane at
 
     x_v = x + h (s(w) − s(v)) .

@@ -35,7 +35,8 @@ class MaterialRecord:
 
     Attributes:
         created: seconds since 1970.
-        lobes_error, homomorphic_error: of the curves alone, see `relume.assets.measured.factorize.MeasuredFactors`.
+        lobes_error, homomorphic_error: errors of the curves without the quotient, see
+            `relume.assets.measured.factorize.MeasuredFactors`.
     """
 
     id: str
@@ -50,7 +51,7 @@ class MaterialRecord:
         return STORE.prefix + self.id
 
     def terms(self) -> list[dict[str, Any]]:
-        """Its terms in a look, without textures, since the measurement includes the color."""
+        """Terms of the material in a look, without textures, since the measurement includes the color."""
         return [{"model": model, "data": self.data, "texture": None} for model in ("measured_lv", "measured_hd")]
 
 

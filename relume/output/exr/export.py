@@ -36,9 +36,9 @@ def export_exr(
         render: renders a look, (height, width, 3 or 4); gets a callback for its progress.
         look: look of the image itself. layers: named looks, whose images become layers of the file.
         attributes: attributes of the file, from `build_attributes`.
-        precision: of the values.
+        precision: float type of the values.
         progress: called with the finished fraction, in [0, 1].
-        space: of the values, as in `attributes`.
+        space: color space of the values, as in `attributes`.
     Raises:
         RelumeError: the file cannot be written. Errors of `render` propagate; then there is no file.
     """

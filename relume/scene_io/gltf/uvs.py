@@ -39,7 +39,7 @@ class UvSlot:
     transform: UvTransform = field(default_factory=UvTransform)
 
     def apply(self, sets: Sequence[Shaped[F32, "vertices 2"]], num_vertices: int) -> Shaped[F32, "vertices 2"]:
-        """Scale, rotate (counter-clockwise with v down) and translate UV coordinates; zero if the set is missing."""
+        """Scale, rotate (counterclockwise with v down) and translate UV coordinates; zero if the set is missing."""
         if self.uv_set >= len(sets):
             return np.zeros((num_vertices, 2), np.float32)
         p = self.transform
