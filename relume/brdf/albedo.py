@@ -160,7 +160,7 @@ def unpack_normal_map(packed_material: bytes) -> NormalMap | None:
 
 
 def drop_normal_map(packed_material: bytes) -> bytes:
-    """Remove the look's normal map, so that the material uses the baked one. packed_material: from `pack_reflectance`"""
+    """Remove the look's normal map, so that the baked one is used. packed_material: from `pack_reflectance`"""
     image_names, mirrors, lobes, normals = _unpack_text(packed_material)
     return (
         packed_material[:_REFLECTANCE_BYTES] + _pack_text(image_names, mirrors, lobes, [])

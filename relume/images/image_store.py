@@ -69,7 +69,8 @@ class ImageRecord:
 
     Attributes:
         created: seconds since 1970. size: width and height. warnings: warnings about the import, one sentence each.
-        roughness: mean roughness, if it is used as a roughness map. recipe: inputs of a derived image; None for an uploaded one.
+        roughness: mean roughness, if used as a roughness map.
+        recipe: inputs of a derived image; None for an uploaded one.
     """
 
     id: str

@@ -28,8 +28,8 @@ class BtfSurface:
 
     Attributes:
         texels: the BTF.
-        samples: samples of each point, from `relume.assets.btf.outgoing_radiance.sample_btf`; zero below
-            the horizon.
+        samples: reflection of each point, from `relume.assets.btf.outgoing_radiance.sample_btf`; zero below the
+            horizon.
         axes: axes of the texture, in the points' frames.
     """
 

@@ -3,9 +3,9 @@
 Passes of the reference are independent, but their noise has heavy tails: a highlight rarely samples a small light, and
 is then bright. So Student's t distribution does not apply. Passes are summed in batches, whose variation shows
 the noise of the mean: if the signs of half of the batches are flipped, the signal cancels and noise of equal variance
-remains. The frame's difference in units of its noise is compared with that of sign-flipped batches, over
-pixels and over blocks of pixels. The largest set of which at most `FALSE_DISCOVERY_RATE` is expected by chance is
-called different (false discovery rate of Benjamini and Hochberg 1995, counted with decoys, Elias and Gygi 2007).
+remains. The frame's difference in units of its noise is compared with that of sign-flipped batches, over pixels
+and over blocks of pixels. The largest set of which at most `FALSE_DISCOVERY_RATE` is expected by chance is called
+different (false discovery rate of Benjamini and Hochberg 1995, counted with decoys, Elias and Gygi 2007).
 
 All results follow from that set: if it is empty, no error was found, however large the differences.
 """

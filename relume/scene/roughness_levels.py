@@ -40,8 +40,9 @@ def levels_of_texture(texture: Texture | None, base: float | None, min_length: f
     """Roughness levels over the range of a map, as `levels_of_material` returns them.
 
     Args:
-        texture: roughness over its mean, as bytes; None for a constant 1. base: that mean, see `rougher`; None without
-            widening by normals. min_length: from `min_mean_normal_length`.
+        texture: roughness over its mean, as bytes; None for a constant 1.
+        base: mean roughness, see `rougher`; None without widening by normals.
+        min_length: from `min_mean_normal_length`.
     """
     return levels_in_range(*ratio_range(texture), base, min_length)
 

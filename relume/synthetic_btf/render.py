@@ -46,7 +46,7 @@ _GOLDEN = np.pi * (3 - 5**0.5)
 
 
 class _SurfaceSamples(NamedTuple):
-    """Points on the geometry. position: off it. (n, 3) float32. normal: shading. (n, 3) float32. material: (n,)"""
+    """Points offset from the geometry, with shading normals. position, normal: (n, 3) float32. material: (n,)"""
 
     position: F32
     normal: F32

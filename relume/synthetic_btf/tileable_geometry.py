@@ -69,9 +69,8 @@ def extruded(
 
     Args:
         path: center line, in a plane that contains z; its first and last points only give the direction.
-        radius: radius of the
-            yarn, across z.
-        num_corners: number of corners of its cross-section. flat: its height over its width.
+        radius: radius of the yarn across z. num_corners: number of corners of the yarn's cross-section.
+        flat: height over width of the cross-section.
     """
     along, path = path[2:] - path[:-2], path[1:-1]
     along /= np.linalg.norm(along, axis=1, keepdims=True)

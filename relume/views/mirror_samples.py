@@ -19,12 +19,12 @@ class MirrorSamples(NamedTuple):
     """Samples in mirrors, m of a view's n.
 
     Attributes:
-        sample: their rows, ascending.
+        sample: rows of the samples, ascending.
         order_index: index in the view's `order`.
         throughput: factor of the radiance in its pixel, without mirrors.
         chain: the mirrors on the path.
-        origin: origin on the last mirror. direction: from there, unit.
-        distance: from there; infinite for the background.
+        origin: point on the last mirror. direction: unit direction from `origin`.
+        distance: distance from `origin`; infinite for the background.
     """
 
     sample: Shaped[NDArray[np.int64], " m"]

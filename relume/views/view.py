@@ -56,7 +56,7 @@ class View:
 
     Attributes:
         bounds: samples of material k are [bounds[k], bounds[k + 1]); after the last material, background.
-        key: of the bake in `cache`.
+        key: key of the bake in `cache`.
         first: samples of pixel p are `order[first[p] : first[p + 1]]`.
         throughput: factor of each sample's radiance in its pixel, in `order`: weight times transmittance of glass; zero
             for samples in mirrors, because the look decides their reflectance. One channel, or 3 with glass or mirrors.
@@ -186,7 +186,7 @@ class View:
         Args:
             material: its index.
             outgoing: light of the patches for gather rays; from `FixedViewTransfer.outgoing_patch_light`.
-            local: of local lights that are visible from the samples.
+            local: visibility of local lights from the samples.
             is_lit: the environment emits light; else no visibility is read.
         """
         rows = self.rows(material)
@@ -320,7 +320,7 @@ def open_view(
 
     Args:
         store: store of the bake. index: index of the view.
-        cache: cache for data shared between frames. key: of the bake in it.
+        cache: cache for data shared between frames. key: key of the bake in `cache`.
         maps: see `View`. rows: `View.baked_rows`.
     Raises:
         ChunkDamagedError: arrays of the store are inconsistent.

@@ -66,7 +66,7 @@ def origin_is_allowed(headers: Headers, allowed_origins: Sequence[str]) -> bool:
 
 
 class RequestLimits:
-    """The outermost middleware."""
+    """Middleware for host, origin and body size; adds the security headers."""
 
     def __init__(
         self,

@@ -81,7 +81,7 @@ def _system_available_bytes() -> int:
 
 
 def check_budget(plan: Plan, data_dir: Path, num_processes: int) -> None:
-    """Reject a plan that needs more memory or disk than there is.
+    """Reject a plan that needs more memory or disk space than is available.
 
     Args:
         plan: plan of the bake.

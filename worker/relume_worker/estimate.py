@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from relume.store.bake_protocol import Plan
 from relume_worker.executor import is_tiny, num_cores
 
-_MAX_EXTRAPOLATION = 8.0  # a bake may have so many times the work of the largest measured one
+_MAX_EXTRAPOLATION = 8.0  # largest work of a bake, relative to the largest measured one
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@
       ▲                 │ └─────▶ failed     submitting a failed or canceled bake queues it again; finished tasks stay
       └───submit────────┴───────▶ canceled
 
-Every change is one statement that names the state it expects, so that processes which race cannot both win.
+Every change is one statement that names the state it expects, so that of two racing processes only one succeeds.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Ledger:
 
         Args:
             scene_id: id of an existing scene. recipe: recipe of the bake.
-            plan: its cost. client: client for fair scheduling.
+            plan: cost of the bake. client: user, for fair scheduling.
         Returns:
             The bake's id.
         Raises:
@@ -165,8 +165,8 @@ class Ledger:
         Args:
             identity: id of the bake. owner: owner of its lease; otherwise nothing changes.
             state: final state.
-            problem: a sentence, if it has failed.
-            num_bytes: size in bytes of the store, if it is ready.
+            problem: a sentence, if the bake has failed.
+            num_bytes: size of the store in bytes, if it is ready.
         Returns:
             As `release`.
         """
@@ -196,13 +196,11 @@ class Ledger:
         """Record that a task's shards are on disk; idempotent.
 
         Args:
-            identity: id of the bake. owner: owner of its lease. task: finished one.
-            cost: seconds and rays.
-            attempts: including this one.
+            identity: id of the bake. owner: owner of its lease. task: the finished task.
+            cost: seconds and rays. attempts: number of attempts, including this one.
         Returns:
-            False if another owner, perhaps with another unfinished store, has the lease, or the bake is deleted:
-                nothing is
-            recorded.
+            False if another owner, perhaps with another unfinished store, has the lease, or the bake is deleted;
+            then nothing is recorded.
         """
         row = TaskRow(bake_id=identity, stage=task.stage, index=task.index, attempts=attempts, **asdict(cost))
         with self.sessions.begin() as session:
@@ -264,7 +262,7 @@ class Ledger:
         """Time per stage of the newest ready bakes of a method, of this scene if there are any.
 
         Args:
-            scene_id: whose bakes are preferred. method: name of the transfer method.
+            scene_id: scene whose bakes are preferred. method: name of the transfer method.
             num_workers: concurrent tasks of bakes that are not tiny.
             limit: number of bakes to read.
         Returns:

@@ -1,7 +1,7 @@
 """Run one bake: stages in order, unfinished tasks to an executor, finished ones to the ledger.
 
-It can be killed at any time: the next run continues where the ledger is, and the published store is the same, bit for
-bit: a task is pure, its shards appear by rename, and only a recorded task counts as done.
+It can be killed at any time: the next run continues after the tasks in the ledger, and the published store is the same,
+bit for bit: a task is pure, its shards appear by rename, and only a recorded task counts as done.
 """
 
 from __future__ import annotations

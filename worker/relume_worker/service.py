@@ -1,4 +1,4 @@
-"""Bake service for server and command line; the ledger and the stores own everything that must survive its threads."""
+"""Bake service for server and command line; all that must survive its threads is in ledger and stores."""
 
 from __future__ import annotations
 

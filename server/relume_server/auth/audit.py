@@ -81,7 +81,7 @@ class Audit:
         """List rows, newest first.
 
         Args:
-            limit: maximum number. before: only rows with a smaller number. actor: only of this user.
+            limit: maximum number. before: only rows with a smaller number. actor: only rows of this user.
         """
         query = select(AuditRow).order_by(AuditRow.number.desc()).limit(min(limit, MAX_LISTED))
         if before is not None:

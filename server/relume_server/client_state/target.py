@@ -1,4 +1,4 @@
-"""The look that a session shall show, and the time of its request."""
+"""The look that a session should show, and the time of its request."""
 
 from __future__ import annotations
 

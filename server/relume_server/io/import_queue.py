@@ -75,8 +75,7 @@ class ImportQueue:
 
         Args:
             reservation: reservation of the upload.
-            make_request: writes files into an empty folder, in a thread, and describes
-                them.
+            make_request: writes files into an empty folder, in a thread, and describes them.
         Raises:
             QuotaError, NearlyFullError: the unpacked result is too large; nothing is stored.
             Also what `Importers.run` raises.

@@ -70,5 +70,5 @@ class StreamedResponses:
         return StreamingResponse(file.chunks(self._readers), media_type=media_type, headers={**headers, **length})
 
     def close(self) -> None:
-        """Create no more."""
+        """Accept no more requests."""
         self._single_flight.close()

@@ -23,8 +23,7 @@ class SessionState:
 
     Attributes:
         traces: None if disabled. caller: the client. member: member of the room; None without a room.
-        audit_writer: None for
-            view-only clients, which change view settings only.
+        audit_writer: None for view-only clients, which change view settings only.
     """
 
     socket: ClientSocket

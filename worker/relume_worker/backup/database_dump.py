@@ -14,7 +14,7 @@ ROWS_PER_BATCH = 1000
 
 
 def copy_ledger(source: Engine, path: Path) -> None:
-    """Copy all rows of one moment, while the ledger is in use.
+    """Copy all rows as of one moment, while the ledger is in use.
 
     Args:
         source: ledger of the newest revision.

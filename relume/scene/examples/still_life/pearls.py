@@ -21,7 +21,7 @@ def contact_height(height: Height, x: float, z: float, radius: float) -> float:
 
     Args:
         height: height of the ground at any (x, z), meters.
-        x, z: of the center, meters.
+        x, z: coordinates of the center, meters.
         radius: radius of the sphere, meters.
     """
     r = radius * np.sqrt(np.linspace(0, 1, 24))[:, None]

@@ -35,7 +35,7 @@ class FrameRequest:
 
     Attributes:
         target: look of the frame.
-        accepting: images that do not have this look yet; all take it, or none.
+        accepting: images that do not have this look yet; all accept it, or none.
         missing_tiles: tiles that the client lacks in HDR, besides those that this step changes.
         only_exact: send nothing unless the step makes the image, or its visible region, exact.
         region: visible region; None: all. has_new_region: the image does not know it yet.
