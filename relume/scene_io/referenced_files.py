@@ -114,7 +114,7 @@ class UploadedFiles(NamedFiles[Path]):
             files: current paths by original name. scene: original name of the scene file.
 
         Raises:
-            SceneError: they are too large in total.
+            SceneError: the files are too large in total.
         """
         if sum(path.stat().st_size for path in files.values()) > MAX_BYTES:
             raise SceneError(f"the files next to the scene have over {MAX_BYTES >> 20} MB; scale them down")
