@@ -24,7 +24,7 @@ from relume.brdf.registry import TERMS
 from relume.brdf.specular import specular_albedo
 from relume.brdf.symmetry import is_isotropic, rotational_symmetry
 from relume.brdf.texture_slots import TEXTURES, Images, NormalMap, texture_slot, user_images
-from relume.math.zernike import OUTGOING_DEGREE, project, recurrence
+from relume.math.zernike import OUTGOING_DEGREE, basis_functions, recurrence
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -45,7 +45,7 @@ _REFLECTANCE_BYTES = 4 * (1 + len(TEXTURES)) * 3 * len(PAIRS)
 _NUM_COSINES, _NUM_AZIMUTHS = 24, 24
 _NUM_OUT, _NUM_RADII, _NUM_AROUND = 10, 32, 12
 _STEPS = 128  # quantization steps of a highlight's F, from 0 to 1
-_STEPS_PER_OCTAVE = 64  # quantization steps of a sharp highlight's parameters
+_STEPS_PER_OCTAVE = 64  # quantization steps per octave of a sharp highlight's parameters
 # least F_00 of a highlight that matters; least F_66 / F_00 of a highlight that the basis does not represent
 _MIN_REFLECTANCE, _MIN_RESIDUAL_RATIO = 0.15, 0.03
 _LAST_PAIR = PAIRS.index((OUTGOING_DEGREE // 2, OUTGOING_DEGREE // 2))  # both of the highest degree, of order 0
@@ -60,7 +60,7 @@ def pack_reflectance(terms: Sequence[Mapping[str, Any]], normals: NormalMap | No
     """Pack a material's F, summed over terms per texture slot, its image names, mirrors, narrow lobes and normal map.
 
     Args:
-        terms: of a complete look. normals: the image that the look uses instead of the material's normal map.
+        terms: terms of a complete look. normals: the image that the look uses instead of the material's normal map.
     Returns:
         Bytes for `unpack_reflectance`, `unpack_images`, `unpack_mirrors`, `unpack_lobes` and `unpack_normal_map`.
     """
@@ -101,7 +101,7 @@ def narrow_lobes(highlights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]
     Args:
         highlights: terms of a complete look.
     Returns:
-        Their documents, for `relume.brdf.highlight_tables`; empty if the basis suffices.
+        Documents of the highlights, for `relume.brdf.highlight_tables`; empty if the basis suffices.
     """
     if any(map(_is_textured, highlights)) or not any(map(_is_narrow, highlights)):
         return []
@@ -160,7 +160,7 @@ def unpack_normal_map(packed_material: bytes) -> NormalMap | None:
 
 
 def drop_normal_map(packed_material: bytes) -> bytes:
-    """Remove the look's normal map, so that the material uses the baked one. packed_material: likewise"""
+    """Remove the look's normal map, so that the baked one is used. packed_material: from `pack_reflectance`"""
     image_names, mirrors, lobes, normals = _unpack_text(packed_material)
     return (
         packed_material[:_REFLECTANCE_BYTES] + _pack_text(image_names, mirrors, lobes, [])
@@ -227,7 +227,7 @@ def directional_albedo(terms: Sequence[Mapping[str, Any]]) -> tuple[Shaped[F64, 
         a(θo) = ∫ f(ωi, ωo) cos θi dωi
 
     Args:
-        terms: of a complete look.
+        terms: terms of a complete look.
     Returns:
         θo in radians, ascending, and a(θo).
     """
@@ -244,7 +244,7 @@ class _QuadraturePoints(NamedTuple):
 
     Attributes:
         wi, wo: local directions. (o, n, 3), (o, 1, 3)
-        h_i: basis functions of ωi, weighted. (o, n, rows). h_o: of ωo, times ∫ cos² mφ dφ. (o, rows)
+        h_i: weighted basis functions at ωi. (o, n, rows). h_o: basis functions at ωo, times ∫ cos² mφ dφ. (o, rows)
         weight_o: weights of ωo with the cosine; h_i contains them. (o,)
     """
 
@@ -275,7 +275,10 @@ def _mirror_quadrature() -> _QuadraturePoints:
     weight = (weight_o * cos_o)[:, None] * solid_angle * np.maximum(above, 0)
     table = recurrence(OUTGOING_DEGREE)
     azimuth_norm = np.where(table.order > 0, np.pi, 2 * np.pi)
-    h_i, h_o = weight[..., None] * project(wi)[..., table.cosine], azimuth_norm * project(wo[:, 0])[:, table.cosine]
+    h_i, h_o = (
+        weight[..., None] * basis_functions(wi)[..., table.cosine],
+        azimuth_norm * basis_functions(wo[:, 0])[:, table.cosine],
+    )
     return _QuadraturePoints(wi, wo, h_i, h_o, weight_o * cos_o)
 
 

@@ -57,7 +57,7 @@ def specular_terms(
     """Specular reflectance of a material's mirror terms: reflected radiance per radiance from the mirror direction.
 
     Args:
-        documents: terms of a complete look. cos_theta_i: at the hit points.
+        documents: terms of a complete look. cos_theta_i: cos θi at the hit points.
         tint: specular texture at the hit points.
     """
     theta, total = np.arccos(np.clip(cos_theta_i, 0, 1).astype(np.float64)), np.zeros((len(cos_theta_i), 3))

@@ -17,8 +17,8 @@ class SpecularChain(NamedTuple):
     """Mirrors on the paths of rays in order from the camera, the same number for each ray.
 
     Attributes:
-        material: of each mirror, index into the scene's materials.
-        cos_theta_i: at the hit.
+        material: index of each mirror's material in the scene.
+        cos_theta_i: cos θi at the hit.
         tint: specular texture at the hit.
     """
 
@@ -66,8 +66,8 @@ class RayPaths(NamedTuple):
     Attributes:
         ray: index of the camera ray, ascending.
         origins: one for all or one each. directions: unit.
-        transmittance: from the origin of the ray back to the camera.
-        length: of the path up to the origin.
+        transmittance: transmittance between the camera and the ray's origin.
+        length: length of the path up to the origin.
         num_glass: number of glass surfaces since the camera.
         chain: mirrors on the path; None without mirrors. path_key: distinguishes paths over different mirrors.
     """

@@ -20,7 +20,7 @@ class RelumeError(Exception):
 
 
 class NotFoundError(RelumeError):
-    """There is no object of that name."""
+    """No object has that name."""
 
 
 class SceneError(RelumeError, ValueError):

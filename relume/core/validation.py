@@ -46,8 +46,8 @@ def check_number(pointer: Pointer, value: Any, minimum: float, maximum: float) -
     """Reject anything but a number in [minimum, maximum], NaN and infinities included.
 
     Args:
-        pointer: location in the document. value: of any type.
-        minimum, maximum: both allowed.
+        pointer: location in the document. value: value of any type.
+        minimum, maximum: inclusive bounds.
     Raises:
         ParameterError: the value is not allowed.
     """
@@ -59,8 +59,8 @@ def check_number_or_rgb(pointer: Pointer, value: Any, minimum: float, maximum: f
     """Reject anything but one number or three numbers for R, G, B.
 
     Args:
-        pointer: location in the document. value: of any type.
-        minimum, maximum: of each number, both allowed.
+        pointer: location in the document. value: value of any type.
+        minimum, maximum: inclusive bounds of each number.
     Raises:
         ParameterError: the value is not allowed.
     """
@@ -74,8 +74,8 @@ def check_triple(pointer: Pointer, value: Any, minimum: float, maximum: float, l
     """Reject anything but three numbers in [minimum, maximum].
 
     Args:
-        pointer: location in the document. value: of any type.
-        minimum, maximum: of each number, both allowed.
+        pointer: location in the document. value: value of any type.
+        minimum, maximum: inclusive bounds of each number.
         label: name of the allowed values in the message.
     Raises:
         ParameterError: the value is not allowed.
@@ -90,7 +90,7 @@ def check_object(pointer: Pointer, value: Any, allowed: Iterable[str]) -> None:
     """Reject anything but an object with fields from `allowed`.
 
     Args:
-        pointer: location in the document. value: of any type.
+        pointer: location in the document. value: value of any type.
         allowed: names of fields.
     Raises:
         ParameterError: the value is not an object, or has an unknown field.

@@ -63,7 +63,8 @@ def complete_lights(partial: Any, default: Mapping[str, Any], previous: Mapping[
     """Merge `partial` into the scene's lights and append the lights that it adds. Raises ParameterError.
 
     Args:
-        default: of the scene. previous: of a valid look; objects shared with it are not validated again.
+        default: default look of the scene.
+        previous: a valid look; objects shared with it are not validated again.
     """
     pointer: Pointer = ("lights",)
     if not isinstance(partial, Mapping):

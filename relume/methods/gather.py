@@ -48,7 +48,7 @@ _PIXELS_PER_PATCH, _MIN_PATCHES = 10, 1024
 _PATCH_STAGE, _RAY_STAGE = 2, 3
 _PATCH_BYTES = POINTS_PER_PATCH * (56 + 2 * RAYS_PER_POINT) + 64
 _NORMAL_BYTES = 240  # per triangle, while normals are computed
-_PATCH_BUILD_BYTES = 4000  # photons, their hits, and the tree that is built over them
+_PATCH_BUILD_BYTES = 4000  # importons, their hits, and the tree that is built over them
 _SHARD_ROW_BYTES = 500  # per sample besides its gather hits, which are held three times: traced, joined, written
 _RAY_NS, _TRIANGLE_US = 8.0, 3.0  # on one core, for scenes of 200 to a million triangles
 

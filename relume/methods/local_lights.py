@@ -23,9 +23,9 @@ from relume.live.fixed_camera.illumination import Illumination, LightSource
 from relume.look import LightGeometry
 from relume.methods.store_layout import has_alpha_tested_surfaces, read_alpha_test
 from relume.raytrace.embree import EmbreeScene
-from relume.raytrace.light_visibility import compute_irradiance, trace_light_visibility
+from relume.raytrace.local_light_visibility import compute_irradiance, trace_light_visibility
 from relume.raytrace.moving_light import MovingLight, trace_moving_light
-from relume.raytrace.scene_buffers import is_front, offset_point
+from relume.raytrace.scene_buffers import is_front, ray_epsilon
 from relume.raytrace.surface_points import SurfacePoints
 from relume.store.bake_protocol import StoreReader
 from relume.transport.shading_points import LocalRays
@@ -82,7 +82,7 @@ class LocalLights:
 
     @cached_property
     def _ray_offset(self) -> float:
-        return offset_point(self.positions)
+        return ray_epsilon(self.positions)
 
     def num_samples(self, geometry: LightGeometry, rectangle_samples: int = SAMPLES) -> int:
         """Return the number of samples of a light, given that of a rectangle; see `make_light_strata`.

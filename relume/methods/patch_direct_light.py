@@ -21,7 +21,7 @@ from relume.methods.spherical_harmonic_transfer import PATCH_DEGREE, HarmonicLig
 from relume.radiosity.highlight_transport import DirectLobes
 from relume.radiosity.patch_irradiance import PatchLight
 from relume.radiosity.reflectance_operator import IncidentLight, ReflectanceOperator
-from relume.raytrace.light_visibility import compute_irradiance
+from relume.raytrace.local_light_visibility import compute_irradiance
 from relume.raytrace.moving_light import MovingLight
 from relume.transport.incident_coefficients import ray_incident_coefficients
 from relume.transport.outgoing_patch_light import NUM_OUTGOING

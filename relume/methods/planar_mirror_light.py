@@ -21,7 +21,13 @@ from numpy.typing import NDArray
 
 from relume.brdf.albedo import Reflectances, pack_reflectance, unpack_mirrors
 from relume.brdf.specular import specular_terms, split_specular
-from relume.camera.planar_mirrors import MAX_PLANES, FlatMirrors, find_flat_mirrors, has_flat_mirrors, mirrored_lights
+from relume.camera.planar_mirrors import (
+    MAX_PLANES,
+    PlanarMirrors,
+    find_planar_mirrors,
+    has_planar_mirrors,
+    mirrored_lights,
+)
 from relume.core.cache import Cache
 from relume.core.color import luminance
 from relume.core.errors import ChunkDamagedError, StoreError
@@ -60,7 +66,7 @@ class MirrorLights:
     lights: Shaped[NDArray[np.int32], " T"]
     group: Shaped[NDArray[np.int32], " T"]
     direction: Shaped[F32, "G 3"]
-    mirrors: FlatMirrors
+    mirrors: PlanarMirrors
     plane: Shaped[NDArray[np.uint8], " patches"]
 
     @property
@@ -70,7 +76,7 @@ class MirrorLights:
 
     @classmethod
     def from_lights(
-        cls, lights: TriangleLights, tiles: Tiles, mirrors: FlatMirrors, plane: Shaped[NDArray[np.uint8], " patches"]
+        cls, lights: TriangleLights, tiles: Tiles, mirrors: PlanarMirrors, plane: Shaped[NDArray[np.uint8], " patches"]
     ) -> MirrorLights:
         """Select the lights that are too bright for a low-degree basis.
 
@@ -99,7 +105,7 @@ class MirrorLights:
 
 def max_mirror_lights(scene: Scene, recipe: Recipe) -> int:
     """Maximum number of virtual lights of a sample, P G."""
-    return MAX_PLANES * min(MAX_GROUPS, recipe.num_lights) if has_flat_mirrors(scene) else 0
+    return MAX_PLANES * min(MAX_GROUPS, recipe.num_lights) if has_planar_mirrors(scene) else 0
 
 
 def make_mirror_lights(
@@ -110,9 +116,9 @@ def make_mirror_lights(
     Args:
         scene: that is baked. geometry: its triangles. store: with its lights. patch_positions: sample points.
     """
-    if not has_flat_mirrors(scene):
+    if not has_planar_mirrors(scene):
         return {}
-    mirrors = find_flat_mirrors(scene, geometry)
+    mirrors = find_planar_mirrors(scene, geometry)
     mirror_lights = MirrorLights.from_lights(
         read_lights(store), read_tiles(store), mirrors, mirrors.containing_plane(patch_positions, geometry.epsilon)
     )
@@ -129,7 +135,7 @@ def read_mirror_lights(store: StoreReader) -> MirrorLights | None:
     def read(name: str) -> NDArray[Any]:
         return store.read(f"mirror_lights/{name}")
 
-    mirrors = FlatMirrors(*map(read, FlatMirrors._fields))
+    mirrors = PlanarMirrors(*map(read, PlanarMirrors._fields))
     mirror_lights = MirrorLights(read("lights"), read("group"), read("direction"), mirrors, read("plane"))
     limits: list[tuple[NDArray[Any], int]] = [
         (mirror_lights.lights, store.shape("lights/irradiance")[0]),

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relume.lights.spherical_triangles import RotatedEnvironment, TriangleLights, integrate_environment
+from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
 from relume.lights.sun_disks import SplitEnvironment, remove_sun_disks
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.free_camera.hard_shadows.lights import HardShadowLight, sun_shadow_targets, unoccluded_sun_vectors
@@ -57,7 +57,7 @@ class SunExtractor:
     def _integrate_residual(self, environment: EnvironmentKey) -> TriangleLights:
         return integrate_environment(
             self.light_transport.tiles,
-            RotatedEnvironment.from_radiance(self._residual_radiance(environment.map)),
+            EnvironmentTexels.from_radiance(self._residual_radiance(environment.map)),
             environment.rotation,
         )
 

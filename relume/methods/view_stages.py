@@ -37,7 +37,7 @@ from relume.camera.transparency_layers import has_layers
 from relume.camera.view_samples import BACKGROUND, camera_setup, sample_pixels
 from relume.core.errors import PlanError
 from relume.lights.sphere_tiles import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
-from relume.lights.spherical_triangles import RotatedEnvironment, integrate_environment
+from relume.lights.spherical_triangles import EnvironmentTexels, integrate_environment
 from relume.look import default_look
 from relume.methods import plan_estimates
 from relume.methods.read_cache import ReadCache
@@ -250,7 +250,7 @@ def light_arrays(scene: Scene, recipe: Recipe) -> dict[str, NDArray[Any]]:
     """Return the light triangles of a scene's environment, as arrays of a store."""
     radiance = scene.environment.radiance
     tiles = choose_tiles(radiance, recipe.num_lights, recipe.relightable)
-    lights = integrate_environment(tiles, RotatedEnvironment.from_radiance(radiance))
+    lights = integrate_environment(tiles, EnvironmentTexels.from_radiance(radiance))
     return {
         "lights/nodes": lights.nodes,
         "lights/direction": lights.direction,

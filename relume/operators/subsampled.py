@@ -74,7 +74,7 @@ def subsampled_bytes(num_samples: int, num_subset: int, num_bands: int) -> int:
     """Return the memory of an operator at a subset of a term's samples.
 
     Args:
-        num_samples: of the term. num_subset: selected samples. num_bands: columns per channel.
+        num_samples: number of samples of the term. num_subset: selected samples. num_bands: columns per channel.
     """
     return quantized_bytes(num_subset, num_bands) + num_samples * _NEIGHBOR_BYTES
 

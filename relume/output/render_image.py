@@ -40,8 +40,8 @@ def render_image(
         size: width and height; None means the baked size, the only one possible for a fixed camera.
         progress: called with the approximate finished fraction. is_canceled: called regularly.
         for_display: coverage is for compositing of display values, as in PNG and WebP.
-        camera_and_size: for a bake with a free camera: another camera than the view's, and the size of the image.
-        static_views: for such a bake: makes the image exact; None: it equals the free-camera image.
+        camera_and_size: for a bake with a free camera, another camera than the view's, and the size of the image.
+        static_views: for such a bake, static views that make the image exact; None: the image is the free-camera image.
     Returns:
         Linear radiance; for a transparent background, coverage as a fourth channel, with premultiplied color.
     Raises:
@@ -78,7 +78,7 @@ def render_small(
 
     Args:
         transfer: an opened bake. view_name: one of its views. look: the look.
-        width: of the small image.
+        width: width of the small image.
     Returns:
         Linear radiance, at least `width` wide if the bake is.
     """

@@ -40,8 +40,8 @@ class GatherHits:
     """Hits of the gather rays of n points.
 
     Attributes:
-        patch: that each ray hits, `NO_PATCH` if it leaves the scene or was not traced.
-        num_rays: traced. trace_s: wall time of the tracing alone.
+        patch: index of the patch that each ray hits, `NO_PATCH` if it leaves the scene or was not traced.
+        num_rays: number of traced rays. trace_s: wall time of the tracing alone.
     """
 
     patch: Shaped[NDArray[np.uint16], "n rays"]
@@ -146,7 +146,7 @@ def trace_gather_rays(
     """Trace all gather rays of points. O(n · rays · (log triangles + log patches)) time.
 
     Args:
-        geometry: the scene's triangles. tree: of the patches.
+        geometry: the scene's triangles. tree: kd-tree of the patches.
         points: ray origins; their seeds shift the pattern.
         wo: view directions, unit, world space; glossy rays are distributed about their mirror direction.
         pattern: ray directions of every point.

@@ -3,7 +3,7 @@
 Successive points are neighbors in the image. In a block of 64, every fourth point is traced against all samples of the
 light. If all these rays agree, the light is visible or occluded for the other points too; otherwise all of them are
 traced. So shadow edges are traced, except for shadows so thin that no ray hits them: they appear when the light stops
-and `relume.raytrace.light_visibility` traces every ray.
+and `relume.raytrace.local_light_visibility` traces every ray.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from relume.lights.light_sampling import LightStrata
 from relume.lights.local_lights import LocalLight, light_sample
 from relume.raytrace.embree import EmbreeScene, occluded, packet_arguments
 from relume.raytrace.gather_rays import cranley_patterson_offset
-from relume.raytrace.light_visibility import shadow_ray
+from relume.raytrace.local_light_visibility import shadow_ray
 from relume.raytrace.ray_packet import (
     LANES,
     enable_first_lanes,

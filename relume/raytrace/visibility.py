@@ -1,4 +1,8 @@
-"""Visibility tracing from points to light triangles: one bit per pair, packets of 16 neighboring points per light."""
+"""Visibility of light triangles from any points: one bit per pair, traced in packets of 16 points per light.
+
+`relume.raytrace.visibility_masks` traces the bits of a bake's view samples, with fewer rays;
+`relume.raytrace.local_light_visibility` traces those of local lights.
+"""
 
 from __future__ import annotations
 
@@ -97,10 +101,10 @@ def trace_visibility(
 
     Args:
         scene: the occluding triangles.
-        origins: off the surface.
+        origins: positions, offset from the surface.
         normals: shading normals; lights below their horizon are not traced and count as occluded.
         directions: unit, toward the lights.
-        alpha_sample: for the rays at blended surfaces; see `SurfacePoints`.
+        alpha_sample: alpha samples for the rays at blended surfaces; see `SurfacePoints`.
         excluded_normals: other normals; lights above their horizon are not traced and count as occluded too.
     Cost: O(n · m · log triangles) time.
     """
@@ -139,7 +143,7 @@ def select_visibility(
     """Select visibility bits of some points and some lights.
 
     Args:
-        visible: of all points and lights, as in `VisibilityBits`. rows: the points. lights: the lights.
+        visible: visibility bits of all points and lights, as in `VisibilityBits`. rows: the points. lights: the lights.
     Returns:
         Their bits, renumbered; ceil(N / 8) bytes
     """

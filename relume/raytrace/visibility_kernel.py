@@ -39,7 +39,7 @@ U64 = NDArray[np.uint64]
 BLOCK = WORD_BITS
 _BLOCK_BITS = 6
 _QUARTER = BLOCK // 4
-_MIN_FULL_LANES = LANES * 3 // 4  # rays to one light from which on they are traced without rays of the next light
+_MIN_FULL_LANES = LANES * 3 // 4  # with this many rays to one light, a packet is traced without rays of the next
 # predictions of the visibility of a light from the untraced samples of a region
 _UNKNOWN, _LIT, _HIDDEN, _BELOW = 0, 1, 2, 3
 # one in this many predicted bits is traced as a check; a power of two, at least the size of a quarter
@@ -55,7 +55,7 @@ class _Block(NamedTuple):
 
     Attributes:
         facing_bits, traced_bits, visibility_bits: above the horizon; traced; unoccluded.
-        alpha_sample: for the rays of each sample at blended surfaces. Its size is `BLOCK`.
+        alpha_sample: alpha samples for the rays of each sample at blended surfaces. Its size is `BLOCK`.
     """
 
     facing_bits: Shaped[U64, " lights"]
@@ -68,7 +68,7 @@ class _Level(NamedTuple):
     """State of a level in its region.
 
     Attributes:
-        prediction: for untraced samples.
+        prediction: prediction for untraced samples.
         is_queued: the light was traced here. is_doubtful: the next level traces it.
         queue, samples: lights in the order of tracing, and masks of the samples to trace.
     """
@@ -358,9 +358,9 @@ def trace_blocks(  # type: ignore[no-untyped-def]
 
     Args:
         occluded: `occluded`. scene: `EmbreeScene.handle`. arguments: address of `packet_arguments`.
-        coherent_arguments: address of those for rays from all samples of a quarter to one light.
-        origins: off the surface. normals: shading normals. (n, 3) float32
-        alpha_sample: for the rays of each sample, or for all, at blended surfaces. (n,) or (1,) float32
+        coherent_arguments: the same for coherent rays, from all samples of a quarter to one light.
+        origins: positions, offset from the surface. normals: shading normals. (n, 3) float32
+        alpha_sample: alpha samples for the rays of each sample, or for all, at blended surfaces. (n,) or (1,) float32
         lights: directions, the two arrays of `relume.lights.neighbors`, and the strong lights, which are always traced.
         start, stop: the samples. bits: output, light m at bit m & 7 of byte m >> 3. (n, bytes) uint8
         counts: traced rays, rays of a full trace, checked predictions, wrong predictions: added to. (4,)

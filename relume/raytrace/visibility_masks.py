@@ -35,8 +35,8 @@ class RayCounts:
 
     Attributes:
         num_traced: traced shadow rays. num_full: rays of a full trace, all pairs above the horizon.
-        num_checked: predicted bits that were traced as a check, uniformly distributed. num_wrong: wrong ones among
-            them.
+        num_checked: predicted bits that were also traced, uniformly distributed.
+        num_wrong: wrong predictions among the checked bits.
     """
 
     num_traced: int
@@ -83,7 +83,7 @@ def make_light_targets(directions: Shaped[F32, "m 3"], irradiance: Shaped[F32, "
     """Prepare lights for `trace_visibility_masks`.
 
     Args:
-        directions: unit, toward the lights. irradiance: of each light, per channel.
+        directions: unit, toward the lights. irradiance: irradiance of each light, per channel.
     """
     luminous = luminance(irradiance)
     return LightTargets(directions, *find_neighbors(directions), luminous > _STRONG_LIGHT_FRACTION * luminous.sum())
@@ -100,10 +100,10 @@ def trace_visibility_masks(
 
     Args:
         scene: the occluding triangles.
-        origins: off the surface, mostly ordered by neighborhood in the image.
+        origins: positions, offset from the surface, mostly ordered by neighborhood in the image.
         normals: shading normals; lights below their horizon are not traced and count as occluded.
         targets: the lights, from `make_light_targets`.
-        alpha_sample: for the rays at blended surfaces; see `SurfacePoints`.
+        alpha_sample: alpha samples for the rays at blended surfaces; see `SurfacePoints`.
     Cost: O(n · m) time, plus O(m · log triangles) for each sample on a shadow edge.
     """
     bits = np.zeros((len(origins), (len(targets.directions) + 7) // 8), np.uint8)

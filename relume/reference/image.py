@@ -71,8 +71,8 @@ class ReferenceImage:
     """Images of one reference pass.
 
     Attributes:
-        all_paths_image: with all light paths; None if not requested.
-        method_image: with the light paths of the method.
+        all_paths_image: image with all light paths; None if not requested.
+        method_image: image with the light paths of the method.
         omitted_paths: paths that the method omits; unsupported_paths: paths that the reference omits too. In sentences.
     """
 
@@ -259,7 +259,7 @@ def points_of_samples(
 ) -> ReferencePoints:
     """Convert view samples to points; points of background samples are meaningless.
 
-    samples: of a view. textures, roughness: at the samples, see `ReferencePoints`.
+    samples: samples of a view. textures, roughness: textures and roughness at the samples, see `ReferencePoints`.
     """
     points = samples.surface.points
     to_camera = samples.camera.astype(np.float64) - points.position

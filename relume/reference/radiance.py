@@ -46,11 +46,12 @@ class ReferencePoints:
     """Points on surfaces with one view direction each; successive points should be neighbors.
 
     Attributes:
-        position: off the surface. normal, tangent: shading frame. wo: toward the viewer.
+        position: positions, offset from the surface. normal, tangent: shading frame. wo: toward the viewer.
         textures: factors of terms by channel, "diffuse" and "specular". (n, 3) float32 each
         roughness: see `relume.raytrace.surface_interaction.SurfaceInteraction`.
-        uv: see there; None to use the mean of BTFs.
-        alpha_sample: for shadow rays at blended surfaces; see `relume.raytrace.surface_points.SurfacePoints`.
+        uv: see `SurfaceInteraction`; None to use the mean of BTFs.
+        alpha_sample: alpha sample for shadow rays at blended surfaces; see
+            `relume.raytrace.surface_points.SurfacePoints`.
     """
 
     position: Shaped[F32, "n 3"]
@@ -153,9 +154,9 @@ def reference_radiance(
 
     Args:
         geometry: the occluding triangles.
-        texels: of the environment, with their radiance and solid angles.
-        points: n of them.
-        materials: terms of each, from a complete look.
+        texels: texels of the environment, with their radiance and solid angles.
+        points: n points.
+        materials: terms of each material, from a complete look.
         spp: texels sampled by power per point, plus some directions sampled by the materials' lobes, and points per
             area light; 0, or as many as there are, for all texels at their centers.
         progress: called with the finished fraction of points, in [0, 1].
@@ -248,7 +249,7 @@ def material_lobes(terms: Sequence[Document]) -> list[Lobe]:
     """Lobes of a material: the cosine lobe, then each lobe of its terms.
 
     Args:
-        terms: from a complete look.
+        terms: terms of a complete look.
     """
     return [cosine_lobe(), *(lobe for document in terms for lobe in _curve_lobes(_tabulate(document)))]
 

@@ -47,7 +47,7 @@ def make_custom_camera(name: str, to_world: Sequence[float], yfov: float) -> Cus
     """Validate a camera that a user placed.
 
     Args:
-        name: of its views.
+        name: name of its views.
         to_world: camera to world, 16 numbers by row; the camera looks along its -Z. Scale is removed.
         yfov: vertical field of view, degrees.
     Raises:

@@ -27,7 +27,7 @@ def import_scene(
 
     Args:
         source: a path, whose folder may have further files; or the bytes of a file.
-        name: of the scene, shown to users.
+        name: name of the scene, shown to users.
         environment: None for the built-in studio.
         companions: further files, if they are not in the folder or in the same archive.
 

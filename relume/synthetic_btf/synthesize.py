@@ -44,7 +44,7 @@ class SyntheticBtf(NamedTuple):
         geometry: one of `GEOMETRIES`, or `MESH`. size: texels per side.
         grid: samples along each side of a texel, each with different light directions.
         bound: allowed relative RMS error of the compression.
-        file: of a mesh. period: of it, see `read_tile`.
+        file: file of a mesh. period: period of the mesh, see `read_tile`.
     """
 
     geometry: str
@@ -91,7 +91,7 @@ def synthesize_btf(
     """Render and compress a BTF; an equal request is the same BTF, and an interrupted one resumes.
 
     Args:
-        folder: of the asset store. request: what to render. name: shown to users.
+        folder: folder of the asset store. request: what to render. name: shown to users.
         progress: called with the completed fraction. is_canceled: checked regularly.
         partial_folder: folder of rendered values; by default in `folder`, named by the request.
     Raises:

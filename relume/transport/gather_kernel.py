@@ -1,4 +1,4 @@
-"""Kernels of gather rays: generate, weight, and list them with their radiance, or sum them at once.
+"""Final gathering: kernels that generate and weight gather rays, and list them with their radiance or sum them.
 
 Loops over all rays of a point write one array each, so that the compiler vectorizes them. Lookups by the patch that a
 ray hits follow in separate loops.

@@ -87,9 +87,9 @@ def incident_coefficients(
     """Compute the incident radiance coefficients of points. O(n · (lights + rays) · K) time.
 
     Args:
-        points: n points. visible: of the lights, as in `ShadingPoints`.
+        points: n points. visible: visibility bits of the lights, as in `ShadingPoints`.
         lights: triangles of the environment. rays: all other light.
-        degree: of the basis.
+        degree: degree of the basis.
     Returns:
         t, with the cosine, of the functions up to the degree.
     """

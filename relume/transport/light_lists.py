@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.term import Angle, Term
 from relume.lights.light_clusters import visible_fraction, weight_by_visibility
-from relume.lights.spherical_triangles import TriangleLights, TriangleSubset
+from relume.lights.spherical_triangles import MergedParts, TriangleLights
 from relume.transport.area_light_kernel import list_area_light
 from relume.transport.light_culling import list_lights
 from relume.transport.shading_points import LocalRays, ShadingPoints, is_area_light
@@ -115,7 +115,7 @@ class LightList:
             weight_by_visibility(self.first[: stop - start + 1], self.light, self._visible_fraction, shading)
         return shading, self._wo
 
-    def _visible_clusters(self, subset: TriangleSubset, visible: Bits) -> Bits:
+    def _visible_clusters(self, subset: MergedParts, visible: Bits) -> Bits:
         """Return the merged lights that are visible at least in part, as bits; fractions are in `_visible_fraction`."""
         visible_fraction(visible, subset.group, subset.fraction, 0, len(visible), self._visible_fraction)
         return np.packbits(self._visible_fraction[:, : len(visible)].T > 0, axis=1, bitorder="little")

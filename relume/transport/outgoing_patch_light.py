@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges
 from relume.math.direction_grid import SIDE, offsets_in_bin
-from relume.math.zernike import DEGREES, OUTGOING_DEGREE, WINDOW_DECAY, num_functions, project
+from relume.math.zernike import DEGREES, OUTGOING_DEGREE, WINDOW_DECAY, basis_functions, num_functions
 from relume.patches.patch_kdtree import NO_PATCH
 
 F32 = NDArray[np.float32]
@@ -118,7 +118,7 @@ def decay_of(roughening: Shaped[F32, " G"]) -> Shaped[F32, " G"]:
 def bin_means() -> Shaped[F32, "J bins"]:
     """Cosine-weighted average of each basis function over each direction bin."""
     wi, weight = offsets_in_bin()  # bins outside the disk take the values of its edge
-    functions = project(wi)[..., :NUM_OUTGOING]
+    functions = basis_functions(wi)[..., :NUM_OUTGOING]
     means = np.einsum("xaybj,xayb->xyj", functions, weight) / np.einsum("xayb->xy", weight)[..., None]
     return np.ascontiguousarray(means.reshape(SIDE * SIDE, NUM_OUTGOING).T, np.float32)
 

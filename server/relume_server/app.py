@@ -43,7 +43,7 @@ from relume_server.lifecycle.connection import Connection
 from relume_server.lifecycle.drain import DrainState
 from relume_server.lifecycle.server import ServerProcess
 from relume_server.lifecycle.websocket_protocol import Socket
-from relume_server.request_limits import Guard
+from relume_server.request_limits import RequestLimits
 from relume_server.runtime.assets import using_asset_stores
 from relume_server.runtime.library import open_library
 from relume_server.schemas.protocol import MAX_MESSAGE_BYTES
@@ -133,7 +133,7 @@ def create_app(
     app.add_middleware(AuthMiddleware, settings=settings, access=lambda: app.state.services.access, clock=clock)
     app.add_middleware(Conditional)
     app.add_middleware(
-        Guard,
+        RequestLimits,
         allowed_hosts=[*settings.allowed_hosts, settings.host],
         allowed_origins=settings.allowed_origins,
         max_body_bytes=settings.max_body_bytes,

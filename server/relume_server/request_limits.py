@@ -65,8 +65,8 @@ def origin_is_allowed(headers: Headers, allowed_origins: Sequence[str]) -> bool:
     return origin_url.scheme in ("http", "https") and origin_url.netloc.lower() == headers.get("host", "").lower()
 
 
-class Guard:
-    """The outermost middleware."""
+class RequestLimits:
+    """Middleware for host, origin and body size; adds the security headers."""
 
     def __init__(
         self,

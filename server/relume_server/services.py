@@ -25,9 +25,9 @@ from relume_server.collaboration.comment_sync import CommentSync
 from relume_server.collaboration.room_lease import RoomLease
 from relume_server.collaboration.rooms import Rooms
 from relume_server.io.import_processes import Importers
-from relume_server.io.import_queue import Intake
+from relume_server.io.import_queue import ImportQueue
 from relume_server.io.import_request import remove_strays
-from relume_server.io.streamed_responses import Answers
+from relume_server.io.streamed_responses import StreamedResponses
 from relume_server.jobs.btf_jobs import BtfQueue
 from relume_server.jobs.comparison_jobs import ComparisonQueue
 from relume_server.jobs.job import Quota
@@ -63,8 +63,8 @@ class Services:
     Attributes:
         drain: whether the server is draining. access: users, roles, quotas, and the audit.
         pictures: renders thumbnails, and merges identical concurrent requests.
-        answers: large responses.
-        intake: runs imports, and stores their results.
+        responses: large responses.
+        import_queue: runs imports, and stores their results.
     """
 
     settings: Settings
@@ -84,9 +84,9 @@ class Services:
     cache_evictor: CacheEvictor
     thumbnails: Thumbnails
     pictures: SingleFlight
-    answers: Answers
+    responses: StreamedResponses
     live: SessionServices
-    intake: Intake
+    import_queue: ImportQueue
 
 
 NUM_PICTURES = 2
@@ -141,9 +141,9 @@ async def open_services(
         thumbnails = Thumbnails(settings.data / "thumbnails", batch.run)
         at_end(thumbnails.close)
         at_end(batch.close)  # closed first, because they use the others
-        pictures, answers = SingleFlight(NUM_PICTURES, "relume-picture"), Answers(settings.data)
+        pictures, responses = SingleFlight(NUM_PICTURES, "relume-picture"), StreamedResponses(settings.data)
         at_end(pictures.close)
-        at_end(answers.close)
+        at_end(responses.close)
         cache_evictor = CacheEvictor(transfers, threads, library.trim_cache, library.cache_used_bytes, batch.release)
         _watch_memory(metrics, library, transfers)
         _watch_jobs(metrics, settings, service, batch, drain)
@@ -185,9 +185,9 @@ async def open_services(
             cache_evictor=cache_evictor,
             thumbnails=thumbnails,
             pictures=pictures,
-            answers=answers,
+            responses=responses,
             live=_live(settings, metrics, traces, library, threads, service, access, drain, rooms, room_lease),
-            intake=Intake(settings, service.ledger, access.quotas, importers),
+            import_queue=ImportQueue(settings, service.ledger, access.quotas, importers),
         )
 
 

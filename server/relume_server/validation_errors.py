@@ -64,7 +64,7 @@ def list_field_errors(errors: Sequence[_Error], document: object, *, is_message:
     `detail`.
 
     Args:
-        errors: of pydantic. document: the parsed body or message. is_message: true for a session message.
+        errors: pydantic's errors. document: the parsed body or message. is_message: true for a session message.
     """
     fields: dict[tuple[str, tuple[str | int, ...]], list[_Error]] = defaultdict(list)
     located = [_locate_error(error, document, is_message) for error in errors]

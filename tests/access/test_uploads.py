@@ -43,7 +43,7 @@ def some_scene(request: ImportRequest) -> str:
 
 @pytest.fixture
 def _imports(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(client.app.state.services.intake.importers, "run", some_scene)
+    monkeypatch.setattr(client.app.state.services.import_queue.importers, "run", some_scene)
 
 
 class Body:
@@ -193,7 +193,7 @@ class TestUnpacking:
 
         settings.max_bytes_per_user = 5_000
         access.quotas.assign_owner("Ann", "scene", "another", 3_000)
-        monkeypatch.setattr(client.app.state.services.intake.importers, "run", unpack)
+        monkeypatch.setattr(client.app.state.services.import_queue.importers, "run", unpack)
         refused = client.post("/api/scenes", files=SCENE, headers=bearer("edit", "Ann"))
         assert (refused.status_code, asked) == (429, [2_000])
         assert "unpacks to more than the 2 kB" in refused.json()["detail"]

@@ -33,7 +33,7 @@ SCENE = {"scene": ("triangle.glb", b"which nobody reads")}
 @pytest.fixture
 def _imports(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     """Importing creates the tiny scene without a separate process."""
-    monkeypatch.setattr(client.app.state.services.intake.importers, "run", write_tiny_scene)
+    monkeypatch.setattr(client.app.state.services.import_queue.importers, "run", write_tiny_scene)
 
 
 def test_buckets_refill() -> None:

@@ -79,13 +79,13 @@ def test_image_hashes_depend_on_frame_code_and_bake_hashes_do_not():
     of_images = {
         "transport/project_kernel",
         "operators/shade",
-        "raytrace/light_visibility",
+        "raytrace/local_light_visibility",
         "lights/prefilter",
         "views/view",
     }
     of_bakes = {
         "raytrace/visibility_kernel",
-        "patches/photon_density",
+        "patches/importons",
         "camera/view_samples",
         "methods/gather",
         "store/writer",

@@ -93,7 +93,7 @@ def normal_mapped(scene, name, scale=SCALE, **others):
 
 def test_pictures_equal_those_of_a_scene_with_the_normal_map(bakes, plain, named):
     """Also in a rotated environment. Triangles of the coarse ball have one tangent each, vertices an interpolated one;
-    patch points see other photons.
+    patch points see other importons.
     """
     bare, baked = bakes
     max_error, usual = (0.015, 1e-6) if bare.method == "direct" else (0.015, 0.003)

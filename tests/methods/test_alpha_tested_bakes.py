@@ -14,7 +14,7 @@ from relume.live.free_camera.browser.geometry_arrays import constants
 from relume.look import LightGeometry
 from relume.methods.registry import METHODS, open_bake
 from relume.output.render_image import render_image
-from relume.raytrace.light_visibility import trace_light_visibility
+from relume.raytrace.local_light_visibility import trace_light_visibility
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.reference.image import reference_image
 from relume.scene.model import Material, Opacity

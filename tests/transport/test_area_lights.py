@@ -18,7 +18,7 @@ from relume.lights.spherical_triangles import NO_LIGHTS
 from relume.look import LightGeometry
 from relume.methods.local_lights import MESH_SAMPLE_FACTOR, SAMPLES
 from relume.raytrace.embree import EmbreeScene
-from relume.raytrace.light_visibility import trace_light_visibility
+from relume.raytrace.local_light_visibility import trace_light_visibility
 from relume.raytrace.surface_points import SurfacePoints
 from relume.transport.projector import Projector
 from relume.transport.shading.shader import Shader

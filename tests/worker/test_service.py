@@ -159,7 +159,7 @@ def test_stores_are_deleted_if_the_ledger_has_no_disk_space(tmp_path: Path, monk
 def test_bake_leaves_disk_space_for_the_ledger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_service(tmp_path) as service:
         with monkeypatch.context() as patch:
-            patch.setattr("relume.store.room.RESERVE_BYTES", 1 << 60)
+            patch.setattr("relume.store.disk_space.RESERVE_BYTES", 1 << 60)
             patch.setattr("relume_worker.service.check_budget", lambda *_: None)
             status = follow(service, service.submit(SCENE.id, RECIPE))
             assert (status.state, (status.problem or "")[:9]) == ("failed", "disk full")

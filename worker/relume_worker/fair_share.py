@@ -11,7 +11,7 @@ class WaitingBake:
     """Work that is waiting.
 
     Attributes:
-        client: who submitted it. is_first: it is small. created: time of submission.
+        client: user who submitted it. is_first: it is small. created: time of submission.
     """
 
     id: str

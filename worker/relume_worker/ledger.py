@@ -4,7 +4,7 @@
       ▲                 │ └─────▶ failed     submitting a failed or canceled bake queues it again; finished tasks stay
       └───submit────────┴───────▶ canceled
 
-Every change is one statement that names the state it expects, so that processes which race cannot both win.
+Every change is one statement that names the state it expects, so that of two racing processes only one succeeds.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ class Ledger:
         """Queue a bake; the same recipe under the same code is the same bake, and a failed or canceled one resumes.
 
         Args:
-            scene_id: of an existing scene. recipe: of the bake.
-            plan: its cost. client: for fair scheduling.
+            scene_id: id of an existing scene. recipe: recipe of the bake.
+            plan: cost of the bake. client: user, for fair scheduling.
         Returns:
             The bake's id.
         Raises:
@@ -163,10 +163,10 @@ class Ledger:
         """Give up the lease; a running bake changes to `state`, a canceled one stays canceled.
 
         Args:
-            identity: of the bake. owner: of its lease; otherwise nothing changes.
+            identity: id of the bake. owner: owner of its lease; otherwise nothing changes.
             state: final state.
-            problem: a sentence, if it has failed.
-            num_bytes: of the store, if it is ready.
+            problem: a sentence, if the bake has failed.
+            num_bytes: size of the store in bytes, if it is ready.
         Returns:
             As `release`.
         """
@@ -196,13 +196,11 @@ class Ledger:
         """Record that a task's shards are on disk; idempotent.
 
         Args:
-            identity: of the bake. owner: of its lease. task: finished one.
-            cost: seconds and rays.
-            attempts: including this one.
+            identity: id of the bake. owner: owner of its lease. task: the finished task.
+            cost: seconds and rays. attempts: number of attempts, including this one.
         Returns:
-            False if another owner, perhaps with another unfinished store, has the lease, or the bake is deleted:
-                nothing is
-            recorded.
+            False if another owner, perhaps with another unfinished store, has the lease, or the bake is deleted;
+            then nothing is recorded.
         """
         row = TaskRow(bake_id=identity, stage=task.stage, index=task.index, attempts=attempts, **asdict(cost))
         with self.sessions.begin() as session:
@@ -215,7 +213,7 @@ class Ledger:
         """Delete the task rows of a bake whose unfinished store is missing or damaged.
 
         Args:
-            identity: of the bake. owner: of its lease; None: nobody runs it.
+            identity: id of the bake. owner: owner of its lease; None: nobody runs it.
         Returns:
             False if another owner has the lease: nothing is deleted.
         """
@@ -235,7 +233,7 @@ class Ledger:
         """Restart a bake from nothing, under this code.
 
         Args:
-            identity: of the bake. owner: process that runs it. code: its code version.
+            identity: id of the bake. owner: process that runs it. code: its code version.
             run: new run marker.
             reason: one sentence, if it had finished tasks.
         Returns:
@@ -264,7 +262,7 @@ class Ledger:
         """Time per stage of the newest ready bakes of a method, of this scene if there are any.
 
         Args:
-            scene_id: whose bakes are preferred. method: name of the transfer method.
+            scene_id: scene whose bakes are preferred. method: name of the transfer method.
             num_workers: concurrent tasks of bakes that are not tiny.
             limit: number of bakes to read.
         Returns:

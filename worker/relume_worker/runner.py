@@ -1,7 +1,7 @@
 """Run one bake: stages in order, unfinished tasks to an executor, finished ones to the ledger.
 
-It can be killed at any time: the next run continues where the ledger is, and the published store is the same, bit for
-bit: a task is pure, its shards appear by rename, and only a recorded task counts as done.
+It can be killed at any time: the next run continues after the tasks in the ledger, and the published store is the same,
+bit for bit: a task is pure, its shards appear by rename, and only a recorded task counts as done.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from relume.core.folder_size import folder_bytes
 from relume.scene.model import Scene
 from relume.store import open_store, publish, read_code, run_bake
 from relume.store.bake_protocol import Task
-from relume.store.room import check_disk_space
+from relume.store.disk_space import check_disk_space
 from relume_worker.database.retry import Given, Result, with_retry
 from relume_worker.lease import HEARTBEAT_S, LeaseRenewer, log_lost_lease
 from relume_worker.ledger import Ledger

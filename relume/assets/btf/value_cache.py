@@ -28,7 +28,7 @@ class ValueFile:
     """Values that are filled view by view, then read; implements `relume.assets.btf.compress.ViewArrays`.
 
     Args:
-        folder: of the files; created if missing. grid: of the directions. size: height and width in texels.
+        folder: folder of the files; created if missing. grid: grid of the directions. size: height and width in texels.
     """
 
     def __init__(self, folder: Path, grid: DirectionGrid, size: tuple[int, int]) -> None:

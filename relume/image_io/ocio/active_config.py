@@ -30,7 +30,7 @@ def using_config(source: str | None, working: str | None = None) -> Iterator[Non
 
 
 def config_source() -> tuple[str, ...]:
-    """Arguments of `use_config`, for another process that shall use the same config; empty without a config."""
+    """Arguments of `use_config`, for another process that should use the same config; empty without a config."""
     return () if _requested is None else tuple(value for value in _requested if value is not None)
 
 

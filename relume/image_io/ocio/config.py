@@ -40,8 +40,10 @@ class Config:
     """A loaded and checked config.
 
     Attributes:
-        name: from the config, or its file name. id: hash of its contents and of the LUT layout. 16 hexadecimal digits
-        working: its name of linear Rec. 709. displays: their views, both in the config's order.
+        name: the config's name, or its file name.
+        id: hash of the config's contents and of the LUT layout. 16 hexadecimal digits
+        working: the config's name of linear Rec. 709.
+        displays: the views of each display, both in the config's order.
         default: the config's default view.
     """
 
@@ -112,7 +114,7 @@ class Config:
 
         Args:
             pixels: linear Rec. 709, C-contiguous.
-            use_table: use the view's LUT, in a third of the time, like the editor.
+            use_table: use the view's LUT, as the editor does; takes a third of the time.
         Raises:
             ParameterError: the config has no such view, or it does not work.
         """

@@ -25,7 +25,7 @@ from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.probes.texture_kernels import sample_texture
-from relume.math.zernike import project
+from relume.math.zernike import basis_functions
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -45,7 +45,7 @@ def basis_gradients() -> Shaped[F32, "3 K"]:
     wi[..., 2] = np.cos(theta)[:, None]
     # the basis is orthonormal in dx dy = cos θ dω, so x / z leaves x dω
     solid_angle = np.sin(theta) * weight * np.pi / 4 * (2 * np.pi / _NUM_QUADRATURE_NODES)
-    return np.asarray(np.einsum("tpi,tpk,t->ik", wi, project(wi), solid_angle), np.float32)
+    return np.asarray(np.einsum("tpi,tpk,t->ik", wi, basis_functions(wi), solid_angle), np.float32)
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.raytrace.barycentric import EDGE_OFFSET_FRACTION, min_barycentrics
 from relume.raytrace.embree import EmbreeScene
-from relume.raytrace.scene_buffers import offset_point
+from relume.raytrace.scene_buffers import ray_epsilon
 
 F32 = NDArray[np.float32]
 
@@ -38,7 +38,7 @@ class OcclusionMesh(NamedTuple):
         Args:
             stored_scene: of the mesh. positions: of its corners. embree: its search tree.
         """
-        surface_offset, corners = offset_point(positions), positions[stored_scene.faces]
+        surface_offset, corners = ray_epsilon(positions), positions[stored_scene.faces]
         twice_area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
         return cls(
             stored_scene,

@@ -20,7 +20,7 @@ from relume.lights.light_clusters import cluster_lights, num_clusters
 from relume.lights.local_lights import num_samples
 from relume.lights.prefilter import downsampled, prefiltered
 from relume.lights.sphere_tiles import Tiles
-from relume.lights.spherical_triangles import RotatedEnvironment, TriangleLights, integrate_environment
+from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
 from relume.live.fixed_camera.illumination import Illumination, with_baked_normals
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightsAndPoints
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry
@@ -137,7 +137,7 @@ class BakedFixedViews:
         def integrate() -> TriangleLights:
             return integrate_environment(
                 self.tiles,
-                RotatedEnvironment.from_radiance(self.environment_radiance(environment.map)),
+                EnvironmentTexels.from_radiance(self.environment_radiance(environment.map)),
                 environment.rotation,
             )
 
@@ -160,7 +160,7 @@ class BakedFixedViews:
         def integrate() -> TriangleLights:
             rotatable = self.cache.get_value(
                 key,
-                lambda: RotatedEnvironment.from_radiance(halve_to_width(find_radiance(environment.map), PREVIEW_WIDTH)),
+                lambda: EnvironmentTexels.from_radiance(halve_to_width(find_radiance(environment.map), PREVIEW_WIDTH)),
             )
             return integrate_environment(self.tiles, rotatable, environment.rotation)
 

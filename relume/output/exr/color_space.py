@@ -22,9 +22,9 @@ class ExportColorSpace:
     """A linear color space.
 
     Attributes:
-        name: for users.
+        name: name for users.
         interop: id in files; None if it has none.
-        chromaticities: of its primaries and white.
+        chromaticities: chromaticities of its primaries and white.
         convert: converts linear Rec. 709 to it, in place, (n, 3); None for linear Rec. 709.
     """
 

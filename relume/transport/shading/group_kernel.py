@@ -1,4 +1,4 @@
-"""Kernels of light groups: which groups a point sees entirely, and which are accurate enough as one light."""
+"""Kernels of light clusters: find those that a point sees entirely, and those that are accurate enough as one light."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def select_groups(visibility_words, first, group_lights, whole):  # type: ignore
 
     Args:
         visibility_words: of each light, bit k for point k; cleared for lights of entirely visible groups. (M,) uint64
-        first, group_lights: of `relume.lights.spherical_triangles.LightGroups`. whole: visibility of each group,
+        first, group_lights: see `relume.lights.spherical_triangles.LightClusters`. whole: visibility of each group,
             written. (G,) uint64
     """
     for g in range(whole.shape[0]):
@@ -54,7 +54,7 @@ def add_groups(  # type: ignore[no-untyped-def]
         normal, tangent, axes, curves, start, stop, out: as in `shade_points`.
         light_list: first, light and shading of the listed groups. local_wo: of the same list.
         lights: nodes, irradiance_radius and `between_variance` of the groups. groups: first and light_index, see
-            `LightGroups`.
+            `LightClusters`.
         visible: of the points; lights to shade individually are set. (points, bytes)
     """
     num_curves, (scale, num_rows) = axes.shape[0], band_scales(curves)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.term import Term
 from relume.core.bit_matrix import rows_to_words, words_to_rows
-from relume.lights.spherical_triangles import LightGroups
+from relume.lights.spherical_triangles import LightClusters
 from relume.transport.light_lists import LightList
 from relume.transport.shading.group_kernel import add_groups, select_groups
 from relume.transport.shading_points import ShadingPoints
@@ -31,7 +31,7 @@ class GroupedLights:
     """
 
     def __init__(
-        self, term: Term, contraction: Contraction, groups: LightGroups, num_lights: int, receivers: ShadingPoints
+        self, term: Term, contraction: Contraction, groups: LightClusters, num_lights: int, receivers: ShadingPoints
     ) -> None:
         self._receivers, self._contraction, self._groups = receivers, contraction, groups
         self._light_list = LightList(term, contraction, groups.lights, receivers)

@@ -52,7 +52,7 @@ class Shader:
         is_diffuse = term.is_lambertian and contraction.kinds.size == 0
         self._diffuse = DiffuseProjector(term, contraction.constant, lights) if is_diffuse else None
         is_groupable = contraction.kinds.size > 0 and not term.is_steep  # curves bound the variation within a group
-        groups = lights.groups if is_groupable else None
+        groups = lights.clusters if is_groupable else None
         self._grouped = groups and GroupedLights(term, contraction, groups, lights.num_lights, receivers)
         self._rays = RayProjector(term, contraction, receivers, POINTS_PER_BLOCK)
         self._area_lights = area_light_lists(term, contraction, receivers)

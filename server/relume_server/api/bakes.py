@@ -162,7 +162,7 @@ async def material_ids(bake: Id, view: Annotated[str, Path(max_length=256)], ser
             raise NotFoundError(f"view {view[:80]!r} has a free camera; read its pixels in a session")
         fixed_view = cast("FixedViewTransfer", transfer).views[view]
         key, media_type = (bake, view, "materials"), PngResponse.media_type
-        return await services.answers.stream(key, lambda: png_bytes(fixed_view.material_ids()), media_type, FOREVER)
+        return await services.responses.stream(key, lambda: png_bytes(fixed_view.material_ids()), media_type, FOREVER)
 
 
 @router.get("/{bake}/environment.png", response_class=PngResponse, name="get_own_environment")

@@ -66,7 +66,7 @@ class Page:
 
         Args:
             entries: the whole list, or at least the page and one more entry.
-            key: of an entry; lower keys come first.
+            key: returns the sort key of an entry; lower keys come first.
         Raises:
             ParameterError: `after` belongs to another list.
         """

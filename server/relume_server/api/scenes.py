@@ -90,7 +90,7 @@ async def import_scene(
         )
         return replace(request, ground=ground)
 
-    identity = await services.intake.import_file(reservation, make_request)
+    identity = await services.import_queue.import_file(reservation, make_request)
     response.headers["Location"] = f"/api/scenes/{identity}"
     return await run_in_threadpool(get_scene_body, identity, services)
 
@@ -101,8 +101,10 @@ async def add_ground(scene: Id, services: ServicesDep, caller: CallerDep, respon
     record = await run_in_threadpool(get_scene, services.bakes.ledger, scene)
     folder = await run_in_threadpool(fetch_if_missing, scene_path(services.settings.data, scene))
     request = ImportRequest.create(services.settings, "grounded", folder, f"{record.name[:185]} on a ground")
-    async with services.intake.reserving(caller.name, await run_in_threadpool(folder_bytes, folder)) as reservation:
-        identity = await services.intake.import_file(reservation, lambda _: request)
+    async with services.import_queue.reserving(
+        caller.name, await run_in_threadpool(folder_bytes, folder)
+    ) as reservation:
+        identity = await services.import_queue.import_file(reservation, lambda _: request)
     response.headers["Location"] = f"/api/scenes/{identity}"
     return await run_in_threadpool(get_scene_body, identity, services)
 

@@ -41,11 +41,11 @@ _UNCHANGED = 200
 
 
 class AuthMiddleware:
-    """Middleware between the guard, which knows no callers, and the routes.
+    """Middleware between `RequestLimits`, which knows no callers, and the routes.
 
     Args:
-        app: of the routes. settings: of the server. access: called for each request, because it is opened after the app
-            is created. clock: monotonic seconds.
+        app: application of the routes. settings: settings of the server.
+        access: called for each request, because it is opened after the app is created. clock: monotonic seconds.
     """
 
     def __init__(

@@ -26,7 +26,7 @@ class Reservation:
     well, count it. Used by one thread at a time.
 
     Args:
-        quotas: of all users. owner: of the upload.
+        quotas: quotas of all users. owner: user who uploads.
     """
 
     def __init__(self, quotas: Quotas, owner: str) -> None:

@@ -35,7 +35,7 @@ class Rooms:
         """Join a room; an editor creates it if it does not exist, with the look of the session.
 
         Args:
-            join_request: of the session. scene: id. caller: of the session.
+            join_request: join request of the session. scene: id. caller: caller of the session.
             initial_document: complete look of the session.
             has_local_settings: keep the session's own view settings, from a lost session.
         Raises:

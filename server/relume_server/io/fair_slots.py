@@ -15,8 +15,8 @@ class Slots:
     """Slots for concurrent work. Event loop only.
 
     Args:
-        num_slots: total. max_per_client: maximum of one client.
-        weights: of clients, see `relume_worker.fair_share.FairShare`.
+        num_slots: total number of slots. max_per_client: maximum number of slots that one client holds.
+        weights: weights of clients, see `relume_worker.fair_share.FairShare`.
     """
 
     def __init__(self, num_slots: int, max_per_client: int, weights: Mapping[str, float]) -> None:

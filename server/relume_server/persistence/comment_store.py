@@ -71,7 +71,7 @@ class CommentStore:
         """Add a comment.
 
         Args:
-            scene: id. pin: position, as JSON. text: checked. author: name. picture: snapshot, WebP.
+            scene: id. pin: position, as JSON. text: validated. author: display name. picture: snapshot, WebP.
         Raises:
             BusyError: the limit is reached.
         """

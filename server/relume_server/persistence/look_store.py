@@ -135,7 +135,7 @@ class LookStore:
         """Save a look; return it, and true if it is new.
 
         Args:
-            name, document: checked. if_match, if_none_match: the headers.
+            name, document: validated. if_match, if_none_match: the headers.
             created: time of a new look, for example of a renamed one; None: now.
         Raises:
             ParameterError: `created` is in the future, or before 1970.

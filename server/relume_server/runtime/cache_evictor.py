@@ -20,7 +20,7 @@ class CacheEvictor:
     """Runs every few seconds while the server runs.
 
     Args:
-        transfers: open bakes. threads: for the work.
+        transfers: open bakes. threads: threads for the work.
         trim_cache: evicts the results of all other stores, down to the floor.
         used_bytes: size of the caches. release_processes: ends idle processes.
     """

@@ -20,7 +20,7 @@ from relume_server.errors import CLOSE_POLICY
 from relume_server.schemas import protocol
 from relume_server.schemas.connection import OpenMessage, PingMessage, PongMessage
 from relume_server.schemas.rooms import PresenceMessage
-from relume_server.session.message_rate import Pace
+from relume_server.session.message_rate import MessageRateLimit
 from relume_server.session.reader import read_message
 from relume_server.session.session_state import SessionState
 
@@ -49,14 +49,14 @@ class MessageReceiver:
             WebSocketDisconnect: the client is gone.
             ProtocolError: the session must end; carries the close code.
         """
-        pace = Pace()
+        rate_limit = MessageRateLimit()
         while True:
             received = await self._websocket.receive()
             received_s = time.perf_counter()
             num_in_flight = self._window.num_in_flight
-            pace.start_message()
+            rate_limit.start_message()
             await self._answer(received, received_s)
-            await pace.pause(is_due=self._window.num_in_flight < num_in_flight)
+            await rate_limit.pause(is_due=self._window.num_in_flight < num_in_flight)
 
     async def _answer(self, received: Any, received_s: float) -> None:
         """Handle a message, or answer with a problem."""

@@ -16,14 +16,14 @@ from session_edits import make_look, relative_rmse, run_next_job, run_until_exac
 from relume.core.cache import Cache
 from relume.core.color import luminance
 from relume.lights.light_clusters import F64, cluster_lights, visible_fraction
-from relume.lights.spherical_triangles import TriangleSubset
+from relume.lights.spherical_triangles import MergedParts
 from relume.live.fixed_camera import operator_budget
 from relume.operators.linear_operator import LinearOperator, MergedLightOperator
 
 FLOOR = "/materials/Floor/terms/1/"
 
 
-def visible_fraction_numpy(visible: NDArray[np.uint8], subset: TriangleSubset, num_clusters: int) -> F64:
+def visible_fraction_numpy(visible: NDArray[np.uint8], subset: MergedParts, num_clusters: int) -> F64:
     """Reference of `visible_fraction` for all points in plain NumPy.
 
     Args:

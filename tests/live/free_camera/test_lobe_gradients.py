@@ -20,7 +20,7 @@ from relume.live.free_camera.primary_visibility import interpolate_to_nodes, tra
 from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.shade_pixels import InterpolatedProbes, MirrorData, shade_pixels
 from relume.live.free_camera.shade_probes import shade_probes
-from relume.math.zernike import DEGREES, WINDOW_DECAY, project
+from relume.math.zernike import DEGREES, WINDOW_DECAY, basis_functions
 from relume.methods.registry import METHODS, open_bake
 from relume.raytrace.surface_points import SurfacePoints
 from relume.scene.model import Material
@@ -96,7 +96,7 @@ def distant_light(points):
     n, t = points.normal.astype(np.float64), points.tangent.astype(np.float64)
     wi = np.einsum("nij,lj->nli", np.stack([t, np.cross(n, t), n], axis=1), towards)
     cosine = np.maximum(wi[..., 2], 0)
-    return np.einsum("nl,lc,nlk->nck", cosine, light, project(wi)).astype(np.float32)
+    return np.einsum("nl,lc,nlk->nck", cosine, light, basis_functions(wi)).astype(np.float32)
 
 
 @pytest.mark.parametrize("terms", [[METAL], [METAL, COAT]])

@@ -27,7 +27,7 @@ def open_database(url: str) -> Engine:
 
     Raises:
         ParameterError: `url` is neither SQLite nor PostgreSQL.
-        DatabaseDamagedError, DiskFullError: from the file. LedgerVersionError: see `upgrading`.
+        DatabaseDamagedError, DiskFullError: the file cannot be used. LedgerVersionError: see `upgrading`.
     """
     engine = connect(url)
     try:

@@ -21,7 +21,7 @@ from relume.live.fixed_camera.material_image import MaterialImage
 from relume.live.fixed_camera.view_images import ViewImages
 from relume.look import LightGeometry
 from relume.operators.shade import ShadedTerm, shade_rows, shaded_bytes
-from relume.raytrace.light_visibility import compute_irradiance
+from relume.raytrace.local_light_visibility import compute_irradiance
 from relume.raytrace.moving_light import MovingLight
 from relume.raytrace.surface_points import SurfacePoints
 from relume.transport.roughness_ranges import contract_levels

@@ -22,7 +22,7 @@ from relume.brdf.evaluate import eval_brdf
 from relume.brdf.quadrature import Quadrature
 from relume.brdf.symmetry import has_reflection_symmetry, is_isotropic
 from relume.live.free_camera.basis.table_symmetry import expand_quarter
-from relume.math.zernike import DEGREE, NUM_FUNCTIONS, num_functions, project, recurrence
+from relume.math.zernike import DEGREE, NUM_FUNCTIONS, basis_functions, num_functions, recurrence
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -79,7 +79,7 @@ def _disk_quadrature(is_half: bool) -> tuple[F64, F64, F64]:
         np.tile((np.arange(num_azimuths) + 0.5) * (2 * np.pi / _NUM_AZIMUTHS), _NUM_RADII),
     )
     wi = np.stack([np.sqrt(r2) * np.cos(phi), np.sqrt(r2) * np.sin(phi), np.sqrt(1 - r2)], axis=-1)
-    functions, recurrence_table = project(wi), recurrence()
+    functions, recurrence_table = basis_functions(wi), recurrence()
     if is_half:
         functions[:, recurrence_table.sine[recurrence_table.order > 0]] = 0
     return wi, np.repeat(weights / 4, num_azimuths) * (2 * np.pi / num_azimuths), functions

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from relume.patches.photon_density import lobe_directions
+from relume.patches.importons import lobe_directions
 from relume.raytrace.barycentric import positions_on_faces
 from relume.raytrace.camera_rays import Hits, camera_directions, trace_rays
 from relume.raytrace.scene_buffers import SceneBuffers

@@ -34,7 +34,7 @@ from relume.live.free_camera.texel_brdf.coefficient_packing import (
     NUM_FUNCTIONS,
     WIDTH,
 )
-from relume.math.zernike import project
+from relume.math.zernike import basis_functions
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -234,7 +234,7 @@ def filtered_factors(direction_grid: DirectionGrid) -> Shaped[F64, "directions l
     sine = np.sqrt(1 - z**2)
     wi = np.stack([sine * np.cos(phi), sine * np.sin(phi), z], axis=1)
     index, weight, retained = interpolation_weights_numpy(direction_grid, wi)
-    functions = pack_lanes(project(wi)[:, :NUM_FUNCTIONS]) * (retained * (2 * np.pi / len(z)))[:, None]
+    functions = pack_lanes(basis_functions(wi)[:, :NUM_FUNCTIONS]) * (retained * (2 * np.pi / len(z)))[:, None]
     out = np.zeros((direction_grid.num_directions, WIDTH))
     for tap in range(index.shape[1]):
         np.add.at(out, index[:, tap], weight[:, tap, None] * functions)
