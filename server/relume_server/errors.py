@@ -23,6 +23,7 @@ from relume.core.errors import ProtocolError, RelumeError, is_disk_full
 from relume_server.schemas.protocol import Problem
 from relume_server.validation_errors import list_field_errors
 from relume_worker.database.failures import describe_error, is_unavailable
+from relume_worker.jobs.job import BusyError, NotReadyError, QuotaError
 
 log = logging.getLogger(__name__)
 MEDIA_TYPE = "application/problem+json"
@@ -45,16 +46,8 @@ CLOSE_NOT_READY = 4409
 CLOSE_DAMAGED = 4410
 
 
-class NotReadyError(RelumeError):
-    """A resource is not in the state that the call needs."""
-
-
 class InUseError(RelumeError):
     """Another object uses the resource."""
-
-
-class BusyError(RelumeError):
-    """The server is at capacity; retrying may succeed."""
 
 
 class NearlyFullError(RelumeError):
@@ -93,10 +86,6 @@ class LoginError(RelumeError):
 
 class ForbiddenError(RelumeError):
     """The caller's role does not allow the call."""
-
-
-class QuotaError(RelumeError):
-    """The caller has reached a quota."""
 
 
 class DrainingError(RelumeError):

@@ -21,13 +21,14 @@ from relume_server.auth import quotas as quotas_module
 from relume_server.auth.reservations import Reservation
 from relume_server.auth.roles import KEY, Caller, Role
 from relume_server.auth.services import AuthServices
-from relume_server.errors import NearlyFullError, QuotaError
+from relume_server.errors import NearlyFullError
 from relume_server.io import upload_middleware
 from relume_server.io.fair_slots import Slots
 from relume_server.io.import_processes import ImportTooLargeError
 from relume_server.io.import_request import ImportRequest, _write_scene
 from relume_server.io.upload_middleware import UploadMiddleware
 from relume_server.settings import Settings
+from relume_worker.jobs.job import QuotaError
 
 Bearer = Callable[..., dict[str, str]]
 SCENE = {"scene": ("triangle.glb", b"which nobody reads")}

@@ -21,11 +21,11 @@ from relume.scene.scene_folder import load_scene, make_scene
 from relume.store import open_store
 from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput
 from relume_server.batch.context import BatchContext
-from relume_server.batch.step import IsNeeded, ProgressCallback, Step
 from relume_server.batch.step_registry import do_step
 from relume_server.io.import_request import ImportRequest, _write_scene
 from relume_server.runtime.protocols import Library
 from relume_server.settings import Settings
+from relume_worker.jobs.step import IsNeeded, ProgressCallback, Step
 
 THETA_H, THETA_D = (f"/materials/Paper/terms/1/curves/{name}" for name in ("theta_h", "theta_d"))
 TILE = 64
@@ -358,20 +358,17 @@ class Control:
         return ReferenceImage(all_paths if is_whole else None, supported, ("What surfaces reflect.",), ())
 
 
-class InThreadBatches:
+class InThreadSteps:
     """Run steps in the calling thread with the server's library."""
 
-    def __init__(self, settings: Settings, library: Library) -> None:
-        self._context = BatchContext(settings.data, library)
+    def __init__(self, settings: Settings, library: Library, bakes: object = None) -> None:
+        self._context = BatchContext(settings.data, library, (settings.import_bytes, settings.import_seconds))
 
     def run(self, step: Step, report: ProgressCallback, is_needed: IsNeeded) -> Mapping[str, Any]:
         return do_step(self._context, step, report, lambda: not is_needed())
 
-    def resident_bytes(self) -> int:
-        return 0
-
-    def release(self) -> None:
-        pass
+    def num_places(self) -> int:
+        return 1
 
     def close(self) -> None:
         pass

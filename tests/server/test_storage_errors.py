@@ -11,7 +11,7 @@ from postgres import make_unavailable_error
 from server_fakes import write_tiny_scene
 
 from relume.core.errors import DiskFullError, MaterialError, RelumeError, SceneError
-from relume_server.batch.process import _answer
+from relume_server.batch.cluster_steps import _answer
 from relume_server.errors import make_problem
 from relume_server.io import import_request
 from relume_server.io.import_request import ImportRequest, run_import

@@ -27,7 +27,7 @@ from relume_worker.database.clock import epoch_s
 from relume_worker.database.models import BakeRow, TaskRow
 from relume_worker.estimate import CompletedBake, crowding, machine_load
 from relume_worker.executor import is_tiny
-from relume_worker.fair_share import WaitingBake
+from relume_worker.jobs.fair_share import Waiting
 from relume_worker.lease import is_alive, log_taken_over
 from relume_worker.status import BakeState, BakeStatus, Phase, TaskCost, bake_id, recipe_from_json, recipe_json
 
@@ -119,12 +119,12 @@ class Ledger:
         """Cancel a queued or running bake; its owner notices at its next heartbeat."""
         return self._change(identity, ("queued", "running"), state="canceled", seconds_left=None, phase=None)
 
-    def claimable(self) -> list[WaitingBake]:
+    def claimable(self) -> list[Waiting]:
         """Bakes without a live owner, longest waiting first: queued, or left by a dead owner."""
         query = select(BakeRow, epoch_s()).where(BakeRow.state.in_(("queued", "running"))).order_by(BakeRow.queued)
         with self.sessions() as session:
             rows = [row for row, now in session.execute(query) if not _is_owned(row, now)]
-        return [WaitingBake(row.id, row.client or "", False, row.queued) for row in rows]
+        return [Waiting(row.id, row.client or "", False, row.queued) for row in rows]
 
     def claim(self, identity: str, owner: str) -> bool:
         """Take the lease of a bake and set it running. False if another owner has it."""

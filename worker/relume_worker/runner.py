@@ -46,7 +46,7 @@ from relume_worker.storage.partial_uploads import PartialUploads, delete_partial
 from relume_worker.task_notes import delete_note, read_note
 from relume_worker.tasks import Job, idle_timer, load_registered_scene, run_task
 
-SCHEDULER_LOST_MESSAGE = "the scheduler is gone; start it, then bake again; finished tasks are saved"
+SCHEDULER_LOST_MESSAGE = "the scheduler is gone; start it, then try again; finished tasks are saved"
 CODE_CHANGED_MESSAGE = (
     "relume was updated since this bake started; it starts again, because one version must make all of it"
 )
@@ -221,7 +221,7 @@ class BakeRunner:
             self._in_flight.clear()  # submitted while the scheduler disappeared, they would never end
             raise RelumeError(SCHEDULER_LOST_MESSAGE) from error
         except Exception as error:
-            if not _is_lost_process(error):
+            if not is_lost_process(error):
                 raise
             if attempt == MAX_ATTEMPTS:
                 raise RelumeError(
@@ -310,7 +310,7 @@ class BakeRunner:
         return staging_path(self.job.data_dir, self.job.bake_id)
 
 
-def _is_lost_process(error: Exception) -> bool:
+def is_lost_process(error: Exception) -> bool:
     """True if a task ended because its process did."""
     if isinstance(error, BrokenExecutor):
         return True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -55,8 +56,19 @@ def _intern_method(method: BakeMethod) -> BakeMethod:
     return _methods.setdefault(pickle.dumps(method), method)
 
 
+_idle_callbacks: list[Callable[[], None]] = []
+
+
+def when_idle(release: Callable[[], None]) -> Callable[[], None]:
+    """Decorate a function that releases something of this process after some time without tasks."""
+    _idle_callbacks.append(release)
+    return release
+
+
 def _release_caches() -> None:
     """Release cached scenes, methods' data and store contents."""
+    for release in _idle_callbacks:
+        release()
     load_registered_scene.cache_clear()
     _methods.clear()
     run_bake.open_stage_reader.cache_clear()

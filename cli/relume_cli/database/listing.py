@@ -134,11 +134,11 @@ def _renders(data_folder: OpenFolder) -> Iterator[Row]:
     """Renders as in the database; only the server knows the progress within a frame."""
     from sqlalchemy import select
 
-    from relume_server.persistence.tables import RenderRow
     from relume_server.schemas.renders import RenderRequest
+    from relume_worker.database.models import JobRow
 
     with data_folder.service.ledger.sessions() as session:
-        rows = list(session.scalars(select(RenderRow).order_by(RenderRow.created.desc())))
+        rows = list(session.scalars(select(JobRow).where(JobRow.kind == "render").order_by(JobRow.created.desc())))
     for row in rows:
         request = RenderRequest.model_validate(json.loads(row.request))
         document = {

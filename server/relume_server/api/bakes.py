@@ -24,13 +24,13 @@ from relume.store.bake_protocol import Plan, Recipe
 from relume_server.api.pagination import PageDep, newest
 from relume_server.auth.roles import Caller, CallerDep
 from relume_server.auth.services import PROXY_REVALIDATION_S
-from relume_server.errors import NotReadyError
 from relume_server.io.png import FOREVER, PngResponse
 from relume_server.schemas.base import Id
 from relume_server.schemas.bodies import BakeBody, BakeRequest, DryRunBody, PlanBody, RecipeBody, format_timestamp
 from relume_server.schemas.cameras import CameraBody
 from relume_server.services import Services, ServicesDep
 from relume_worker.cameras import resolve_views
+from relume_worker.jobs.job import NotReadyError
 from relume_worker.presets import PRESETS, resolve_num_probes
 from relume_worker.scenes import get_scene
 from relume_worker.status import FREE_CAMERA_METHODS, BakeState, BakeStatus, bake_id

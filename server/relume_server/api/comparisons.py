@@ -15,14 +15,13 @@ from relume_server.api.pagination import PageDep
 from relume_server.api.renders import baked_view, check_display, check_look, check_picture_size
 from relume_server.auth.roles import CallerDep
 from relume_server.batch.frame_sequence import comparison_camera
-from relume_server.errors import NotReadyError
 from relume_server.io.downloads import Download
 from relume_server.jobs.comparison_jobs import ComparisonJob
-from relume_server.jobs.job import JobFilter
 from relume_server.openapi import files
 from relume_server.schemas.base import Id, JobState
 from relume_server.schemas.bodies import ComparisonBody, ComparisonPlanBody, ComparisonRequest
 from relume_server.services import Services, ServicesDep
+from relume_worker.jobs.job import JobFilter, NotReadyError
 
 router = APIRouter(prefix="/api/comparisons", tags=["comparisons"])
 Picture = Literal["error", "reference", "method-error", "method-reference"]

@@ -21,10 +21,8 @@ from relume_server.api.job_lists import UserName, format_timestamps, list_jobs
 from relume_server.api.pagination import PageDep
 from relume_server.auth.roles import Caller, CallerDep
 from relume_server.batch.frame_sequence import check_animation, look_at_frame, look_document_at_frame, with_pivot
-from relume_server.errors import NotReadyError
 from relume_server.io.downloads import Download, ZipStream
 from relume_server.io.video import check_encoder
-from relume_server.jobs.job import JobFilter, new_id
 from relume_server.jobs.render_jobs import RenderJob, planned_bytes
 from relume_server.openapi import files
 from relume_server.schemas.base import MAX_NAME, Id, JobState, Name
@@ -41,6 +39,7 @@ from relume_server.schemas.renders import (
     RenderRequest,
 )
 from relume_server.services import Services, ServicesDep
+from relume_worker.jobs.job import JobFilter, NotReadyError, new_id
 from relume_worker.scenes import get_scene
 
 router = APIRouter(prefix="/api/renders", tags=["renders"])

@@ -9,8 +9,9 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from relume.core.errors import bytes_text
-from relume_server.errors import NearlyFullError, QuotaError
+from relume_server.errors import NearlyFullError
 from relume_server.runtime.disk_space import free_bytes
+from relume_worker.jobs.job import QuotaError
 
 if TYPE_CHECKING:
     from relume_server.auth.quotas import OwnedKind, Quotas

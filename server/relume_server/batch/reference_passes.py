@@ -29,9 +29,9 @@ from relume.methods.view_stages import MIN_SIDE
 from relume.reference.comparison import Comparison, Estimate, compare, error_map
 from relume_server.batch.context import BatchContext
 from relume_server.batch.frame_sequence import comparison_camera
-from relume_server.batch.step_timer import estimate_seconds
 from relume_server.runtime.protocols import F32
 from relume_server.schemas.bodies import ComparisonRequest
+from relume_worker.jobs.step_timer import estimate_seconds
 from relume_worker.paths import scene_path
 
 if TYPE_CHECKING:

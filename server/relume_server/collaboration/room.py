@@ -12,8 +12,8 @@ from relume_server.auth.roles import Caller
 from relume_server.client_state.target import Target
 from relume_server.collaboration.join import JoinRequest
 from relume_server.collaboration.participant import COLORS, Participant
-from relume_server.errors import BusyError
 from relume_server.schemas.rooms import Person
+from relume_worker.jobs.job import BusyError
 
 LOCAL_SECTIONS = ("display", "transport")
 """View settings: sections of a look that are not shared."""

@@ -10,8 +10,8 @@ from relume_server.auth.roles import Caller, Role
 from relume_server.collaboration.join import JoinRequest
 from relume_server.collaboration.member import RoomEntry
 from relume_server.collaboration.room import Room, with_local_settings
-from relume_server.errors import BusyError
 from relume_server.schemas.rooms import ROOM_PREFIX
+from relume_worker.jobs.job import BusyError
 
 Key = tuple[str, str]
 

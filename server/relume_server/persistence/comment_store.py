@@ -14,8 +14,8 @@ from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session, sessionmaker
 
 from relume.core.errors import NotFoundError, ParameterError
-from relume_server.errors import BusyError
 from relume_server.persistence.tables import CommentRow
+from relume_worker.jobs.job import BusyError
 
 MAX_COMMENTS, MAX_PER_SCENE, MAX_BYTES = 10_000, 500, 256 * 1024**2
 

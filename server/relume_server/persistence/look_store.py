@@ -16,8 +16,9 @@ from sqlalchemy.orm import Session, sessionmaker
 
 from relume.core.errors import NotFoundError, ParameterError, bytes_text
 from relume.look import Look
-from relume_server.errors import BusyError, PreconditionFailedError, PreconditionRequiredError, TooLargeError
+from relume_server.errors import PreconditionFailedError, PreconditionRequiredError, TooLargeError
 from relume_server.persistence.tables import LookRow
+from relume_worker.jobs.job import BusyError
 
 MAX_LOOK_BYTES = 256 * 1024
 MAX_LOOKS = 10_000

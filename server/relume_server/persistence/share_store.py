@@ -19,8 +19,9 @@ from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, sessionmaker
 
 from relume.core.errors import NotFoundError, ParameterError, bytes_text
-from relume_server.errors import BusyError, TooLargeError
+from relume_server.errors import TooLargeError
 from relume_server.persistence.tables import ShareRow
+from relume_worker.jobs.job import BusyError
 
 MAX_SHARE_BYTES = 256 * 1024
 MAX_SHARES, MAX_BYTES = 10_000, 256 * 1024**2

@@ -1,4 +1,4 @@
-"""Lease owner of a job's files, written next to them by the server.
+"""Lease owner of a job's files, written next to them by the service that runs it.
 
 A process that was suspended together with its server does not ask before it continues: it finds here that another
 server has taken the job over.

@@ -1,4 +1,4 @@
-"""A step of batch work: small enough for a line of JSON; its results are files."""
+"""A step of a job: small enough for a message of JSON; its results are files."""
 
 from __future__ import annotations
 
@@ -16,15 +16,17 @@ class Step:
 
     Attributes:
         kind: key of `relume_server.batch.step_registry.STEPS`.
-        is_first: interactive; runs before long steps.
+        is_first: somebody waits for it: it takes an urgent place, and does not wait for its client's turn.
         values: arguments of the step; JSON.
-        claim: folder and lease owner of its job, see `relume_server.batch.step_claim`; None: no job.
+        claim: folder and lease owner of its job, see `relume_worker.jobs.claim`; None: no job.
+        client: who submitted the job; bulk work is shared fairly among clients.
     """
 
     kind: str
     is_first: bool = False
     values: Mapping[str, Any] = field(default_factory=dict)
     claim: tuple[str, str] | None = None
+    client: str = ""
 
 
 class RunStep(Protocol):
@@ -44,11 +46,13 @@ class RunStep(Protocol):
         ...
 
 
-class Batches(Protocol):
-    """Runs steps in processes; see `relume_server.batch.pool`."""
+class StepExecutor(Protocol):
+    """Runs steps in worker processes; see `relume_server.batch.cluster_steps`."""
 
     @property
     def run(self) -> RunStep: ...
-    def resident_bytes(self) -> int: ...
-    def release(self) -> None: ...
+    def num_places(self) -> int:
+        """Number of bulk steps that run at once."""
+        ...
+
     def close(self) -> None: ...

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class WaitingBake:
+class Waiting:
     """Work that is waiting.
 
     Attributes:
@@ -24,8 +24,8 @@ class FairShare:
     """Schedules clients by their shares.
 
     Each client has a virtual time that advances by 1 / share per turn; the earliest is next (stride scheduling:
-    Waldspurger and Weihl, *Stride scheduling: deterministic proportional-share resource management*, 1995). New clients
-    start at the earliest waiting client's time: turns cannot be saved up.
+    Waldspurger and Weihl, *Stride scheduling: deterministic proportional-share resource management*, 1995). Clients who
+    return start no earlier than those who waited meanwhile: turns cannot be saved up.
     """
 
     def __init__(self, client_weights: Mapping[str, float]) -> None:
@@ -35,18 +35,18 @@ class FairShare:
         """
         self._client_weights = dict(client_weights)
         self._virtual_times: dict[str, float] = {}
+        self._earliest = 0.0
 
-    def sort(self, waiting_bakes: Sequence[WaitingBake]) -> list[WaitingBake]:
+    def sort(self, waiting: Sequence[Waiting]) -> list[Waiting]:
         """Sort by turn, if each client took none before the next."""
-        clients = {work.client for work in waiting_bakes}
-        earliest = min(
-            (self._virtual_times[client] for client in clients if client in self._virtual_times), default=0.0
-        )
-        self._virtual_times = {client: self._virtual_times.get(client, earliest) for client in clients}
-        return sorted(
-            waiting_bakes, key=lambda work: (not work.is_first, self._virtual_times[work.client], work.created)
-        )
+        times = {work.client: self._time(work.client) for work in waiting}
+        self._earliest = min(times.values(), default=self._earliest)
+        return sorted(waiting, key=lambda work: (not work.is_first, times[work.client], work.created))
 
     def pick_next(self, client: str) -> None:
         """Record a turn of a client."""
-        self._virtual_times[client] += 1.0 / self._client_weights.get(client, 1.0)
+        self._virtual_times[client] = self._time(client) + 1.0 / self._client_weights.get(client, 1.0)
+        self._virtual_times = {name: time for name, time in self._virtual_times.items() if time > self._earliest}
+
+    def _time(self, client: str) -> float:
+        return max(self._earliest, self._virtual_times.get(client, 0.0))
