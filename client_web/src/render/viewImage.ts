@@ -16,9 +16,9 @@ const BACKGROUND = 65535;
 /** A screen that can show an image. */
 export interface ImagePresenter {
   readonly renderer: DisplayRenderer;
-  present(): Promise<void>;
-  redraw(): void;
-  size(): CanvasGeometry;
+  present: () => Promise<void>;
+  redraw: () => void;
+  size: () => CanvasGeometry;
 }
 
 export class ViewImage {

@@ -26,7 +26,7 @@ const LONGEST_STEM = 120;
 export function fileStem(kind = "", space = ""): string {
   const limits = lightFilters.value.map((limit) => limit.label);
   const nameParts = [scene.value?.name ?? "picture", activeViewName.value, kind, ...limits, space].join(" ").trim();
-  return [...nameParts.replace(/[^\p{L}\p{N}._-]+/gu, "-")].slice(0, LONGEST_STEM).join("");
+  return Array.from(nameParts.replace(/[^\p{L}\p{N}._-]+/gu, "-")).slice(0, LONGEST_STEM).join("");
 }
 
 export async function exportPng(): Promise<void> {

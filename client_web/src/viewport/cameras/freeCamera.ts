@@ -80,7 +80,7 @@ export class FreeCamera {
     const [width, height] = limitRenderSize(...this.size);
     const middle = requestPixelProbe(this.view.name, Math.floor(width / 2), Math.floor(height / 2));
     const position = await middle.then((answer) => answer.position, () => null);
-    if (position !== null) this.motion.replace((orbit) => orbitOf(poseOf(orbit), this.bounds, position as Triple));
+    if (position !== null) this.motion.replace((orbit) => orbitOf(poseOf(orbit), this.bounds, position));
   }
 
   /** Focus on a point. */
@@ -170,9 +170,9 @@ export class FreeCamera {
 
   private load(): StoredCamera {
     try {
-      const { orbit, size } = JSON.parse(sessionStorage.getItem(this.key) ?? "{}") as Partial<StoredCamera>;
+      const { orbit, size } = JSON.parse(sessionStorage.getItem(this.key) ?? "{}") as { orbit?: Orbit | null; size?: number[] | null };
       const isSize = Array.isArray(size) && size.length === 2 && size.every((side) => Number.isInteger(side) && side > 0);
-      return { orbit: orbit && isClose(orbit, orbit) ? orbit : null, size: isSize ? size : null };
+      return { orbit: orbit && isClose(orbit, orbit) ? orbit : null, size: isSize ? (size as StoredCamera["size"]) : null };
     } catch {
       return { orbit: null, size: null };
     }
