@@ -3,7 +3,7 @@
 import { signal } from "@preact/signals";
 import { freeCameraOf } from "../../viewport/cameras/freeCamera";
 import type { CameraPose } from "../../viewport/cameras/orbit";
-import { limitRenderSize } from "../../session/clientRendering";
+import { limitRenderSize } from "../../session/clientRenderer";
 import { untilToneMapReady } from "../../session/colorTransforms";
 import { untilExact } from "../../session/fidelityState";
 import { stage } from "../../render/renderStage";

@@ -1,7 +1,8 @@
 /** Free cameras of views: moved by the user, sent to the server, stored for a reload. */
 import { effect } from "@preact/signals";
-import { sendToShown } from "../../session/connections";
-import { renderIfPossible, limitRenderSize, isMoving, setMoving, setCameraSeq } from "../../session/clientRendering";
+import { connections, sendToShown } from "../../session/connections";
+import { limitRenderSize } from "../../session/clientRenderer";
+import { renderIfPossible, isMoving, setMoving } from "../../session/clientRendering";
 import { requestPixelProbe } from "../../session/pixelProbe";
 import type { HelloMessage, Triple } from "../../protocol";
 import { bake } from "../../state/bakes";
@@ -151,7 +152,7 @@ export class FreeCamera {
   private sendPose(camera: View["camera"], refine: "exact" | "none"): void {
     const { name } = this.view;
     this.number = Math.max(this.number + 1, Date.now());
-    setCameraSeq(name, this.number);
+    connections.shown?.cameraSeqs.set(name, this.number);
     sendToShown({ type: "camera", view: name, seq: this.number, ...camera, size: limitRenderSize(...this.size), active_control: null, refine });
   }
 
