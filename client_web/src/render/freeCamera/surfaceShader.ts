@@ -143,7 +143,7 @@ function groupGlsl(number: number, quantity: string, { lobes, textures }: Materi
     ivec4 group = texelFetch(uMaterials, at(material + ${number}), 0);
     if (group.z > 0) {
       vec3 total = ratio * ${quantity};
-      ${lobes ? `${ADD_LOBE(albedo)}` : ""}
+      ${lobes ? ADD_LOBE(albedo) : ""}
       ${textures ? "if (group.w >= 0) total *= textureAt(group.w, uv, footprint);" : ""}
       color += max(total, 0.0);
     }
