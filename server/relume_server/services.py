@@ -109,9 +109,8 @@ def open_steps(settings: Settings, library: Library, bakes: BakeService) -> Step
     from relume_server.batch.cluster_steps import ClusterSteps
     from relume_server.batch.worker_process import ProcessSettings
 
-    cache_bytes = settings.batch_bytes // bakes.executors.num_workers
     limits = settings.import_bytes, settings.import_seconds
-    process = ProcessSettings(str(settings.data.resolve()), cache_bytes, config_source(), *limits)
+    process = ProcessSettings(str(settings.data.resolve()), settings.batch_bytes, config_source(), *limits)
     return ClusterSteps(bakes.executors, process, settings.fair_shares)
 
 

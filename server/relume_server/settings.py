@@ -81,7 +81,7 @@ class Settings(BaseSettings):
     batch_bytes: int = Field(
         default_factory=lambda: _default_cache_bytes() // 2,
         gt=0,
-        description="cache of renders and comparisons, in all worker processes together",
+        description="cache of renders and comparisons, in all worker processes of a machine together",
     )
     prewarm: bool = Field(default=True, description="whether the first image of a new bake is computed in advance")
     max_queued: int = Field(default=100, ge=1, description="queued and running renders, and separately comparisons")

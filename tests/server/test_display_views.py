@@ -98,6 +98,5 @@ def test_config_of_the_server_is_used_by_steps(settings: Settings) -> None:
             steps = open_steps(settings, cast("Any", None), cast("Any", bakes))
         process = cast("ClusterSteps", steps)._process
         assert process.config == expected
-        assert process.cache_bytes == settings.batch_bytes // 2
         with using_config(*[*process.config, None][:2]):
             assert config_source() == expected

@@ -19,6 +19,7 @@ from relume_server.batch.step_registry import do_step
 from relume_server.errors import make_problem
 from relume_server.runtime.assets import using_asset_stores
 from relume_server.runtime.library import open_library
+from relume_worker.executor import num_cores
 from relume_worker.jobs.step import Step
 from relume_worker.tasks import idle_timer, when_idle
 
@@ -30,7 +31,7 @@ class ProcessSettings(NamedTuple):
     """Settings of the server that its steps need in other processes.
 
     Attributes:
-        data: data directory, at the same path on every machine. cache_bytes: of one process.
+        data: data directory, at the same path on every machine. cache_bytes: of all processes of a machine together.
         config: of OpenColorIO, and its working space, see `relume.image_io.ocio.active_config`.
         import_bytes, import_seconds: limits of sandboxed readers.
     """
@@ -86,7 +87,7 @@ def _context(process: ProcessSettings) -> BatchContext:
             stack.enter_context(using_asset_stores(Path(process.data)))
             stack.enter_context(using_config(*[*process.config, None][:2]))
             limits = process.import_bytes, process.import_seconds
-            context = BatchContext(Path(process.data), open_library(process.cache_bytes, 0), limits)
+            context = BatchContext(Path(process.data), open_library(process.cache_bytes // num_cores(), 0), limits)
             _open.append((process, context, stack))
         return _open[0][1]
 
