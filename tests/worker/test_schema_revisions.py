@@ -11,6 +11,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from sqlalchemy import Engine, inspect, select, text
@@ -87,6 +88,7 @@ def test_ledger_from_before_revisions_is_upgraded_with_its_rows(old_ledger: Path
     before = connect(f"sqlite:///{old_ledger}")
     assert revision(before) is None
     old_rows = rows(before)
+    old_rows["comparisons"] = old_rows.pop("truths")
     before.dispose()
     with closing(Ledger(engine := open_database(f"sqlite:///{old_ledger}"))) as ledger:
         assert (revision(engine), differences(engine)) == (latest_revision(), [])
@@ -120,14 +122,15 @@ def test_older_ledgers_get_missing_columns_and_tables(old_ledger: Path) -> None:
 
 
 def test_values_get_their_new_names(old_ledger: Path) -> None:
-    with closing(Ledger(engine := open_database(f"sqlite:///{old_ledger}"))) as ledger:
-        (bake,) = ledger.bakes()
-        with engine.begin() as connection:
-            connection.execute(text("UPDATE bakes SET state = 'cancelled'"))
-            connection.execute(text("INSERT INTO owned VALUES ('btf-work', 'a', 'Ann', 7), ('btf', 'b', 'Ann', 8)"))
-            connection.execute(text("UPDATE alembic_version SET version_num = '0009'"))
-        upgrade(engine, is_requested=False)
-        assert ledger.bake(bake.id).state == "canceled"
+    engine, config = connect(f"sqlite:///{old_ledger}"), upgrading._config()
+    with engine.begin() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, "0009")
+        connection.execute(text("UPDATE bakes SET state = 'cancelled'"))
+        connection.execute(text("INSERT INTO owned VALUES ('btf-work', 'a', 'Ann', 7), ('btf', 'b', 'Ann', 8)"))
+    upgrade(engine, is_requested=False)
+    with closing(Ledger(engine)) as ledger:
+        assert [bake.state for bake in ledger.bakes()] == ["canceled"]
         with ledger.sessions() as session:
             assert set(session.scalars(select(OwnedRow.kind))) == {"btf-job", "btf"}
 

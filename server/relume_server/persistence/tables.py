@@ -77,7 +77,7 @@ class BtfRow(JobRow):
 class ComparisonRow(JobRow):
     """A comparison with the reference; `done` passes are finished."""
 
-    __tablename__ = "truths"
+    __tablename__ = "comparisons"
 
 
 class RoomRow(Base):
