@@ -23,6 +23,7 @@ from relume_cli.bake_progress import follow
 from relume_cli.main import main
 from relume_cli.tokens import open_access
 from relume_server.persistence.look_store import LookStore
+from relume_server.persistence.tables import RenderRow
 from relume_server.schemas.bodies import BakeBody, DryRunBody, SceneBody
 from relume_worker.scenes import register_scene
 from relume_worker.service import BakeService
@@ -86,6 +87,15 @@ def test_list_lines_begin_with_an_identifier(run: Any) -> None:
     for kind in ("materials", "images", "renders"):
         assert run("list", kind, "--json")[:2] == (0, "")
     assert "cornell_box" in [line.split()[0] for line in run("list", "built-ins")[1].splitlines()]
+
+
+def test_render_whose_request_cannot_be_read_is_listed_as_failed(run: Any, tmp_path: Path) -> None:
+    with closing(BakeService(tmp_path)) as service, service.ledger.sessions.begin() as session:
+        session.add(RenderRow(id="r" * 16, request='{"eye":1}', state="queued", done=0, created=0.0))
+    code, text, _ = run("list", "renders", data=tmp_path)
+    assert (code, text) == (0, f"{'r' * 16}  failed     0 of 1 frames  unknown, png\n")
+    (render,) = parsed(run("list", "renders", "--json", data=tmp_path)[1])
+    assert render["problem"].endswith("; request it again")
 
 
 def test_lists_accept_only_meaningful_filters(run: Any) -> None:

@@ -19,7 +19,7 @@ from relume_server.errors import BusyError, QuotaError
 from relume_server.jobs.job import Quota
 from relume_server.jobs.queue import JobQueue
 from relume_server.persistence.tables import RenderRow
-from relume_server.schemas.renders import RenderRequest
+from relume_server.schemas.renders import RENDER_PLACEHOLDER, RenderRequest
 from relume_worker.database import open_database
 from relume_worker.fair_share import FairShare, WaitingBake
 from relume_worker.lease import new_owner
@@ -196,7 +196,7 @@ def test_weights_set_the_number_of_turns() -> None:
 class Counting(JobQueue[RenderRequest]):
     """A queue whose steps only record their client."""
 
-    row, noun, request_type = RenderRow, "render", RenderRequest
+    row, noun, placeholder = RenderRow, "render", RENDER_PLACEHOLDER
 
     def steps(self, request: RenderRequest) -> int:
         return request.num_frames

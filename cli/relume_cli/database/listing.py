@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -134,27 +133,28 @@ def _renders(data_folder: OpenFolder) -> Iterator[Row]:
     """Renders as in the database; only the server knows the progress within a frame."""
     from sqlalchemy import select
 
+    from relume_server.jobs.job import read_row
     from relume_server.persistence.tables import RenderRow
-    from relume_server.schemas.renders import RenderRequest
+    from relume_server.schemas.renders import RENDER_PLACEHOLDER
 
     with data_folder.service.ledger.sessions() as session:
         rows = list(session.scalars(select(RenderRow).order_by(RenderRow.created.desc())))
     for row in rows:
-        request = RenderRequest.model_validate(json.loads(row.request))
+        request, state, problem = read_row(row, RENDER_PLACEHOLDER)
         document = {
             "id": row.id,
             "bake": request.bake,
             "view": request.view,
             "format": request.format,
             "size": request.size,
-            "state": row.state,
+            "state": state,
             "done": row.done,
             "total": request.num_frames,
-            "problem": row.problem,
+            "problem": problem,
             "created": iso_time(row.created),
         }
         done = f"{row.done} of {request.num_frames} frames"
-        yield document, f"{row.id}  {row.state:9}  {done}  {request.name or request.view}, {request.format}"
+        yield document, f"{row.id}  {state:9}  {done}  {request.name or request.view}, {request.format}"
 
 
 def _built_ins() -> list[Row]:

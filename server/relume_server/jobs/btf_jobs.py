@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from sqlalchemy.orm import Session, sessionmaker
@@ -16,7 +17,7 @@ from relume_server.batch.step_timer import StepTimer
 from relume_server.jobs.job import Job, Quota
 from relume_server.jobs.queue import JobQueue
 from relume_server.persistence.tables import BtfRow
-from relume_server.schemas.btfs import BtfRequest
+from relume_server.schemas.btfs import BOUND, BtfRequest
 from relume_worker.paths import btfs_path
 
 BtfJob = Job[BtfRequest]
@@ -25,7 +26,7 @@ BtfJob = Job[BtfRequest]
 class BtfQueue(JobQueue[BtfRequest]):
     """BTF jobs in the database, with files in `data`/btf-jobs/<id>/; one step per job, which can be interrupted."""
 
-    row, noun, request_type = BtfRow, "BTF", BtfRequest
+    row, noun, placeholder = BtfRow, "BTF", BtfRequest(name="unknown", error=BOUND)
     resumable = ("stopped",)
 
     def __init__(
@@ -60,9 +61,10 @@ class BtfQueue(JobQueue[BtfRequest]):
         return request.geometry is None
 
     def material(self, identity: str) -> str | None:
-        """Id of the BTF that a job has made; None if it is not ready."""
-        path = self.folder / identity / RESULT_FILE
-        return str(json.loads(path.read_text())["material"]) if path.exists() else None
+        """Id of the BTF that a job has made; None if it is not ready, or if its file is damaged."""
+        with suppress(FileNotFoundError, ValueError, LookupError, TypeError):
+            return str(json.loads((self.folder / identity / RESULT_FILE).read_bytes())["material"])
+        return None
 
     def step(self, job: BtfJob, timer: StepTimer) -> int:
         """Start or resume the job, for a while."""

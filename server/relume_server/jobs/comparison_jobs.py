@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import Field
+from pydantic import Field, ValidationError
 from sqlalchemy.orm import Session, sessionmaker
 
 from relume_server.batch.reference_passes import FIGURES
@@ -45,7 +45,7 @@ class DurationEstimate(NamedTuple):
 class ComparisonQueue(JobQueue[ComparisonRequest]):
     """Comparisons in the database, with files in `data`/comparisons/<id>/; a step is one pass."""
 
-    row, noun, request_type = ComparisonRow, "comparison", ComparisonRequest
+    row, noun, placeholder = ComparisonRow, "comparison", ComparisonRequest(bake="0" * 16, view="unknown")
 
     def __init__(self, sessions: sessionmaker[Session], data: Path, run: RunStep, quota: Quota) -> None:
         """
@@ -117,8 +117,10 @@ class ComparisonQueue(JobQueue[ComparisonRequest]):
 
     def figures(self, identity: str) -> Figures:
         """Errors of the frame from the passes so far."""
-        path = self.folder / identity / FIGURES
-        return Figures.model_validate_json(path.read_text()) if path.exists() else Figures.model_validate({})
+        try:
+            return Figures.model_validate_json((self.folder / identity / FIGURES).read_bytes())
+        except (FileNotFoundError, ValidationError):  # there are no passes yet, or another version wrote it
+            return Figures.model_validate({})
 
     def step(self, job: ComparisonJob, timer: StepTimer) -> int:
         """Render the frame if it is missing, and one pass."""

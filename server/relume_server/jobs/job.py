@@ -7,10 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
+
+from relume_server.persistence.tables import JobRow
 
 ACTIVE = ("queued", "running")
 STATES = (*ACTIVE, "ready", "failed", "stopped")
+UNREADABLE = "the request cannot be read, because another version of relume wrote it or it is damaged; request it again"
 
 Request = TypeVar("Request", bound=BaseModel)
 
@@ -62,6 +65,19 @@ class JobFilter:
     user: str | None = None
     bake: str | None = None
     name: str | None = None
+
+
+def read_row(row: JobRow, placeholder: Request) -> tuple[Request, str, str | None]:
+    """Read the request, the state and the problem of a row.
+
+    Args:
+        row: of a job.
+        placeholder: request that is returned, with the state "failed", if the row's request cannot be read.
+    """
+    try:
+        return type(placeholder).model_validate_json(row.request), row.state, row.problem
+    except ValidationError:
+        return placeholder, "failed", UNREADABLE
 
 
 def new_id() -> str:

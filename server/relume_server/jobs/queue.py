@@ -31,7 +31,7 @@ from relume_server.batch.step import RunStep, Step
 from relume_server.batch.step_claim import claim
 from relume_server.batch.step_timer import StepTimer
 from relume_server.errors import BusyError, NotReadyError, QuotaError, make_problem
-from relume_server.jobs.job import ACTIVE, STATES, Job, JobFilter, Quota, Request, new_id
+from relume_server.jobs.job import ACTIVE, STATES, UNREADABLE, Job, JobFilter, Quota, Request, new_id, read_row
 from relume_server.persistence.tables import JobRow
 from relume_worker.database.clock import epoch_s
 from relume_worker.database.failures import DatabaseError
@@ -46,7 +46,8 @@ _CHECK_INTERVAL_S = 0.1
 class JobQueue(ABC, Generic[Request]):
     """Jobs of one kind; their files are in `folder`/<id>/.
 
-    A subclass defines the table, the noun for messages, the request, the number of steps, the priority, and a step.
+    A subclass defines the table, the noun for messages, the number of steps, the priority, a step, and a placeholder
+    of requests that cannot be read.
 
     Only the owner of a row's lease changes its state, its files and its quota. A server that was suspended for longer
     than the lease notices at its next statement on the row, and drops its work.
@@ -54,7 +55,7 @@ class JobQueue(ABC, Generic[Request]):
 
     row: ClassVar[type[JobRow]]
     noun: ClassVar[str]
-    request_type: type[Request]
+    placeholder: Request
     resumable: ClassVar[Sequence[str]] = ("stopped", "failed")
     """States from which a job can be resumed: its files are still there."""
 
@@ -173,12 +174,17 @@ class JobQueue(ABC, Generic[Request]):
         return self._job(row)
 
     def _job(self, row: JobRow) -> Job[Request]:
-        request = self.request_type.model_validate_json(row.request)
+        request, state, problem = read_row(row, self.placeholder)
         total, timer = self.steps(request), self._timers.get(row.id) if row.state == "running" else None
         progress = min(1.0, (row.done + (timer.fraction if timer is not None else 0.0)) / total)
         seconds_left = timer.seconds_left(total - row.done) if timer is not None else None
-        ended = row.problem, row.created, row.started, row.ended
-        return Job(row.id, request, row.client or "", row.state, row.done, total, progress, seconds_left, *ended)
+        ended = problem, row.created, row.started, row.ended
+        return Job(row.id, request, row.client or "", state, row.done, total, progress, seconds_left, *ended)
+
+    def _check_readable(self, job: Job[Request]) -> None:
+        """Check that the request of a job could be read. Raises NotReadyError."""
+        if job.request is self.placeholder:
+            raise NotReadyError(UNREADABLE)
 
     def page(
         self, job_filter: JobFilter, limit: int, after: tuple[float, str] | None = None, *, newest_first: bool = True
@@ -236,8 +242,9 @@ class JobQueue(ABC, Generic[Request]):
             job: as read. states: from which it may be queued.
             prepare: called before it can start.
         Raises:
-            NotReadyError: it is in another state. BusyError, QuotaError: as `submit`.
+            NotReadyError: it is in another state, or its request cannot be read. BusyError, QuotaError: as `submit`.
         """
+        self._check_readable(job)
         row = self.row
         values = {"state": "queued", "problem": None, "ended": None}
         statement = update(row).where(row.id == job.id, row.state.in_(states)).values(values)
@@ -335,6 +342,7 @@ class JobQueue(ABC, Generic[Request]):
         timer = self._timers.setdefault(job.id, StepTimer(self.step_s(job.request)))
         timer.start()
         try:
+            self._check_readable(job)
             folder.mkdir(parents=True, exist_ok=True)
             claim(folder, self._owner)
             with LeaseRenewer(self._renew_lease, job.id, self._owner):

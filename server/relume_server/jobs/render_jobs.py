@@ -14,7 +14,7 @@ from relume_server.io.downloads import safe_stem
 from relume_server.jobs.job import Job, Quota
 from relume_server.jobs.queue import JobQueue
 from relume_server.persistence.tables import RenderRow
-from relume_server.schemas.renders import RenderRequest
+from relume_server.schemas.renders import RENDER_PLACEHOLDER, RenderRequest
 
 RenderJob = Job[RenderRequest]
 HEAD_BYTES = 1 << 16
@@ -24,7 +24,7 @@ HEAD_BYTES = 1 << 16
 class RenderQueue(JobQueue[RenderRequest]):
     """Batches in the database, with images in `data`/renders/<id>/; a step is one image."""
 
-    row, noun, request_type = RenderRow, "render", RenderRequest
+    row, noun, placeholder = RenderRow, "render", RENDER_PLACEHOLDER
 
     def __init__(
         self,
