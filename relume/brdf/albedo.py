@@ -60,7 +60,7 @@ def pack_reflectance(terms: Sequence[Mapping[str, Any]], normals: NormalMap | No
     """Pack a material's F, summed over terms per texture slot, its image names, mirrors, narrow lobes and normal map.
 
     Args:
-        terms: of a complete look. normals: the image that the look uses instead of the material's normal map.
+        terms: terms of a complete look. normals: the image that the look uses instead of the material's normal map.
     Returns:
         Bytes for `unpack_reflectance`, `unpack_images`, `unpack_mirrors`, `unpack_lobes` and `unpack_normal_map`.
     """
@@ -227,7 +227,7 @@ def directional_albedo(terms: Sequence[Mapping[str, Any]]) -> tuple[Shaped[F64, 
         a(θo) = ∫ f(ωi, ωo) cos θi dωi
 
     Args:
-        terms: of a complete look.
+        terms: terms of a complete look.
     Returns:
         θo in radians, ascending, and a(θo).
     """
@@ -244,7 +244,8 @@ class _QuadraturePoints(NamedTuple):
 
     Attributes:
         wi, wo: local directions. (o, n, 3), (o, 1, 3)
-        h_i: basis functions of ωi, weighted. (o, n, rows). h_o: of ωo, times ∫ cos² mφ dφ. (o, rows)
+        h_i: basis functions of ωi, weighted. (o, n, rows).
+        h_o: hemispherical function h_o of ωo, times ∫ cos² mφ dφ. (o, rows)
         weight_o: weights of ωo with the cosine; h_i contains them. (o,)
     """
 

@@ -137,7 +137,8 @@ class CameraSetup:
         """Trace and merge the rays of a tile.
 
         Args:
-            tile: of the image. is_edge: for all pixels of the image. positions: of the rays within an edge pixel.
+            tile: tile of the image. is_edge: for all pixels of the image.
+            positions: positions of the rays within an edge pixel.
         Returns:
             Merged rays; the number of merged rays in edge pixels; the number of traced rays.
         """

@@ -147,7 +147,7 @@ def _plane_of_triangle(normal: F32, corners: F64, material: int) -> FlatMirrors:
 
 
 def mirrored_lights(normal: Shaped[F32, "P 3"], directions: Shaped[F32, "T 3"]) -> Shaped[F32, "P T 3"]:
-    """Mirror directions to lights at planes. normal: of the planes, unit. directions: to the lights, unit"""
+    """Mirror directions to lights at planes. normal: normal of the planes, unit. directions: to the lights, unit"""
     twice_cosine = 2 * normal.astype(np.float64) @ directions.T
     return np.asarray(directions[None] - twice_cosine[..., None] * normal[:, None], np.float32)
 

@@ -65,7 +65,7 @@ def refract(
 
     Args:
         geometry: the triangles. glass: glass parameters of materials.
-        paths: of the rays. hits: of all paths. rows: paths that hit glass.
+        paths: paths of the rays. hits: hits of all paths. rows: paths that hit glass.
     Returns:
         True for hits on thin glass or the outside of a solid, and the continued paths.
     """

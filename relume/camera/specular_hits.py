@@ -36,8 +36,8 @@ def reflect_rays(
     """Continue the paths of rays that hit mirrors.
 
     Args:
-        geometry: the triangles. materials: of the scene.
-        paths: of the rays. hits: of all paths. rows: paths that hit mirrors.
+        geometry: the triangles. materials: materials of the scene.
+        paths: paths of the rays. hits: hits of all paths. rows: paths that hit mirrors.
         pixel_angle: angle of a pixel, radians. num_keys: larger than any mesh index.
     Returns:
         The continued paths.

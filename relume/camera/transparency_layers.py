@@ -36,10 +36,10 @@ class TransparencyLayer(NamedTuple):
     Attributes:
         ray: index of the camera ray, ascending.
         hits: hits of the rays; distances are along the whole path.
-        directions: of the last path segment, unit.
+        directions: directions of the last path segment, unit.
         transmittance: from the hit back to the camera, without the reflectance of mirrors.
         is_visible: the surface itself is shown; false if the path only continues there.
-        origins: of the last path segment: the camera, or the last surface that changed the direction.
+        origins: origins of the last path segment: the camera, or the last surface that changed the direction.
         chain: mirrors on the path; None without mirrors.
         is_mirrored: the surface is a mirror, and another layer has its reflection.
         key: mesh index of the hit, −1 for the background; offset to distinguish paths over different mirrors.
@@ -115,7 +115,7 @@ def trace_layers(
     """Trace camera rays through glass and off mirrors.
 
     Args:
-        geometry: the triangles. materials: of the scene. camera_position: origin of the rays.
+        geometry: the triangles. materials: materials of the scene. camera_position: origin of the rays.
         directions: unit. alpha_sample: see `trace_rays`.
         pixel_angle: angle of a pixel, radians, to filter textures on mirrors.
         traces_mirrors: add layers of reflections in mirrors.

@@ -35,7 +35,8 @@ class ArrayPointer:
     """A contiguous array argument of an intrinsic.
 
     Args:
-        context, builder: of the intrinsic. array_type: Numba type of the array. array: its LLVM value.
+        context, builder: Numba's arguments of the intrinsic. array_type: Numba type of the array.
+        array: its LLVM value.
     """
 
     def __init__(self, context: Any, builder: Any, array_type: Any, array: Any) -> None:
@@ -119,7 +120,7 @@ def prefetch(typing_context, array, index):  # type: ignore[no-untyped-def]
     """Prefetch the cache line of an item that will be read soon.
 
     Args:
-        typing_context: Numba's. array: contiguous. index: of the item, a tuple.
+        typing_context: Numba's. array: contiguous. index: index of the item, a tuple.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

@@ -26,7 +26,7 @@ _LIGHTS_PER_CLUSTER, _MIN_CLUSTERS = 8, 400
 
 
 def num_clusters(num_lights: int) -> int:
-    """Return the number of merged lights of a merged-light operator. num_lights: of the bake."""
+    """Return the number of merged lights of a merged-light operator. num_lights: number of lights of the bake."""
     return max(_MIN_CLUSTERS, num_lights // _LIGHTS_PER_CLUSTER)
 
 
@@ -34,7 +34,7 @@ def cluster_lights(lights: TriangleLights, tiles: Tiles, num_clusters: int) -> T
     """Merge the light of tiles into about `num_clusters` triangles, with their parts.
 
     Args:
-        lights: of the tiles. tiles: M tiles. num_clusters: rounded down to 8 + 3k; not above M.
+        lights: lights of the tiles. tiles: M tiles. num_clusters: rounded down to 8 + 3k; not above M.
     """
     luminous = luminance(lights.irradiance).astype(np.float64)
     codes, group = np.unique(_coarser_codes(tiles, luminous, num_clusters), return_inverse=True)
@@ -88,7 +88,7 @@ def weight_by_visibility(first, light, visible_fractions, shading):  # type: ign
     Args:
         first, light: from `relume.transport.light_culling.list_lights`. visible_fractions: from `visible_fraction`.
             (C, ≥ points)
-        shading: of each entry, multiplied. (1 or 3, K) float32
+        shading: shading of each entry, multiplied. (1 or 3, K) float32
     """
     for p in range(first.shape[0] - 1):
         for row in range(shading.shape[0]):

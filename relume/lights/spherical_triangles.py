@@ -28,7 +28,7 @@ class TriangleSubset(NamedTuple):
     """Parts of merged triangles: M triangles of a finer division, with their own visibility.
 
     Attributes:
-        group: the merged triangle of each part. fraction: of that triangle's light.
+        group: the merged triangle of each part. fraction: fraction of that triangle's light.
     """
 
     group: Shaped[NDArray[np.int32], " M"]
@@ -48,8 +48,8 @@ class TriangleLights:
         nodes: unit directions of the corners a, b, c and of the midpoints of ab, bc, ca, one row per axis.
         direction: mean direction of the light, and of shadow rays.
         irradiance: ∫ L dω over the tile: irradiance on a surface perpendicular to it; per channel.
-        parts: of merged triangles, with visibility per part.
-        codes: of the tiles in the hierarchy, see `Tiles`; None if not needed.
+        parts: parts of merged triangles, with visibility per part.
+        codes: codes of the tiles in the hierarchy, see `Tiles`; None if not needed.
     """
 
     nodes: Shaped[F32, "3 6 M"]
@@ -146,7 +146,7 @@ def match_moments(
     """Return triangles whose uniform light has the moments of the tiles' light, and its mean directions.
 
     Args:
-        corners: of the tiles. texels: light in the tiles.
+        corners: corners of the tiles. texels: light in the tiles.
     """
     num_tiles = len(corners)
     total = texels.sums(texels.luminous, num_tiles)
@@ -177,7 +177,7 @@ def merge_groups(
     theirs, so that Σ L Ω cos θi is preserved wherever all parts are above the horizon.
 
     Args:
-        lights: M lights. group: of each. codes: of a node above each group.
+        lights: M lights. group: group of each. codes: codes of a node above each group.
     """
     luminous = luminance(lights.irradiance).astype(np.float64)
     corners = lights.nodes[:, :3].transpose(2, 1, 0).astype(np.float64)
@@ -190,7 +190,7 @@ def merge_groups(
 
 
 def _group_lights(lights: TriangleLights, codes: NDArray[np.uint64], max_lights: int) -> LightGroups:
-    """Group 2 to `max_lights` lights below a common node. codes: of their tiles. (M,)"""
+    """Group 2 to `max_lights` lights below a common node. codes: codes of their tiles. (M,)"""
     inner, (num_below,) = sum_inner_nodes(codes, np.ones((1, len(codes))))
     group_codes, group, group_size = np.unique(
         highest_ancestors(codes, inner[num_below > max_lights]), return_inverse=True, return_counts=True
@@ -223,7 +223,8 @@ class RotatedEnvironment:
     """The texels of an unrotated environment, computed once for all rotations.
 
     Attributes:
-        light: radiance × solid angle. luminous: its luminance. directions: unit. solid_angles: of the texels, sr.
+        light: radiance × solid angle. luminous: its luminance. directions: unit.
+        solid_angles: solid angles of the texels, sr.
     """
 
     light: Shaped[F64, "n 3"]
@@ -249,7 +250,7 @@ def integrate_environment(tiles: Tiles, environment: RotatedEnvironment, rotatio
 
     Args:
         tiles: M tiles of the sphere. environment: its texels.
-        rotation: of the environment about +Y, degrees, counter-clockwise from above.
+        rotation: rotation of the environment about +Y, degrees, counter-clockwise from above.
     """
     directions = rotate_about_y(environment.directions, rotation)
     texels = LightTexels(tiles.locate(directions), environment.luminous, directions, environment.solid_angles)

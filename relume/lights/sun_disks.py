@@ -139,7 +139,7 @@ def _remove_excess(
 
 
 def _make_sun_disk(bright: _BrightTexels, is_inside: NDArray[np.bool_], light: F64, size: tuple[int, int]) -> SunDisk:
-    """Build a disk from its texels. light: of each, L dω. (n, 3). size: height and width of the map"""
+    """Build a disk from its texels. light: light of each, L dω. (n, 3). size: height and width of the map"""
     rows, columns, luminous = bright.rows[is_inside], bright.columns[is_inside], luminance(light.astype(np.float32))
     mean = luminous @ bright.directions[is_inside] / luminous.sum()
     serpentine = np.where(rows % 2 == 0, columns, -columns)  # alternating direction: successive texels are adjacent

@@ -105,8 +105,8 @@ def precompute(
     """Precompute the operator of one free curve at all receivers.
 
     Args:
-        bands: of all the term's curves, (3, J) each, or (L, 3, J) if one depends on the level; values of the active
-            one do not matter.
+        bands: bands of all the term's curves, (3, J) each, or (L, 3, J) if one depends on the level; values of the
+            active one do not matter.
         lights, receivers: incident light, and its receivers.
         progress: called with the completed fraction. is_canceled: polled.
         is_quantized: whether the operator is quantized.
@@ -186,7 +186,7 @@ def level_bounds(
     """Return the L + 1 bounds of the levels' samples, if free curves depend on the level; else None.
 
     Args:
-        receivers: sorted by level. bands: of all curves. free_curves: names of the free curves.
+        receivers: sorted by level. bands: bands of all curves. free_curves: names of the free curves.
     """
     num_of_levels = num_levels({name: bands[name] for name in free_curves})
     if num_of_levels == 1 or receivers.level is None:

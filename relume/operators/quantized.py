@@ -124,8 +124,8 @@ def stream_quantized(
     Reads 2 · count · tiles · samples bytes per channel; memory-bound.
 
     Args:
-        transport: quantized. scale: of its blocks. columns: from `changed_columns`.
-        image: added to. bounds: of the levels' samples, tile by tile; None for a single level.
+        transport: quantized. scale: scale of its blocks. columns: from `changed_columns`.
+        image: added to. bounds: bounds of the levels' samples, tile by tile; None for a single level.
     """
     if columns.count.any():
         if bounds is None:

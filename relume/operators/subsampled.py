@@ -34,7 +34,7 @@ class SubsampledOperator(Operator):
 
     Attributes:
         subset_operator: at the selected samples. num_subset: their number.
-        neighbors: selected samples around each sample. weight: of these; rows sum to one.
+        neighbors: selected samples around each sample. weight: weight of these; rows sum to one.
     """
 
     subset_operator: LinearOperator | QuantizedOperator
@@ -74,7 +74,7 @@ def subsampled_bytes(num_samples: int, num_subset: int, num_bands: int) -> int:
     """Return the memory of an operator at a subset of a term's samples.
 
     Args:
-        num_samples: of the term. num_subset: selected samples. num_bands: columns per channel.
+        num_samples: number of samples of the term. num_subset: selected samples. num_bands: columns per channel.
     """
     return quantized_bytes(num_subset, num_bands) + num_samples * _NEIGHBOR_BYTES
 
@@ -107,6 +107,6 @@ def interpolate(
 
     Args:
         rows: values of the selected samples, C order. neighbors: selected samples for each of n samples.
-        weight: of these. image: added to; holds n samples.
+        weight: weight of these. image: added to; holds n samples.
     """
     parallel_for_chunks(lambda start, stop: _interpolate(rows, neighbors, weight, image, start, stop), len(image))

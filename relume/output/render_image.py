@@ -78,7 +78,7 @@ def render_small(
 
     Args:
         transfer: an opened bake. view_name: one of its views. look: the look.
-        width: of the small image.
+        width: width of the small image.
     Returns:
         Linear radiance, at least `width` wide if the bake is.
     """

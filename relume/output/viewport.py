@@ -34,7 +34,7 @@ class Viewport:
     """A scene for camera placement.
 
     Attributes:
-        colors: of the materials, linear.
+        colors: colors of the materials, linear.
         default_camera: a camera that frames the scene. bounds_min, bounds_max: corners of its bounds, meters.
     """
 

@@ -146,7 +146,7 @@ def trace_gather_rays(
     """Trace all gather rays of points. O(n · rays · (log triangles + log patches)) time.
 
     Args:
-        geometry: the scene's triangles. tree: of the patches.
+        geometry: the scene's triangles. tree: tree of the patches.
         points: ray origins; their seeds shift the pattern.
         wo: view directions, unit, world space; glossy rays are distributed about their mirror direction.
         pattern: ray directions of every point.

@@ -35,7 +35,7 @@ class PatchTree(NamedTuple):
         axis: 0 to 2 for a position component, 3 to 5 for a normal component.
         value: smaller keys are in the first child, others in the second.
         children: nodes; −1 − c for patch c.
-        roots: of side s of mesh m at 2 m + s, with s = 1 for the back side.
+        roots: roots of side s of mesh m at 2 m + s, with s = 1 for the back side.
     """
 
     axis: Shaped[NDArray[np.uint8], " n"]
@@ -186,7 +186,7 @@ def grow_tree(
     Args:
         keys: position and unit normal.
         reach: width of the footprint at each point, below which a ray does not resolve positions.
-        side: of each point, in [0, num_sides). num_sides: twice the number of meshes.
+        side: side of each point, in [0, num_sides). num_sides: twice the number of meshes.
         max_patches: at most `MAX_PATCHES`; fewer if points coincide, or more so that each side has one.
     Returns:
         The tree, and the points of each patch.

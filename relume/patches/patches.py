@@ -34,7 +34,7 @@ class Patches:
     """Patches in the order of their tree.
 
     Attributes:
-        position: of the sample points, offset from the surface. normal: shading normals there.
+        position: position of the sample points, offset from the surface. normal: shading normals there.
         diffuse, specular: texture channels, averaged over the points.
         material: index into the scene's materials.
         uv: coordinates, filter width and texture rotation, as in
@@ -78,7 +78,7 @@ def choose_patches(
     """Create about `num_patches` patches where gather rays of the views arrive; seeded by the scene alone.
 
     Args:
-        scene: of the views. geometry: its triangles.
+        scene: scene of the views. geometry: its triangles.
         views: names of the cameras. size: width and height of their images, pixels.
         num_patches: clamped to `MAX_PATCHES` less two for each mesh.
     """

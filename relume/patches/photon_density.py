@@ -47,8 +47,8 @@ class Photons:
     """Hits of paths, without the first visible surface.
 
     Attributes:
-        hits: on triangles. directions: of the incoming rays.
-        width: of the lobe, radians; over the distance it is the footprint that one ray does not resolve.
+        hits: on triangles. directions: directions of the incoming rays.
+        width: width of the lobe, radians; over the distance it is the footprint that one ray does not resolve.
     """
 
     hits: Hits
@@ -82,7 +82,7 @@ def shoot_photons(
     """Shoot photons, seeded by the scene's id.
 
     Args:
-        scene: of the views. geometry: its triangles.
+        scene: scene of the views. geometry: its triangles.
         views: names of the cameras that paths start from. size: width and height of their images, pixels.
         num_photons: requested; there are fewer if paths leave the scene too soon.
     """

@@ -49,7 +49,7 @@ class HighlightTables(NamedTuple):
         """Tabulate the highlights of all materials.
 
         Args:
-            reflectances: of all materials. material: of each patch.
+            reflectances: reflectances of all materials. material: material of each patch.
             textures: multipliers of each of `relume.brdf.texture_slots.TEXTURES`.
             energy_scale: factor on all outgoing light of a patch.
         """

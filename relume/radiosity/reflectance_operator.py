@@ -69,7 +69,7 @@ class ReflectanceOperator:
         """Compute F of patches.
 
         Args:
-            reflectances: of all materials. material: of each patch.
+            reflectances: reflectances of all materials. material: material of each patch.
             textures: multipliers of each of `relume.brdf.texture_slots.TEXTURES`.
         """
         matrices = np.stack([unpack_reflectance(material_reflectance) for material_reflectance in reflectances])

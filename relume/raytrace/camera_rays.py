@@ -60,7 +60,7 @@ class Hits:
 
 @nb.njit(nogil=True, cache=True)
 def _trace(intersect, scene, arguments, origins, directions, alpha_sample, start, stop, face, uv, distance):  # type: ignore[no-untyped-def]
-    """Trace rays [start, stop). origins, alpha_sample: of n rays, or one for all."""
+    """Trace rays [start, stop). origins, alpha_sample: origins and alpha sample of n rays, or one for all."""
     last_origin, last_alpha_sample = origins.shape[0] - 1, alpha_sample.shape[0] - 1
     packet = new_packet(scene, arguments)
     for k in range(LANES):  # Embree does not modify origins
@@ -89,7 +89,8 @@ def trace_rays(
 
     Args:
         scene: the triangles. origin: (3,) or (n, 3). directions: unit.
-        alpha_sample: of each ray (n,), or one for all, in (0, 1] for blended surfaces or a constant of `alpha_filter`.
+        alpha_sample: alpha sample of each ray (n,), or one for all, in (0, 1] for blended surfaces or a constant of
+            `alpha_filter`.
     """
     n = len(directions)
     origins = np.ascontiguousarray(origin, np.float32).reshape(-1, 3)

@@ -124,7 +124,7 @@ class EmbreeScene:
 
         Args:
             positions: finite. faces: vertex indices.
-            alpha_test: of triangles that are not opaque; None if all are.
+            alpha_test: arrays of triangles that are not opaque; None if all are.
         Raises:
             SceneError: Embree rejected the geometry.
         """

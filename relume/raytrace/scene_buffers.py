@@ -26,7 +26,8 @@ class SceneBuffers:
     """All meshes of a scene, merged.
 
     Attributes:
-        positions, normals, tangents, uvs: of the vertices; tangents have the sign of the bitangent.
+        positions, normals, tangents, uvs: positions, normals, tangents and UV coordinates of the vertices; tangents
+            have the sign of the bitangent.
         faces: vertex indices of the corners.
         face_material: index into the scene's materials.
         face_mesh: index into the scene's meshes.
@@ -84,7 +85,7 @@ def is_front(
 
     Args:
         embree: the triangles. positions: their vertices. faces: vertex indices.
-        origin: of the rays. (3,) or (n, 3). points: on triangles; the rays' targets.
+        origin: origin of the rays. (3,) or (n, 3). points: on triangles; the rays' targets.
     """
     directions = (points - origin) / np.linalg.norm(points - origin, axis=1, keepdims=True)
     face = trace_rays(embree, origin, directions.astype(np.float32), IGNORE_GLASS).face

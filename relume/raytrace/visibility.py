@@ -139,7 +139,7 @@ def select_visibility(
     """Select visibility bits of some points and some lights.
 
     Args:
-        visible: of all points and lights, as in `VisibilityBits`. rows: the points. lights: the lights.
+        visible: visibility of all points and lights, as in `VisibilityBits`. rows: the points. lights: the lights.
     Returns:
         Their bits, renumbered; ceil(N / 8) bytes
     """

@@ -83,7 +83,7 @@ def make_light_targets(directions: Shaped[F32, "m 3"], irradiance: Shaped[F32, "
     """Prepare lights for `trace_visibility_masks`.
 
     Args:
-        directions: unit, toward the lights. irradiance: of each light, per channel.
+        directions: unit, toward the lights. irradiance: irradiance of each light, per channel.
     """
     luminous = luminance(irradiance)
     return LightTargets(directions, *find_neighbors(directions), luminous > _STRONG_LIGHT_FRACTION * luminous.sum())

@@ -78,9 +78,9 @@ class Comparison:
     """Errors of a frame, relative to the root mean square of the reference over pixels and channels.
 
     Attributes:
-        rmse: of the difference, noise included. noise: of the estimate.
-        error: of the frame, without noise; None if it cannot be separated from the noise.
-        standard_error: of `error`, one standard deviation over other passes; None if `error` is.
+        rmse: RMSE of the difference, noise included. noise: noise of the estimate.
+        error: error of the frame, without noise; None if it cannot be separated from the noise.
+        standard_error: standard error of `error`, one standard deviation over other passes; None if `error` is.
         error_upper_bound: two standard deviations above the error.
         significant_pixel_fraction: fraction of pixels that differ by more than noise explains; at most
             `FALSE_DISCOVERY_RATE` of these by chance.
@@ -142,7 +142,7 @@ def error_map(
     """Map of too bright (orange) and too dark (blue) pixels, in full color from a quarter of a stop, in sRGB.
 
     Args:
-        frame: linear radiance. estimate: of the reference.
+        frame: linear radiance. estimate: estimate of the reference.
         differs: pixels from `compare`; all others are gray.
     """
     mean = luminance(estimate.mean).astype(np.float64)
@@ -245,7 +245,7 @@ def _threshold(noise_ratios: F64, null_ratios: F64) -> float:
     """Least value above which at most `FALSE_DISCOVERY_RATE` are expected by chance; infinite if there is none.
 
     Args:
-        null_ratios: of all `_NUM_SIGN_FLIPS` trials.
+        null_ratios: null ratios of all `_NUM_SIGN_FLIPS` trials.
     """
     values = np.sort(noise_ratios[noise_ratios > 0])
     num_discoveries = len(values) - np.arange(len(values))

@@ -41,7 +41,7 @@ class ReferenceEmitter:
     """A light of a look in a scene.
 
     Attributes:
-        triangles: of a mesh light. is_two_sided: emits to both sides.
+        triangles: triangles of a mesh light. is_two_sided: emits to both sides.
         uvs: texture coordinates of their corners. image: emission relative to its mean; None if uniform.
     """
 
@@ -63,7 +63,7 @@ class ReferenceEmitter:
 
         Args:
             geometry: the occluding triangles.
-            position: of the points, meters.
+            position: position of the points, meters.
             num: number of samples per point.
             rng: random number generator.
             alpha_sample: for the rays of each point, or for all; see `relume.raytrace.surface_points.SurfacePoints`.

@@ -153,7 +153,7 @@ class _ViewSetup:
     """Samples of a view, and the lights of its look.
 
     Attributes:
-        points: of `samples`, which are sorted by material.
+        points: points of `samples`, which are sorted by material.
         light: the environment of the look; texels: rotated and scaled by the look.
     """
 
@@ -259,7 +259,7 @@ def points_of_samples(
 ) -> ReferencePoints:
     """Convert view samples to points; points of background samples are meaningless.
 
-    samples: of a view. textures, roughness: at the samples, see `ReferencePoints`.
+    samples: samples of a view. textures, roughness: at the samples, see `ReferencePoints`.
     """
     points = samples.surface.points
     to_camera = samples.camera.astype(np.float64) - points.position

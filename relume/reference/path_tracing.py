@@ -73,13 +73,13 @@ def reference_indirect(
 
     Args:
         scene: its materials and lights.
-        geometry: of the scene.
-        texels: of the environment, with its gain in the look.
+        geometry: geometry of the scene.
+        texels: texels of the environment, with its gain in the look.
         look: terms and lights.
         points: n of them. material: index into the scene's materials.
         light_paths: selections; `direct` selects direct light in mirrors.
         num_paths: per point. spp: environment texels per path vertex.
-        seed: of the paths; other seeds are independent.
+        seed: seed of the paths; other seeds are independent.
     Cost: O(n · num_paths · bounces · spp) shadow rays, with the maximum number of bounces of all selections.
     """
     classes, local_lights = roughness_classes(scene, look), emitters(scene, look)
@@ -212,7 +212,8 @@ def _sample_directions(
     """Sample a direction for each point from one of its material's lobes.
 
     Args:
-        classes: of the scene. lobes: of each class. points: n of them. class_index: of each. (n,)
+        classes: classes of the scene. lobes: lobes of each class. points: n of them.
+        class_index: class index of each. (n,)
         btf_surfaces: by class and term, for all points of a class.
         rng: random number generator.
     Returns:

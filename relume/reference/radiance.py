@@ -153,7 +153,7 @@ def reference_radiance(
 
     Args:
         geometry: the occluding triangles.
-        texels: of the environment, with their radiance and solid angles.
+        texels: texels of the environment, with their radiance and solid angles.
         points: n of them.
         materials: terms of each, from a complete look.
         spp: texels sampled by power per point, plus some directions sampled by the materials' lobes, and points per

@@ -45,7 +45,7 @@ class Texture:
         pixels: top row first. uint8 with three channels, or one for kind "share", if there is an encoding; otherwise
             float32 with three.
         wrap: wrap modes of u and v outside [0, 1): "repeat", "mirror" or "clamp".
-        encoding: of bytes; None if pixels are linear RGB or normals.
+        encoding: encoding of bytes; None if pixels are linear RGB or normals.
     """
 
     pixels: Shaped[NDArray[Any], "height width channels"]
@@ -171,7 +171,7 @@ class Scene:
 
     Attributes:
         id: hash of the content, hexadecimal.
-        warnings: of the importer, one sentence each.
+        warnings: warnings of the importer, one sentence each.
         variants: partial looks by name, from the file.
     """
 

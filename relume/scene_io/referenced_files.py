@@ -82,7 +82,7 @@ class NamedFiles(Generic[Entry]):
     def __init__(self, entries: Mapping[str, Entry], folder: str, read: Callable[[Entry], bytes]) -> None:
         """
         Args:
-            entries: by name, passed to `read`. folder: of the scene file, within those names.
+            entries: by name, passed to `read`. folder: folder of the scene file, within those names.
         """
         self._entries = {posixpath.normpath(name.replace("\\", "/")).lower(): entry for name, entry in entries.items()}
         self._folder, self._read = folder, read

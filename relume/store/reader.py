@@ -60,7 +60,7 @@ class Reader:
         """Read rows [start, stop) of an array.
 
         Args:
-            path: of the array inside the store. start, stop: rows; by default all.
+            path: path of the array inside the store. start, stop: rows; by default all.
         Raises:
             StoreDeletedError: the whole store was deleted.
             ChunkDamagedError: a shard is missing or truncated, or a checksum fails.

@@ -81,7 +81,7 @@ class StoreWriter:
         """Write rows [start, start + len(rows)) of an array: whole shards, or up to the array's end.
 
         Args:
-            path: of the array, which must exist.
+            path: path of the array, which must exist.
             rows: with the array's type and shape except for their number.
             start: index of the first row.
         Raises:

@@ -71,9 +71,9 @@ class TileGeometry:
     """A tile with its repetitions, as a ray-tracing scene.
 
     Args:
-        tile: one period. grid: of light and view directions. size: height and width of the texture, texels.
+        tile: one period. grid: grid of light and view directions. size: height and width of the texture, texels.
         samples_per_side: samples along each side of a texel, each with different light directions.
-        seed: of the rays for form factors.
+        seed: seed of the rays for form factors.
     """
 
     def __init__(

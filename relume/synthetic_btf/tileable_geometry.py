@@ -21,7 +21,7 @@ class Tile(NamedTuple):
 
     Attributes:
         normals: unit. faces: counter-clockwise from outside.
-        material: of each face.
+        material: material of each face.
         materials: terms of each, as in look documents; isotropic.
     """
 
@@ -68,9 +68,10 @@ def extruded(
     """Extrude a yarn along a path: positions, normals and faces.
 
     Args:
-        path: center line, in a plane that contains z; its first and last points only give the direction. radius: of the
+        path: center line, in a plane that contains z; its first and last points only give the direction.
+        radius: radius of the
             yarn, across z.
-        num_corners: of its cross-section. flat: its height over its width.
+        num_corners: number of corners of its cross-section. flat: its height over its width.
     """
     along, path = path[2:] - path[:-2], path[1:-1]
     along /= np.linalg.norm(along, axis=1, keepdims=True)

@@ -87,7 +87,8 @@ def deposit(typing_context, out, band, low, middle, high, rise, fall, red, green
 
     Args:
         typing_context: Numba's. out: (3, bands padded by 8) float32. band: first of the eight.
-        low, middle, high, rise, fall: of the triangle, from `overlap`. red, green, blue: its weights.
+        low, middle, high, rise, fall: shape of the triangle, from `overlap`.
+        red, green, blue: its weights.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -114,7 +115,8 @@ def mean_over_bands(typing_context, decrements, channel, band, low, middle, high
 
     Args:
         typing_context: Numba's. decrements: c_{j-1} − c_j of a curve. (3, bands padded by 8) float32. channel: its row.
-        band: first of the eight. low, middle, high, rise, fall: of the triangle, from `overlap`.
+        band: first of the eight.
+        low, middle, high, rise, fall: shape of the triangle, from `overlap`.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -131,8 +133,9 @@ def add_means(typing_context, means, settings, first, band, low, middle, high, r
 
     Args:
         typing_context: Numba's. means: added to. (settings,) float32, a multiple of eight.
-        settings: of a curve. (bands padded by 8, settings) float32. first: first of the eight settings.
-        band: first of the eight bands. low, middle, high, rise, fall: of the triangle, from `overlap`.
+        settings: settings of a curve. (bands padded by 8, settings) float32. first: first of the eight settings.
+        band: first of the eight bands.
+        low, middle, high, rise, fall: shape of the triangle, from `overlap`.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

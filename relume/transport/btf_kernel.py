@@ -50,8 +50,8 @@ def neighbor_texels(levels, u, v, footprint, texel, weight):  # type: ignore[no-
     """Select texels for trilinear interpolation.
 
     Args:
-        levels: of the BTF. u, v: coordinates, in repeats. footprint: its side, in repeats.
-        texel: indices, written. (8,) int32. weight: of each texel, written. (8,) float32
+        levels: levels of the BTF. u, v: coordinates, in repeats. footprint: its side, in repeats.
+        texel: indices, written. (8,) int32. weight: weight of each texel, written. (8,) float32
     Returns:
         Number of texels: four of each level with a weight.
     """
@@ -127,7 +127,8 @@ def _add_weights(cluster, weight, view, texel, texel_weight, num, sample_weight,
     """Add the weights of texels for one view, by cluster.
 
     Args:
-        cluster, weight: of the BTF. view: its index. texel, texel_weight: see `neighbor_texels`. num: number of texels.
+        cluster, weight: cluster and weight of the BTF. view: its index. texel, texel_weight: see `neighbor_texels`.
+        num: number of texels.
         sample_weight: weight of this footprint sample.
         num_clusters: clusters so far. clusters: their indices, written. (≥ num_clusters + num,) int32
         sums: weights of their means and components, written. (≥ num_clusters + num, ≥ 1 + C)
@@ -156,7 +157,8 @@ def _footprint_samples(levels, heights, footprint_center, x, y, z, slant, out): 
     """Distribute samples along a footprint and look up the relief height of each.
 
     Args:
-        levels: of the BTF. heights, footprint_center: as in `_shade_texels`. x, y, z: view direction. slant: its slant.
+        levels: levels of the BTF. heights, footprint_center: as in `_shade_texels`. x, y, z: view direction.
+        slant: its slant.
         out: u, v and height of each sample, written. (≥ samples, 3)
     Returns:
         Number of samples; width of the footprint.
@@ -233,7 +235,7 @@ def texel_rows(
     """Compute the outgoing radiance of points [start, stop), texel by texel.
 
     Args:
-        btf_ref: the BTF and its mapping. lights: of the environment, None for rays alone.
+        btf_ref: the BTF and its mapping. lights: lights of the environment, None for rays alone.
         receivers: all points, with `uv`. start, stop: range of points.
     Returns:
         Outgoing radiance.
@@ -249,8 +251,8 @@ def outgoing_rows(
     """Compute the outgoing radiance of points from binned incident light.
 
     Args:
-        btf_ref: the BTF and its mapping. tables: of the BTF, or from `rotated_tables`.
-        incident: of m points, see `texture_light_rows`.
+        btf_ref: the BTF and its mapping. tables: tables of the BTF, or from `rotated_tables`.
+        incident: incident light of m points, see `texture_light_rows`.
         receivers: all points, with `uv`. start: the first of the m points.
     Returns:
         Outgoing radiance.

@@ -26,7 +26,7 @@ def weighted_basis(pattern: RayPattern, seed: int, degree: int) -> Shaped[F32, "
     """Evaluate w_r h_k(ω_r) for each ray, including the cosine.
 
     Args:
-        pattern: of the rays, all cosine-distributed. seed: of the points. degree: of the basis.
+        pattern: pattern of the rays, all cosine-distributed. seed: seed of the points. degree: degree of the basis.
     Raises:
         ValueError: the pattern has glossy rays.
     """

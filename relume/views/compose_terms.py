@@ -77,7 +77,7 @@ def add_term(
     """Add one term of a material to the view's radiance, or overwrite the radiance with it.
 
     Args:
-        image: Σ_j c_j T_j. color: of the term.
+        image: Σ_j c_j T_j. color: color of the term.
         texture: per sample, None for 1. outgoing: product of the curves of the view angle, None for 1.
         first: the material's first sample in the view. num: number of its samples. replace: overwrite.
         radiance: output.

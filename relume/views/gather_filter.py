@@ -47,8 +47,9 @@ def _fill_weights(  # type: ignore[no-untyped-def]
     """Compute filter weights between samples.
 
     Args:
-        order, first: samples of pixel p are order[first[p] : first[p + 1]]. pixel: of each sample. (n,) int64
-        position, normal: of each. (n, 3) float32. alpha_sample: of each, or of all; only equal ones are averaged.
+        order, first: samples of pixel p are order[first[p] : first[p + 1]]. pixel: pixel of each sample. (n,) int64
+        position, normal: position and normal of each. (n, 3) float32.
+        alpha_sample: alpha sample of each, or of all; only equal ones are averaged.
         min_normal_cosine: between the normals of neighbors.
         starts, column_index, weights: output, compressed rows. (n + 1,), (≥ entries,) each
     Returns:
@@ -89,8 +90,8 @@ def make_neighbor_filter(
     """Make the filter of a material's samples; its rows sum to one.
 
     Args:
-        pixel: y · width + x of each sample. width: of the image, pixels.
-        points: of the samples.
+        pixel: y · width + x of each sample. width: width of the image, pixels.
+        points: points of the samples.
         num_passes: number of tent filter passes for diffuse light.
     Cost: O(n) time.
     """

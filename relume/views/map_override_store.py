@@ -59,7 +59,7 @@ class RayTracer(Protocol):
     def gather_hits(
         self, points: SurfacePoints, wo: Shaped[F32, "n 3"], pattern: RayPattern
     ) -> Shaped[NDArray[np.uint16], "n rays"]:
-        """Find the patches that gather rays of points hit. wo: toward the viewer. pattern: of the rays"""
+        """Find the patches that gather rays of points hit. wo: toward the viewer. pattern: pattern of the rays"""
         ...
 
     def mirror_lights(self, points: SurfacePoints) -> Shaped[NDArray[np.uint8], "n bytes"]:
@@ -104,7 +104,7 @@ class MapOverrideStore:
 
     Args:
         store: the other store. view: index of the view. rows: row of each sample there. (surface samples,)
-        level: of each sample here. (surface samples,) uint8. ratios: of each material's levels.
+        level: level of each sample here. (surface samples,) uint8. ratios: ratios of each material's levels.
         perturbed: samples with overridden normals, by the first row of their material; in the order here.
         materials: index of each of those materials. tracer: for their rays. cache, key: for traced rays.
     """
@@ -155,7 +155,7 @@ class MapOverrideStore:
         """Read some rows of an array of the view, of one material's samples; rays are traced only for those.
 
         Args:
-            path: of the array. rows: in any order. (k,)
+            path: path of the array. rows: in any order. (k,)
         """
         if len(rows) == 0:
             return self.read(path, 0, 0)

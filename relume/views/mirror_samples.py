@@ -51,8 +51,9 @@ def read_mirror_samples(
     """Read the samples of a view in mirrors; None if there are none.
 
     Args:
-        store: an open store. k: index of the view. order: of its samples, by pixel.
-        sample_throughput: of each sample. num_surface: number of samples on surfaces, which come first.
+        store: an open store. k: index of the view. order: order of its samples, by pixel.
+        sample_throughput: sample throughput of each sample.
+        num_surface: number of samples on surfaces, which come first.
     Raises:
         ChunkDamagedError: a mirror has a material that does not exist in the scene.
     """

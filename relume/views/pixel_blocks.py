@@ -89,7 +89,8 @@ def _find_nearest(
     """Fill `neighbors` and `weight`, (n, k), of samples [start, stop), by distance of `features`, (n, 5).
 
     Args:
-        features: pixel position and scaled normal. subset_features: of the chosen samples. block_sample: index of the
+        features: pixel position and scaled normal. subset_features: subset features of the chosen samples.
+        block_sample: index of the
             chosen sample in each block, -1 for none.
     """
     rows, columns = block_sample.shape

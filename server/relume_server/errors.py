@@ -133,7 +133,7 @@ class ErrorMapping:
 
     Attributes:
         slug: last part of the problem's `type`.
-        close_code: of a session that the exception ends.
+        close_code: close code of a session that the exception ends.
     """
 
     status: int
@@ -253,7 +253,7 @@ def http_problem(error: HTTPException, method: str, allowed_methods: Sequence[st
     """Build the problem for a request that the framework rejected: unknown address, wrong method, unreadable body.
 
     Args:
-        error: of the framework. method: of the request. allowed_methods: of the address.
+        error: error of the framework. method: method of the request. allowed_methods: allowed methods of the address.
     """
     status, detail = error.status_code, str(error.detail)
     if status == HTTPStatus.BAD_REQUEST:

@@ -84,7 +84,7 @@ def check_budget(plan: Plan, data_dir: Path, num_processes: int) -> None:
     """Reject a plan that needs more memory or disk than there is.
 
     Args:
-        plan: of the bake.
+        plan: plan of the bake.
         data_dir: on the disk for the store.
         num_processes: concurrent worker processes on this machine; 0 if they run elsewhere.
     Raises:

@@ -50,7 +50,7 @@ def estimate_seconds(
     any. Much smaller bakes are mostly overhead: additional work takes the planned time, unless they were faster.
 
     Args:
-        plan: of the bake.
+        plan: plan of the bake.
         completed: measured bakes of any scenes.
         num_workers: concurrent tasks.
         load_factor: expected threads per core.

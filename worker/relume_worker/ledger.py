@@ -47,7 +47,7 @@ class Ledger:
         """Queue a bake; the same recipe under the same code is the same bake, and a failed or canceled one resumes.
 
         Args:
-            scene_id: of an existing scene. recipe: of the bake.
+            scene_id: id of an existing scene. recipe: recipe of the bake.
             plan: its cost. client: for fair scheduling.
         Returns:
             The bake's id.
@@ -163,10 +163,10 @@ class Ledger:
         """Give up the lease; a running bake changes to `state`, a canceled one stays canceled.
 
         Args:
-            identity: of the bake. owner: of its lease; otherwise nothing changes.
+            identity: id of the bake. owner: owner of its lease; otherwise nothing changes.
             state: final state.
             problem: a sentence, if it has failed.
-            num_bytes: of the store, if it is ready.
+            num_bytes: size of the store, bytes, if it is ready.
         Returns:
             As `release`.
         """
@@ -196,7 +196,7 @@ class Ledger:
         """Record that a task's shards are on disk; idempotent.
 
         Args:
-            identity: of the bake. owner: of its lease. task: finished one.
+            identity: id of the bake. owner: owner of its lease. task: finished one.
             cost: seconds and rays.
             attempts: including this one.
         Returns:
@@ -215,7 +215,7 @@ class Ledger:
         """Delete the task rows of a bake whose unfinished store is missing or damaged.
 
         Args:
-            identity: of the bake. owner: of its lease; None: nobody runs it.
+            identity: id of the bake. owner: owner of its lease; None: nobody runs it.
         Returns:
             False if another owner has the lease: nothing is deleted.
         """
@@ -235,7 +235,7 @@ class Ledger:
         """Restart a bake from nothing, under this code.
 
         Args:
-            identity: of the bake. owner: process that runs it. code: its code version.
+            identity: id of the bake. owner: process that runs it. code: its code version.
             run: new run marker.
             reason: one sentence, if it had finished tasks.
         Returns:

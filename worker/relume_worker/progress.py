@@ -24,7 +24,7 @@ class ExpectedWork:
 
     Attributes:
         seconds: total, None if unknown.
-        stage_fractions: of the time, by stage, None if unknown.
+        stage_fractions: fractions of the time, by stage, None if unknown.
         parallel: concurrent tasks.
     """
 
@@ -50,7 +50,7 @@ class Progress:
     ) -> None:
         """
         Args:
-            plan: of the bake. initial: progress before an interruption. expected_work: from finished bakes.
+            plan: plan of the bake. initial: progress before an interruption. expected_work: from finished bakes.
             clock: monotonic seconds.
         """
         self._clock, self._expected_work = clock, expected_work or ExpectedWork()

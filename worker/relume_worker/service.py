@@ -66,7 +66,7 @@ class BakeService:
             scheduler: address of a Dask scheduler; None: an embedded cluster, started by the first bake that needs it.
             num_workers: processes of the embedded cluster; None: one per core.
             methods: available methods by name; None: relume's registry.
-            client_weights: of some clients, see `relume_worker.fair_share.FairShare`.
+            client_weights: weights of some clients, see `relume_worker.fair_share.FairShare`.
         """
         get_storage()  # fail early if its address is invalid
         bake_code()  # of the running version: its files may be replaced meanwhile

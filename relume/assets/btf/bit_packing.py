@@ -32,7 +32,7 @@ def pack(rows: Shaped[I8, "n columns"], bits: Shaped[U8, " columns"]) -> Shaped[
     """Pack rows into `packed_bytes` bytes.
 
     Args:
-        rows: from −`max_code` of the column's bits to `max_code` + 1. bits: of each column, 1 to 8.
+        rows: from −`max_code` of the column's bits to `max_code` + 1. bits: bits of each column, 1 to 8.
     """
     shifted = (rows + max_code(bits)).astype(np.uint8)
     columns = [np.unpackbits(column[:, None], axis=1)[:, 8 - b :] for column, b in zip(shifted.T, bits, strict=True)]

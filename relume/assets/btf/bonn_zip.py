@@ -42,7 +42,7 @@ class ZippedBtf:
     """The images of a zip; implements `relume.assets.btf.compress.ViewArrays` without a cache.
 
     Args:
-        path: of the file.
+        path: path of the file.
     Raises:
         MaterialError: it is no such file, or images are missing, duplicate, or of different sizes.
     """

@@ -34,7 +34,7 @@ class DirectionGrid(NamedTuple):
     """Rings of directions, indexed from the pole outward and by ascending φ.
 
     Attributes:
-        theta: of each ring, ascending from 0, radians.
+        theta: theta of each ring, ascending from 0, radians.
         first: index of the first direction of each ring, then the number of directions.
         shift: φ of the first direction of each ring, in steps between its directions, [0, 1).
     """
@@ -53,7 +53,7 @@ def make_direction_grid(theta_and_counts: Sequence[tuple[float, int]], shift: Se
     """Make a grid from θ in degrees and the number of directions of each ring.
 
     Args:
-        theta_and_counts: of each ring. shift: as in `DirectionGrid`; by default zero.
+        theta_and_counts: θ and number of directions of each ring. shift: as in `DirectionGrid`; by default zero.
     Raises:
         MaterialError: the first ring is not the pole, θ does not ascend, or there are too few or too many directions.
     """

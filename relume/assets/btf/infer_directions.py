@@ -22,7 +22,7 @@ def infer_rings(
     """Fit rings about the normal to directions; each ring may start at its own φ.
 
     Args:
-        theta, phi: of each direction, degrees.
+        theta, phi: theta and phi of each direction, degrees.
     Returns:
         The grid; for each of its directions, the index of the given one.
     Raises:

@@ -35,16 +35,16 @@ class LocalPcaBtf:
     """A compressed BTF with V view and L light directions, in K clusters with C components for each view.
 
     Attributes:
-        grid: of both directions.
+        grid: grid of both directions.
         levels: first texel, height and width of each mip level.
-        cluster: of each texel of each level.
+        cluster: cluster of each texel of each level.
         weight: α, in units that `step` includes.
         bits: for the weights of each component, with sign.
         mean: M.
         eigen: E, in units of `step`.
         step: quantization step of the product of weight and eigenvector.
         average: over all texels.
-        height: of the relief above the plane, in side lengths of the texture; one zero if unknown.
+        height: height of the relief above the plane, in side lengths of the texture; one zero if unknown.
         error: relative RMS of the texels by the number of components, from zero to C.
     """
 
@@ -108,7 +108,7 @@ class LocalPcaBtf:
         """Weighted sum of texels for one view direction: the BRDF times cosine.
 
         Args:
-            view: index of the view direction. texels: indices. texel_weights: of each.
+            view: index of the view direction. texels: indices. texel_weights: texel weights of each.
         """
         cluster_index, total = self.cluster[view, texels], np.zeros(self.mean.shape[2:])
         for k in np.unique(cluster_index):

@@ -27,7 +27,7 @@ class MatrixBtf:
     """The values of a .btf file; implements `relume.assets.btf.compress.ViewArrays`.
 
     Args:
-        path: of the file.
+        path: path of the file.
     Raises:
         MaterialError: it is no such file, damaged, too large, or its directions are not rings.
     """

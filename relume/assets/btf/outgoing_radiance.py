@@ -23,7 +23,8 @@ def _add_texels(size, u, v, position_weight, cluster, weight, cluster_slot, used
 
     Args:
         size: height and width. u, v: the position, in texels from the center of the first. position_weight: its weight.
-        cluster, weight: of the texels. cluster_slot: row of `factors` for each cluster, negative if it has none yet.
+        cluster, weight: cluster and weight of the texels.
+        cluster_slot: row of `factors` for each cluster, negative if it has none yet.
         used_clusters: clusters with a row; the last entry is their number.
     """
     left, upper = math.floor(u), math.floor(v)
@@ -45,7 +46,7 @@ def _add_texels(size, u, v, position_weight, cluster, weight, cluster_slot, used
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
 def _sample_btf_kernel(grid, shears, height, size, cluster, weight, tables, texel_positions, wo, out):  # type: ignore[no-untyped-def]
-    """Kernel of `sample_btf`. shears: of the directions. size: height and width in texels."""
+    """Kernel of `sample_btf`. shears: shears of the directions. size: height and width in texels."""
     lowest, highest = height.min(), height.max()
     view, view_weight = np.empty(4, np.int32), np.empty(4, np.float32)
     cluster_slot, used_clusters = np.full(256, -1, np.int64), np.empty(4 * texel_positions.shape[1] + 1, np.int64)
@@ -141,7 +142,7 @@ def outgoing_radiance(
 
     Args:
         btf: the BTF. values_by_light: from `sample_btf`.
-        axes: of the texture, in the frames of the points.
+        axes: axes of the texture, in the frames of the points.
         point_index: point of each direction. wi: in the frames of their points, unit.
     Returns:
         Radiance per unit of irradiance perpendicular to `wi`, including the cosine.

@@ -68,7 +68,8 @@ def parallax_intersection(height, lowest, highest, u, v, shear):  # type: ignore
     """Find the height at which a ray first meets the relief, in steps of half a texel and linear in the last.
 
     Args:
-        height: of the relief, in side lengths of the texture. (height, width) float32. lowest, highest: its range.
+        height: height of the relief, in side lengths of the texture. (height, width) float32.
+        lowest, highest: its range.
         u, v: crossing with the plane, in repeats. shear: s of the ray.
     """
     rows, columns = height.shape

@@ -46,7 +46,7 @@ def _clear(
     """A clear day: Kittler's luminance with colors, a sun and a ground.
 
     Args:
-        elevation: of the sun, degrees. zenith, horizon: colors. (3,) each
+        elevation: elevation of the sun, degrees. zenith, horizon: colors. (3,) each
         sun_color: its color. sun_ratio: its irradiance perpendicular to it, over the diffuse irradiance of the ground.
     """
     w = texel_directions(HEIGHT, WIDTH).astype(np.float64)

@@ -50,7 +50,7 @@ def store_environment(folder: Path, source: Path, name: str) -> EnvironmentRecor
     """Import an equirectangular .hdr or .exr file; an existing one with this content gets the new name.
 
     Args:
-        folder: of the asset store.
+        folder: folder of the asset store.
         source: the file to import.
         name: shown to users.
     Raises:

@@ -38,7 +38,7 @@ def read_header(data: bytes, name: str) -> RadianceHeader:
     """Read a header.
 
     Args:
-        data: of the file. name: of the environment, in messages.
+        data: data of the file. name: name of the environment, in messages.
     Raises:
         SceneError: there is no header, or rows are not ordered from the top.
     """

@@ -56,7 +56,7 @@ class _MapReader:
     """Reads a map in strips of rows, and repairs and downsamples each by an integer factor.
 
     Attributes:
-        width: of the map in the file.
+        width: width of the map in the file.
     """
 
     def __init__(self, name: str, max_width: int) -> None:

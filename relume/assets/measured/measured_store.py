@@ -35,7 +35,8 @@ class MaterialRecord:
 
     Attributes:
         created: seconds since 1970.
-        lobes_error, homomorphic_error: of the curves alone, see `relume.assets.measured.factorize.MeasuredFactors`.
+        lobes_error, homomorphic_error: errors of the curves alone, see
+            `relume.assets.measured.factorize.MeasuredFactors`.
     """
 
     id: str
@@ -67,7 +68,7 @@ def store_material(folder: Path, source: Path, name: str, file_name: str | None 
     """Import a MERL file; takes some seconds and 0.5 GB. An existing one with this content gets the new name.
 
     Args:
-        folder: of the asset store.
+        folder: folder of the asset store.
         source: the file to import.
         name: shown to users.
         file_name: in errors; None for the name in the path.

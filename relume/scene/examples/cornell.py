@@ -89,8 +89,8 @@ def sunny_environment(
     """Return a blue environment with a sun disk, hazy by default; black below the horizon.
 
     Args:
-        sun_direction: toward the sun. rows: of the map, which is twice as wide.
-        radius: of the sun, radians; its radiance grows as the radius shrinks.
+        sun_direction: toward the sun. rows: rows of the map, which is twice as wide.
+        radius: radius of the sun, radians; its radiance grows as the radius shrinks.
     """
     directions = texel_directions(rows, 2 * rows).astype(np.float64)
     cosine = directions @ (sun_direction / np.linalg.norm(sun_direction))

@@ -39,7 +39,7 @@ def read_library(data: bytes, folder: str = "") -> dict[str, MtlMaterial]:
     """Read the materials of a library by name.
 
     Args:
-        folder: of the library, relative to the scene.
+        folder: folder of the library, relative to the scene.
     Raises:
         SceneError: too large, too many materials, or a line is invalid.
     """

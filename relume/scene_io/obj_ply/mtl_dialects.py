@@ -87,7 +87,7 @@ def make_mtl_terms(
 
     Args:
         mtl_material: its numbers. textures: by channel.
-        roughness: of the PBR extension, including its map; None without it.
+        roughness: roughness of the PBR extension, including its map; None without it.
         has_normal_map: minification widens its highlights.
     """
     numbers = mtl_material.numbers

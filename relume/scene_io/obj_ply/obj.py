@@ -32,7 +32,8 @@ class Obj:
     """The triangles of an OBJ file and its references.
 
     Attributes:
-        colors: of positions, as scanners and sculpting programs write them after the coordinates; unused if incomplete.
+        colors: colors of positions, as scanners and sculpting programs write them after the coordinates; unused if
+            incomplete.
         libraries: names of material files.
         groups: triangles, nine indices each, by object and material.
         ignored_keywords: kinds of unsupported lines.

@@ -22,8 +22,10 @@ def select_groups(visibility_words, first, group_lights, whole):  # type: ignore
     """Find groups of which a point sees all lights, and clear these lights' visibility.
 
     Args:
-        visibility_words: of each light, bit k for point k; cleared for lights of entirely visible groups. (M,) uint64
-        first, group_lights: of `relume.lights.spherical_triangles.LightGroups`. whole: visibility of each group,
+        visibility_words: visibility words of each light, bit k for point k; cleared for lights of entirely visible
+            groups. (M,) uint64
+        first, group_lights: arrays of `relume.lights.spherical_triangles.LightGroups`.
+        whole: visibility of each group,
             written. (G,) uint64
     """
     for g in range(whole.shape[0]):
@@ -52,10 +54,10 @@ def add_groups(  # type: ignore[no-untyped-def]
 
     Args:
         normal, tangent, axes, curves, start, stop, out: as in `shade_points`.
-        light_list: first, light and shading of the listed groups. local_wo: of the same list.
+        light_list: first, light and shading of the listed groups. local_wo: local view direction of the same list.
         lights: nodes, irradiance_radius and `between_variance` of the groups. groups: first and light_index, see
             `LightGroups`.
-        visible: of the points; lights to shade individually are set. (points, bytes)
+        visible: visibility of the points; lights to shade individually are set. (points, bytes)
     """
     num_curves, (scale, num_rows) = axes.shape[0], band_scales(curves)
     chunks = allocate_chunks(lights[0].shape[0] // CHUNK + 1, num_rows)

@@ -36,7 +36,7 @@ class Quotas:
     Identical content is stored once, and belongs to the first user only.
 
     Attributes:
-        settings: of the server.
+        settings: settings of the server.
         deciding: lock for checking and counting in one step, so that concurrent calls cannot both pass a limit.
     """
 

@@ -37,7 +37,7 @@ class Caller:
     Attributes:
         name: for quotas, scheduling and audit; empty without login. Names from proxies begin with `PROXY`, which no
             token's name does: a proxy's Ann is not the owner of Ann's token.
-        role: of the caller. address: of the client.
+        role: role of the caller. address: address of the client.
         auth_method: no login required, not logged in, by token, or by proxy.
         token: id of the token. watches: joined by a view-only link.
     """

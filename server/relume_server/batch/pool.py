@@ -28,8 +28,8 @@ class ProcessPool:
         """
         Args:
             data: data directory. num_processes: maximum.
-            num_bytes: cache of each process. num_threads: of the kernels in each.
-            niceness: of the processes, 0…19.
+            num_bytes: cache of each process. num_threads: number of threads of the kernels in each.
+            niceness: niceness of the processes, 0…19.
             idle_s: lifetime of an idle process.
         """
         self._data, self._num_processes = data, num_processes

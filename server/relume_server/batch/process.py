@@ -53,8 +53,8 @@ class BatchProcess:
     def __init__(self, data: Path, num_bytes: int, num_threads: int, niceness: int) -> None:
         """
         Args:
-            data: data directory. num_bytes: cache of the process. num_threads: of its kernels.
-            niceness: of the process, 0…19.
+            data: data directory. num_bytes: cache of the process. num_threads: number of threads of its kernels.
+            niceness: niceness of the process, 0…19.
         """
         numbers = map(str, (num_bytes, num_threads, niceness))
         command = [sys.executable, *COMMAND, str(data.resolve()), *numbers, *config_source()]

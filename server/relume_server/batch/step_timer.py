@@ -47,7 +47,7 @@ def estimate_seconds(work: Callable[[Callable[[float], object]], object], scale:
     """Estimate the seconds of work whose main part is `scale` times as large.
 
     Args:
-        work: does a small sample; called with a progress callback. scale: of the main part.
+        work: does a small sample; called with a progress callback. scale: scale of the main part.
     """
     began = time.monotonic()
     early: list[tuple[float, float]] = []

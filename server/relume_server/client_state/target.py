@@ -36,7 +36,7 @@ class CameraState:
     """Requested camera of a free-camera view.
 
     Attributes:
-        seq: repeated in frames. size: of the image, pixels. received_s: time of the message.
+        seq: repeated in frames. size: size of the image, pixels. received_s: time of the message.
         is_idle: an exact image follows when nothing else is left to do.
     """
 

@@ -18,7 +18,7 @@ class JoinRequest:
     Attributes:
         room: id; None for view-only clients.
         view_token: opens the room view-only; derived from the id, which cannot be derived from it.
-        participant_token: of an earlier session. name: display name.
+        participant_token: token of an earlier session. name: display name.
     """
 
     room: str | None

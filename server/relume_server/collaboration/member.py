@@ -54,7 +54,8 @@ class RoomMember:
     """Connects a session to its room. Event loop only.
 
     Args:
-        entry: of the room. look, pending: of the session, updated by others' edits. may_edit: more than view settings.
+        entry: entry of the room. look, pending: look and pending edits of the session, updated by others' edits.
+        may_edit: more than view settings.
     Attributes:
         changed: set when something is to be sent. has_comments: comments have changed.
     """
@@ -91,7 +92,7 @@ class RoomMember:
         """Pass the session's accepted edit on to all others, unless it changes view settings only.
 
         Args:
-            target: after the edit. patch: of the edit, as sent by the client.
+            target: after the edit. patch: patch of the edit, as sent by the client.
         Returns:
             The target to show here, with its `room_revision`.
         """

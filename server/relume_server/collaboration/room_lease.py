@@ -27,7 +27,7 @@ class RoomLease:
     """Holds the leases of this server's rooms. Event loop only.
 
     Args:
-        rooms: of this server. leases: in the database. drain: when the server drains, its rooms are free.
+        rooms: rooms of this server. leases: in the database. drain: when the server drains, its rooms are free.
         threads: for leases; for short work only.
     """
 

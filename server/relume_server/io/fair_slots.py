@@ -16,7 +16,7 @@ class Slots:
 
     Args:
         num_slots: total. max_per_client: maximum of one client.
-        weights: of clients, see `relume_worker.fair_share.FairShare`.
+        weights: weights of clients, see `relume_worker.fair_share.FairShare`.
     """
 
     def __init__(self, num_slots: int, max_per_client: int, weights: Mapping[str, float]) -> None:

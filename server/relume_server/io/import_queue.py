@@ -74,7 +74,8 @@ class Intake:
         """Import a file, assign it to its owner, and return its id.
 
         Args:
-            reservation: of the upload. make_request: writes files into an empty folder, in a thread, and describes
+            reservation: reservation of the upload.
+            make_request: writes files into an empty folder, in a thread, and describes
                 them.
         Raises:
             QuotaError, NearlyFullError: the unpacked result is too large; nothing is stored.

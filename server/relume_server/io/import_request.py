@@ -45,7 +45,8 @@ class ImportRequest:
         scene: file name of a scene or a material, with folders.
         companions: paths of a scene's companion files, by name.
         ground: whether to add a ground plane. period: side of one period, meters, if known.
-        seconds: limit of processor and wall time. max_bytes: of address space. max_file_bytes: of each written file.
+        seconds: limit of processor and wall time. max_bytes: limit of the address space, bytes.
+        max_file_bytes: limit of each written file, bytes.
     """
 
     into: str

@@ -34,7 +34,7 @@ class UploadMiddleware:
 
     Args:
         app: to protect. access: called for each upload, because it is opened after the app is created.
-        max_per_user: concurrent uploads of one user; others wait. weights: of users in scheduling.
+        max_per_user: concurrent uploads of one user; others wait. weights: weights of users in scheduling.
     """
 
     def __init__(

@@ -40,7 +40,7 @@ class BtfQueue(JobQueue[BtfRequest]):
     ) -> None:
         """
         Args:
-            sessions: of the database. data: data directory.
+            sessions: sessions of the database. data: data directory.
             run: runs steps. quota: limits of the queue.
             report_ready: called with the ids of a finished job and of its BTF, and its size in bytes.
             report_failed: called with the id of a failed job; it takes no more space.

@@ -59,7 +59,7 @@ class Job(Generic[Request]):
 
 @dataclass(frozen=True)
 class JobFilter:
-    """Filter of a list of jobs; None: any. bake, name: of their requests."""
+    """Filter of a list of jobs; None: any. bake, name: bake and name of their requests."""
 
     state: str | None = None
     user: str | None = None
@@ -71,7 +71,7 @@ def read_row(row: JobRow, placeholder: Request) -> tuple[Request, str, str | Non
     """Read the request, the state and the problem of a row.
 
     Args:
-        row: of a job.
+        row: row of a job.
         placeholder: request that is returned, with the state "failed", if the row's request cannot be read.
     """
     try:

@@ -62,7 +62,7 @@ class JobQueue(ABC, Generic[Request]):
     def __init__(self, sessions: sessionmaker[Session], folder: Path, run: RunStep, quota: Quota) -> None:
         """
         Args:
-            sessions: of the database. folder: created if missing.
+            sessions: sessions of the database. folder: created if missing.
             run: runs a step in another process. quota: limits of the queue.
         """
         self._sessions, self.folder, self.run, self._quota = sessions, folder, run, quota
@@ -107,7 +107,7 @@ class JobQueue(ABC, Generic[Request]):
         """Run a step in another process, while the job is wanted.
 
         Args:
-            job: of the step. kind, values: of the step. report: called with the fraction done.
+            job: job of the step. kind, values: kind and values of the step. report: called with the fraction done.
         """
         step = Step(kind, self.is_first(job.request), values, (str(self.folder / job.id), self._owner))
         return self.run(step, report, lambda: self.is_needed(job.id))
@@ -192,7 +192,7 @@ class JobQueue(ABC, Generic[Request]):
         """List jobs, newest first or last.
 
         Args:
-            job_filter: of the list. limit: maximum number.
+            job_filter: filter of the list. limit: maximum number.
             after: time of creation and id of the row before the page; None: start with the first.
             newest_first: order.
         """

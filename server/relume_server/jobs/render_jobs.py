@@ -37,8 +37,8 @@ class RenderQueue(JobQueue[RenderRequest]):
     ) -> None:
         """
         Args:
-            sessions: of the database. data: data directory.
-            run: runs steps. quota: limits of the queue. scene_name: of a bake's id.
+            sessions: sessions of the database. data: data directory.
+            run: runs steps. quota: limits of the queue. scene_name: returns the name of the scene by a bake's id.
             report_bytes: called with the id of a finished render, and the size of its files in bytes.
         """
         super().__init__(sessions, data / "renders", run, quota)
@@ -126,7 +126,7 @@ def planned_bytes(request: RenderRequest, size: tuple[int, int], num_layers: int
     """Upper bound of the size of a render's files: uncompressed images, and all of them again in the archive.
 
     Args:
-        request: the batch. size: of an image, pixels. num_layers: per image, including the image itself.
+        request: the batch. size: size of an image, pixels. num_layers: per image, including the image itself.
     """
     channel_bytes = 1 if request.format != "exr" else 2 if request.precision == "half" else 4
     picture_bytes = size[0] * size[1] * 3 * channel_bytes * num_layers

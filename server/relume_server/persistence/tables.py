@@ -84,7 +84,7 @@ class RoomRow(Base):
     """Lease of rooms, see `relume_server.persistence.leases`; deleted when they are empty.
 
     Attributes:
-        prefix: of their ids. owner, heartbeat: as for the lease of a job.
+        prefix: prefix of their ids. owner, heartbeat: as for the lease of a job.
     """
 
     __tablename__ = "rooms"
@@ -98,7 +98,7 @@ class CommentRow(Base):
     """A comment, see `relume_server.persistence.comment_store`.
 
     Attributes:
-        pin: JSON: bake, view, x, y, size, camera. picture: WebP. num_bytes: of all of it.
+        pin: JSON: bake, view, x, y, size, camera. picture: WebP. num_bytes: size of all of it, bytes.
         created, resolved: seconds since 1970; None: open.
     """
 
@@ -121,9 +121,10 @@ class IdempotencyRow(Base):
     """A call with an idempotency key and its response, see `relume_server.persistence.idempotency`.
 
     Attributes:
-        client, key: caller, and the caller's key. digest: of the whole request.
+        client, key: caller, and the caller's key. digest: digest of the whole request.
         owner: the process that runs it; see `relume_worker.lease`. created: seconds since 1970 by the database's clock.
-        status: of the response; None: not yet. location, media_type, body: of the response.
+        status: status of the response; None: not yet.
+        location, media_type, body: location, media type and body of the response.
     """
 
     __tablename__ = "idempotency"

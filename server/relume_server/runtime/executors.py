@@ -22,7 +22,7 @@ class Threads:
 
     Attributes:
         queries: for short database queries that must not wait: room leases, events.
-        short_slots: of sessions in the pool for short steps, first come, first served.
+        short_slots: slots of sessions in the pool for short steps, first come, first served.
     """
 
     def __init__(self) -> None:

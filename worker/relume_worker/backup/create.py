@@ -39,7 +39,7 @@ def create_backup(
     copied files.
 
     Args:
-        data_dir: to back up. ledger: of it.
+        data_dir: to back up. ledger: ledger of it.
         repository: the backup folder, created if missing.
         start_report: for progress.
     Returns:

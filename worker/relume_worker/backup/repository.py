@@ -57,7 +57,7 @@ class Snapshot:
     """A data directory at one moment.
 
     Attributes:
-        name: time, UTC. relume: version that made it. revision: of the ledger. ledger: its copy.
+        name: time, UTC. relume: version that made it. revision: revision of the ledger. ledger: its copy.
         left_out: one sentence for each file that is missing.
     """
 

@@ -42,8 +42,8 @@ def restore(
     all others; the ledger's entry leads to baking it again.
 
     Args:
-        repository: the backup folder. name: of the snapshot; None: the newest.
-        data_dir: empty, missing, or with the same restore interrupted. ledger_url: of an empty ledger.
+        repository: the backup folder. name: name of the snapshot; None: the newest.
+        data_dir: empty, missing, or with the same restore interrupted. ledger_url: URL of an empty ledger.
         start_report: for progress.
     Returns:
         The snapshot, and one sentence for each object that is damaged in the backup.

@@ -113,7 +113,7 @@ class Outage:
     Calls overlap: a slow call that began before the last change is ignored.
 
     Args:
-        log: to write to. label: of the server.
+        log: to write to. label: label of the server.
     """
 
     def __init__(self, log: logging.Logger, label: str) -> None:

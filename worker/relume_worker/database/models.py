@@ -48,7 +48,7 @@ class BakeRow(Base):
     Attributes:
         code: code version that makes or made it; None in rows of older versions.
         client: first user who submitted it; None in rows of older versions.
-        run: of its unfinished store, see `relume_worker.run_marker`; None in rows of older versions.
+        run: run of its unfinished store, see `relume_worker.run_marker`; None in rows of older versions.
         crowding: see `relume_worker.estimate`; None if it is not ready, or older than this measurement.
     """
 

@@ -78,7 +78,7 @@ def open_cached(path: Path, open_store: Callable[[Path], Opened]) -> Opened:
     """Open a bake, fetched if it is only in the storage; it is locked while the returned object lives.
 
     Args:
-        path: of its store. open_store: opens it; raises if it does not exist.
+        path: path of its store. open_store: opens it; raises if it does not exist.
     """
     if get_storage() is None:
         return open_store(path)

@@ -22,7 +22,7 @@ async def remove_unused(
     """Delete an asset that no saved look, share link, session of this server or running job uses.
 
     Args:
-        store, folder, identity: of the asset. kind: for quotas. services: of the server.
+        store, folder, identity: store, folder and id of the asset. kind: for quotas. services: services of the server.
         called: name in messages; default: its id.
     Raises:
         NotFoundError: it does not exist. InUseError: it is in use; nothing is deleted.

@@ -12,7 +12,7 @@ def trace_fields(
     """Return the name, times and attributes of a frame's span.
 
     Args:
-        request: answered by the frame. painted: result of the step. num_bytes: of the message.
+        request: answered by the frame. painted: result of the step. num_bytes: size of the message, bytes.
         send_start_s, send_end_s: before and after sending, seconds of `time.perf_counter`.
     """
     received_s = request.received_s or painted.started_s

@@ -43,10 +43,10 @@ class FrameRequest:
         is_visible_exact: the client knows that its visible region is exact.
         is_due: there is something to send even if this step changes nothing.
         is_client_exact: the client knows that its image is exact.
-        size: of the image. jpeg_size: of its JPEG, no larger.
+        size: size of the image. jpeg_size: size of its JPEG, no larger.
         received_s: time of the edit or camera message that no frame has answered yet, if any.
         camera_state: to set before the step; None if it is set, or fixed.
-        camera_seq: of the camera that the frame shows.
+        camera_seq: number of the camera that the frame shows.
         client_keys: keys of the parts that the client's shader has, if it renders; otherwise None.
     """
 

@@ -34,19 +34,19 @@ class Viewport:
     """Chooses the next frame of a view, and records its result.
 
     Attributes:
-        target: of the last step.
+        target: target of the last step.
         job: what the image waits for.
         is_converged: another step would change nothing.
-        is_exact: the client's image is exact. progress: of the last step.
+        is_exact: the client's image is exact. progress: progress of the last step.
         not_before_s: no refined frame is sent earlier.
-        camera_state: of the last step, for a free camera.
+        camera_state: state of the last step, for a free camera.
         highlight: pending interval of a curve to highlight. served_s: time of its last turn.
     """
 
     def __init__(self, view: CameraView, picture: Picture, *, is_free_camera: bool) -> None:
         """
         Args:
-            view: of the bake. picture: its live image. is_free_camera: then it has something to show at once.
+            view: view of the bake. picture: its live image. is_free_camera: then it has something to show at once.
         """
         self.name, self.size, self.picture = view.name, (view.width, view.height), picture
         self.target: Target | None = None
