@@ -45,12 +45,12 @@ class DurationEstimate(NamedTuple):
 class ComparisonQueue(JobQueue[ComparisonRequest]):
     """Comparisons in the database, with files in `data`/comparisons/<id>/; a step is one pass."""
 
-    row, noun, placeholder = ComparisonRow, "comparison", ComparisonRequest(bake="0" * 16, view="unknown")
+    row, noun, placeholder = ComparisonRow, "comparison", ComparisonRequest(bake="0" * 16, view="unknown", look={})
 
     def __init__(self, sessions: sessionmaker[Session], data: Path, run: RunStep, quota: Quota) -> None:
         """
         Args:
-            sessions: of the database. data: data directory.
+            sessions: sessions of the database. data: data directory.
             run: runs steps. quota: limits of the queue.
         """
         super().__init__(sessions, data / "comparisons", run, quota)
@@ -78,7 +78,7 @@ class ComparisonQueue(JobQueue[ComparisonRequest]):
         another view is measured, from passes of other views.
 
         Args:
-            request: the comparison. num_pixels: of the image.
+            request: the comparison. num_pixels: number of pixels of the image.
         """
         key = _kind(request)
         if key not in self._pass_s:
