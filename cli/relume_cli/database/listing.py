@@ -37,9 +37,9 @@ def list_items(
     from relume_cli.database.actions import open_data_folder
 
     if scene is not None and kind != "bakes":
-        raise ParameterError("--scene", scene, f"none: only bakes have a scene, not {kind}")
+        raise ParameterError("--scene", scene, f"no scene, because {kind} have none")
     if state is not None and kind not in ("bakes", "renders"):
-        raise ParameterError("--state", state, f"none: only bakes and renders have a state, not {kind}")
+        raise ParameterError("--state", state, f"no state, because {kind} have none")
     if kind == "built-ins":
         rows = _built_ins()
     elif kind == "bakes":

@@ -62,7 +62,9 @@ class _Span(NamedTuple):
 
 
 class _PcaChoice(NamedTuple):
-    """clusters, components: of each view. bits: of each component's weights. (components,) uint8"""
+    """clusters, components: clusters and components of each view. bits: bits of each component's weights. (components,)
+    uint8
+    """
 
     clusters: int
     components: int
@@ -164,7 +166,7 @@ def _view_rows(images: ViewArrays, view: int) -> F32:
     """Values of all texels from one view direction. (texels, lights · 3)"""
     values = images.get_view(view)
     if not np.isfinite(values).all() or values.min() < 0:
-        raise MaterialError("the BTF has negative or non-finite values")
+        raise MaterialError("the BTF has negative or non-finite values; check its images")
     return np.ascontiguousarray(values.transpose(1, 0, 2)).reshape(values.shape[1], -1)
 
 
@@ -322,7 +324,7 @@ def build_mip_levels(
     """Average blocks of 2 × 2 texels repeatedly, down to one texel.
 
     Args:
-        z: of the finest level, row by row. size: height and width.
+        z: z of the finest level, row by row. size: height and width.
     Returns:
         All levels, the finest first.
     """
