@@ -16,7 +16,7 @@ def bytes_text(num_bytes: float) -> str:
 
 
 def count_text(count: int, singular: str, plural: str) -> str:
-    """Format a number of things: 1 entry, 2 entries."""
+    """Format a count with its noun, `singular` or `plural`: 1 entry, 2 entries."""
     return f"{count:,} {singular if count == 1 else plural}"
 
 
