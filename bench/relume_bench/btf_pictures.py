@@ -43,7 +43,7 @@ def against_geometry(record: BtfRecord, folder: Path, tiny: bool) -> Figure:
     """Compare a plane covered with a BTF of the weave with the path-traced weave.
 
     Args:
-        record: of the BTF. folder: for stores. tiny: a trial run.
+        record: record of the BTF. folder: for stores. tiny: a trial run.
     """
     name = "btf.geometry_rmse"
     if (why := missing()) is not None:
@@ -73,7 +73,8 @@ def traced_by_peer(
     """Render the actual geometry with the peer, with paths of up to seven bounces.
 
     Args:
-        displaced_scene: the scene. size: of the view. spp: per pass. terms: of each mesh. to: folder to create.
+        displaced_scene: the scene. size: size of the view. spp: per pass. terms: terms of each mesh.
+        to: folder to create.
     Returns:
         (passes, height, width, 3) float32
     """
@@ -92,7 +93,8 @@ def bake_with_btf(plane: Scene, record: BtfRecord, size: tuple[int, int], path: 
     """Bake and open a fixed view of one material's surface, with the look that covers it.
 
     Args:
-        plane: the scene. record: of the BTF. size: of the view. path: of the store. lights: environment triangles.
+        plane: the scene. record: record of the BTF. size: size of the view. path: path of the store.
+        lights: environment triangles.
     """
     bake = open_bake(
         bake_in_process(METHODS["direct"], plane, Recipe("direct", ("camera",), size, lights), path), Cache(2 << 30)
@@ -107,7 +109,7 @@ def against_table(record: BtfRecord, values: ValueFile, folder: Path, tiny: bool
     Each sample uses the texel that contains it, on both sides, which excludes the error of interpolation.
 
     Args:
-        record: of the BTF. values: uncompressed. folder: for stores. tiny: a trial run.
+        record: record of the BTF. values: uncompressed. folder: for stores. tiny: a trial run.
     """
     plane, _ = _make_scenes(GEOMETRIES["weave"](), *_CAMERA_ANGLES[0])
     size = (12, 12) if tiny else (96, 96)

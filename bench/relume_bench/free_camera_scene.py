@@ -38,7 +38,7 @@ class Drag(NamedTuple):
     """Frame times of a drag.
 
     Attributes:
-        seconds: of each frame. lag_s: median age of the look whose indirect light is shown.
+        seconds: seconds of each frame. lag_s: median age of the look whose indirect light is shown.
     """
 
     seconds: list[float]
@@ -77,7 +77,7 @@ class FreeCameraScene:
     """A built-in scene, baked for a free camera.
 
     Args:
-        name: of the scene. folder: for its stores. size: of images. tiny: a trial run.
+        name: name of the scene. folder: for its stores. size: size of images. tiny: a trial run.
         num_probes: approximate number; None: 50,000.
     """
 
@@ -147,7 +147,7 @@ class FreeCameraScene:
         """Show one look after another, each as soon as the frame of the previous one is encoded.
 
         Args:
-            frames: number. change: of the look's document, by the fraction of the drag. is_watched: interactive.
+            frames: number. change: change of the look's document, by the fraction of the drag. is_watched: interactive.
             on_frame: other changes to the image in each frame.
         Returns:
             Seconds from each look to its frame. No two drags use the same values, because results of edits are cached.

@@ -77,7 +77,7 @@ def bake(scene: Scene, recipe: Recipe, target: Path) -> Baked:
     """Bake in this process with the method `gather`.
 
     Args:
-        scene: to bake. recipe: of the bake.
+        scene: to bake. recipe: recipe of the bake.
         target: folder of the store.
     Returns:
         The store, wall seconds, and wall and tracing seconds and rays of every stage.

@@ -67,7 +67,7 @@ def measure(tiny: bool) -> list[Figure]:
 
 class _LightDrag(NamedTuple):
     """frames_s: seconds of each frame. prepared_s: one-time work: transport rows for a move, the light's image for
-    dimming. error: of the last frame, relative RMSE against the exact image.
+    dimming. error: error of the last frame, relative RMSE against the exact image.
     """
 
     frames_s: list[float]

@@ -70,7 +70,7 @@ def render_pair(name: str, spp: int = _SPP, tiny: bool = False, *, is_full: bool
     """Bake and render one of `SIZES` with both renderers.
 
     Args:
-        name: of the scene. spp: per Mitsuba pass. tiny: a trial run.
+        name: name of the scene. spp: per Mitsuba pass. tiny: a trial run.
         is_full: surfaces on the path reflect by all their terms; otherwise by diffuse ones.
     """
     scene = cornell_box(is_floor_glossy=True) if name == "cornell_box" else built_in(name)

@@ -31,7 +31,7 @@ def reflected(transfer: FixedViewTransfer, terms: Mapping[str, Sequence[Mapping[
     """Indirect light of an image. (height, width, 3)
 
     Args:
-        transfer: the bake. terms: of materials that differ from the scene's default look.
+        transfer: the bake. terms: terms of materials that differ from the scene's default look.
     """
     document = copy.deepcopy(transfer.default_look)
     for name, material_terms in terms.items():

@@ -95,7 +95,7 @@ def measure_radiance_rmse(
     """Radiance of some probes toward the camera by all paths, against path tracing; for a look with broad terms.
 
     Args:
-        scene: without textures. num: visible probes. num_paths: per probe. change: of its look.
+        scene: without textures. num: visible probes. num_paths: per probe. change: change of its look.
     """
     look, free_camera_bake, camera_position = (
         scene.look(change),

@@ -22,7 +22,7 @@ class Group:
     """Figures that are measured together, by `measure(tiny)` of a module.
 
     Attributes:
-        tiny: of `measure`: meaningless sizes that take seconds, for the tests.
+        tiny: parameter of `measure`: meaningless sizes that take seconds, for the tests.
     """
 
     module: str
@@ -223,7 +223,7 @@ def run(prefix: str, as_json: bool, tiny: bool = False) -> int:
     """Measure and print; 1 if something failed or no figure has such a name.
 
     Args:
-        prefix: of the figures to measure; "" for all.
+        prefix: prefix of the figures to measure; "" for all.
         as_json: print a list of figures to stdout, and text to stderr.
         tiny: meaningless sizes that take seconds, for the tests.
     """

@@ -51,9 +51,9 @@ def make_sun_environment(name: str, height: float, num_rows: int = 256, spread: 
     """An environment with a sun whose radiance falls to 1/e at 1 − cos = spread, with constant power.
 
     Args:
-        name: of the environment.
-        height: of the sun; the tangent of its elevation is about 1.28 times this.
-        num_rows: of the map, which is twice as wide.
+        name: name of the environment.
+        height: height of the sun; the tangent of its elevation is about 1.28 times this.
+        num_rows: number of rows of the map, which is twice as wide.
         spread: 1 − cos of the sun's angular radius.
     """
     d = texel_directions(num_rows, 2 * num_rows)
@@ -67,7 +67,7 @@ def teapot_on_table(environment: Environment, pot: Terms, table: Terms, camera_d
     """Newell's teapot, 0.16 m high, on a table of 3 × 3 m; view "front", square images frame the pot.
 
     Args:
-        environment: of the scene.
+        environment: environment of the scene.
         pot, table: terms of the two materials, "Teapot" and "Table".
         camera_distance: 1 for a pot that covers about a third of the image.
     """

@@ -66,7 +66,7 @@ def _complete_map(pointer: Pointer, given: Mapping[str, Any], term: Term) -> dic
         return {}
     roughness_map = given["roughness_map"]
     if term.width is None:
-        raise invalid_value(pointer, roughness_map, f"nothing: {term.model!r} has no width")
+        raise invalid_value(pointer, roughness_map, f"no roughness map, because {term.model!r} has no width")
     return {"roughness_map": check_map(pointer, roughness_map)}
 
 
@@ -75,7 +75,7 @@ def _complete_data(pointer: Pointer, given: Mapping[str, Any], term: Term) -> di
     name = given.get("data")
     if term.data is None:
         if "data" in given:
-            raise invalid_value(pointer, name, f"nothing: {term.model!r} has no data")
+            raise invalid_value(pointer, name, f"no data, because {term.model!r} has none")
         return {}
     if not isinstance(name, str) or not term.data.exists(name):
         names = names_text(term.data.list_names())

@@ -48,7 +48,8 @@ class SpecularChain(NamedTuple):
         """Pad a chain to `max_mirrors` mirrors with `NO_MIRROR`.
 
         Args:
-            chain: of `num_rays` rays; None without mirrors. max_mirrors: at least the number of mirrors of the chain.
+            chain: chain of `num_rays` rays; None without mirrors.
+            max_mirrors: at least the number of mirrors of the chain.
         """
         num_missing = max_mirrors - (0 if chain is None else chain.num_mirrors)
         ones = np.ones((num_rays, num_missing), np.float32)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from relume.core.errors import ParameterError
+from relume.core.errors import Description, ParameterError, count_text
 
 Pointer = tuple[str | int, ...]
 MAX_COLOR = 1e4
@@ -24,9 +24,12 @@ def invalid_value(pointer: Pointer, value: object, allowed: str) -> ParameterErr
         allowed: the allowed values, as the end of a sentence.
     """
     if isinstance(value, dict | list | tuple):
-        value = f"{'an object' if isinstance(value, dict) else 'a list'} of {len(value)}"  # its text could be huge
+        kind = "an object" if isinstance(value, dict) else "a list"
+        value = Description(f"{kind} of {count_text(len(value), 'entry', 'entries')}")  # its text could be huge
+    elif value is None:
+        value = Description("null")
     elif isinstance(value, int) and value.bit_length() > 64:
-        value = "an integer beyond 64 bits"  # too long to be printed
+        value = Description("an integer beyond 64 bits")  # too long to be printed
     return ParameterError(pointer_text(pointer), value, allowed)
 
 
@@ -100,4 +103,4 @@ def check_object(pointer: Pointer, value: Any, allowed: Iterable[str]) -> None:
     unknown = value.keys() - set(allowed)
     if unknown:
         name = min(unknown, key=str)
-        raise invalid_value((*pointer, name), "unknown", f"one of {names_text(allowed)}, or leave it out")
+        raise invalid_value((*pointer, name), Description("unknown"), f"one of {names_text(allowed)}, or leave it out")

@@ -21,7 +21,7 @@ class TransferMethod(BakeMethod, Protocol):
 
         Args:
             key: the store's path; identifies this bake's entries in the cache.
-            cache: of results computed from the bake.
+            cache: cache of results computed from the bake.
         Raises:
             StoreError: the store's description is invalid.
             ChunkDamagedError: its arrays do not fit each other.

@@ -48,7 +48,7 @@ class DiskEstimate(NamedTuple):
     """Bytes on disk.
 
     Attributes:
-        store: of the finished store. scratch: of temporary files while samples are sorted.
+        store: path of the finished store. scratch: folder of temporary files while samples are sorted.
     """
 
     store: int
@@ -59,10 +59,10 @@ class Rates(NamedTuple):
     """Measured sizes of a trial bake, in bytes.
 
     Attributes:
-        samples: samples per pixel. pixels: of a trial image.
+        samples: samples per pixel. pixels: pixels of a trial image.
         sample: per view sample, without the following. light: per sample and light. gather_hits: per sample.
         patch: per patch, without lights. patch_light: per patch and light. per_light: per light.
-        constant: of everything that does not scale.
+        constant: sum of everything that does not scale.
     """
 
     samples: float
@@ -80,7 +80,7 @@ def estimate_disk(method: BakeMethod, scene: Scene, recipe: Recipe, plan: Plan) 
     """Estimate the disk space of a bake.
 
     Args:
-        method, scene, recipe: of the bake. plan: with its bound.
+        method, scene, recipe: method, scene and recipe of the bake. plan: with its bound.
     Returns:
         At most the bound; the bound itself if it is small or the method has no estimate.
     """

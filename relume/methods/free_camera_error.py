@@ -43,7 +43,7 @@ def measure_error(store: StoreReader, scene: Scene, size: tuple[int, int]) -> Sh
     """Return the error and its standard error; NaN if everything is dark or the memory budget is exceeded.
 
     Args:
-        store: of a bake with a free camera, complete except for this result. scene: with its cameras.
+        store: store of a bake with a free camera, complete except for this result. scene: with its cameras.
         size: default width and height of the images; small ones are measured with fewer rays.
     """
     # no folder: images are not saved beside an unfinished bake

@@ -74,7 +74,7 @@ class BakedFreeCamera:
         """Open a store.
 
         Args:
-            store: an open store. key: of the bake in the cache. cache: of results computed from the bake.
+            store: an open store. key: key of the bake in the cache. cache: cache of results computed from the bake.
         Raises:
             StoreError: its description is invalid. ChunkDamagedError: its arrays do not match.
         """
@@ -129,7 +129,7 @@ class BakedFreeCamera:
         """Return the surfaces with material map overrides.
 
         Args:
-            overrides: of each material.
+            overrides: overrides of each material.
         Raises:
             NotFoundError, SceneError: an image cannot be loaded.
         """
@@ -296,7 +296,7 @@ class BakedFreeCamera:
 
         Args:
             light: direct illumination by environment and area lights; emissive surfaces are excluded.
-            material: of the probes. is_preview: approximates environments other than the baked one.
+            material: material of the probes. is_preview: approximates environments other than the baked one.
         """
         rows, cache = np.flatnonzero(self.stored_scene.material == material), self.cache.transient
         key = self.key, "unoccluded light", material

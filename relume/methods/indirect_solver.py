@@ -29,7 +29,7 @@ class IndirectSolver:
     Args:
         direct_light: direct illumination of the patches.
         find_direct_light: returns the same for normal-map overrides, by the image of each material.
-        key: of the bake in `cache`.
+        key: key of the bake in `cache`.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class IndirectSolver:
         Both ends are approximated alike, so that errors cancel.
 
         Args:
-            before, after: of the same sources.
+            before, after: light of the same sources.
         """
         return self._delta(before, after, is_sharp=True).outgoing_light(self._patches)
 

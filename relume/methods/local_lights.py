@@ -54,7 +54,7 @@ class LocalLights:
     """Triangles of a store, and lights among them; shared by all images of the bake.
 
     Args:
-        key: of the bake in `cache`.
+        key: key of the bake in `cache`.
     """
 
     def __init__(self, store: StoreReader, cache: Cache, key: str) -> None:
@@ -152,7 +152,8 @@ class LocalLights:
         """True for points of an emissive material that are visible from an emissive side.
 
         Args:
-            material: its index. camera_position: of each point, or one for all. position: of the points.
+            material: its index. camera_position: camera position of each point, or one for all.
+            position: position of the points.
         """
         if self._is_two_sided(material):
             return np.ones(len(position), np.bool_)
@@ -164,7 +165,7 @@ class LocalLights:
         """Trace the visibility of a light's samples from points; see `LocalRays.visible`.
 
         Args:
-            geometry: of the light. points: receivers. num_samples: from `LocalLights.num_samples`.
+            geometry: geometry of the light. points: receivers. num_samples: from `LocalLights.num_samples`.
         """
         return trace_light_visibility(self.embree, self._ray_offset, *self.sample_light(geometry, num_samples), points)
 

@@ -37,7 +37,8 @@ class LocalPatchLight:
 
     Args:
         local: the lights. patches: the receivers.
-        cache: of results computed from the bake. key: of the bake in it. normal_overrides: see `DirectPatchLight`.
+        cache: cache of results computed from the bake. key: key of the bake in it.
+        normal_overrides: see `DirectPatchLight`.
     """
 
     def __init__(
@@ -101,7 +102,7 @@ class DirectPatchLight:
     Args:
         patches: the receivers. local: local lights. find_lights: returns the triangles of an environment.
         find_preview_lights: approximates them.
-        cache: of results computed from the bake. key: of the bake in it.
+        cache: cache of results computed from the bake. key: key of the bake in it.
         harmonic: transfer of low-frequency light, for previews; None if a bake has none.
         normal_overrides: identifies overridden normals; empty for the baked ones.
     """

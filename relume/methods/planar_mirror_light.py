@@ -58,9 +58,9 @@ class MirrorLights:
     """The traced lights, grouped by direction.
 
     Attributes:
-        lights: indices of the T traced lights of the bake. group: of each.
+        lights: indices of the T traced lights of the bake. group: group of each.
         direction: to the G groups. mirrors: the planes, P of them.
-        plane: of each patch, `NO_PLANE` if it lies in none.
+        plane: plane of each patch, `NO_PLANE` if it lies in none.
     """
 
     lights: Shaped[NDArray[np.int32], " T"]
@@ -81,7 +81,8 @@ class MirrorLights:
         """Select the lights that are too bright for a low-degree basis.
 
         Args:
-            lights: of a bake. tiles: of these lights. mirrors: of its scene. plane: of its patches.
+            lights: lights of a bake. tiles: tiles of these lights. mirrors: mirrors of its scene.
+            plane: plane of its patches.
         """
         brightness = luminance(lights.irradiance).astype(np.float64)
         bright_indices = np.flatnonzero(brightness > _BRIGHT * brightness.sum() / (4 * np.pi) * tiles.solid_angles)
@@ -153,7 +154,7 @@ class AddedMirrorLights:
     """Change of the light of planar mirrors; a `relume.live.fixed_camera.protocols.MirrorLightsDelta`.
 
     Attributes:
-        direction: of the virtual lights. normal_irradiance: change of irradiance perpendicular to it.
+        direction: direction of the virtual lights. normal_irradiance: change of irradiance perpendicular to it.
         patch_radiance: change of the mean radiance to other patches, which samples do not receive.
     """
 
@@ -162,7 +163,7 @@ class AddedMirrorLights:
     patch_radiance: Shaped[F32, "patches 3"]
 
     def rays(self, visible: Shaped[NDArray[np.uint8], "n bytes"]) -> MirrorRays:
-        """Return the rays to samples. visible: of the virtual lights."""
+        """Return the rays to samples. visible: visibility of the virtual lights."""
         return MirrorRays(self.direction, self.normal_irradiance, visible)
 
 
@@ -170,8 +171,9 @@ class MirrorLightTransfer:
     """Light of planar mirrors of one bake, in any look; thread-safe.
 
     Args:
-        mirror_lights: the traced lights. patches: of the bake. find_lights: returns the triangles of an environment.
-        cache: of results computed from the bake. key: of the bake in it.
+        mirror_lights: the traced lights. patches: patches of the bake.
+        find_lights: returns the triangles of an environment.
+        cache: cache of results computed from the bake. key: key of the bake in it.
     """
 
     def __init__(
@@ -195,7 +197,8 @@ class MirrorLightTransfer:
         """Return the rays to samples.
 
         Args:
-            light: for which `is_in` is true. visible: of the virtual lights, see `lights_visible_in_mirrors`.
+            light: for which `is_in` is true.
+            visible: visibility of the virtual lights, see `lights_visible_in_mirrors`.
         """
         return MirrorRays(self._directions, self._reflected_irradiance(light), visible)
 

@@ -23,7 +23,7 @@ def open_bake(path: Path, cache: Cache) -> OpenBake:
     """Open a published store by the method that baked it.
 
     Args:
-        cache: of results computed from the bake.
+        cache: cache of results computed from the bake.
     Raises:
         StoreNotFoundError, SchemaVersionError, ChunkDamagedError, StoreError: see `relume.store.open_store`.
     """
@@ -38,7 +38,7 @@ def open_transfer(path: Path, cache: Cache) -> FixedViewTransfer:
     """Open a published store of fixed views.
 
     Args:
-        cache: of results computed from the bake.
+        cache: cache of results computed from the bake.
     Raises:
         StoreError: it has a free camera. Otherwise as `open_bake`.
     """

@@ -65,7 +65,7 @@ class NormalRetracer:
         """Return the patches that gather rays hit.
 
         Args:
-            points: with the new normals. wo: view directions. pattern: of the rays.
+            points: with the new normals. wo: view directions. pattern: pattern of the rays.
         """
         return trace_gather_rays(self._geometry, self._tree, points, wo, pattern).patch
 

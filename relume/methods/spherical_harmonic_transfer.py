@@ -40,8 +40,8 @@ class HarmonicLight:
 
     Attributes:
         probe_transfer: in the Zernike basis of `FAST_DEGREE`.
-        irradiance: of patches.
-        patch_coefficients: of their first points, of `PATCH_DEGREE`.
+        irradiance: irradiance of patches.
+        patch_coefficients: patch coefficients of their first points, of `PATCH_DEGREE`.
         light_coefficients: weights of the bake's lights for each harmonic.
     """
 
@@ -57,7 +57,7 @@ class HarmonicLight:
 
 
 def make_harmonic_light(store: StoreReader, seed: int) -> dict[str, NDArray[Any]]:
-    """Compute the arrays of a store for `read_harmonic_light`. seed: of the clusters."""
+    """Compute the arrays of a store for `read_harmonic_light`. seed: seed of the clusters."""
     light_samples = read_shadow_ray_directions(store), read_tiles(store).solid_angles
     probes, visible, patches = read_probes(store), store.read("probes/visibility"), read_patches(store)
 

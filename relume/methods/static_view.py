@@ -119,7 +119,8 @@ class StaticTracing:
     """A static view that is being traced; after cancellation it resumes from there.
 
     Args:
-        method: with these stages. scene: with the camera added. recipe: of its view. store: for the view's arrays.
+        method: with these stages. scene: with the camera added. recipe: recipe of its view.
+        store: for the view's arrays.
     """
 
     def __init__(self, method: GatherMethod, scene: Scene, recipe: Recipe, store: ExtendedStore) -> None:

@@ -64,7 +64,7 @@ class ViewStage(NamedTuple):
     """Results of the first stage that every task of the second needs.
 
     Attributes:
-        targets: of shadow rays. num_surface_samples: of each view.
+        targets: targets of shadow rays. num_surface_samples: number of surface samples of each view.
     """
 
     targets: LightTargets

@@ -52,7 +52,7 @@ class ParameterOperator:
     Attributes:
         fixed_settings: other parameters of the same curves, with their values.
         curves: affected by the parameter.
-        nodes: of R, G and B, equally many; products of the affected curves (`_product`).
+        nodes: nodes of R, G and B, equally many; products of the affected curves (`_product`).
     """
 
     model: str
@@ -130,7 +130,7 @@ class ParameterOperator:
         project.
 
         Args:
-            bands: of all the term's curves, (3, J) each; values of the affected ones do not matter.
+            bands: bands of all the term's curves, (3, J) each; values of the affected ones do not matter.
             lights, receivers: incident light, and its receivers.
             progress: called with the completed fraction. is_canceled: polled.
             is_quantized: whether the operator is quantized.
@@ -198,7 +198,7 @@ def _choose_channel_nodes(num: int, values: F64, rows: Sequence[F64], weights: F
     """Choose nodes per channel, as few as suffice and equally many; None if `MAX_NODES` do not suffice.
 
     Args:
-        rows: of each curve, at the values and between them. (2 n − 1, 3, J) each
+        rows: rows of each curve, at the values and between them. (2 n − 1, 3, J) each
     """
     products = [np.array([_product(bands) for bands in zip(*(r[:, c] for r in rows), strict=True)]) for c in range(num)]
 

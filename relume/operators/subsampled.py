@@ -34,7 +34,7 @@ class SubsampledOperator(Operator):
 
     Attributes:
         subset_operator: at the selected samples. num_subset: their number.
-        neighbors: selected samples around each sample. weight: of these; rows sum to one.
+        neighbors: selected samples around each sample. weight: weight of these; rows sum to one.
     """
 
     subset_operator: LinearOperator | QuantizedOperator
@@ -107,6 +107,6 @@ def interpolate(
 
     Args:
         rows: values of the selected samples, C order. neighbors: selected samples for each of n samples.
-        weight: of these. image: added to; holds n samples.
+        weight: weight of these. image: added to; holds n samples.
     """
     parallel_for_chunks(lambda start, stop: _interpolate(rows, neighbors, weight, image, start, stop), len(image))

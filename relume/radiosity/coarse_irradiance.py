@@ -45,7 +45,7 @@ def incident_fast(patches: PatchLight, outgoing: OutgoingLight, rows: Shaped[NDA
     """Approximate the incident light of patches from other patches with directional light.
 
     Args:
-        patches: the receivers. outgoing: of all patches. rows: patches that need coefficients.
+        patches: the receivers. outgoing: outgoing light of all patches. rows: patches that need coefficients.
     """
     irradiance, binned_light = (
         np.empty((patches.num_patches, 3), np.float32),

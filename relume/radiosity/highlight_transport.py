@@ -167,7 +167,7 @@ def _spread(bins, table_index, gain, tables, bin_permutation, out):  # type: ign
     Args:
         bins: light. (G, `NUM_REFLECTIONS`, `NUM_FINE_BINS`, 3). table_index: tables of each patch, −1 for none. (G,
             terms)
-        gain: of each. (G, terms, 3). tables: T of all highlights. (tables, `NUM_FINE_BINS`, 1 or 3,
+        gain: gain of each. (G, terms, 3). tables: T of all highlights. (tables, `NUM_FINE_BINS`, 1 or 3,
             `NUM_DIRECTION_BINS`)
         bin_permutation: see `reflected_bins`. out: added to. (G, 3, `NUM_DIRECTION_BINS`)
     """

@@ -31,7 +31,8 @@ def mean_incoming(
     """Average every basis function over the directions of rays that hit a patch; zero if none does.
 
     Args:
-        gather_hits: patches that rays hit. bins: their direction bins there. num_patches: of the scene.
+        gather_hits: patches that rays hit. bins: their direction bins there.
+        num_patches: number of patches of the scene.
     """
     counts = np.zeros((num_patches, SIDE * SIDE), np.float32)
     _count(gather_hits, bins, counts)

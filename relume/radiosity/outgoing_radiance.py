@@ -24,7 +24,7 @@ class BinnedRadiance(NamedTuple):
     """Additional binned outgoing radiance of some patches.
 
     Attributes:
-        rows: these patches. radiance: of each.
+        rows: these patches. radiance: radiance of each.
     """
 
     rows: Shaped[NDArray[np.intp], " F"]
@@ -93,7 +93,7 @@ def first_bounce(
     """Reflect incident light once.
 
     Args:
-        reflectance_operator: of the patches. incident: light at the patches.
+        reflectance_operator: reflectance operator of the patches. incident: light at the patches.
         outgoing_highlights: light reflected by sharp highlights; None: these use the low-degree basis.
     """
     isotropic, coefficients = reflectance_operator.apply(incident)

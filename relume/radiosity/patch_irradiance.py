@@ -41,10 +41,10 @@ class PatchLight:
 
     Attributes:
         points: sample points, patch by patch. visible: lights from these.
-        gather_hits: of the points' gather rays. pattern: their directions, for one point.
+        gather_hits: gather hits of the points' gather rays. pattern: their directions, for one point.
         material: index into the scene's materials.
         textures: multipliers of each of `relume.brdf.texture_slots.TEXTURES`.
-        uv: of the points, for material map overrides, see `relume.patches.patches`; None if not stored.
+        uv: UV coordinates of the points, for material map overrides, see `relume.patches.patches`; None if not stored.
         surface_normal: normals without normal mapping, for overrides; None if not stored.
     """
 
@@ -136,7 +136,7 @@ class PatchLight:
         """Return the light visibility of the points of patches `rows`.
 
         Args:
-            rows: the patches. light_indices: of the bake's lights; None: all.
+            rows: the patches. light_indices: light indices of the bake's lights; None: all.
         """
         visible = self._select_visible(self.visible[rows].reshape(-1, self.visible.shape[2]), light_indices)
         return np.ascontiguousarray(visible.reshape(len(rows), self.points_per_patch, visible.shape[1]))
@@ -157,7 +157,7 @@ class PatchLight:
         Args:
             rows: the patches. lights: triangles of the environment.
             degree: at most `OUTGOING_DEGREE`; coefficients of higher functions are zero.
-            light_indices: of the lights in the bake; None: all.
+            light_indices: light indices of the lights in the bake; None: all.
         """
         points, visible = (
             self.first_points(rows),
@@ -210,7 +210,7 @@ class PatchLight:
         """Return the incident light from other patches with directional light.
 
         Args:
-            outgoing: of all patches. rows: patches that need coefficients.
+            outgoing: outgoing light of all patches. rows: patches that need coefficients.
         """
         gather_hits = self._gather_hits_by_point
         point_values = ray_incident_coefficients(self.points, [GatherRays(gather_hits, self.pattern, outgoing)], 0)[

@@ -153,7 +153,7 @@ class _ViewSetup:
     """Samples of a view, and the lights of its look.
 
     Attributes:
-        points: of `samples`, which are sorted by material.
+        points: points of `samples`, which are sorted by material.
         light: the environment of the look; texels: rotated and scaled by the look.
     """
 

@@ -1,8 +1,8 @@
 """Quantization of roughness maps into levels.
 
 A minified normal map makes a material rougher: normals vary within the footprint of a pixel. With their mean n̄, slopes
-have the variance σ² = (1 − |n̄|) / |n̄| along each axis (Toksvig 2005), and a microfacet lobe with slope variance α² / 2
-widens to α² + 2 σ² (Olano and Baker 2010). With α = r²,
+have the variance σ² = (1 − |n̄|) / |n̄| along each axis (Toksvig 2005), and a microfacet lobe with slope variance α² /
+2 widens to α² + 2 σ² (Olano and Baker 2010). With α = r²,
 
     r'(x) = (r(x)⁴ + 2 σ²(x))^¼,   stored relative to the material's own roughness r.
 

@@ -62,5 +62,5 @@ def read_file(source: str | Path | bytes) -> bytes:
         except OSError as problem:
             raise SceneError(f"{str(source)!r} cannot be read ({problem.strerror}); check the path") from None
     if len(data) > MAX_FILE_BYTES:
-        raise SceneError(f"the scene file is {len(data) >> 20} MB, the limit {MAX_FILE_BYTES >> 20} MB; simplify it")
+        raise SceneError(f"the scene file has {len(data) >> 20} of at most {MAX_FILE_BYTES >> 20} MB; simplify it")
     return data

@@ -61,9 +61,9 @@ class SyntheticBtf(NamedTuple):
         if not (self.size >= MIN_SIZE and self.size**2 <= MAX_TEXELS):
             raise ParameterError("--size", self.size, f"{MIN_SIZE} to {int(MAX_TEXELS**0.5)} texels")
         if not 1 <= self.grid <= MAX_GRID:
-            raise ParameterError("--grid", self.grid, f"1 to {MAX_GRID}")
+            raise ParameterError("--grid", self.grid, f"a number from 1 to {MAX_GRID}")
         if not 1e-4 <= self.bound <= 0.5:
-            raise ParameterError("--error", self.bound, "0.0001 to 0.5")
+            raise ParameterError("--error", self.bound, "a number from 0.0001 to 0.5")
 
     def tile(self) -> Tile:
         """Return the geometry. Raises SceneError, ParameterError if the file is unusable."""

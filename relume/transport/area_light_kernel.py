@@ -116,7 +116,7 @@ def _add_halves(  # type: ignore[no-untyped-def]
 
     Args:
         frame: tangent, n × t, normal of the shaded point. (3, 3) corner: relative to this point, meters. (4, 3)
-        normal: of the light at this part. (3,) first_fraction: fraction of the light in the first triangle.
+        normal: normal of the light at this part. (3,) first_fraction: fraction of the light in the first triangle.
         area: that the quadrilateral represents, m². gain: (3,). num_triangles, end: triangles and entries so far.
         light, wi, nodes, irradiance_radius: written, see `list_area_light`.
     Returns:
@@ -154,7 +154,8 @@ def _outline(light, strata, emitter_parts, part_index, sample, shift, x, y, z, a
     """Compute the quadrilateral that represents a part.
 
     Args:
-        light, strata, emitter_parts: of the area light. part_index: index of the part. sample: its only sample, if the
+        light, strata, emitter_parts: arrays of the area light. part_index: index of the part.
+        sample: its only sample, if the
         part is not flat.
         shift: sample offset of the shaded point. x, y, z: the shaded point. area: that the part represents, m².
         corner: relative to the shaded point, written. (4, 3) across: normal of the light at the part, written. (3,)
@@ -186,7 +187,8 @@ def _list_visible_parts(  # type: ignore[no-untyped-def]
     """List the visible parts of an area light; return the triangles and entries so far.
 
     Args:
-        frame: as in `_add_halves`. position: of the point. (3,) shift: of its samples. bits: their visibility.
+        frame: as in `_add_halves`. position: position of the point. (3,) shift: shift of its samples.
+        bits: their visibility.
         area_light: light, strata, parts and gain, as in `LocalRays`. scratch: from `_scratch`.
         num_triangles, end, light, wi, nodes, irradiance_radius: as in `_add_halves`.
     """

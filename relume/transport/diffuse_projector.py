@@ -51,8 +51,8 @@ def sum_lights(normal, visible, direction, irradiance, start, stop, out):  # typ
     """Sum the visible lights of points [start, stop).
 
     Args:
-        normal: of all points. (n, 3) float32. visible: as in `ShadingPoints`. (n, bytes) uint8
-        direction, irradiance: of the lights. (3, M) float32
+        normal: normal of all points. (n, 3) float32. visible: as in `ShadingPoints`. (n, bytes) uint8
+        direction, irradiance: direction and irradiance of the lights. (3, M) float32
         out: Σ V L Ω cos θi, written. (stop - start, 3) float32
     """
     _sum(normal, visible, direction, irradiance, start, stop, np.empty(direction.shape[1], np.float32), out)
@@ -73,7 +73,7 @@ class DiffuseProjector:
     """Shades points of a Lambertian term with constant curves.
 
     Args:
-        term: the term. constant: product of its curves. lights: of the environment.
+        term: the term. constant: product of its curves. lights: lights of the environment.
     """
 
     def __init__(self, term: Term, constant: Shaped[F32, " 3"], lights: TriangleLights) -> None:

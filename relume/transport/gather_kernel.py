@@ -105,7 +105,8 @@ def _lobes_hit(gather_hits, lobe, rows, rays):  # type: ignore[no-untyped-def]
     """List the rays of a point that hit a patch with a lobe; return their number. Avoids unpredictable branches.
 
     Args:
-        gather_hits: of the point. (rays,) lobe: of each patch. rows, rays: lobes and rays, written. (> rays,)
+        gather_hits: gather hits of the point. (rays,) lobe: lobe of each patch.
+        rows, rays: lobes and rays, written. (> rays,)
     """
     num = 0
     for ray in range(gather_hits.shape[0]):
@@ -155,7 +156,9 @@ def list_gather_rays(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _list(points, wo, gather_hits, pattern, outgoing, start, stop, scratch, first, wi, out, irradiance):  # type: ignore[no-untyped-def]
-    """Implement `list_gather_rays`. scratch: of `_lobes_hit` and `_generate_rays`, and the list index of each ray."""
+    """Implement `list_gather_rays`. scratch: scratch of `_lobes_hit` and `_generate_rays`, and the list index of each
+    ray.
+    """
     _, normal, tangent, seed, _ = points
     rows, rays, local, weights, entry_index = scratch
     has_lobes, num_rays, end = outgoing.table.shape[0] > 0, gather_hits.shape[1], 0

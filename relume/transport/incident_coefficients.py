@@ -140,7 +140,7 @@ def add_scaled(
     """Add incident radiance coefficients times a gain per channel to others, in place.
 
     Args:
-        total: added to. addend: of as many functions or fewer.
+        total: added to. addend: coefficients of as many functions or fewer.
         rows: the points that are added; None: all. has_all_rows: `addend` has all n points, not only `rows`.
     """
     target_rows = np.arange(len(total)) if rows is None else rows

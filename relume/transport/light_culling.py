@@ -73,8 +73,8 @@ def cull(kinds, support, radius, light, wi, begin, end, ox, oy, oz, reach, neare
 
     Args:
         kinds: angles of fixed curves. support: angle beyond which each is zero, radians. (D,)
-        radius: of each light, radians. light: listed lights. wi: local unit directions to these. (3, K)
-        begin, end: of the list. ox, oy, oz: local wo. reach, nearest: scratch. (≥ end − begin,)
+        radius: radius of each light, radians. light: listed lights. wi: local unit directions to these. (3, K)
+        begin, end: range of the list. ox, oy, oz: local wo. reach, nearest: scratch. (≥ end − begin,)
     """
     for k in range(kinds.shape[0]):
         limit = support[k] + _SLACK
@@ -129,7 +129,7 @@ def list_lights(  # type: ignore[no-untyped-def]
 def _list(  # type: ignore[no-untyped-def]
     normal, tangent, wo, visible, directions, radius, kinds, support, start, stop, scratch, first, light, wi, out
 ):
-    """Implement `list_lights`. scratch: of `cull`. (M,) each"""
+    """Implement `list_lights`. scratch: scratch of `cull`. (M,) each"""
     num_lights, (reach, nearest) = directions.shape[0], scratch
     end = np.int64(0)
     for p in range(start, stop):

@@ -71,7 +71,7 @@ class LightList:
         lights: triangles of the environment. receivers: all points, with their visibility and rays.
 
     Attributes:
-        irradiance: of the lights, times constant curves. (M, 3)
+        irradiance: irradiance of the lights, times constant curves. (M, 3)
         first, light: written by `list`, see `list_lights`.
     """
 
@@ -98,7 +98,7 @@ class LightList:
         """List the lights of points [start, stop), at most a block.
 
         Args:
-            visible: of the lights, or of their parts, from these points, as in `ShadingPoints`.
+            visible: visibility of the lights, or of their parts, from these points, as in `ShadingPoints`.
         Returns:
             q cos θi of each entry (one row if all channels are equal), and the local wo of each. The latter has its
             full capacity: a slice has another memory layout, for which kernels would be compiled again.

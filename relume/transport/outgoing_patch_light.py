@@ -45,7 +45,7 @@ class OutgoingLight(NamedTuple):
         isotropic: the isotropic part; black in row `NO_PATCH`.
         lobe: row of each patch in the other arrays; −1: isotropic only.
         frame: tangents and bitangents. scale: radiance of one step of the table.
-        table: of each bin, x outermost. smooth: the same, with fewer rings.
+        table: table of each bin, x outermost. smooth: the same, with fewer rings.
     """
 
     isotropic: Shaped[F32, "patches 3"]
@@ -76,8 +76,8 @@ def radiance_from_patch(
     Args:
         isotropic_radiance: as in `OutgoingLight`. rows: patches with a directional part.
         frame: their tangents and bitangents. coefficients: their L_j.
-        decay: of the smoothed table, see `decay_of`; None if only patches look it up, which gather widely: `smooth` is
-            then `table`.
+        decay: decay of the smoothed table, see `decay_of`; None if only patches look it up, which gather widely:
+            `smooth` is then `table`.
         extra_bins: additional binned radiance of some of the G: ascending indices, (F,), and radiance, (F, 3, SIDE²).
     """
     lobe = np.full(NO_PATCH + 1, -1, np.int32)
@@ -128,7 +128,7 @@ def bin_of(frame, row, dx, dy, dz):  # type: ignore[no-untyped-def]
     """Return the bin of a direction.
 
     Args:
-        frame: of all rows. (G, 2, 3) float32. row: of the patch.
+        frame: frame of all rows. (G, 2, 3) float32. row: row of the patch.
         dx, dy, dz: unit, away from the patch, world space.
     """
     x = frame[row, 0, 0] * dx + frame[row, 0, 1] * dy + frame[row, 0, 2] * dz
@@ -144,7 +144,8 @@ def incident_along(outgoing, gather_hits, bins, out):  # type: ignore[no-untyped
     """Look up the radiance that arrives along the rays of a point.
 
     Args:
-        outgoing: of all patches, an `OutgoingLight`. gather_hits: patches that the rays hit. (rays,) uint16
+        outgoing: outgoing light of all patches, an `OutgoingLight`.
+        gather_hits: patches that the rays hit. (rays,) uint16
         bins: direction bin at the patch. (rays,) uint8
         out: radiance, written. (3, rays) float32
     """

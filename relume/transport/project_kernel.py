@@ -330,7 +330,8 @@ def project_points(  # type: ignore[no-untyped-def]
         normal, tangent: shading frames of all points. (n, 3) float32. start, stop: range of points.
         first, light, local_wo: from `list_lights`.
         shading: q · cos θi of each entry, one row for all channels, or three. (1 or 3, K) float32
-        nodes: of the lights. (3 axes, 6, M) float32. irradiance: of the lights, per channel. (M, 3) float32
+        nodes: nodes of the lights. (3 axes, 6, M) float32.
+        irradiance: irradiance of the lights, per channel. (M, 3) float32
         kinds, axes, num_bands, bands, decrements, num_rows, settings, setting_index, support, active: see
         `Contraction`.
         fine: tolerance of the bend, relative to exact operators; last level of division. `FINE` or `COARSE`.

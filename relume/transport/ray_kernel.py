@@ -96,7 +96,7 @@ def list_mirror_lights(  # type: ignore[no-untyped-def]
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _multiply(bands, num_rows, band, weight, num):  # type: ignore[no-untyped-def]
-    """Multiply the weights of rays by a fixed curve. bands: (3, ≥ J). band: of each ray. weight: (3, ≥ num)"""
+    """Multiply the weights of rays by a fixed curve. bands: (3, ≥ J). band: band of each ray. weight: (3, ≥ num)"""
     for channel in range(3):
         row = channel if num_rows == 3 else 0
         for n in range(num):
@@ -108,7 +108,7 @@ def _add_settings(settings, setting_index, band, weight, num, product, out):  # 
     """Add rays to all settings of the curves with several settings.
 
     Args:
-        band: of each curve and ray. product: scratch, as long as a row of the settings. out: (3, ≥ N)
+        band: band of each curve and ray. product: scratch, as long as a row of the settings. out: (3, ≥ N)
     """
     num_padded = out.shape[1]
     blue = settings.shape[2] // num_padded - 1

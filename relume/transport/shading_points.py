@@ -106,7 +106,7 @@ class LocalRays:
     """Rays that carry the light of a local light.
 
     Attributes:
-        light: of unit emission. strata: its samples, shifted by the points' seeds.
+        light: light of unit emission. strata: its samples, shifted by the points' seeds.
         gain: factor on the light's unit emission.
         visible: sample k of a point in bit k & 7 of byte k >> 3.
     """
@@ -182,7 +182,7 @@ class ShadingPoints:
         visible: light m of a point in bit m & 7 of byte m >> 3; set only above the horizon.
         rays: light along rays; empty for the environment's triangles alone.
         uv: see `relume.raytrace.surface_interaction.SurfaceInteraction`; None if unknown.
-        level: of roughness, see `relume.transport.roughness_ranges`; None if all have the same.
+        level: level of roughness, see `relume.transport.roughness_ranges`; None if all have the same.
     """
 
     points: SurfacePoints

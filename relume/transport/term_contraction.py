@@ -44,8 +44,8 @@ class Contraction:
         kinds: `Angle` of each curve that depends on wi. axes: `Curve.axes` of each.
         bands: padded by 8, with the last band.
         num_rows: 1 if a curve is equal in all channels, else 3.
-        settings: of the V curves with several settings, settings last: N, padded with zeros to a multiple of eight, or
-            three times as many if channels differ.
+        settings: settings of the V curves with several settings, settings last: N, padded with zeros to a multiple of
+            eight, or three times as many if channels differ.
         setting_index: row of each curve in `settings`, -1 for none.
         support: bands beyond which a fixed curve is zero; infinite for the free one.
         constant: product of the curves, if all are flat and none is listed.
@@ -116,7 +116,7 @@ def contract(term: Term, bands: Mapping[str, NDArray[np.float64]], active: str |
     """Contract a term; curves of the outgoing angle are omitted (they multiply the finished sample).
 
     Args:
-        term: with these curves. bands: of each curve by name. (3, J) float64, or (3, N, J) for N settings at once
+        term: with these curves. bands: bands of each curve by name. (3, J) float64, or (3, N, J) for N settings at once
         active: the free curve, None to contract all.
     """
     curves = [curve for curve in term.curves if not curve.depends_on_view]

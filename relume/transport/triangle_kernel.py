@@ -30,7 +30,8 @@ def _multiply_means(overlaps, bands, decrements, num_bands, num_rows, num, weigh
     """Multiply the weights (3, n) of subtriangles by the average of a fixed curve over each.
 
     Args:
-        overlaps: from `_overlaps`. bands, decrements: of the curve, padded. (≥ num_rows, ≥ num_bands + 8) each
+        overlaps: from `_overlaps`.
+        bands, decrements: bands and decrements of the curve, padded. (≥ num_rows, ≥ num_bands + 8) each
         num_rows: 1 if the channels are equal, else 3.
     """
     last = num_bands - 1
@@ -69,7 +70,7 @@ def _multiply_settings(overlaps, settings, num_bands, num, mean, product):  # ty
     """Multiply each subtriangle's product (n, rows) by its averages of a fixed curve at all settings.
 
     Args:
-        overlaps: from `_overlaps`. settings: of the curve, padded. (≥ num_bands + 8, rows)
+        overlaps: from `_overlaps`. settings: settings of the curve, padded. (≥ num_bands + 8, rows)
         mean: scratch. (rows,)
     """
     last = num_bands - 1
@@ -110,9 +111,11 @@ def weight_subtriangles(irradiance, light, shading, begin, entry_index, area_fra
     """Weight the light of each subtriangle: irradiance · q cos θi · its fraction of the triangle.
 
     Args:
-        irradiance: of all lights. (m, 3). light: of each listed entry. shading: q cos θi of these. (1 or 3, entries)
-        begin, entry_index: entry of each subtriangle, relative to `begin`. area_fractions: of the whole triangle.
-        num: of subtriangles. weight: written. (3, ≥ num)
+        irradiance: irradiance of all lights. (m, 3). light: light of each listed entry.
+        shading: q cos θi of these. (1 or 3, entries)
+        begin, entry_index: entry of each subtriangle, relative to `begin`.
+        area_fractions: area fractions of the whole triangle.
+        num: number of subtriangles. weight: written. (3, ≥ num)
     """
     blue_row = shading.shape[0] - 1
     for n in range(num):
@@ -132,10 +135,11 @@ def add_subtriangles(  # type: ignore[no-untyped-def]
 
     Args:
         subtriangles: angles at the corners, per curve. num: number of subtriangles.
-        num_bands, bands, decrements, num_rows: of the curves; see `_multiply_means`.
+        num_bands, bands, decrements, num_rows: sizes and arrays of the curves; see
+            `_multiply_means`.
         settings, setting_index: see `_add_settings`. active: the free curve, −1 for none.
         overlaps, mean, product: scratch.
-        weight: of the subtriangles, modified. (3, ≥ num). out: added to.
+        weight: weight of the subtriangles, modified. (3, ≥ num). out: added to.
     """
     for k in range(subtriangles.shape[0]):
         if k != active and setting_index[k] < 0:

@@ -110,7 +110,7 @@ class Frames(BaseModel):
 class FrameJobs(JobKind[Frames]):
     """Jobs whose finished frames are files."""
 
-    name, request_type = "render", Frames
+    name, placeholder = "render", Frames(name="unknown", num=1)
 
     def steps(self, request: Frames) -> int:
         return request.num

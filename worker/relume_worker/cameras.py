@@ -79,7 +79,7 @@ def delete_camera(ledger: Ledger, scene_id: str, name: str) -> None:
             delete(CameraRow).where(CameraRow.scene_id == scene_id, CameraRow.name == name).returning(CameraRow.name)
         )
         if session.scalars(statement).first() is None:
-            raise NotFoundError(f"the scene has no camera {name[:80]!r} that a user placed")
+            raise NotFoundError(f"the scene has no camera {name[:80]!r} that a user placed; place it first")
 
 
 def resolve_views(ledger: Ledger, record: SceneRecord, requested: Sequence[str | CustomCamera]) -> Views:

@@ -41,7 +41,7 @@ def write_picture(
     """Render the exact image of a look, and write it.
 
     Args:
-        source: a bake. look: complete. path: of the file. exr: options for EXR files.
+        source: a bake. look: complete. path: path of the file. exr: options for EXR files.
         report: called with the fraction done.
     """
     from relume.output.render_image import render_image

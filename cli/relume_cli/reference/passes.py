@@ -191,7 +191,7 @@ def percent(fraction: float, error: float | None = None) -> str:
     """Format a fraction in percent, with the digits that its standard error justifies.
 
     Args:
-        fraction: of one. error: its standard error; None: two digits.
+        fraction: fraction of one. error: its standard error; None: two digits.
     """
     from math import floor, log10
 

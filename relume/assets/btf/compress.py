@@ -164,7 +164,7 @@ def _view_rows(images: ViewArrays, view: int) -> F32:
     """Values of all texels from one view direction. (texels, lights · 3)"""
     values = images.get_view(view)
     if not np.isfinite(values).all() or values.min() < 0:
-        raise MaterialError("the BTF has negative or non-finite values")
+        raise MaterialError("the BTF has negative or non-finite values; check its images")
     return np.ascontiguousarray(values.transpose(1, 0, 2)).reshape(values.shape[1], -1)
 
 

@@ -64,7 +64,7 @@ class ValueFile:
         """
         for view in range(self.num_done, self._shape[0]):
             if is_canceled():
-                raise CancelledError("canceled; start it again to resume")
+                raise CancelledError("the rendering was canceled; start it again to resume")
             progress(view / self._shape[0])
             self._values[view] = np.minimum(images(view), MAX_VALUE)
             self._values.flush()  # type: ignore[attr-defined]

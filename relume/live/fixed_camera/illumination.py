@@ -34,7 +34,7 @@ class Illumination(NamedTuple):
     """The light in a scene; images in equal light need the same operators.
 
     Attributes:
-        reflectances: of all materials, for indirect illumination; empty if that is not shown.
+        reflectances: reflectances of all materials, for indirect illumination; empty if that is not shown.
         paths: the light paths that are shown; indirect ones only if they were baked.
         local: the lights with a gain above zero. environment_gain: per channel; 1 if there are no local lights, since
             the gain then multiplies the finished image (`picture_gain`).

@@ -74,7 +74,7 @@ class Job(Protocol):
 
 
 class LightComponent(NamedTuple):
-    """A component of a light. key: of the image in it alone. gain: per channel."""
+    """A component of a light. key: key of the image in it alone. gain: per channel."""
 
     key: tuple[Hashable, ...]
     light: Illumination
@@ -103,7 +103,7 @@ class PrecomputeOperator:
     """The operator of a term along the basis of an edit, all other factors fixed (eq. 22, Ben-Artzi 2006).
 
     Attributes:
-        bands: of the term's curves, (3, J) each. light: the illumination.
+        bands: bands of the term's curves, (3, J) each. light: the illumination.
         form: precision and sampling of the operator.
     """
 
@@ -197,7 +197,7 @@ def can_resume_from(ready: DisplayedImage, changed: Collection[str], basis: Edit
     """Return whether changes along a basis may be added to a converged image: no other curve differs.
 
     Args:
-        ready: image of a term. changed: curves whose target it does not show. basis: of an operator.
+        ready: image of a term. changed: curves whose target it does not show. basis: basis of an operator.
     """
     has_curves = all(not np.isnan(ready.bands.get(name, np.nan)).any() for name in basis.affected_curves)
     return ready.is_converged and has_curves and set(changed) <= set(basis.affected_curves)
@@ -209,7 +209,7 @@ class Shade:
     it.
 
     Attributes:
-        model: of the term. bands: of its curves, (3, J) each. light_components: their sum is the light.
+        model: model of the term. bands: bands of its curves, (3, J) each. light_components: their sum is the light.
         is_default: the look is the scene's own, whose images are cached next to the store.
     """
 
@@ -358,7 +358,7 @@ class Resum:
 
     Attributes:
         ready: the state after the steps. sum_into: adds the same image, summed once, to zeros.
-        rounding: of such a sum, see `DisplayedImage`.
+        rounding: rounding of such a sum, see `DisplayedImage`.
     """
 
     target: TermTarget

@@ -33,7 +33,7 @@ class LiveTerm:
     """State of one term.
 
     Attributes:
-        document: of the term in the newest look. light: the target illumination.
+        document: document of the term in the newest look. light: the target illumination.
         term: the declaration of its model with its fixed parameters. model: identifies the model and these parameters.
         target_bands: bands of each curve in the newest look. (3, J) float64 each, or (L, 3, J), see `TargetTerm`
         target_rows_key: the same as bytes, in order of the curves' names, for keys.

@@ -67,7 +67,8 @@ def operator_form(material: MaterialImage, num_columns: int, budget_bytes: int) 
     """Return the best form of an operator that fits the budget; None if none does.
 
     Args:
-        material: the image of a material. num_columns: of the operator, in each channel. budget_bytes: of the cache.
+        material: the image of a material. num_columns: number of columns of the operator, in each channel.
+        budget_bytes: budget in bytes of the cache.
     """
     if EXACT.num_bytes(material, num_columns) <= budget_bytes:
         return EXACT

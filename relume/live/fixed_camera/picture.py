@@ -38,7 +38,7 @@ class Progress:
 
     Attributes:
         tiles: x, y, width, height of the updated tiles. exact: the picture shows its look exactly.
-        fidelity: of the visible region. complete: every term has an image.
+        fidelity: fidelity of the visible region. complete: every term has an image.
         previous_error: relative RMS difference of an exact image from the image it replaces, for a free camera.
     """
 

@@ -87,7 +87,9 @@ class LocalLightTransport(Protocol):
         ...
 
     def preview_rays(self, source: LightSource, visible: Shaped[NDArray[np.uint8], "n bytes"]) -> LocalRays:
-        """Return the same as rays, for terms that depend on the incident direction. visible: of `MovingLight`"""
+        """Return the same as rays, for terms that depend on the incident direction. visible: visibility of
+        `MovingLight`
+        """
         ...
 
     def unoccluded(self, geometry: LightGeometry, points: SurfacePoints) -> Shaped[F32, " n"]:

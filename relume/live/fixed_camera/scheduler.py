@@ -44,7 +44,7 @@ class StrategyScheduler:
     """The scheduler of one picture.
 
     Attributes:
-        light: the displayed illumination. gain: of the finished image.
+        light: the displayed illumination. gain: gain of the finished image.
     """
 
     def __init__(self, images: ViewImages, *, is_watched: bool) -> None:

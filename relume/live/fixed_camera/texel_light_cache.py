@@ -22,7 +22,7 @@ def is_cacheable(images: ViewImages, material: MaterialImage, btf_ref: BtfRef) -
     """Return whether the incident light of a material fits the memory budget.
 
     Args:
-        images: of a view. material: its image. btf_ref: its BTF.
+        images: images of a view. material: its image. btf_ref: its BTF.
     """
     return _BUDGET_DIVISOR * incident_light_bytes(btf_ref, material.num_samples) <= images.cache.budget_bytes
 
@@ -33,7 +33,7 @@ def get_texel_light(
     """Return the cached incident light of a material, or None; the rotation of the BTF may differ.
 
     Args:
-        images: of a view. material: its image. btf_ref: its BTF. light: the illumination.
+        images: images of a view. material: its image. btf_ref: its BTF. light: the illumination.
     """
     return images.cache.get_cached(_key(images, material, btf_ref, light), BtfIncidentLight)
 
@@ -49,7 +49,7 @@ def put_texel_light(
     """Return the incident light of a material in the frames of its BTF, computed and cached; replaces another rotation.
 
     Args:
-        images: of a view. material: its image. btf_ref: its BTF. light: the illumination.
+        images: images of a view. material: its image. btf_ref: its BTF. light: the illumination.
         progress: called with the fraction done. is_canceled: polled regularly.
     Raises:
         CancelledError: `is_canceled` returned true.

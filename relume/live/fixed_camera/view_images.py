@@ -58,7 +58,7 @@ class ViewImages:
     Attributes:
         default: the scene's own look. by_name: the materials in the scene's order.
         light: the illumination. default_light: that of the scene's own look.
-        gain: of the finished image. mirrors: the mirrors of the image.
+        gain: gain of the finished image. mirrors: the mirrors of the image.
         region: visible pixels of the image: x, y, width, height; None: all.
     """
 
@@ -208,7 +208,7 @@ class ViewImages:
         declared = term.term.curves if isinstance(pointer, CurvePointer) else term.term.parameters
         names = [item.name for item in declared]
         if pointer.name not in names:
-            raise ParameterError(str(pointer), pointer.name, ", ".join(names))
+            raise ParameterError(str(pointer), pointer.name, "one of " + ", ".join(names))
         return material, term
 
     def basis(self, pointer: CurvePointer | ParameterPointer) -> EditBasis | None:
@@ -239,7 +239,8 @@ class ViewImages:
         """Cache key of the operator of `live`, a term of `material`, along a basis.
 
         Args:
-            bands: of the term's curves, (3, J) each; those of the basis are free. is_merged_light: it is from merged
+            bands: bands of the term's curves, (3, J) each; those of the basis are free.
+            is_merged_light: it is from merged
                 lights.
         """
         return (

@@ -30,8 +30,10 @@ def is_edge(material, normals, faces, distance, directions, p, q):  # type: igno
     """Return whether two pixels show different materials, or one material with another normal or offset.
 
     Args:
-        material, normals: of faces. (faces,), (faces, 3). faces: visible in pixels, −1 for none. (pixels,)
-        distance, directions: of the pixels' rays. (pixels,), (pixels, 3) float32. p, q: the pixels.
+        material, normals: material and normals of faces. (faces,), (faces, 3).
+        faces: visible in pixels, −1 for none. (pixels,)
+        distance, directions: distance and directions of the pixels' rays. (pixels,), (pixels, 3) float32.
+        p, q: the pixels.
     """
     # no branches: Numba would count array references in each, which took two thirds of the time
     f, g = faces[p], faces[q]
@@ -64,7 +66,7 @@ def find_edges(
     """Return the pixels on edges in row-major order.
 
     Args:
-        stored_scene: the scene. hits: of the rays through all pixel centers. directions: of these rays.
+        stored_scene: the scene. hits: hits of the rays through all pixel centers. directions: directions of these rays.
         size: width and height in pixels.
     """
     width, height = size
@@ -85,7 +87,7 @@ def resolve(
     """Average all rays of each pixel.
 
     Args:
-        values: of the rays through all pixel centers, then of the extra rays.
+        values: values of the rays through all pixel centers, then of the extra rays.
         owner: pixels of the extra rays.
     Returns:
         The mean per pixel, num_pixels in all.

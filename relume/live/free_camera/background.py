@@ -53,8 +53,9 @@ def background_radiance(
     """Return the background along rays that show it or a shadow catcher, float32; zero elsewhere.
 
     Args:
-        transfer: of the picture. background, light: of its look. gain: of the finished image per channel.
-        gbuffer: of the rays. is_shadow_catcher: per material.
+        transfer: transfer of the picture. background, light: background and light of its look.
+        gain: gain of the finished image per channel.
+        gbuffer: G-buffer of the rays. is_shadow_catcher: per material.
     """
     num_rays = len(gbuffer.directions)
     if background.kind == "color":
@@ -87,7 +88,8 @@ def composite_over(
     """Composite surfaces over the background, and shadows of catchers onto it.
 
     Args:
-        stored_scene: the scene. gbuffer: of the rays. background: from `background_radiance`. shadow_catcher: data of
+        stored_scene: the scene. gbuffer: G-buffer of the rays. background: from `background_radiance`.
+        shadow_catcher: data of
             shadow catchers.
         gain: that `out` has been multiplied by.
         is_direct: direct light is shown, and with it the background.

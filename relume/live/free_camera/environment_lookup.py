@@ -97,8 +97,8 @@ def add_environment(environment, rotation, direction, level, gain, out):  # type
     """Add the prefiltered radiance in a direction.
 
     Args:
-        environment: its levels. rotation: of the map, in turns, plus one half.
-        direction: unit, a tuple. level: of the blur, from `blur_level`. gain: a factor.
+        environment: its levels. rotation: rotation of the map, in turns, plus one half.
+        direction: unit, a tuple. level: level of the blur, from `blur_level`. gain: a factor.
         out: added to. (3,)
     """
     level_coordinate: Any = min(level, np.float32(environment.levels.shape[0] - 1))
@@ -139,9 +139,9 @@ def sample(
     """Write the environment to pixels without a surface.
 
     Args:
-        radiance: of the environment, equirectangular.
+        radiance: radiance of the environment, equirectangular.
         rotation: about +Y, degrees, counterclockwise from above. gain: per channel.
-        face: of each pixel, −1 for none. directions: unit, of the rays.
+        face: face of each pixel, −1 for none. directions: unit, of the rays.
         out: radiance, float32, written there.
     """
     environment = EnvironmentLookup(

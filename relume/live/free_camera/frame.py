@@ -62,7 +62,7 @@ class MaterialState(NamedTuple):
     """The materials of a look, projected.
 
     Attributes:
-        tables: outgoing coefficients. lobes: of narrow terms.
+        tables: outgoing coefficients. lobes: lobes of narrow terms.
         is_reflective: a material reflects any light by a group of terms.
         btf_materials: materials with a BTF.
         projected: the terms of each, projected.
@@ -88,7 +88,7 @@ class MaterialState(NamedTuple):
         """Project the terms of each material, of a complete look.
 
         Args:
-            terms: of each. previous: an earlier state, to reuse what has not changed.
+            terms: terms of each. previous: an earlier state, to reuse what has not changed.
             normals: normal-map overrides of each; None: none.
             is_blocking: see `find_btf_materials`.
         """
@@ -122,7 +122,8 @@ class FrameRequestState(NamedTuple):
     """The target of a frame.
 
     Attributes:
-        look: its materials and background are used. light: the illumination. gain: of the finished image, per channel.
+        look: its materials and background are used. light: the illumination.
+        gain: gain of the finished image, per channel.
         incident: incident radiance coefficients of that light. is_coarse: they are approximate.
         texel_light: cached incident light of BTF texels.
         is_fine: pixels use two lobes like probes, and highlight edges are antialiased
@@ -143,10 +144,10 @@ class ShadingBuffers(NamedTuple):
     """Intermediate results of a frame.
 
     Attributes:
-        lobe_visibility: of probes along their lobes. outgoing: radiance of probes.
-        gradients: of probes, from `relume.live.free_camera.highlights.lobe_gradients`.
+        lobe_visibility: lobe visibility of probes along their lobes. outgoing: radiance of probes.
+        gradients: gradients of probes, from `relume.live.free_camera.highlights.lobe_gradients`.
         node_values: outgoing radiance, lobe visibility and gradients of lattice nodes.
-        light_gradient: of lattice nodes, see `InterpolatedProbes`.
+        light_gradient: light gradient of lattice nodes, see `InterpolatedProbes`.
         radiance: along the rays.
     """
 
@@ -183,9 +184,9 @@ def render_frame(
     """Render a frame without antialiasing of highlight edges.
 
     Args:
-        transfer: of the bake. state: the target.
-        gbuffer: of the camera's rays. size: width and height in pixels.
-        shadow_visibility: of each hard-shadow light along the rays. (rays,) float32 each
+        transfer: transfer of the bake. state: the target.
+        gbuffer: G-buffer of the camera's rays. size: width and height in pixels.
+        shadow_visibility: shadow visibility of each hard-shadow light along the rays. (rays,) float32 each
     """
     width, height = size
     final_frame = finish_rays(transfer, state, gbuffer, camera, height, shadow_visibility)
@@ -221,7 +222,7 @@ def finish_rays(
     """Return the radiance of rays, with glass and background.
 
     Args:
-        transfer, state, gbuffer, camera, shadow_visibility: as in `render_frame`. height: of the image, pixels.
+        transfer, state, gbuffer, camera, shadow_visibility: as in `render_frame`. height: height of the image, pixels.
     """
     stored_scene, light = transfer.stored_scene, state.light
     buffers = _shade(transfer, state, gbuffer, DirtyRegion(gbuffer.is_needed, gbuffer.is_visible, None), camera, height)
@@ -270,7 +271,8 @@ def shows_btf(transfer: FreeCameraTransfer, materials: MaterialState, gbuffer: G
     """Return whether any ray of a region hits a material with a BTF.
 
     Args:
-        transfer: of the bake. materials: of the look. gbuffer: of the image's rays. region: of the image.
+        transfer: transfer of the bake. materials: materials of the look. gbuffer: G-buffer of the image's rays.
+        region: region of the image.
     """
     if not materials.btf_materials.available:
         return False

@@ -40,7 +40,7 @@ class DirtyPixels(NamedTuple):
 
     Attributes:
         pixels: pixels with any of its rays.
-        first_extra_ray: of each, index of its first extra ray.
+        first_extra_ray: index of the first extra ray of each.
     """
 
     region: DirtyRegion
@@ -77,8 +77,8 @@ def find_dirty_pixels(
     """Return the pixels that show some materials.
 
     Args:
-        stored_scene: the scene. gbuffer: of the image's rays, without glass.
-        is_changed: the materials. num_pixels: of the image.
+        stored_scene: the scene. gbuffer: G-buffer of the image's rays, without glass.
+        is_changed: the materials. num_pixels: number of pixels of the image.
     """
     probe_mask = (gbuffer.is_needed & is_changed[stored_scene.material]).astype(np.uint8)
     node_mask, ray_mask = np.zeros_like(gbuffer.is_visible), np.zeros(len(gbuffer.directions), np.bool_)
@@ -120,7 +120,7 @@ def resolve_subset(
     """Average all rays of some pixels; see `relume.live.free_camera.antialiasing.resolve` for all pixels.
 
     Args:
-        radiance: of the rays through all pixel centers, then of the extra rays.
+        radiance: radiance of the rays through all pixel centers, then of the extra rays.
         owner: pixels of the extra rays, ascending. dirty: the pixels to resolve.
         out: radiance, float32, written there. rgb9e5: the same, packed.
     """

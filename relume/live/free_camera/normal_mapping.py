@@ -97,7 +97,8 @@ def normal_tilt(textures, texture, texture_uv, footprint, n, t, handedness, outw
 
     Args:
         textures: all of them. texture: index of the map. texture_uv, footprint: u and v, and see `sample_texture`.
-        n: the normal, unit. t: tangent, not yet orthogonal to it. handedness: of the bitangent; its sign counts.
+        n: the normal, unit. t: tangent, not yet orthogonal to it.
+        handedness: handedness of the bitangent; its sign counts.
         outward: the face normal on the visible side. scratch: (3,)
     Returns:
         The unit normal; n itself if the mapped normal points below the face.

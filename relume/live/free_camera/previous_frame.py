@@ -21,8 +21,9 @@ class PreviousImage:
     """The last rendered image.
 
     Attributes:
-        state: its target. gbuffer: of its rays. frame: the finished frame.
-        shadow_visibility: of hard-shadow lights along its rays. has_highlight_edges: its highlight edges are
+        state: its target. gbuffer: G-buffer of its rays. frame: the finished frame.
+        shadow_visibility: shadow visibility of hard-shadow lights along its rays.
+        has_highlight_edges: its highlight edges are
             antialiased.
         rgb9e5: its pixels, encoded as RGB9_E5; None until requested.
     """

@@ -31,9 +31,9 @@ class GBuffer(NamedTuple):
     """Surfaces along camera rays: one ray per pixel center in row-major order, then extra rays on edges, then glass.
 
     Attributes:
-        hits: of the rays. directions: of the rays, unit.
+        hits: hits of the rays. directions: directions of the rays, unit.
         owner: pixel of each extra ray.
-        lattice_node: the three nodes around each hit. weight: of each; zero if the hit has none.
+        lattice_node: the three nodes around each hit. weight: weight of each; zero if the hit has none.
         glass: in front of rays; its own hits come after all others.
         is_visible: nonzero for lattice nodes around any hit.
         is_needed: nonzero for probes that visible nodes interpolate.
@@ -49,7 +49,7 @@ class GBuffer(NamedTuple):
     is_needed: Shaped[NDArray[np.uint8], " probes"]
 
     def pixel_centers(self, num_pixels: int) -> GBuffer:
-        """Return only the rays through pixel centers, behind glass. num_pixels: of the image"""
+        """Return only the rays through pixel centers, behind glass. num_pixels: number of pixels of the image"""
         rows = slice(0, num_pixels)
         return self._replace(
             hits=self.hits.rows(rows), directions=self.directions[rows], owner=self.owner[:0],
@@ -113,7 +113,7 @@ def trace_primary(stored_scene: StoredScene, embree: EmbreeScene, camera: Camera
     """Trace the camera rays of an image.
 
     Args:
-        stored_scene: the scene. embree: its triangles. camera: of the image. size: width and height in pixels.
+        stored_scene: the scene. embree: its triangles. camera: camera of the image. size: width and height in pixels.
     """
     num_pixels, camera_position = size[0] * size[1], camera.to_world[:3, 3].astype(np.float32)
     directions = _directions(camera, size, np.arange(num_pixels, dtype=np.int32), _PIXEL_CENTER)
@@ -149,7 +149,7 @@ def trace_through_glass(
 
     Args:
         stored_scene, embree, camera, size: as in `trace_primary`.
-        pixels: the pixels. offsets: of rays in each pixel, pixel units.
+        pixels: the pixels. offsets: offsets of rays in each pixel, pixel units.
     Returns:
         k rays for each pixel in succession, as if each ray were a pixel.
     """
@@ -232,7 +232,7 @@ def interpolate_to_nodes(
 
     Args:
         stored_scene: the scene. is_visible: nonzero for nodes to evaluate.
-        values: of probes. out: overwritten there; None: new, zero elsewhere.
+        values: values of probes. out: overwritten there; None: new, zero elsewhere.
     """
     flat = values.reshape(len(values), -1)
     node_values = np.zeros((len(is_visible), *values.shape[1:]), np.float32) if out is None else out

@@ -20,8 +20,9 @@ class OcclusionMesh(NamedTuple):
     """Triangles, their search tree, and offsets of ray origins.
 
     Attributes:
-        stored_scene: of the mesh. positions: of triangle corners, meters. embree: search tree.
-        surface_offset: of ray origins, meters. edge_offset: least barycentric coordinates of ray origins, as in
+        stored_scene: stored scene of the mesh. positions: positions of triangle corners, meters. embree: search tree.
+        surface_offset: offset of ray origins, meters.
+        edge_offset: least barycentric coordinates of ray origins, as in
             `relume.raytrace.surface_interaction`.
     """
 
@@ -36,7 +37,7 @@ class OcclusionMesh(NamedTuple):
         """Compute the offsets.
 
         Args:
-            stored_scene: of the mesh. positions: of its corners. embree: its search tree.
+            stored_scene: stored scene of the mesh. positions: positions of its corners. embree: its search tree.
         """
         surface_offset, corners = ray_epsilon(positions), positions[stored_scene.faces]
         twice_area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)

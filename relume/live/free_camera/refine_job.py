@@ -42,7 +42,7 @@ class RefineHighlights:
     """Renders the fine frame; a `relume.live.fixed_camera.jobs.Job`.
 
     Attributes:
-        render: of the camera and look at the start of the job. key: equal for jobs of one camera and look.
+        render: render of the camera and look at the start of the job. key: equal for jobs of one camera and look.
         on_done: receives the frame.
     """
 

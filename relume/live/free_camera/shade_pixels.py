@@ -40,9 +40,10 @@ class MirrorData(NamedTuple):
     """Radiance of reflection lobes.
 
     Attributes:
-        lobes: of all materials. environment: prefiltered.
-        lobe_visibility: of lattice nodes along their lobes, from `relume.live.free_camera.highlights.lobe_visibility`.
-        gradients: of lattice nodes, from `relume.live.free_camera.highlights.lobe_gradients`.
+        lobes: lobes of all materials. environment: prefiltered.
+        lobe_visibility: lobe visibility of lattice nodes along their lobes, from
+            `relume.live.free_camera.highlights.lobe_visibility`.
+        gradients: gradients of lattice nodes, from `relume.live.free_camera.highlights.lobe_gradients`.
         is_fine: use two lobes for every highlight, as at probes, not only for those that need it.
     """
 
@@ -58,7 +59,7 @@ def blend(values, lattice_node, weight):  # type: ignore[no-untyped-def]
     """Interpolate vectors between the three lattice nodes of a pixel.
 
     Args:
-        values: of all nodes. (nodes, 3). lattice_node: the three, a tuple. weight: of each, a tuple.
+        values: values of all nodes. (nodes, 3). lattice_node: the three, a tuple. weight: weight of each, a tuple.
     """
     x = y = z = np.float32(0)
     for k in range(3):
@@ -133,7 +134,8 @@ def _gradient_term(gradients, lattice_node, weight, direction, n):  # type: igno
     """Return the change of incident luminance between the pixel's lobe and the interpolated ones, for unit albedo.
 
     Args:
-        gradients: of all nodes. (nodes, 4). lattice_node, weight, direction: of the pixel, see `shade_pixels`.
+        gradients: gradients of all nodes. (nodes, 4).
+        lattice_node, weight, direction: lattice node, weight and direction of the pixel, see `shade_pixels`.
         n: interpolated normal, before normal mapping.
     """
     x, y, z = blend(gradients, lattice_node, weight)
@@ -150,7 +152,8 @@ def interpolate_uv(uvs, corners, uv):  # type: ignore[no-untyped-def]
     """Return the texture coordinates of a point in a triangle.
 
     Args:
-        uvs: of all corners. (corners, 2). corners: the triangle's three, a tuple. uv: barycentric, of the last two
+        uvs: UV coordinates of all corners. (corners, 2). corners: the triangle's three, a tuple.
+        uv: barycentric, of the last two
             corners.
     """
     a, b, c = corners
@@ -164,7 +167,7 @@ def texture_footprint(distance, pixel_angle, uv_scale, cosine):  # type: ignore[
 
     Args:
         distance: to the camera, meters. pixel_angle: angle of a pixel, radians.
-        uv_scale: texture units per meter of the surface. cosine: of the view angle, of either sign.
+        uv_scale: texture units per meter of the surface. cosine: cosine of the view angle, of either sign.
     """
     return distance * pixel_angle * uv_scale / math.sqrt(max(abs(cosine), _MIN_SLANT))
 
@@ -173,7 +176,9 @@ def texture_footprint(distance, pixel_angle, uv_scale, cosine):  # type: ignore[
 def _perturbed_normal(  # type: ignore[no-untyped-def]
     textures, texture, texture_uv, footprint, tangents, corners, uv, n, outward, is_back_face, scratch
 ):
-    """Apply the normal map to the normal n of a pixel. outward: of the face. is_back_face: the ray hits its back."""
+    """Apply the normal map to the normal n of a pixel. outward: outward of the face. is_back_face: the ray hits its
+    back.
+    """
     a, b, c = corners
     w0, w1, w2 = np.float32(1) - uv[0] - uv[1], uv[0], uv[1]
     side = np.float32(-1) if is_back_face else np.float32(1)
@@ -296,7 +301,7 @@ def shade_pixels(
     """Compute the radiance along rays; zero for rays that miss.
 
     Args:
-        stored_scene: that is hit. gbuffer: of the rays. pixel_angle: angle of a pixel, radians.
+        stored_scene: that is hit. gbuffer: G-buffer of the rays. pixel_angle: angle of a pixel, radians.
         interpolated_probes: at all lattice nodes. emission: mean emitted radiance of each material.
         mirror_data: radiance of lobes, added. rows: rays to shade; None: all. out: written; None: a new array.
     """

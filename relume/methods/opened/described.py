@@ -15,7 +15,7 @@ def read_fields(store: StoreReader, key: str, cache: Cache) -> dict[str, Any]:
     """Read the fields of `BakedFixedViews` from a store.
 
     Args:
-        store: an open store. key: of the bake in the cache. cache: of results computed from the bake.
+        store: an open store. key: key of the bake in the cache. cache: cache of results computed from the bake.
     Raises:
         StoreError: its description is invalid. ChunkDamagedError: its arrays do not match.
     """
@@ -28,7 +28,7 @@ def read_light_fields(store: StoreReader, key: str, cache: Cache) -> dict[str, A
     """Read the fields that do not depend on views.
 
     Args:
-        store: an open store. key: of the bake in the cache. cache: of results computed from the bake.
+        store: an open store. key: key of the bake in the cache. cache: cache of results computed from the bake.
     Raises:
         StoreError: its description is invalid.
     """

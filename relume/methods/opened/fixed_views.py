@@ -50,7 +50,7 @@ class BakedFixedViews:
     """One bake of fixed views with direct illumination; a `relume.live.fixed_camera.protocols.FixedViewTransfer`.
 
     Attributes:
-        cache: of results computed from the bake.
+        cache: cache of results computed from the bake.
         key: path of the store; identifies this bake's entries in the cache.
         default_look: the complete look of the scene as it was imported.
     """
@@ -201,7 +201,7 @@ class BakedFixedViews:
         """Return the rays that carry indirect illumination to samples.
 
         Args:
-            light: all light of the scene. gather_rays: of the samples; their `outgoing` is replaced.
+            light: all light of the scene. gather_rays: gather rays of the samples; their `outgoing` is replaced.
             mirror_visibility: lights that the samples see in planar mirrors.
         """
         outgoing = self.outgoing_patch_light(light)

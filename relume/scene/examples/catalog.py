@@ -63,5 +63,5 @@ BUILT_IN: dict[str, BuiltIn] = {
 def built_in(name: str) -> Scene:
     """Return the scene with that name in `BUILT_IN`. Raises ParameterError for any other name."""
     if name not in BUILT_IN:
-        raise ParameterError("--built-in", name, ", ".join(BUILT_IN))
+        raise ParameterError("--built-in", name, "one of " + ", ".join(BUILT_IN))
     return BUILT_IN[name].make()

@@ -52,7 +52,7 @@ def add_groups(  # type: ignore[no-untyped-def]
 
     Args:
         normal, tangent, axes, curves, start, stop, out: as in `shade_points`.
-        light_list: first, light and shading of the listed groups. local_wo: of the same list.
+        light_list: first, light and shading of the listed groups. local_wo: local view direction of the same list.
         lights: nodes, irradiance_radius and `between_variance` of the groups. groups: first and light_index, see
             `LightClusters`.
         visible: of the points; lights to shade individually are set. (points, bytes)

@@ -27,7 +27,7 @@ class GroupedLights:
 
     Args:
         term, contraction, receivers: as in `relume.transport.shading.shader.Shader`.
-        groups: of the lights. num_lights: number of individual lights.
+        groups: groups of the lights. num_lights: number of individual lights.
     """
 
     def __init__(

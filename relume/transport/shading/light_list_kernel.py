@@ -28,7 +28,8 @@ def per_axis(axes, local_wo, entry, out):  # type: ignore[no-untyped-def]
     """Multiply wo by the axes of each curve.
 
     Args:
-        axes: of the curves. (C, 3). local_wo: of all entries. (3, entries). entry: its index. out: written. (C, 3)
+        axes: axes of the curves. (C, 3). local_wo: local view direction of all entries. (3, entries). entry: its index.
+        out: written. (C, 3)
     """
     for k in range(axes.shape[0]):
         for axis in range(3):
@@ -52,7 +53,7 @@ def evaluate_listed(  # type: ignore[no-untyped-def]
     Args:
         n, t: normal and tangent of the point. light_list: light and shading of its list.
         lights: nodes and irradiance_radius, see `shade_points`, and group_range, see `evaluate`, of all lights.
-        curves, scale, wo, scratch: as in `evaluate`. local: of one chunk, written.
+        curves, scale, wo, scratch: as in `evaluate`. local: local of one chunk, written.
         chunk_range: scratch for the group_range of a chunk; unused if that is empty. (CHUNK,)
         chunks: from `allocate_chunks`, written except for the deferred indices. total: added to. (3,)
     """

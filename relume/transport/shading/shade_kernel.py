@@ -45,8 +45,9 @@ def _divide(local, weight, radius, indices, parent, to_local, to_weight, to_radi
     """Create the four children of the listed triangles; return their number.
 
     Args:
-        local, weight, radius: of a generation, as in `evaluate` and `load_weights`. indices: the listed. (n,)
-        parent: scratch. (22, ≥ n) to_local, to_weight, to_radius: of the children, written.
+        local, weight, radius: arrays of a generation, as in `evaluate` and `load_weights`.
+        indices: the listed. (n,)
+        parent: scratch. (22, ≥ n) to_local, to_weight, to_radius: arrays of the children, written.
     """
     count = indices.shape[0]
     for node in range(6):
@@ -150,8 +151,8 @@ def shade_points(  # type: ignore[no-untyped-def]
 
     Args:
         normal, tangent, first, light, shading, local_wo, start, stop: as in `project_points`.
-        nodes: of the lights. (M, 6, 3) float32 irradiance_radius: their irradiance and, in radians, radius. (M, 4)
-            float32
+        nodes: nodes of the lights. (M, 6, 3) float32 irradiance_radius: their irradiance and, in radians, radius. (M,
+            4) float32
         axes: `Curve.axes` of each. (C, 3) float32
         curves: see `evaluate`.
         out: added to; its content counts as part of a point's light. (points, 3, ≥ 1) float32

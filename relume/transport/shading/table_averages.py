@@ -100,7 +100,7 @@ def _integrals(steps, low, high, cosine_shift, num, integral):  # type: ignore[n
     """Integrate a curve times cos θi over boxes, relative to the mean cosine.
 
     Args:
-        steps: of the curve, see `WholeCurves`. (≥ J, 3) low, high: from `_ends`. cosine_shift: from
+        steps: steps of the curve, see `WholeCurves`. (≥ J, 3) low, high: from `_ends`. cosine_shift: from
             `_compute_cosine_shift`.
         integral: written. (≥ num,)
     """
@@ -162,9 +162,9 @@ def evaluate(curves, scale, wo, local, radius, group_range, num, scratch, value,
         curves: kinds, steps, numbers of rows and of bands, see `WholeCurves`. scale: bands per radian. (C,)
         wo: times `Curve.axes`, one for each curve. (C, 3)
         local: corners and edge midpoints; only the midpoints are read. (3 axes, 6, ≥ num)
-        radius: of the triangles, radians. (≥ num,)
-        group_range: of groups, variance between their lights, each with one cos θi; empty for individual lights.
-            (≥ num,)
+        radius: radius of the triangles, radians. (≥ num,)
+        group_range: range of groups, variance between their lights, each with one cos θi; empty for individual
+            lights. (≥ num,)
         scratch: (11, ≥ num). value: written. (1 or 3, ≥ num) error: relative, written. (≥ num,)
     """
     kinds, steps, num_rows, _ = curves
@@ -199,7 +199,7 @@ def load_nodes(nodes, node, light, begin, num, x, y, z):  # type: ignore[no-unty
     """Look up a node of listed lights [begin, begin + num).
 
     Args:
-        nodes: of all lights. (M, 6, 3) node: its index. light: listed lights. (K,) begin, num: range of the list.
+        nodes: nodes of all lights. (M, 6, 3) node: its index. light: listed lights. (K,) begin, num: range of the list.
         x, y, z: written. (≥ num,) each
     """
     for k in range(num):

@@ -147,7 +147,7 @@ def cancel_bake(bake: Id, services: ServicesDep, delete_files: bool = False) -> 
         services.bakes.delete(bake)
         services.access.quotas.disown("bake", bake)
     elif not services.bakes.cancel(bake) and (state := services.bakes.get(bake).state) != "canceled":
-        raise NotReadyError(f"the bake is {state}; nothing to cancel (?delete_files=true deletes it)")
+        raise NotReadyError(f"the bake is {state}, so there is nothing to cancel; ?delete_files=true deletes it")
     return Response(status_code=204)
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Response
 from fastapi.concurrency import run_in_threadpool
 
-from relume.core.errors import ParameterError
+from relume.core.errors import Description, ParameterError
 from relume.live.fixed_camera.protocols import CameraMode, OpenBake
 from relume_server.api.bakes import require_ready_bake
 from relume_server.api.job_lists import UserName, format_timestamps, list_jobs
@@ -54,8 +54,8 @@ def _check(request: ComparisonRequest, transfer: OpenBake) -> None:
         comparison_camera(request, transfer)
         check_picture_size(request.size)
     elif request.camera is not None or request.size is not None:
-        allowed = "none, because this bake has fixed cameras"
-        raise ParameterError("camera" if request.size is None else "size", "given", allowed)
+        name = "camera" if request.size is None else "size"
+        raise ParameterError(name, Description("set"), f"no {name}, because this bake has fixed cameras")
     check_look(request.look, transfer, "/look")
     check_display(request.look, "/look")
 
@@ -109,8 +109,8 @@ def get_picture(
     job = services.comparisons.get(comparison)
     path = services.comparisons.picture_path(comparison, name)
     if not path.exists():
-        needed = "1 pass is" if name.endswith("reference") else "2 passes are"
-        raise NotReadyError(f"{needed} needed, {job.completed} done; try again later")
+        needed = "1 pass" if name.endswith("reference") else "2 passes"
+        raise NotReadyError(f"this image needs {needed}, and {job.completed} of {job.total} are done; try again later")
     return Download(path, media_type="image/png", headers={"Cache-Control": "no-store"})
 
 

@@ -143,7 +143,7 @@ def check_query(request: Request) -> None:
             allowed = (
                 f"only {', '.join(allowed_names)}"
                 if allowed_names
-                else "none, because this call has no query parameters"
+                else "no query parameter, because this call has none"
             )
             raise ParameterError(f"query parameter {name[:80]}", request.query_params[name], allowed)
 

@@ -10,7 +10,7 @@ from fastapi import APIRouter, Path, Query, Response
 from fastapi.concurrency import run_in_threadpool
 
 from relume import look as looks
-from relume.core.errors import NotFoundError, ParameterError
+from relume.core.errors import Description, NotFoundError, ParameterError
 from relume.image_io.ocio.active_config import get_config
 from relume.image_io.ocio.view import OcioView
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, OpenBake
@@ -77,7 +77,7 @@ def _queue(request: RenderRequest, max_bytes: int, caller: Caller, services: Ser
 async def frame_looks(request: LooksRequest, services: ServicesDep) -> LooksBody:
     """Look and camera of each frame of an animation, so that an editor plays exactly what will be rendered."""
     if request.num_frames > MAX_LISTED_FRAMES:
-        raise ParameterError("frames", request.num_frames, f"at most {MAX_LISTED_FRAMES} for this call")
+        raise ParameterError("frames", request.num_frames, f"at most {MAX_LISTED_FRAMES} frames for this call")
     await run_in_threadpool(require_ready_bake, services, request.bake)
     async with services.transfers.acquire(request.bake, services.bakes.store_path(request.bake)) as transfer:
         return await run_in_threadpool(_frame_looks, request, transfer)
@@ -92,7 +92,7 @@ def _frame_looks(request: LooksRequest, transfer: OpenBake) -> LooksBody:
         documents.append(dict(look_document_at_frame(request, request.view, transfer, index)))
         num_chars += len(json.dumps(documents[-1]))
         if num_chars > MAX_LISTED_BYTES:
-            raise ParameterError("frames", request.num_frames, f"at most {index} with looks of this size")
+            raise ParameterError("frames", request.num_frames, f"at most {index} frames with looks of this size")
     return LooksBody(looks=documents, cameras=cameras)
 
 
@@ -109,8 +109,8 @@ def _path_cameras(request: LooksRequest, transfer: OpenBake) -> list[CameraFrame
 
 def _check_looks(request: Keyframes, transfer: OpenBake) -> None:
     if len(request.looks) > request.num_frames:
-        allowed = f"at most one per frame, {request.num_frames}"
-        raise ParameterError("looks", f"{len(request.looks)} keyframes", allowed)
+        value = Description(f"a list of {len(request.looks)} looks")
+        raise ParameterError("looks", value, f"at most one look per frame, {request.num_frames} in total")
     for index, partial in enumerate(request.looks):
         check_look(partial, transfer, f"/looks/{index}")
 
@@ -227,7 +227,7 @@ def retry_frame(render: Id, index: FrameIndex, services: ServicesDep) -> RenderB
 def _job_with_frame(identity: str, index: int, services: Services) -> RenderJob:
     job = services.renders.get(identity)
     if index >= job.total:
-        raise NotFoundError(f"this batch has {job.total} frames, numbered from 0")
+        raise NotFoundError(f"this batch has no frame {index}; choose from 0 to {job.total - 1}")
     return job
 
 

@@ -12,7 +12,7 @@ from typing import Annotated
 from fastapi import APIRouter, File, Form, Query, Response, UploadFile
 from fastapi.concurrency import run_in_threadpool
 
-from relume.core.errors import NotFoundError, ParameterError
+from relume.core.errors import Description, NotFoundError, ParameterError
 from relume.core.folder_size import folder_bytes
 from relume_server.api.pagination import PageDep, newest
 from relume_server.auth.roles import CallerDep
@@ -75,7 +75,7 @@ async def import_scene(
         raise ParameterError("name", name, "printable characters")
     if len(companions) > MAX_COMPANIONS or any(len(each.filename or "") > MAX_PATH for each in companions):
         allowed = f"at most {MAX_COMPANIONS} files with names of at most {MAX_PATH:,} characters"
-        raise ParameterError("companions", f"{len(companions)} files", allowed)
+        raise ParameterError("companions", Description(f"a list of {len(companions)} files"), allowed)
     called = name.strip() or plain_stem(scene.filename) or "Scene"
 
     def make_request(folder: Path) -> ImportRequest:

@@ -62,7 +62,7 @@ class Reservation:
         """Return the error for a file that unpacks to more than `max_import_bytes`."""
         if self._quotas.remaining_bytes(self.owner) is None:
             return NearlyFullError(
-                f"the file unpacks to more than {bytes_text(limit_bytes)}, and the disk has no more space"
+                f"the file unpacks to more than {bytes_text(limit_bytes)}, and the disk has no more; free some space"
             )
         return QuotaError(
             f"the file unpacks to more than the {bytes_text(limit_bytes)} left in your quota; delete a scene, a "

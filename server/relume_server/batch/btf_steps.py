@@ -40,7 +40,7 @@ def run_btf_slice(
     """Render or read a BTF, compress and store it; an interrupted step saves its results.
 
     Args:
-        context: of the process. report, is_canceled: callbacks.
+        context: context of the process. report, is_canceled: callbacks.
         request: body of the job. folder: its files, including uploads.
     Returns:
         `is_done`: whether the BTF is stored; otherwise the step must run again.

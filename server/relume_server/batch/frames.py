@@ -39,8 +39,9 @@ def paint_frame(
     """Render one image of a batch.
 
     Args:
-        context: of the process. report, is_canceled: callbacks.
-        request: body of the batch. index: of the image. path: of its file, which appears when it is complete.
+        context: context of the process. report, is_canceled: callbacks.
+        request: body of the batch. index: index of the image.
+        path: path of its file, which appears when it is complete.
         scene_name: stored in the file.
     """
     render_request, target = RenderRequest.model_validate(request), Path(path)
@@ -100,7 +101,7 @@ def pack(
     """Pack a finished batch.
 
     Args:
-        context: of the process. report, is_canceled: callbacks.
+        context: context of the process. report, is_canceled: callbacks.
         frames: path and archive name of each image. archive: file to write.
         video: video file to write, or None. fps: its frames per second.
     """

@@ -38,7 +38,7 @@ class Prewarmer:
     ) -> None:
         """
         Args:
-            data: data directory. ledger: of bakes. run: runs steps. thumbnails: of bakes.
+            data: data directory. ledger: ledger of bakes. run: runs steps. thumbnails: thumbnails of bakes.
             is_used: true if a bake is open, so that its images are rendered anyway.
         """
         self._data, self._ledger, self._run_step = data, ledger, run

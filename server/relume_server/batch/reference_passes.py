@@ -55,7 +55,7 @@ def make_frame(
     """Render the frame to compare, and a first reference image, if they are missing.
 
     Args:
-        context: of the process. report, is_canceled: callbacks.
+        context: context of the process. report, is_canceled: callbacks.
         request: body of the comparison. folder: its files.
     Returns:
         `passes`: number of finished passes.
@@ -110,7 +110,7 @@ def make_pass(
     """Add one pass.
 
     Args:
-        context: of the process. report, is_canceled: callbacks.
+        context: context of the process. report, is_canceled: callbacks.
         request: body of the comparison. folder: its files, from `make_frame`.
     Returns:
         `passes`: number of finished passes.
@@ -139,7 +139,7 @@ def time_pass(
     """Measure the time of a pass with a small image.
 
     Args:
-        context: of the process. report, is_canceled: callbacks. request: body of the comparison.
+        context: context of the process. report, is_canceled: callbacks. request: body of the comparison.
     Returns:
         `seconds` per pass.
     """

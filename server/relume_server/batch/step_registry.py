@@ -31,8 +31,8 @@ def do_step(context: BatchContext, step: Step, report: ProgressCallback, is_canc
     """Run one step in this process.
 
     Args:
-        context: of the process.
-        step: of a registered kind.
+        context: context of the process.
+        step: step of a registered kind.
         report: called with the fraction done. is_canceled: polled.
     Raises:
         CancelledError: `is_canceled` returned true, or another server has taken the job over. Also what the step

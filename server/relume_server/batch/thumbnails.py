@@ -16,7 +16,7 @@ class Thumbnails:
     """Files in a folder, rendered if they are missing.
 
     Args:
-        folder: of the files. run: runs steps.
+        folder: folder of the files. run: runs steps.
     """
 
     def __init__(self, folder: Path, run: RunStep) -> None:

@@ -75,7 +75,7 @@ class Room:
 
     def _add_participant(self, join_request: JoinRequest, caller: Caller) -> Participant:
         if len(self._participants) >= self._max_people:
-            raise BusyError(f"{self._max_people} people are in this room, its limit; wait until one leaves")
+            raise BusyError(f"{self._max_people} people are in this room, which is its limit; wait until one leaves")
         self._num_joined += 1
         used_colors = {participant.color for participant in self._participants.values()}
         color = next((color for color in COLORS if color not in used_colors), COLORS[self._num_joined % len(COLORS)])

@@ -48,7 +48,7 @@ class Rooms:
             if caller.role < Role.EDIT:
                 raise BusyError("this room is empty; it opens when an editor joins")
             if len(self._rooms) >= self._max_rooms:
-                raise BusyError(f"{self._max_rooms} rooms are open, the limit; wait until one is closed")
+                raise BusyError(f"{self._max_rooms} rooms are open, which is the limit; wait until one is closed")
             room = Room(dict(initial_document), self._max_people, self._away_seconds, partial(self._discard, key))
         participant = room.join(join_request, caller)
         self._rooms[key] = room

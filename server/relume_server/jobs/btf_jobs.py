@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from relume.core.folder_size import folder_bytes
 from relume_server.batch.btf_steps import RESULT_FILE, UPLOAD_FILE
-from relume_server.schemas.btfs import BtfRequest
+from relume_server.schemas.btfs import BOUND, BtfRequest
 from relume_worker.jobs.job import Job
 from relume_worker.jobs.job_kind import JobKind
 from relume_worker.jobs.job_run import JobRun
@@ -22,7 +23,7 @@ BtfJob = Job[BtfRequest]
 class BtfJobs(JobKind[BtfRequest]):
     """BTF jobs with files in `data`/btf-jobs/<id>/; one step per job, in slices of time."""
 
-    name, request_type = "btf", BtfRequest
+    name, placeholder = "btf", BtfRequest(name="unknown", error=BOUND)
     resumable = ("stopped",)
 
     def __init__(
@@ -50,9 +51,10 @@ class BtfJobs(JobKind[BtfRequest]):
         return request.geometry is None
 
     def material(self, identity: str) -> str | None:
-        """Id of the BTF that a job has made; None if it is not ready."""
-        path = self.folder / identity / RESULT_FILE
-        return str(json.loads(path.read_text())["material"]) if path.exists() else None
+        """Id of the BTF that a job has made; None if it is not ready, or if its file is damaged."""
+        with suppress(FileNotFoundError, ValueError, LookupError, TypeError):
+            return str(json.loads((self.folder / identity / RESULT_FILE).read_bytes())["material"])
+        return None
 
     def run(self, run: JobRun[BtfRequest]) -> None:
         """Start or resume the job; after each slice of time others may have a turn."""

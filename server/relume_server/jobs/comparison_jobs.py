@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import Field
+from pydantic import Field, ValidationError
 
 from relume_server.batch.reference_passes import FIGURES
 from relume_server.schemas.base import Body
@@ -44,7 +44,7 @@ class DurationEstimate(NamedTuple):
 class ComparisonJobs(JobKind[ComparisonRequest]):
     """Comparisons with files in `data`/comparisons/<id>/; a step is one pass, added to the sum of earlier ones."""
 
-    name, request_type = "comparison", ComparisonRequest
+    name, placeholder = "comparison", ComparisonRequest(bake="0" * 16, view="unknown", look={})
 
     def __init__(self, service: JobService, data: Path) -> None:
         """
@@ -76,7 +76,7 @@ class ComparisonJobs(JobKind[ComparisonRequest]):
         another view is measured, from passes of other views.
 
         Args:
-            request: the comparison. num_pixels: of the image.
+            request: the comparison. num_pixels: number of pixels of the image.
         """
         key = _kind(request)
         if key not in self._pass_s:
@@ -116,8 +116,10 @@ class ComparisonJobs(JobKind[ComparisonRequest]):
 
     def figures(self, identity: str) -> Figures:
         """Errors of the frame from the passes so far."""
-        path = self.folder / identity / FIGURES
-        return Figures.model_validate_json(path.read_text()) if path.exists() else Figures.model_validate({})
+        try:
+            return Figures.model_validate_json((self.folder / identity / FIGURES).read_bytes())
+        except (FileNotFoundError, ValidationError):  # there are no passes yet, or another version wrote it
+            return Figures.model_validate({})
 
     def run(self, run: JobRun[ComparisonRequest]) -> None:
         """Render the frame if it is missing, and the passes one after another."""

@@ -9,7 +9,7 @@ from pathlib import Path
 from relume.core.filesystem import UNFINISHED
 from relume.core.folder_size import folder_bytes
 from relume_server.io.downloads import safe_stem
-from relume_server.schemas.renders import RenderRequest
+from relume_server.schemas.renders import RENDER_PLACEHOLDER, RenderRequest
 from relume_worker.jobs.job import Job
 from relume_worker.jobs.job_kind import JobKind
 from relume_worker.jobs.job_run import JobRun
@@ -25,7 +25,7 @@ LAYER_FOLDERS = ".layers-*"
 class RenderJobs(JobKind[RenderRequest]):
     """Batches of images in `data`/renders/<id>/; a step is one image, and as many run at once as there are places."""
 
-    name, request_type = "render", RenderRequest
+    name, placeholder = "render", RENDER_PLACEHOLDER
 
     def __init__(
         self,
@@ -125,7 +125,7 @@ def planned_bytes(request: RenderRequest, size: tuple[int, int], num_layers: int
     """Upper bound of the size of a render's files: uncompressed images, and all of them again in the archive.
 
     Args:
-        request: the batch. size: of an image, pixels. num_layers: per image, including the image itself.
+        request: the batch. size: size of an image, pixels. num_layers: per image, including the image itself.
     """
     channel_bytes = 1 if request.format != "exr" else 2 if request.precision == "half" else 4
     picture_bytes = size[0] * size[1] * 3 * channel_bytes * num_layers

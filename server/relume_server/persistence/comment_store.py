@@ -105,7 +105,7 @@ class CommentStore:
         with self._sessions() as session:
             picture = _row(session, scene, comment).picture
         if picture is None:
-            raise NotFoundError("this comment has no snapshot")
+            raise NotFoundError("this comment has no snapshot; view the pixel of its pin instead")
         return picture
 
     def delete(self, scene: str, comment: str) -> None:

@@ -120,7 +120,7 @@ def _as_json(document: Mapping[str, Any]) -> str:
     try:
         text = json.dumps(document, separators=(",", ":"), allow_nan=False)
     except (ValueError, RecursionError):
-        raise ParameterError("/look", "not a number", "a look with finite numbers") from None
+        raise ParameterError("/look", Description("not JSON with finite numbers"), "a look document") from None
     if len(text.encode()) > MAX_SHARE_BYTES:
         raise TooLargeError(f"a shared look has at most {bytes_text(MAX_SHARE_BYTES)}; simplify its curves")
     return text

@@ -79,7 +79,7 @@ class MessageReceiver:
         """Answer an invalid message; a limited number is tolerated."""
         self._num_bad += 1
         if self._num_bad > MAX_BAD_MESSAGES:
-            raise ProtocolError("too many invalid messages; reload the page", CLOSE_POLICY)
+            raise ProtocolError("this session sent too many invalid messages; reload the page", CLOSE_POLICY)
         await self._socket.refuse(problem)
 
     def _dispatch(self, message: protocol.ClientMessage, received_s: float) -> None:
@@ -148,7 +148,7 @@ class MessageReceiver:
     def _set_camera(self, message: protocol.CameraMessage, received_s: float) -> None:
         """Store a new camera; a `seq` that is not newer than the last is ignored."""
         if self._transfer.camera_mode is not CameraMode.FREE:
-            raise ParameterError("view", message.view, "a view with a free camera; bake the scene with method probes")
+            raise ParameterError("view", message.view, "a view with a free camera, or bake with method probes")
         self._check_view(message.view)
         width, height = message.size
         if not (width >= 1 and height >= 1 and width * height <= protocol.MAX_CAMERA_PIXELS):

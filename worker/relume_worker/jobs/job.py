@@ -6,12 +6,14 @@ import secrets
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
 
 from relume.core.errors import RelumeError
+from relume_worker.database.models import JobRow
 
 ACTIVE = ("queued", "running")
 STATES = (*ACTIVE, "ready", "failed", "stopped")
+UNREADABLE = "the request cannot be read, because another version of relume wrote it or it is damaged; request it again"
 
 Request = TypeVar("Request", bound=BaseModel)
 
@@ -64,12 +66,25 @@ class Job(Generic[Request]):
 
 @dataclass(frozen=True)
 class JobFilter:
-    """Filter of a list of jobs; None: any. bake, name: of their requests."""
+    """Filter of a list of jobs; None: any. bake, name: bake and name of their requests."""
 
     state: str | None = None
     user: str | None = None
     bake: str | None = None
     name: str | None = None
+
+
+def read_row(row: JobRow, placeholder: Request) -> tuple[Request, str, str | None]:
+    """Read the request, the state and the problem of a row.
+
+    Args:
+        row: row of a job.
+        placeholder: request that is returned, with the state "failed", if the row's request cannot be read.
+    """
+    try:
+        return type(placeholder).model_validate_json(row.request), row.state, row.problem
+    except ValidationError:
+        return placeholder, "failed", UNREADABLE
 
 
 def new_id() -> str:

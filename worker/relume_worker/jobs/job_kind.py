@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Generic
 
 from relume_worker.database.models import JobRow
-from relume_worker.jobs.job import ACTIVE, Job, JobFilter, Request, new_id
+from relume_worker.jobs.job import ACTIVE, UNREADABLE, Job, JobFilter, NotReadyError, Request, new_id, read_row
 
 if TYPE_CHECKING:
     from relume_worker.jobs.job_run import JobRun
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 class JobKind(ABC, Generic[Request]):
     """Jobs of one kind; their files are in `folder`/<id>/.
 
-    A subclass defines its name, the request, the number of steps, the priority, and `run`. Finished steps must be
-    files, because a job is resumed by another process: after a kill, an update, or a takeover.
+    A subclass defines its name, the number of steps, the priority, `run`, and a placeholder of requests that cannot be
+    read. Finished steps must be files, because a job is resumed by another process: after a kill, an update, or a takeover.
     """
 
     name: ClassVar[str]
-    request_type: type[Request]
+    placeholder: Request
     resumable: ClassVar[Sequence[str]] = ("stopped", "failed")
     """States from which a job can be resumed: its files are still there."""
 
@@ -99,14 +99,17 @@ class JobKind(ABC, Generic[Request]):
 
     def job(self, row: JobRow) -> Job[Request]:
         """Return the job of a row."""
-        request = self.request_type.model_validate_json(row.request)
+        request, state, problem = read_row(row, self.placeholder)
         total, timer = self.steps(request), self._service.timer(row.id) if row.state == "running" else None
         progress = min(1.0, (row.done + (timer.fraction if timer is not None else 0.0)) / total)
         seconds_left = timer.seconds_left(total - row.done) if timer is not None else None
         times = row.created, row.started, row.ended
-        return Job(
-            row.id, request, row.client or "", row.state, row.done, total, progress, seconds_left, row.problem, *times
-        )
+        return Job(row.id, request, row.client or "", state, row.done, total, progress, seconds_left, problem, *times)
+
+    def check_readable(self, job: Job[Request]) -> None:
+        """Check that the request of a job could be read. Raises NotReadyError."""
+        if job.request is self.placeholder:
+            raise NotReadyError(UNREADABLE)
 
     def page(
         self, job_filter: JobFilter, limit: int, after: tuple[float, str] | None = None, *, newest_first: bool = True
@@ -140,6 +143,7 @@ class JobKind(ABC, Generic[Request]):
             self.requeue(identity, self.resumable)
 
     def requeue(self, identity: str, states: Sequence[str], prepare: Callable[[], object] = lambda: None) -> None:
-        """Queue a job in one of some states again, see `JobLedger.requeue`."""
+        """Queue a job in one of some states again, see `JobLedger.requeue`. Its request must be readable."""
+        self.check_readable(self.get(identity))
         self._service.ledger.requeue(self._service.ledger.get(self.name, identity), states, prepare)
         self._service.wake()

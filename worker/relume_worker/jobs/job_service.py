@@ -140,6 +140,7 @@ class JobService:
     def _run_steps(self, kind: JobKind[Any], run: JobRun[Any]) -> None:
         job, ledger = run.job, self.ledger
         try:
+            kind.check_readable(job)
             run.folder.mkdir(parents=True, exist_ok=True)
             claim(run.folder, ledger.owner)
             kind.run(run)

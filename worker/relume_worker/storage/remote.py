@@ -56,7 +56,7 @@ class ObjectStorage:
             self._store = from_url(url, **options)
         except (BaseError, ValueError, OSError) as error:
             reason = str(error).partition("\n")[0][:200]  # the library's own details follow
-            raise ParameterError("RELUME_STORAGE", url, f"one that works ({reason})") from None
+            raise ParameterError("RELUME_STORAGE", url, f"a URL that works ({reason})") from None
 
     def put(self, name: str, folder: Path, files: Sequence[str]) -> None:
         """Upload a folder under a name atomically; replaces an existing one.

@@ -14,7 +14,7 @@ class LightStrategy(Protocol):
     """Updates a term's reference image, which is exact, to the same curves in another light.
 
     Attributes:
-        fidelity: of the resulting images.
+        fidelity: fidelity of the resulting images.
     """
 
     fidelity: Fidelity

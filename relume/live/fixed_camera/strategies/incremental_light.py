@@ -34,7 +34,8 @@ class PrecomputeRows:
     """Operator from the outgoing radiance of patches to the image of a term; cached.
 
     Attributes:
-        material: index into the scene's. bands: of the term's curves, (3, J) each. light: for expected light values.
+        material: index into the scene's. bands: bands of the term's curves, (3, J) each.
+        light: for expected light values.
     """
 
     label: str

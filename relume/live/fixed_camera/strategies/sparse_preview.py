@@ -142,7 +142,7 @@ class SparsePreview:
     """Previews of terms in one light; the only strategy that reaches any light without a reference image.
 
     Attributes:
-        gain: of the finished image in that light.
+        gain: gain of the finished image in that light.
         detail: number of refinements.
     """
 

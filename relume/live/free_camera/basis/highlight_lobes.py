@@ -133,7 +133,7 @@ def _is_term_representable(term: Mapping[str, Any]) -> bool:
 
 
 def _needs_two_lobes(sigma: F64) -> bool:
-    """Return whether one lobe would be a bad fit. sigma: of both. (rows, 2)"""
+    """Return whether one lobe would be a bad fit. sigma: sigma of both. (rows, 2)"""
     return bool((sigma.max(axis=1) > _MAX_WIDTH_RATIO * sigma.min(axis=1))[cosines() > _MIN_VIEW_COSINE].any())
 
 
@@ -150,7 +150,7 @@ def terms_in_lobe(coefficients: Sequence[OutgoingCoefficients]) -> list[bool]:
     """Select the terms of a material in its lobe: narrow ones; if there are none, those with a highlight.
 
     Args:
-        coefficients: of each term.
+        coefficients: coefficients of each term.
     """
     narrow = [is_narrow(term) for term in coefficients]
     return narrow if any(narrow) else [_has_highlight(term) for term in coefficients]
@@ -243,7 +243,7 @@ class _IsotropicGrid(NamedTuple):
     Attributes:
         quadrature: for φo = 0. moment_weights: for it, see `_lobe_quadrature`.
         grid_quadrature, cosine: at grid directions of shapes, and cos θi there. (rows, directions) float32
-        x, z: of ωi. (rows, n) float32. area: solid angles. (n,) float32
+        x, z: x and z of ωi. (rows, n) float32. area: solid angles. (n,) float32
     """
 
     quadrature: Quadrature
@@ -269,7 +269,7 @@ def _lobe_quadrature(phi: float, num_azimuths: int) -> tuple[F64, F64, F64]:
     """Distribute directions around the mirror directions of view directions in all rows.
 
     Args:
-        phi: φo of the view directions. num_azimuths: of the directions around each.
+        phi: φo of the view directions. num_azimuths: number of azimuths of the directions around each.
     Returns:
         ωi (rows, n, 3); ωo (rows, 1, 3); weights of cos θi dωi, and times x and z (rows, n, 3). x points along the
         surface, away from the view direction; z = cos θi.

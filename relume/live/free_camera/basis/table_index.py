@@ -27,7 +27,8 @@ def view_direction_local(position, normal, tangent, camera_position):  # type: i
     """Return table coordinates of a point's ωo: a row, the fraction toward the next, and cos φo, sin φo.
 
     Args:
-        position, normal, tangent: of the point. camera_position: of the camera.
+        position, normal, tangent: position, normal and tangent of the point.
+        camera_position: position of the camera.
     """
     x, y, z = camera_position[0] - position[0], camera_position[1] - position[1], camera_position[2] - position[2]
     scale = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-20)))

@@ -24,7 +24,7 @@ def environment_light_array(lights: EnvironmentLights) -> dict[str, Texels]:
     """Return the direction and width index of each light, then its irradiance.
 
     Args:
-        lights: of the environment.
+        lights: lights of the environment.
     Returns:
         (2 lights, 4) float32
     """
@@ -38,7 +38,7 @@ def lobe_shape_array(lobes: Lobes, material: int, normal_variation: Shaped[F32, 
     """Return the table of a material's highlight.
 
     Args:
-        lobes: of all materials. material: one with a lobe. normal_variation: of all, see
+        lobes: lobes of all materials. material: one with a lobe. normal_variation: variation of all normals, see
             `relume.live.free_camera.probes.stored_scene.StoredScene`.
     Returns:
         Of each row 1 − β, α², and the weight of the table for varying normals; then, for each width and ring, the

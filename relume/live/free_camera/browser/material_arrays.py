@@ -66,7 +66,8 @@ def array_blocks(
     """Return the array blocks that a shader needs to show a look, by name.
 
     Args:
-        transfer: of the bake. state: of the frame. versions: of its materials, and of its incident coefficients.
+        transfer: transfer of the bake. state: state of the frame.
+        versions: versions of its materials, and of its incident coefficients.
     """
     look, light = state.look, state.light
     lobes, background = state.materials.lobes, look.background
@@ -229,7 +230,7 @@ def needed_function_counts(
     all with a normal map.
 
     Args:
-        materials: of the look. has_map: materials with a normal map.
+        materials: materials of the look. has_map: materials with a normal map.
     Returns:
         For all light, and for light other than the environment, which highlights add separately.
     """

@@ -46,8 +46,8 @@ def visible_fractions(
     """Return the visible fraction of a light at each ray's hit, float32.
 
     Args:
-        solid: the scene. gbuffer: of the rays. camera: of the rays.
-        size: width and height of the image, pixels. targets: of shadow rays.
+        solid: the scene. gbuffer: G-buffer of the rays. camera: camera of the rays.
+        size: width and height of the image, pixels. targets: targets of shadow rays.
     """
     width, height = size
     num_pixels, num_visible = width * height, np.zeros(len(gbuffer.hits.face), np.uint8)

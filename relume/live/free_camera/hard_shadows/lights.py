@@ -52,7 +52,9 @@ class HardShadowLight(NamedTuple):
     gain: Shaped[F32, " 3"]
 
     def scatter(self, rows: Shaped[NDArray[np.intp], " n"], shape: tuple[int, int, int]) -> HardShadowLight:
-        """Return the same light with coefficients of all probes, zero except in `rows`. shape: of all coefficients."""
+        """Return the same light with coefficients of all probes, zero except in `rows`. shape: shape of all
+        coefficients.
+        """
         vectors = np.zeros(shape, np.float32)
         vectors[rows] = self.vectors
         return self._replace(vectors=vectors)
@@ -91,7 +93,7 @@ def unoccluded_sun_vectors(sun_disk: SunDisk, rotation: float, probes: SurfacePo
     """Return the unoccluded incident coefficients of a sun disk at probes.
 
     Args:
-        sun_disk: of a map. rotation: of the map, degrees. probes: the probes.
+        sun_disk: sun disk of a map. rotation: rotation of the map, degrees. probes: the probes.
     """
     mean = rotate_about_y(sun_disk.mean[None], rotation)
     length = np.linalg.norm(mean)

@@ -53,9 +53,11 @@ def add_direct_sharp(
     """Add the reflected light of hard-shadow lights, for terms that the basis represents.
 
     Args:
-        hard_shadow_lights: of the illumination. shadow_visibility: of each along the rays. (rays,) float32 each
-        stored_scene: the scene. gbuffer: of the rays. camera: of the rays. pixel_angle: of a pixel, radians.
-        materials: of the surfaces. unused_environment: any; it is not shown.
+        hard_shadow_lights: hard-shadow lights of the illumination.
+        shadow_visibility: shadow visibility of each along the rays. (rays,) float32 each
+        stored_scene: the scene. gbuffer: G-buffer of the rays. camera: camera of the rays.
+        pixel_angle: angle of a pixel, radians.
+        materials: materials of the surfaces. unused_environment: any; it is not shown.
         rays: the rays to shade; None: all.
         out: radiance, float32, added to.
     """

@@ -104,8 +104,10 @@ def trace_single_target(occluded, scene, arguments, rays, targets, ray_indices, 
     """Trace one target from each of the rays ray_indices[start:stop].
 
     Args:
-        occluded, scene, arguments: of Embree. rays: of the camera. targets: of the light. ray_indices: the rays. (m,)
-        width: of the image, pixels. start, stop: the range. num_visible: written, 0 or `NUM_TARGETS`. (rays,) uint8
+        occluded, scene, arguments: Embree's function and its arguments. rays: rays of the camera.
+        targets: targets of the light. ray_indices: the rays. (m,)
+        width: width of the image, pixels. start, stop: the range.
+        num_visible: written, 0 or `NUM_TARGETS`. (rays,) uint8
     """
     packet, at = new_packet(scene, arguments), np.empty((3, 3), np.float32)
     is_above = np.zeros(LANES, np.bool_)
@@ -180,7 +182,7 @@ def predict(rays, width, height, start, stop, num_visible, is_uncertain):  # typ
     """Predict untraced pixels in blocks of 2 × 2 pixels [start, stop); mark them uncertain if neighbors disagree.
 
     Args:
-        rays: of the camera. width, height: of the image, pixels. start, stop: the range.
+        rays: rays of the camera. width, height: width and height of the image, pixels. start, stop: the range.
         num_visible: visible targets, written for untraced pixels. (rays,) uint8. is_uncertain: written. (rays,)
     """
     across, down = (width + 1) // 2, (height + 1) // 2
@@ -239,7 +241,8 @@ def needs_refinement_at_edges(rays, owner, num_pixels, rays_per_pixel, num_visib
 
     Args:
         rays, num_visible: as in `predict`. owner: pixels of the extra rays, ascending. (k,)
-        num_pixels: of the image. rays_per_pixel: extra rays per edge pixel. start, stop: the range. is_uncertain:
+        num_pixels: number of pixels of the image. rays_per_pixel: extra rays per edge pixel.
+        start, stop: the range. is_uncertain:
             written. (k,)
     """
     for first in range(start * rays_per_pixel, stop * rays_per_pixel, rays_per_pixel):

@@ -26,7 +26,7 @@ class PrefilteredEnvironment(NamedTuple):
         environment: its levels; blurred ones exclude bright lights.
         bright_lights: small bright regions: direction, world space, ∫ L dω, and 1 − |Σ ω L / Σ L|, the variance of
             their own width; at most `MAX_BRIGHT_LIGHTS`.
-        rotation: of the levels, from `rotation_of`. gain: per channel.
+        rotation: rotation of the levels, from `rotation_of`. gain: per channel.
     """
 
     environment: EnvironmentLookup
@@ -107,9 +107,10 @@ def add_environment_in_lobe(environment, visibility, direction, sigma, gain, out
     """Add the environment in a lobe, without the environment's gain.
 
     Args:
-        environment: a `PrefilteredEnvironment`. visibility: of the environment without bright lights, and of each
+        environment: a `PrefilteredEnvironment`.
+        visibility: visibility of the environment without bright lights, and of each
             bright light, a tuple.
-        direction: of the lobe, a tuple. sigma: of the blur, radians. gain: a factor.
+        direction: direction of the lobe, a tuple. sigma: sigma of the blur, radians. gain: a factor.
         out: added to, radiance. (3,)
     """
     level = blur_level(sigma)

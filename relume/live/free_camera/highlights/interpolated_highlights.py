@@ -119,8 +119,10 @@ def add_environment_highlights(
     """Add the probes' environment highlights, minus the lobes that pixels evaluate.
 
     Args:
-        stored_scene: the scene. lobes: of all materials. environment: prefiltered. camera_position: of the camera.
-        lobe_visibility: of the probes along their lobes, from `relume.live.free_camera.highlights.lobe_visibility`.
+        stored_scene: the scene. lobes: lobes of all materials. environment: prefiltered.
+        camera_position: position of the camera.
+        lobe_visibility: lobe visibility of the probes along their lobes, from
+            `relume.live.free_camera.highlights.lobe_visibility`.
         light_sums: from `relume.live.free_camera.highlights.light_sum_kernel`.
         is_needed: nonzero for probes to evaluate.
         outgoing: its radiance is added to. is_fine: pixels evaluate two lobes, not one.

@@ -45,7 +45,7 @@ class EnvironmentLights(NamedTuple):
     """The environment triangles, in groups: one light for each combination of visible triangles in a group.
 
     Attributes:
-        lights: of each combination the mean direction, unit, then Σ E per channel.
+        lights: lights of each combination the mean direction, unit, then Σ E per channel.
         table: start of the table of its width.
     """
 
@@ -59,8 +59,8 @@ class EnvironmentLights(NamedTuple):
         """Group successive lights.
 
         Args:
-            directions, irradiance: of each light, adjacent lights in succession.
-            radius: of a circle about each, radians.
+            directions, irradiance: directions and irradiance of each light, adjacent lights in succession.
+            radius: radius of a circle about each, radians.
         """
         num_rows = -(-len(directions) // LIGHTS_PER_GROUP) * LIGHTS_PER_GROUP
         rows = np.zeros((num_rows, 7))
@@ -176,7 +176,8 @@ def sum_lights(
 
     Args:
         stored_scene: the scene. visibility_bits: light l of a probe in bit l & 7 of byte l >> 3.
-        lights: of the environment. lobes: of all materials. camera_position: of the camera.
+        lights: lights of the environment. lobes: lobes of all materials.
+        camera_position: position of the camera.
         is_needed: nonzero for probes to evaluate; the others get zero.
     Returns:
         Σ for unit albedo, without the fractions of lobes; zero if the basis represents the highlight.

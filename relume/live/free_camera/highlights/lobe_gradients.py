@@ -43,7 +43,7 @@ def _sum_factors(tables, lobes, material, row, channel, factors, step):  # type:
     """Sum the tables and albedos of a material's terms with a highlight.
 
     Args:
-        tables, lobes: of all materials. material, row, channel: indices.
+        tables, lobes: tables and lobes of all materials. material, row, channel: indices.
         factors, step: written, w_k p_k in the row and the difference to the next. (entries,)
     Returns:
         The albedo in the row, and the difference to the next.
@@ -72,7 +72,8 @@ def _outgoing_with_derivatives(recurrence_table, incident, channel, factors, ste
     """Sum the incident light of a probe with coefficients, and its derivatives.
 
     Args:
-        recurrence_table: of the basis. incident: t of the probe. (3, K). channel, factors, step: see `_sum_factors`.
+        recurrence_table: recurrence table of the basis. incident: t of the probe. (3, K).
+        channel, factors, step: see `_sum_factors`.
         view_coordinates: from `view_direction_local`.
     Returns:
         Σ_k w_k p_k t_k; its derivative per row; and per radian of φo.
@@ -216,8 +217,8 @@ def gradients_along_lobe(
 
     Args:
         stored_scene: the scene. non_environment: t of all light except the environment's own.
-        tables: of all materials; anisotropic ones are ignored. lobes: of all materials.
-        camera_position: of the camera.
+        tables: tables of all materials; anisotropic ones are ignored. lobes: lobes of all materials.
+        camera_position: position of the camera.
         is_needed: nonzero for probes to evaluate.
         out: overwritten there; None: new, zero elsewhere.
     Returns:

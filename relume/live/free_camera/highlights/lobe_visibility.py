@@ -104,7 +104,8 @@ def trace_lobe_visibility(
 
     Args:
         stored_scene: the scene. visibility_bits: light l of a probe in bit l & 7 of byte l >> 3.
-        lobe_lights: of the environment. lobes: of all materials. camera_position: of the camera.
+        lobe_lights: lobe lights of the environment. lobes: lobes of all materials.
+        camera_position: position of the camera.
         is_needed: nonzero for probes to evaluate.
         out: overwritten there; None: new, zero elsewhere.
     Returns:

@@ -22,8 +22,8 @@ class IncidentCoefficients(NamedTuple):
     """Incident radiance coefficients of all probes.
 
     Attributes:
-        total: of all light except that of hard-shadow lights.
-        non_environment: of light other than the environment's own, including local hard-shadow lights.
+        total: sum of all light except that of hard-shadow lights.
+        non_environment: sum of light other than the environment's own, including local hard-shadow lights.
         hard_shadow_lights: their visibility is traced per pixel.
     """
 
@@ -58,9 +58,9 @@ def combine(
     """Sum coefficients over sources; transport is linear in them.
 
     Args:
-        transfer: of the probes. light: the illumination.
+        transfer: transfer of the probes. light: the illumination.
         get_vectors: returns those of one light element, without sun disks that are hard-shadow lights.
-        hard_shadow_lights: of the light.
+        hard_shadow_lights: hard-shadow lights of the light.
         indirect: indirect light with its gains, instead of that from `get_vectors`.
         rows: probes to evaluate, the others are undefined; None: all.
     """
@@ -92,7 +92,7 @@ def combine_all(
     """Return the coefficients of all probes, computed if they are not cached.
 
     Args:
-        transfer: of the probes. light: the illumination. has_hard_shadows: pixels trace hard-shadow lights.
+        transfer: transfer of the probes. light: the illumination. has_hard_shadows: pixels trace hard-shadow lights.
     """
     hard_shadow_lights = transfer.hard_shadow_lights(light, None) if has_hard_shadows else ()
     return combine(

@@ -23,7 +23,8 @@ class IndirectCoefficients(NamedTuple):
 
     Attributes:
         light: the illumination. is_complete: nonzero for evaluated probes.
-        exact: cached coefficients of some elements, with their gains. approximate: of the others, for evaluated probes.
+        exact: cached coefficients of some elements, with their gains.
+        approximate: approximation of the others, for evaluated probes.
     """
 
     light: Illumination
@@ -62,7 +63,7 @@ def indirect_of(
     """Return the indirect illumination of some probes, exact if cached, else approximate.
 
     Args:
-        transfer: of the probes. light: the illumination. is_needed: nonzero for probes to evaluate.
+        transfer: transfer of the probes. light: the illumination. is_needed: nonzero for probes to evaluate.
     """
     exact = {
         element: (PartialCoefficients(transfer.vectors(element, without_sun_disks=False)), gain)
@@ -103,7 +104,7 @@ def update_reflectances(
     """Return approximate coefficients of some probes after a change of reflectances: the previous ones plus the change.
 
     Args:
-        transfer: of the probes. before: a light of the same sources. previous: its exact coefficients.
+        transfer: transfer of the probes. before: a light of the same sources. previous: its exact coefficients.
         light: the illumination. rows: the probes.
     """
     delta, incident = transfer.indirect_delta(before, light, rows), previous.copy()

@@ -62,7 +62,7 @@ class IncrementalProbeLightJob:
     """Computes approximate indirect light during a drag: some frames late, and not canceled by newer looks.
 
     Attributes:
-        light: of the look when the job was created. compute: computes it. on_done: receives the result.
+        light: light of the look when the job was created. compute: computes it. on_done: receives the result.
     """
 
     light: Illumination

@@ -31,7 +31,7 @@ class LightRequest(NamedTuple):
     """The requested light.
 
     Attributes:
-        light: of the look. has_hard_shadows: pixels trace hard-shadow lights.
+        light: light of the look. has_hard_shadows: pixels trace hard-shadow lights.
     """
 
     light: Illumination

@@ -51,7 +51,8 @@ def density_from_distance(
     """Compute the spacing relative to that at the RMS distance from the cameras.
 
     Args:
-        geometry: of the scene. camera_positions: initial cameras; twice as far away there are a quarter of the probes.
+        geometry: geometry of the scene.
+        camera_positions: initial cameras; twice as far away there are a quarter of the probes.
         probe_grid: at whose nodes it is computed; at the centroid of faces with one row.
     """
     steps = enumerate_nodes(probe_grid.num_rows)
@@ -77,8 +78,8 @@ def density_from_shadows(
     """Compute the spacing, finer where neighboring probes differ in visibility.
 
     Args:
-        geometry, camera_positions: as in `density_from_distance`. placed_probes: of a first pass.
-        lights: of the environment, which count as much as uniform light.
+        geometry, camera_positions: as in `density_from_distance`. placed_probes: placed probes of a first pass.
+        lights: lights of the environment, which count as much as uniform light.
     """
     probe_grid, lattice_nodes = placed_probes.probe_grid, placed_probes.lattice_nodes
     steps = enumerate_nodes(probe_grid.num_rows)
@@ -144,7 +145,9 @@ def _grids_by_size(probe_grid: ProbeGrid) -> Iterator[tuple[NDArray[np.int64], N
 
 
 class _TestDirections(NamedTuple):
-    """Directions in which visibility is compared. direction: (d, 3). weight: of the light each represents. (d,)"""
+    """Directions in which visibility is compared. direction: (d, 3). weight: weight of the light each represents.
+    (d,)
+    """
 
     direction: F32
     weight: F64

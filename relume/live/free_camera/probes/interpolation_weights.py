@@ -48,7 +48,7 @@ def weights_from_nearby_probes(
 
     Args:
         probe_features, node_features: in spacings; position, then the features that separate surfaces.
-        normals: of the nodes, unit.
+        normals: normals of the nodes, unit.
     """
     tree = cKDTree(probe_features)
     num_neighbors = min(len(probe_features), PROBES_PER_NODE + 1)
@@ -108,7 +108,8 @@ def weights_from_edge_ends(
     """Interpolate the remaining nodes as midpoints of edges, coarse edges first.
 
     Args:
-        seed_weights: of the nodes `seed_nodes`. node_index: lattice node of each grid node. probe_grid: of the nodes.
+        seed_weights: seed weights of the nodes `seed_nodes`. node_index: lattice node of each grid node.
+        probe_grid: probe grid of the nodes.
     """
     num_lattice_nodes, num_probes = int(node_index.max()) + 1, int(seed_weights.probe.max()) + 1
     coordinates = np.repeat(seed_nodes, PROBES_PER_NODE), seed_weights.probe.ravel().astype(np.intp)

@@ -41,7 +41,8 @@ class LatticeNodes(NamedTuple):
     """Merged nodes of all grids, where radiance is interpolated.
 
     Attributes:
-        normal: unit, on the visible side. probe: interpolation probes, distinct unless of zero weight. weight: of each,
+        normal: unit, on the visible side. probe: interpolation probes, distinct unless of zero weight.
+        weight: weight of each,
             sum 1.
     """
 
@@ -54,8 +55,8 @@ class NodeTable(NamedTuple):
     """Nodes of all grids, before merging.
 
     Attributes:
-        surface_points: positions and normals. material, side, component: of each.
-        spacing: of the probes around each, meters; ratios are powers of two.
+        surface_points: positions and normals. material, side, component: material, side and component of each.
+        spacing: spacing of the probes around each, meters; ratios are powers of two.
         is_candidate: True if it may be a probe; the others are midpoints of coarser grids.
         corner, extent: from `bounding_cube`.
     """
@@ -85,7 +86,7 @@ def representative_nodes(grid_nodes: NodeTable, normal_steps: int) -> NDArray[np
     """Merge candidates within the merge distance; return one of each, by material, then in Morton order.
 
     Args:
-        grid_nodes: of all grids. normal_steps: quantization steps of normal components.
+        grid_nodes: grid nodes of all grids. normal_steps: quantization steps of normal components.
     """
     candidates = np.flatnonzero(grid_nodes.is_candidate)
     representatives, _ = _merge_nodes(grid_nodes.rows(candidates), _MERGE_DISTANCE, normal_steps)
@@ -96,7 +97,7 @@ def num_representatives(grid_nodes: NodeTable, normal_steps: int) -> int:
     """Count `representative_nodes`, for a search over spacings.
 
     Args:
-        grid_nodes: of all grids; keys are hashed to one number each, with few collisions.
+        grid_nodes: grid nodes of all grids; keys are hashed to one number each, with few collisions.
         normal_steps: as in `representative_nodes`.
     """
     position_key, attribute_key = _keys(
@@ -115,7 +116,7 @@ def build_nodes(
     """Merge nodes and compute their interpolation weights.
 
     Args:
-        grid_nodes: of all grids. probe_nodes: those that are probes. probe_grid: of the nodes.
+        grid_nodes: grid nodes of all grids. probe_nodes: those that are probes. probe_grid: probe grid of the nodes.
     Returns:
         The merged nodes, and the merged index of each grid node.
     """
@@ -162,7 +163,7 @@ def bounding_cube(surface_points: SurfacePoints) -> tuple[Shaped[F32, " 3"], flo
 def _key_kernel(  # type: ignore[no-untyped-def]
     positions_normals, material, side, level, size, corner, normal_steps, start, stop, position_key, attribute_key
 ):
-    """Compute the keys of nodes [start, stop). size: of the boxes within which nodes merge. (n,) float64"""
+    """Compute the keys of nodes [start, stop). size: size of the boxes within which nodes merge. (n,) float64"""
     position, normal = positions_normals
     base = 2 * normal_steps + 1
     for i in range(start, stop):

@@ -61,7 +61,7 @@ class PlacedProbes:
     """Probes on surfaces, and the lattice that interpolates them.
 
     Attributes:
-        probes: by material, then in Morton order. material: of each.
+        probes: by material, then in Morton order. material: material of each.
         spacing: at the RMS distance from the cameras, meters.
     """
 
@@ -78,7 +78,7 @@ def place_probes(
     """Place about `num_probes` probes on all visible sides.
 
     Args:
-        geometry: of the scene. is_open: True for visible sides. density: spacing relative to the finest, see
+        geometry: geometry of the scene. is_open: True for visible sides. density: spacing relative to the finest, see
             `relume.live.free_camera.probes.density`; uniform at first. num_probes: at most `MAX_PROBES`.
     Raises:
         PlanError: no surface has any area.
@@ -188,7 +188,9 @@ def _num_rows(longest: F64, spacing: float, power_range: NDArray[np.int64]) -> N
 
 
 class _PlacementInput(NamedTuple):
-    """Scene that probes are placed on. normals, component, finest_power: of faces, see `ProbeDensity.face_extremes`."""
+    """Scene that probes are placed on. normals, component, finest_power: normals, component and finest power of faces,
+    see `ProbeDensity.face_extremes`.
+    """
 
     geometry: SceneBuffers
     normals: F32

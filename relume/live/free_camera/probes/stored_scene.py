@@ -36,8 +36,8 @@ class SceneTextures(NamedTuple):
 
     Attributes:
         arrays: "textures/<k>", (height, width, 3) float16.
-        attributes: of the store: texture of each material in each of `TEXTURES`, its normal map and its emission image,
-            −1 for none, and the wrap modes of each texture.
+        attributes: attributes of the store: texture of each material in each of `TEXTURES`, its normal map and its
+            emission image, −1 for none, and the wrap modes of each texture.
     """
 
     arrays: dict[str, NDArray[Any]]
@@ -97,7 +97,7 @@ class Textures(NamedTuple):
 
     Attributes:
         levels: first texel, height and width of each level, finest first. first: first level of each texture; one more
-            at the end. wraps: of u and v: repeat, mirror, clamp.
+            at the end. wraps: wraps of u and v: repeat, mirror, clamp.
         material_textures: texture of each material in each of `TEXTURES`, its normal map, its emission image; −1 for
             none.
     """
@@ -114,9 +114,11 @@ class StoredScene:
     """Surfaces of a bake for a free camera.
 
     Attributes:
-        lattice_nodes: interpolated from probes. probes: where light is stored. material: of each probe.
-        uvs: texture coordinates of triangle corners. tangents: of the corners, with the sign of the bitangent; empty if
-            no material has a normal map. face_material: of each triangle. uv_faces: corners of the triangles among
+        lattice_nodes: interpolated from probes. probes: where light is stored. material: material of each probe.
+        uvs: texture coordinates of triangle corners.
+        tangents: tangents of the corners, with the sign of the bitangent; empty if
+            no material has a normal map. face_material: face material of each triangle.
+        uv_faces: corners of the triangles among
             `uvs`.
         face_normal: unit, on the side from which the corners are counterclockwise. uv_scale: texture units per meter.
     """

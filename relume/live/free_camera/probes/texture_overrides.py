@@ -49,7 +49,7 @@ def overridden_textures(
     """Apply map overrides to a stored scene.
 
     Args:
-        stored_scene: as baked. positions: of triangle corners. overrides: of each material.
+        stored_scene: as baked. positions: positions of triangle corners. overrides: overrides of each material.
     Raises:
         NotFoundError, SceneError: an image cannot be loaded.
     """
@@ -88,7 +88,7 @@ def _tangents(stored_scene: StoredScene, positions: F32, uv_coordinates: F32, ha
     """Compute missing tangents along u, averaged over adjacent triangles by area.
 
     Args:
-        uv_coordinates: of each triangle's corners. (faces, 3, 2) has_normal_map: of materials.
+        uv_coordinates: UV coordinates of each triangle's corners. (faces, 3, 2) has_normal_map: flags of materials.
     """
     if not has_normal_map.any():
         return stored_scene.tangents

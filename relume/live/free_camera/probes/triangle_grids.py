@@ -37,7 +37,7 @@ class ProbeDensity(NamedTuple):
     """Spacing of probes relative to the finest, at the nodes of grids.
 
     Attributes:
-        probe_grid: of the nodes; not merged yet. power: of two.
+        probe_grid: probe grid of the nodes; not merged yet. power: power of two.
     """
 
     probe_grid: ProbeGrid
@@ -65,7 +65,7 @@ class GridSteps(NamedTuple):
     """Positions of nodes in their grids.
 
     Attributes:
-        grid: face · 2 + side. i, j: steps toward the second and the third corner. rows: of the grid.
+        grid: face · 2 + side. i, j: steps toward the second and the third corner. rows: rows of the grid.
     """
 
     grid: Shaped[I32, " n"]
@@ -81,7 +81,7 @@ def num_nodes(rows: NDArray[np.integer]) -> I64:
 
 
 def first_nodes(rows: NDArray[np.integer]) -> NDArray[np.uint32]:
-    """Offset of the first node of each grid in the concatenation. rows: of each, any shape"""
+    """Offset of the first node of each grid in the concatenation. rows: rows of each, any shape"""
     counts = num_nodes(rows).ravel()
     return (np.cumsum(counts) - counts).reshape(rows.shape).astype(np.uint32)
 
@@ -97,7 +97,8 @@ def surrounding_nodes(probe_grid, face, side, u, v):  # type: ignore[no-untyped-
     """Find the three nodes that surround a point in a face, and their weights.
 
     Args:
-        probe_grid: with nodes on this side. face, side: of the point. u, v: barycentric, of the second and third
+        probe_grid: with nodes on this side. face, side: face and side of the point.
+        u, v: barycentric, of the second and third
             corner.
     """
     rows = np.int64(probe_grid.num_rows[face, side])
@@ -143,7 +144,7 @@ def find_edge_midpoints(
     """Select nodes that are midpoints of edges of 2 · `step` steps, with the ends of these edges.
 
     Args:
-        steps, first: of all grids. nodes: to test. step: a power of two.
+        steps, first: arrays of all grids. nodes: to test. step: a power of two.
     Returns:
         The midpoints, and both ends.
     """

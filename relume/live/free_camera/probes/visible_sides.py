@@ -33,7 +33,7 @@ def visible_sides(geometry: SceneBuffers, cameras: Sequence[Camera], seed: int) 
     """Find the visible sides of faces.
 
     Args:
-        geometry: of the scene. cameras: of the bake. seed: of the rays.
+        geometry: geometry of the scene. cameras: cameras of the bake. seed: seed of the rays.
     Returns:
         Side 0 is the one from which the corners are counterclockwise.
     """

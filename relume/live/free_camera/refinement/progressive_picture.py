@@ -43,7 +43,7 @@ class ProgressivePicture:
 
     Args:
         free_camera_picture: displayed while the camera moves, and until the static view is exact.
-        make_static_view: traces the view of a camera; slow. cache: of static views.
+        make_static_view: traces the view of a camera; slow. cache: cache of static views.
     """
 
     def __init__(

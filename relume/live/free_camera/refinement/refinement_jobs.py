@@ -53,7 +53,7 @@ class StaticViewState:
 
     Attributes:
         make_static_view: traces the view; expensive. cache: for its results.
-        sized_camera: camera and image size. look, solo: of the image.
+        sized_camera: camera and image size. look, solo: look and soloed light of the image.
     """
 
     make_static_view: StaticViewFactory

@@ -15,7 +15,7 @@ class TablesJob:
     """Computes the tables of a BTF; a `relume.live.fixed_camera.jobs.Job`.
 
     Attributes:
-        data, components: of `get_texel_tables`. on_done: called when they are ready.
+        data, components: arguments of `get_texel_tables`. on_done: called when they are ready.
     """
 
     data: str

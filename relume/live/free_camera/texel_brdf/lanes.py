@@ -103,7 +103,8 @@ def integrate(typing_context, coefficients, axes, secondary_axes, vectors, nodes
     Args:
         typing_context: Numba's. coefficients: (24,) float32. axes: color axes. (3, 3) float32
         secondary_axes: from `pack_secondary_axes`. vectors: light at nodes, in lanes. (nodes, 3 F) float32
-        nodes: three, a tuple of uint32. weights: of each, a tuple. rotations: cosine and sine of each, a tuple of six.
+        nodes: three, a tuple of uint32. weights: weights of each, a tuple.
+        rotations: cosine and sine of each, a tuple of six.
         side: −1 if azimuths run the other way, else 1.
     Returns:
         Radiance per channel, a tuple of float32.

@@ -57,7 +57,7 @@ class TextureFootprint(NamedTuple):
     """Camera and G-buffer that texels are shaded for.
 
     Attributes:
-        camera_position: meters. pixel_angle: angle of a pixel, radians. gbuffer: of its rays.
+        camera_position: meters. pixel_angle: angle of a pixel, radians. gbuffer: G-buffer of its rays.
     """
 
     camera_position: Shaped[F32, " 3"]
@@ -136,7 +136,8 @@ def _fetch_texels(levels, direction_grid, weights, columns, num_rays, ray_buffer
     """Find the texels and view directions of each ray, and prefetch their coefficients while others are summed.
 
     Args:
-        ray_buffers: scratch of one ray. batch_buffers: of all rays: 8 texels a ray, their weights, 4 view directions a
+        ray_buffers: scratch of one ray.
+        batch_buffers: buffers of all rays: 8 texels a ray, their weights, 4 view directions a
             ray, their weights; written. counts: texels of each ray, written.
     """
     texel, texel_weight, view, view_weight = ray_buffers
@@ -158,7 +159,8 @@ def _integrate_nodes(coefficients, axes, secondary_axes, tangents, vectors, node
     """Integrate a texel's coefficients with the light interpolated between three lattice nodes, per channel.
 
     Args:
-        coefficients, axes, secondary_axes, vectors, nodes, weights, side: of `integrate`. tangents: of nodes.
+        coefficients, axes, secondary_axes, vectors, nodes, weights, side: coefficients, axes, secondary axes, vectors,
+            nodes, weights and side of `integrate`. tangents: tangents of nodes.
         x, y: axes of the texture, tuples.
     """
     t, u, v = vector_row(tangents, nodes[0]), vector_row(tangents, nodes[1]), vector_row(tangents, nodes[2])
@@ -253,8 +255,9 @@ def shade_texels(
     Rays of one pixel that hit the same surface share the texel difference: a texel is as wide as the pixel's side.
 
     Args:
-        btf_materials: of the look. stored_scene: that is hit. positions: of triangle corners, meters.
-        footprint: of the camera. incident: at its probes. out: radiance along the rays, written.
+        btf_materials: BTF materials of the look. stored_scene: that is hit.
+        positions: positions of triangle corners, meters.
+        footprint: footprint of the camera. incident: at its probes. out: radiance along the rays, written.
     """
     if not btf_materials:
         return

@@ -51,7 +51,7 @@ class TexelTables(NamedTuple):
 
     Attributes:
         levels: mip levels that are stored, see `LocalPcaBtf`.
-        weight: packed coefficients of each texel minus those of the mean, in steps. step: of each coefficient.
+        weight: packed coefficients of each texel minus those of the mean, in steps. step: step of each coefficient.
         axes: orthonormal columns of the color space in which coefficients are packed.
     """
 
@@ -65,7 +65,7 @@ class BtfMaterial(NamedTuple):
     """A BTF on a material.
 
     Attributes:
-        material: index of the material. texels: the BTF and its placement. tables: of the BTF. color: tint.
+        material: index of the material. texels: the BTF and its placement. tables: tables of the BTF. color: tint.
     """
 
     material: int

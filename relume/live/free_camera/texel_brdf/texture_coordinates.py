@@ -62,7 +62,7 @@ def face_placements(positions: Shaped[F32, "corners 3"], stored_scene: StoredSce
     """Return the placement of the texture on each triangle: one row, one cache line.
 
     Args:
-        positions: of triangle corners, meters. stored_scene: has the triangles.
+        positions: positions of triangle corners, meters. stored_scene: has the triangles.
     Returns:
         Texture x axis along the triangle, unit; handedness of its axes, 1 if y is to the left of x about the normal of
         counterclockwise corners, else −1, 0 without texture coordinates; coordinates of the first corner; from there to
@@ -101,8 +101,8 @@ def gather_hits(placements, normals, face, uv, distance, directions, lattice_nod
     """Gather the hits of rays rows[start:start + num] into columns; at most `BATCH_SIZE` rays.
 
     Args:
-        placements: from `face_placements`. normals: of lattice nodes. face, uv, distance: hits of the rays.
-        directions: of the rays. lattice_node, weight: interpolation nodes of the hits and their weights.
+        placements: from `face_placements`. normals: normals of lattice nodes. face, uv, distance: hits of the rays.
+        directions: directions of the rays. lattice_node, weight: interpolation nodes of the hits and their weights.
         columns: written. (NUM_COLUMNS · BATCH_SIZE,)
     """
     for j in range(num):

@@ -66,9 +66,10 @@ def add_rotated(lanes, rotation, side, weight, is_added, out):  # type: ignore[n
     """Add a rotated coefficient vector.
 
     Args:
-        lanes: of the vector. (3 F,) float32. rotation: from `_rotation_powers`. side: −1 if azimuths run the other way,
+        lanes: lanes of the vector. (3 F,) float32. rotation: from `_rotation_powers`.
+        side: −1 if azimuths run the other way,
             else 1.
-        weight: of the vector. is_added: add to `out`, else overwrite it. (3 F,) float32
+        weight: weight of the vector. is_added: add to `out`, else overwrite it. (3 F,) float32
     """
     c1, s1, c2, s2, c3, s3, c4, s4 = rotation
     for i in range(PAIRS):
