@@ -18,7 +18,7 @@ from sqlalchemy import func, select
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, sessionmaker
 
-from relume.core.errors import NotFoundError, ParameterError, bytes_text
+from relume.core.errors import Description, NotFoundError, ParameterError, bytes_text
 from relume_server.errors import TooLargeError
 from relume_server.persistence.tables import ShareRow
 from relume_worker.jobs.job import BusyError
