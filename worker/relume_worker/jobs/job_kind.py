@@ -23,7 +23,8 @@ class JobKind(ABC, Generic[Request]):
     """Jobs of one kind; their files are in `folder`/<id>/.
 
     A subclass defines its name, the number of steps, the priority, `run`, and a placeholder of requests that cannot be
-    read. Finished steps must be files, because a job is resumed by another process: after a kill, an update, or a takeover.
+    read. Finished steps must be files, because another process may resume the job: after a kill, an update, or a
+    takeover.
     """
 
     name: ClassVar[str]
