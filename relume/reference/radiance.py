@@ -12,7 +12,8 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.curves import CHANNELS, curve_values, drawn_curves
+from relume.brdf.curve_edits import drawn_curves
+from relume.brdf.curves import CHANNELS, curve_values
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Curve, Term
 from relume.brdf.texture_slots import texture_channel

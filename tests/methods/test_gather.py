@@ -24,9 +24,9 @@ from relume.lights.spherical_triangles import tessellate_environment
 from relume.live.fixed_camera.illumination import illumination_from_look
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
+from relume.live.opened.openers import open_transfer
 from relume.look import LightPaths, validate
 from relume.math.zernike import OUTGOING_DEGREE
-from relume.methods.registry import open_transfer
 from relume.output.render_image import render_image
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.patches.patches import patch_sample_points

@@ -19,9 +19,9 @@ from relume.live.free_camera.browser.highlight_arrays import environment_light_a
 from relume.live.free_camera.environment_lookup import rotation_of
 from relume.live.free_camera.frame import FrameRequestState, MaterialState
 from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists, lobe_widths
-from relume.live.free_camera.probes.stored_scene import EMISSION, NORMAL_MAP
 from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.math.zernike import DEGREE, DEGREES, FAST_DEGREE, NUM_FUNCTIONS, num_functions, recurrence
+from relume.probes.stored_scene import EMISSION, NORMAL_MAP
 from relume.views.resolve import encode_pixels
 
 F32 = NDArray[np.float32]

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.assets import environments
+from relume.assets.environments.environment_names import load_environment
 from relume.assets.environments.equirect import halve_to_width, lookup, rotate_about_y
 from relume.core.cache import Cache
 from relume.core.source_hash import image_code
@@ -23,11 +23,12 @@ from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import RotatedEnvironment, TriangleLights, integrate_environment
 from relume.live.fixed_camera.illumination import Illumination, with_baked_normals
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightsAndPoints
+from relume.live.opened.described import read_fields
+from relume.live.opened.indirect_solver import IndirectSolver
+from relume.live.opened.local_lights import LocalLights, ShadowCache
+from relume.live.opened.planar_mirror_light import AddedMirrorLights
+from relume.live.opened.retrace import NormalRetracer
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry
-from relume.methods.indirect_solver import IndirectSolver
-from relume.methods.local_lights import LocalLights, ShadowCache
-from relume.methods.planar_mirror_light import AddedMirrorLights
-from relume.methods.retrace import NormalRetracer
 from relume.methods.store_layout import read_lights, read_shadow_ray_directions, read_tiles
 from relume.operators.image_cache import ImageFiles
 from relume.raytrace.surface_points import SurfacePoints
@@ -68,6 +69,17 @@ class BakedFixedViews:
     camera_mode = CameraMode.FIXED
     axes = frozenset((EditAxis.CURVE, EditAxis.PARAMETER, EditAxis.LIGHT, EditAxis.ENVIRONMENT))
 
+    @classmethod
+    def from_store(cls, store: StoreReader, key: str, cache: Cache) -> Self:
+        """Open a store: an `Opener`.
+
+        Args:
+            store: an open store. key: of the bake in the cache. cache: of results computed from the bake.
+        Raises:
+            StoreError: its description is invalid. ChunkDamagedError: its arrays do not match.
+        """
+        return cls(**read_fields(store, key, cache))
+
     @cached_property
     def derived(self) -> ImageFiles:
         """Images of the default look, computed once."""
@@ -103,7 +115,7 @@ class BakedFixedViews:
         Raises:
             NotFoundError: it does not exist here. SceneError: its files are damaged.
         """
-        return environments.load_environment(name).radiance if name is not None else self._scene_radiance()
+        return load_environment(name).radiance if name is not None else self._scene_radiance()
 
     def _scene_radiance(self) -> F32:
         def read() -> F32:
