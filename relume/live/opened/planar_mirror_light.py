@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.albedo import Reflectances, pack_reflectance, unpack_mirrors
+from relume.brdf.albedo import Reflectances, material_reflectance
 from relume.brdf.specular import split_specular
 from relume.brdf.specular_reflectance import specular_terms
 from relume.camera.planar_mirrors import mirrored_lights
@@ -120,7 +120,7 @@ class MirrorLightTransfer:
         for p, material in enumerate(mirror_lights.mirrors.material):
             on_plane = mirror_lights.plane == p
             tint = tints[on_plane].mean(axis=0) if on_plane.any() else np.ones(3)
-            terms = unpack_mirrors(light.reflectances[material])
+            terms = light.reflectances[material].planar_mirrors
             mirror_reflectance[p] = specular_terms(terms, cosine[p], np.broadcast_to(tint, (len(cosine[p]), 3)))
         return np.asarray((mirror_reflectance * incident).reshape(-1, 3), np.float32)
 
@@ -180,6 +180,4 @@ class MirrorLightTransfer:
 
 def _mirror_reflectances(reflectances: Reflectances) -> Reflectances:
     """Return the specular part of materials."""
-    return tuple(
-        pack_reflectance(list(map(split_specular, unpack_mirrors(reflectance)))) for reflectance in reflectances
-    )
+    return tuple(material_reflectance(list(map(split_specular, material.planar_mirrors))) for material in reflectances)

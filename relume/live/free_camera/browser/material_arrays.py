@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -11,6 +10,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.texture_slots import TEXTURES
 from relume.live.fixed_camera.illumination import material_emission
 from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS, Lobes
@@ -150,7 +150,7 @@ def _highlight_blocks(transfer: FreeCameraTransfer, state: FrameRequestState) ->
     )
     shapes = {
         f"shapes/{k}": ArrayBlock(
-            (json.dumps(projected[k].terms, sort_keys=True), float(normal_variation[k])),
+            (tuple(map(FrozenTerm.from_document, projected[k].terms)), float(normal_variation[k])),
             partial(lobe_shape_array, lobes, k, normal_variation),
         )
         for k in np.flatnonzero(lobes.lobe_index >= 0).tolist()
