@@ -32,4 +32,5 @@ def _hashable(value: Any) -> Hashable:
     if isinstance(value, list | tuple):
         is_flat = not value or isinstance(value[0], float)  # most numbers are in curves: lists of numbers alone
         return tuple(value) if is_flat else tuple([_hashable(item) for item in value])
-    return value
+    scalar: Hashable = value
+    return scalar

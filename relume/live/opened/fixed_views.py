@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from relume.assets.environments.environment_names import load_environment
 from relume.assets.environments.equirect import halve_to_width, lookup, rotate_about_y
 from relume.core.cache import Cache
+from relume.core.errors import ParameterError, StoreError
 from relume.core.source_hash import image_code
 from relume.lights.light_clusters import cluster_lights, num_clusters
 from relume.lights.local_lights import num_samples
@@ -23,12 +24,11 @@ from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import RotatedEnvironment, TriangleLights, integrate_environment
 from relume.live.fixed_camera.illumination import Illumination, with_baked_normals
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightsAndPoints
-from relume.live.opened.described import read_fields
 from relume.live.opened.indirect_solver import IndirectSolver
 from relume.live.opened.local_lights import LocalLights, ShadowCache
 from relume.live.opened.planar_mirror_light import AddedMirrorLights
 from relume.live.opened.retrace import NormalRetracer
-from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry
+from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, complete
 from relume.methods.store_layout import read_lights, read_shadow_ray_directions, read_tiles
 from relume.operators.image_cache import ImageFiles
 from relume.raytrace.surface_points import SurfacePoints
@@ -346,3 +346,41 @@ def displayed_of(lights: TriangleLights, light: Illumination) -> TriangleLights:
     if light.environment_gain == (1.0, 1.0, 1.0):
         return lights
     return replace(lights, irradiance=lights.irradiance * np.array(light.environment_gain, np.float32))
+
+
+def read_fields(store: StoreReader, key: str, cache: Cache) -> dict[str, Any]:
+    """Read the fields of `BakedFixedViews` from a store.
+
+    Args:
+        store: an open store. key: of the bake in the cache. cache: of results computed from the bake.
+    Raises:
+        StoreError: its description is invalid. ChunkDamagedError: its arrays do not match.
+    """
+    fields = read_light_fields(store, key, cache)
+    views = (open_view(store, k, cache, key) for k in range(len(store.attributes["views"])))
+    return {**fields, "views": {view.name: view for view in views}}
+
+
+def read_light_fields(store: StoreReader, key: str, cache: Cache) -> dict[str, Any]:
+    """Read the fields that do not depend on views.
+
+    Args:
+        store: an open store. key: of the bake in the cache. cache: of results computed from the bake.
+    Raises:
+        StoreError: its description is invalid.
+    """
+    attributes = store.attributes
+    try:
+        return {
+            "cache": cache,
+            "key": key,
+            "store": store,
+            "scene_id": attributes["scene"],
+            "method": attributes["method"],
+            "num_lights": attributes["num_lights"],
+            "default_look": complete({}, attributes["look"]),
+            "material_names": tuple(attributes["materials"]),
+            "views": {},
+        }
+    except (KeyError, TypeError, IndexError, ParameterError) as error:
+        raise StoreError(f"the store's description is invalid ({error}); delete the bake and bake again") from error

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import Illumination, Normals
 from relume.live.fixed_camera.protocols import EditAxis
-from relume.live.opened.described import read_fields
-from relume.live.opened.fixed_views import BakedFixedViews, IntegrateEnvironment, SampledTransfer
+from relume.live.opened.fixed_views import BakedFixedViews, IntegrateEnvironment, SampledTransfer, read_fields
 from relume.live.opened.harmonic_light import HarmonicLight, read_harmonic_light
 from relume.live.opened.indirect_solver import IndirectSolver
 from relume.live.opened.local_lights import LocalLights

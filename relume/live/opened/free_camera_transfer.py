@@ -24,7 +24,7 @@ from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists
 from relume.live.free_camera.occluded_probes import find_occluded_probes
 from relume.live.free_camera.ray_scene import OcclusionMesh
 from relume.live.free_camera.texture_overrides import NO_OVERRIDES, ProbeMapOverrides, overridden_textures
-from relume.live.opened.described import read_light_fields
+from relume.live.opened.fixed_views import read_light_fields
 from relume.live.opened.fixed_views_indirect import BakedIndirectViews
 from relume.live.opened.prefiltered_environments import PrefilteredEnvironments
 from relume.live.opened.stored_patches import read_patches
