@@ -11,10 +11,11 @@ from relume.brdf.registry import TERMS
 from relume.brdf.term import VIEW
 from relume.core.cache import Cache
 from relume.live.fixed_camera.protocols import EditAxis
+from relume.live.opened.openers import open_transfer
 from relume.look import validate
-from relume.methods.registry import METHODS, open_transfer
-from relume.store import bake_in_process
+from relume.methods.registry import METHODS
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 BUDGET = 1 << 28
 

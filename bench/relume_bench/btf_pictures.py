@@ -18,14 +18,15 @@ from relume.assets.environments.studio import studio
 from relume.brdf.registry import TERMS
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import illumination_from_look
+from relume.live.opened.openers import open_bake
 from relume.look import Look, validate
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.examples.still_life.still_life import look_at
 from relume.scene.model import Material, Mesh, Scene
 from relume.scene.scene_folder import make_scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume.synthetic_btf.synthesize import GEOMETRIES
 from relume.synthetic_btf.tileable_geometry import centered_height, repeat_tile
 from relume.transport.btf_kernel import texel_rows

@@ -17,14 +17,15 @@ from relume.live.fixed_camera.picture import Picture
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.primary_visibility import trace_primary as look_around
 from relume.live.free_camera.refine_job import RefineHighlights
+from relume.live.opened.free_camera_transfer import BakedFreeCamera
+from relume.live.opened.openers import open_bake, open_transfer
 from relume.look import Look, complete, validate
-from relume.methods.free_camera_transfer import BakedFreeCamera
-from relume.methods.registry import METHODS, open_bake, open_transfer
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.examples.catalog import built_in
 from relume.scene.model import Scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume_bench.background_jobs import BackgroundJobs
 from relume_bench.timing import percentiles
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.albedo import scatters_diffusely
 from relume.core.cache import Cache
-from relume.methods.registry import open_transfer
+from relume.live.opened.openers import open_transfer
 from relume.scene.examples.catalog import built_in
 from relume.scene.examples.cornell import cornell_box
 from relume.scene.model import Scene

@@ -22,12 +22,12 @@ from relume.core.cache import Cache
 from relume.live.fixed_camera.jobs import PrecomputeOperator
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.protocols import FixedViewTransfer
+from relume.live.opened.openers import open_transfer
 from relume.look import Look, validate
 from relume.methods.direct import DirectMethod
-from relume.methods.registry import open_transfer
 from relume.operators.linear_operator import operator_bytes, quantized_bytes
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
 from relume_bench.points import relative_rmse
 from relume_bench.scenes import cook_torrance, teapot_on_table

@@ -28,14 +28,14 @@ from relume.core.thread_pools import num_threads
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.protocols import FixedViewTransfer
 from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
+from relume.live.opened.openers import open_transfer
 from relume.look import Look, validate
 from relume.methods.direct import DirectMethod
 from relume.methods.gather import GatherMethod
-from relume.methods.registry import open_transfer
 from relume.output.render_image import render_image
 from relume.scene.examples.still_life import demo_scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import BakeMethod, Recipe
+from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
 from relume_bench.timing import seconds
 

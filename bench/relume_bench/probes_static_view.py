@@ -26,14 +26,15 @@ from relume.core.thread_pools import num_threads
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.refinement.progressive_picture import ProgressivePicture
 from relume.live.free_camera.refinement.refinement_jobs import TRACING_FRACTION, SparseExactJob, StaticViewJob
+from relume.live.opened.free_camera_transfer import BakedFreeCamera
+from relume.live.opened.openers import open_bake
+from relume.live.opened.static_view import StaticViewBuilder
 from relume.look import complete, validate
-from relume.methods.free_camera_transfer import BakedFreeCamera
-from relume.methods.registry import METHODS, open_bake
-from relume.methods.static_view import StaticViewBuilder
+from relume.methods.registry import METHODS
 from relume.scene.examples.catalog import built_in
 from relume.scene.model import Scene
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume_bench.figure import Figure
 
 _CACHE_BYTES = 4 << 30

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from relume.assets.environments.read_environment import read_environment
 from relume.camera.view_samples import BACKGROUND
 from relume.core.cache import Cache
+from relume.live.opened.openers import open_transfer
 from relume.look import validate
-from relume.methods.registry import open_transfer
 from relume.output.render_image import render_image
 from relume.scene.model import Scene
 from relume.scene_io.import_scene import import_scene

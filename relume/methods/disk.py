@@ -22,15 +22,16 @@ from numpy.typing import NDArray
 
 from relume.core.cache import get_asset
 from relume.core.folder_size import folder_bytes
-from relume.live.free_camera.probes.stored_scene import MAX_TEXTURE_SIDE
 from relume.methods import plan_estimates
 from relume.methods.direct import DirectMethod
 from relume.methods.gather import GatherMethod, num_patches
 from relume.methods.probes import bound_store_bytes as parts_of_surface
+from relume.probes.stored_scene import MAX_TEXTURE_SIDE
 from relume.scene.model import Scene
-from relume.store import bake_in_process, open_store
 from relume.store.bake_protocol import BakeMethod, Plan, Recipe
 from relume.store.publish import array_paths
+from relume.store.reader import open_store
+from relume.store.run_bake import bake_in_process
 from relume.store.writer import create_store
 
 SMALL_BYTES = 32 << 20  # plans up to this size keep their bound

@@ -38,7 +38,6 @@ from relume.camera.view_samples import BACKGROUND, camera_setup, sample_pixels
 from relume.core.errors import PlanError
 from relume.lights.sphere_tiles import MAX_LIGHTS, MIN_LIGHTS, choose_tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, integrate_environment
-from relume.look import default_look
 from relume.methods import plan_estimates
 from relume.methods.read_cache import ReadCache
 from relume.methods.store_layout import SHARD_ROWS, read_lights, read_shadow_ray_directions
@@ -141,7 +140,6 @@ class SampledViews:
             "size": list(recipe.size),
             "num_lights": recipe.num_lights,
             "relightable": recipe.relightable,
-            "look": default_look(scene.materials, scene.lights),
             "materials": [material.name for material in scene.materials],
             "double_sided": [material.double_sided for material in scene.materials],
             "has_alpha_test": any(material.is_alpha_tested for material in scene.materials),

@@ -21,7 +21,8 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.curves import curve_bands, drawn_curves
+from relume.brdf.curve_edits import drawn_curves
+from relume.brdf.curves import curve_bands
 from relume.brdf.parameter_sweep import curves_of_parameter, slider_values, solid_angles
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Curve, Term

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.albedo import Reflectances, unpack_images
+from relume.brdf.albedo import Reflectances
 from relume.images.image_store import load_texture
 from relume.lights.spherical_triangles import TriangleLights
 from relume.math.zernike import OUTGOING_DEGREE, recurrence
@@ -100,7 +100,7 @@ class PatchLight:
 
     def _texture_multipliers(self, reflectances: Reflectances) -> F32:
         """Return texture multipliers, with the look's material map overrides. (2, C, 3) float32"""
-        image_names = [unpack_images(material_reflectance) for material_reflectance in reflectances]
+        image_names = [material_reflectance.images for material_reflectance in reflectances]
         if not any(map(any, image_names)):
             return self.textures
         multipliers = self.textures.copy()

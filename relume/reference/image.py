@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.assets import environments
 from relume.assets.environments.environment import Environment
+from relume.assets.environments.environment_names import load_environment
 from relume.assets.environments.equirect import lookup, rotate_about_y
 from relume.camera.specular_hits import is_mirror_material
 from relume.camera.view_samples import BACKGROUND, ViewSamples, sample_view
@@ -191,7 +191,7 @@ def _prepare_view(scene: Scene, view: str, look: Look, size: tuple[int, int]) ->
     geometry = build_scene_buffers(scene)
     # here mirrors are lobes like others, and light through tinted glass is traced per channel, not by mean tints
     samples = sample_view(scene, geometry, view, size, traces_mirrors=False, by_channel=True)
-    light = scene.environment if look.environment.map is None else environments.load_environment(look.environment.map)
+    light = scene.environment if look.environment.map is None else load_environment(look.environment.map)
     texels = environment_texels(light, look.environment.rotation).scaled(look.environment.gain)
     look_args = scene, look, samples.surface, samples.material
     points = points_of_samples(samples, surface_textures(*look_args), surface_roughness(*look_args))

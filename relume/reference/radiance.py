@@ -3,7 +3,6 @@ lights, with f the sum of a look's terms."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -12,7 +11,9 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.curves import CHANNELS, curve_values, drawn_curves
+from relume.brdf.curve_edits import drawn_curves
+from relume.brdf.curves import CHANNELS, curve_values
+from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.registry import TERMS
 from relume.brdf.term import Curve, Term
 from relume.brdf.texture_slots import texture_channel
@@ -112,13 +113,13 @@ class _Tables:
 
 
 def _tabulate(document: Document) -> _Tables:
-    return _build_tables(json.dumps(document, sort_keys=True))
+    return _build_tables(FrozenTerm.from_document(document))
 
 
 @asset_cached("tables of brute force")
-def _build_tables(term_text: str) -> _Tables:
+def _build_tables(frozen_term: FrozenTerm) -> _Tables:
     """Tabulate a term; cached, because paths need all terms of all roughness classes at every bounce; some MB."""
-    document = json.loads(term_text)
+    document = frozen_term.document
     term = TERMS[document["model"]].normalized(document)
     curves = [curve for curve in term.curves if not curve.depends_on_view]
     gamma = np.linspace(0.0, MAX_ANGLE, _STEPS + 1)

@@ -1,7 +1,7 @@
 """The bake protocol: plan (pure), tasks, compute (pure), and the interfaces for workers.
 
-bake (worker, once) → freeze (server, on prepare) → frame (server, per edit). To add a method, write one module and add
-one line to `relume.methods.registry`; the contract suite in tests/contract then tests it.
+bake (worker, once) → freeze (server, on prepare) → frame (server, per edit). `relume.methods.registry` lists how
+methods bake, `relume.live.opened.openers` how their bakes open; the contract suite in tests/contract tests both.
 """
 
 from __future__ import annotations
@@ -173,7 +173,7 @@ class TaskStore(StoreReader, Protocol):
 
 
 class BakeMethod(Protocol):
-    """Baking of a light transport method; `relume.methods.base.TransferMethod` adds opening."""
+    """Baking of a light transport method; nothing of pictures."""
 
     @property
     def name(self) -> str:
@@ -194,7 +194,7 @@ class BakeMethod(Protocol):
         ...
 
     def attributes(self, scene: Scene, recipe: Recipe) -> dict[str, Any]:
-        """Root attributes of the store: JSON, enough to open it without the scene."""
+        """Root attributes of the store: JSON; with the scene's look, enough to open it without the scene."""
         ...
 
     def tasks(self, stage: int, scene: Scene, recipe: Recipe, store: StoreReader) -> Sequence[Task]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -32,7 +32,6 @@ from relume.views.store_io import (
     TransferReader,
     make_material_pattern,
     read_camera,
-    read_gather_rays,
     read_ray_origins,
     read_roughness_levels,
     read_roughness_ratios,
@@ -232,8 +231,9 @@ class View:
     def gather_rays(self, material: int, outgoing: OutgoingLight) -> GatherRays:
         """Read the gather rays of a material's samples, with the filter between neighbors."""
         rows = self.rows(material)
-        unfiltered = read_gather_rays(self.store, self.index, material, rows.start, rows.stop, outgoing)
-        return replace(unfiltered, sharing=self._neighbor_filter(material))
+        gather_hits = self.store.read(f"views/{self.index}/gather_hits", rows.start, rows.stop)
+        pattern = make_material_pattern(self.store, self.index, material)
+        return GatherRays(gather_hits, pattern, outgoing, sharing=self._neighbor_filter(material))
 
     def trace_gather_rays(self, material: int, is_canceled: Callable[[], bool]) -> None:
         """Trace gather rays that were not baked, because of an overridden normal map; reading them is then immediate.

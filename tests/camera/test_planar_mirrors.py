@@ -14,13 +14,14 @@ from relume.brdf.fresnel import schlick
 from relume.camera.planar_mirrors import find_planar_mirrors, lights_visible_in_mirrors
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
-from relume.methods.registry import METHODS, open_bake, open_transfer
-from relume.methods.static_view import StaticViewBuilder
+from relume.live.opened.openers import open_bake, open_transfer
+from relume.live.opened.static_view import StaticViewBuilder
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 F0, COLOR, ALBEDO, ROWS = 0.7, 0.8, 0.6, 64
 MIRROR = Material("Mirror", ({"model": "ggx", "color": [COLOR] * 3, "params": {"roughness": 0.03, "f0": F0}},))

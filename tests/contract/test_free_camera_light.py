@@ -19,10 +19,10 @@ from session_edits import make_look, relative_rmse
 from relume.core.cache import Cache
 from relume.core.errors import CancelledError, ChunkDamagedError
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.methods.registry import open_bake
-from relume.methods.spherical_harmonic_transfer import read_harmonic_light
-from relume.methods.store_layout import read_patches
-from relume.store import open_store
+from relume.live.opened.harmonic_light import read_harmonic_light
+from relume.live.opened.openers import open_bake
+from relume.live.opened.stored_patches import read_patches
+from relume.store.reader import open_store
 
 ROUNDED = 1e-4  # float32 sums of one thousand lights in another order
 
@@ -62,7 +62,7 @@ def test_bakes_without_harmonics_follow_light(baked, free_bake, monkeypatch):
         return picture.image()
 
     harmonic = rough(free_bake)
-    monkeypatch.setattr("relume.methods.opened.fixed_views_indirect.read_harmonic_light", lambda store, cells: None)
+    monkeypatch.setattr("relume.live.opened.fixed_views_indirect.read_harmonic_light", lambda store, cells: None)
     plain = rough(open_bake(baked, Cache(1 << 30)))
     assert 0 < relative_rmse(harmonic, plain) < 0.04
 

@@ -11,12 +11,13 @@ from relume.live.free_camera.frame import render_frame
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.refinement.progressive_picture import ProgressivePicture
 from relume.live.free_camera.refinement.refinement_jobs import SparseExactJob, StaticViewJob
-from relume.methods.registry import METHODS, open_bake, open_transfer
-from relume.methods.static_view import StaticTracing, StaticViewBuilder
+from relume.live.opened.openers import open_bake, open_transfer
+from relume.live.opened.static_view import StaticTracing, StaticViewBuilder
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.custom_camera import with_cameras
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 SIZE = (64, 40)
 
@@ -131,7 +132,7 @@ def test_static_view_of_an_earlier_camera_is_discarded(picture, free_bake):
 
 
 def test_static_view_reports_progress_and_resumes(picture, monkeypatch):
-    monkeypatch.setattr("relume.methods.static_view._ROWS_PER_TASK", 512)
+    monkeypatch.setattr("relume.live.opened.static_view._ROWS_PER_TASK", 512)
     job, shares = picture.next_job(), []
     with pytest.raises(CancelledError):
         job.run(shares.append, lambda: len(shares) > 3)

@@ -16,10 +16,10 @@ from relume.core.cache import Cache
 from relume.core.errors import CancelledError, ParameterError, StoreError
 from relume.images.image_store import load_normal_map, store
 from relume.live.fixed_camera.picture import Picture
-from relume.live.free_camera.probes.texture_overrides import NO_OVERRIDES, ProbeMapOverrides, overridden_textures
+from relume.live.free_camera.texture_overrides import NO_OVERRIDES, ProbeMapOverrides, overridden_textures
+from relume.live.opened.retrace import NormalRetracer
 from relume.look import default_look, validate
 from relume.methods.gather import RAYS_PER_SAMPLE
-from relume.methods.retrace import NormalRetracer
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.reference.image import reference_image
 from relume.reference.textures import with_overrides

@@ -13,8 +13,8 @@ from session_edits import BUDGET, make_look
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.jobs import Shade
-from relume.methods.opened import fixed_views as transfer_module
-from relume.methods.registry import open_transfer
+from relume.live.opened import fixed_views as transfer_module
+from relume.live.opened.openers import open_transfer
 from relume.operators.image_cache import ImageFiles
 from relume.operators.shade import ShadedTerm
 

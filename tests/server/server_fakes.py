@@ -18,8 +18,8 @@ from relume.output.viewport import Viewport
 from relume.reference import ReferenceImage
 from relume.scene.model import Camera, Material, Mesh, Scene
 from relume.scene.scene_folder import load_scene, make_scene
-from relume.store import open_store
 from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput
+from relume.store.reader import open_store
 from relume_server.batch.context import BatchContext
 from relume_server.batch.step_registry import do_step
 from relume_server.io.import_request import ImportRequest, _write_scene

@@ -16,7 +16,7 @@ from tiny_scenes import still_life
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
-from relume.methods.registry import open_bake
+from relume.live.opened.openers import open_bake
 from relume.store.bake_protocol import Recipe
 from relume_server.batch import prewarm as module
 from relume_server.batch.prewarm import Prewarmer

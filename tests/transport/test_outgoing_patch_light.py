@@ -6,7 +6,7 @@ import numpy as np
 import numpy_reference as ref
 import pytest
 
-from relume.brdf.albedo import PAIRS, pack_reflectance, reflectance_matrix
+from relume.brdf.albedo import PAIRS, material_reflectance, reflectance_matrix
 from relume.brdf.evaluate import eval_brdf
 from relume.math.zernike import OUTGOING_DEGREE, WINDOW_DECAY, basis_functions, recurrence
 from relume.patches.patch_kdtree import NO_PATCH
@@ -80,7 +80,7 @@ def reflect_one_direction(roughness):
     """Outgoing light of metal for one direction, 50 directions of it, and its decay."""
     metal = {**PLAIN, "model": "ggx", "color": [1, 1, 1], "params": {"roughness": roughness, "f0": 0.9}}
     plain = np.ones((2, 50, 3), np.float32)
-    made = ReflectanceOperator.from_materials((pack_reflectance([metal]),), np.zeros(50, np.uint16), plain)
+    made = ReflectanceOperator.from_materials((material_reflectance([metal]),), np.zeros(50, np.uint16), plain)
     vectors = np.repeat(basis_functions(over_hemisphere(50, 6))[:, None, :NUM_OUTGOING], 3, axis=1).astype(np.float32)
     of_patches, leaving = made.apply(IncidentLight(plain[0], vectors))
     even = np.zeros((NO_PATCH + 1, 3), np.float32)

@@ -11,7 +11,7 @@ import pytest
 from fake_method import RECIPE, FakeMethod, tiny_scene
 
 from relume.core.errors import StoreError
-from relume.store import open_store, read_code
+from relume.store.reader import open_store, read_code
 from relume_worker.paths import staging_path
 from relume_worker.runner import CODE_CHANGED_MESSAGE
 from relume_worker.scenes import register_scene

@@ -21,8 +21,9 @@ from relume.core.errors import (
     NotFoundError,
     ParameterError,
 )
-from relume.store import bake_in_process, open_store
 from relume.store.bake_protocol import Task
+from relume.store.reader import open_store
+from relume.store.run_bake import bake_in_process
 from relume_worker import lease, scenes
 from relume_worker.database.models import BakeRow
 from relume_worker.executor import Executors

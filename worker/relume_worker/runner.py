@@ -31,9 +31,11 @@ from relume.core.errors import (
 from relume.core.filesystem import remove_folder
 from relume.core.folder_size import folder_bytes
 from relume.scene.model import Scene
-from relume.store import open_store, publish, read_code, run_bake
+from relume.store import run_bake
 from relume.store.bake_protocol import Task
 from relume.store.disk_space import check_disk_space
+from relume.store.publish import publish
+from relume.store.reader import open_store, read_code
 from relume_worker.database.retry import Given, Result, with_retry
 from relume_worker.lease import HEARTBEAT_S, LeaseRenewer, log_lost_lease
 from relume_worker.ledger import Ledger

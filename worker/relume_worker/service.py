@@ -15,8 +15,8 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from relume.core.errors import NotFoundError, ParameterError, StorageError
 from relume.core.source_hash import bake_code
-from relume.store import read_code
 from relume.store.bake_protocol import BakeMethod, Plan, Recipe
+from relume.store.reader import read_code
 from relume_worker.backup.restore import refuse_unfinished
 from relume_worker.budget import check_budget
 from relume_worker.database import open_database

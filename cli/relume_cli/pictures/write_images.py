@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from relume.live.fixed_camera.protocols import OpenBake
+    from relume.live.opened.static_view import StaticViewBuilder
     from relume.look import Look
-    from relume.methods.static_view import StaticViewBuilder
     from relume.scene.model import Camera
     from relume_cli.pictures.files import ExrOptions
     from relume_cli.pictures.plans import PlannedFile, TurntablePlan

@@ -1,4 +1,4 @@
-"""Interface of an open bake for pictures, independent of the method; `relume.methods` implements it."""
+"""Interface of an open bake for pictures, independent of the method; `relume.live.opened` implements it."""
 
 from __future__ import annotations
 

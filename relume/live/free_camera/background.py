@@ -20,9 +20,9 @@ from relume.live.fixed_camera.background.background import MAX_CATCHER_RATIO
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.free_camera.environment_lookup import sample
 from relume.live.free_camera.primary_visibility import GBuffer
-from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.look.model import BackgroundLook
+from relume.probes.stored_scene import StoredScene
 
 F32 = NDArray[np.float32]
 

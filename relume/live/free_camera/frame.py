@@ -29,15 +29,15 @@ from relume.live.free_camera.incremental_frame import DirtyPixels, DirtyRegion, 
 from relume.live.free_camera.normal_mapping import light_gradient
 from relume.live.free_camera.primary_visibility import GBuffer, interpolate_to_nodes
 from relume.live.free_camera.probe_light.incident import IncidentCoefficients
-from relume.live.free_camera.probes.stored_scene import StoredScene
-from relume.live.free_camera.probes.texture_overrides import ProbeMapOverrides
 from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.live.free_camera.shade_pixels import InterpolatedProbes, MirrorData, shade_pixels
 from relume.live.free_camera.shade_probes import ProbeRadiance, shade_probes
 from relume.live.free_camera.texel_brdf.shade_texels import IncidentTexelLight, TextureFootprint, shade_texels
 from relume.live.free_camera.texel_brdf.texel_tables import BtfMaterials, find_btf_materials
 from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight
+from relume.live.free_camera.texture_overrides import ProbeMapOverrides
 from relume.look import Look
+from relume.probes.stored_scene import StoredScene
 from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]

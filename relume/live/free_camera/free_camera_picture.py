@@ -36,13 +36,13 @@ from relume.live.free_camera.primary_visibility import GBuffer, trace_primary
 from relume.live.free_camera.probe_light.incident import IncidentCoefficients
 from relume.live.free_camera.probe_light.jobs import IncrementalProbeLightJob, ProbeLightJob
 from relume.live.free_camera.probe_light.state import LightRequest, ProbeLightState
-from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.live.free_camera.refine_job import RefineHighlights, render_fine_frame
 from relume.live.free_camera.residual_correction import apply_residual
 from relume.live.free_camera.texel_brdf.job import TablesJob
 from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight
 from relume.look import Look
+from relume.probes.stored_scene import StoredScene
 from relume.scene.model import Camera
 from relume.views.resolve import encode_coverage, encode_pixels
 

@@ -9,7 +9,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.fresnel import schlick
-from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.probes.stored_scene import StoredScene
 from relume.raytrace.alpha_filter import STOP_AT_OPAQUE
 from relume.raytrace.alpha_test import GLASS_RULE
 from relume.raytrace.camera_rays import Hits, trace_rays

@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from relume.core.color import LUMINANCE
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
-from relume.live.free_camera.probes.stored_scene import StoredScene
-from relume.live.free_camera.probes.texture_kernels import sample_texture
+from relume.live.free_camera.texture_kernels import sample_texture
 from relume.math.zernike import basis_functions
+from relume.probes.stored_scene import StoredScene
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

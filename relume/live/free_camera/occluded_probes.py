@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges, parallel_for_chunks
 from relume.live.free_camera.primary_visibility import GBuffer
-from relume.live.free_camera.probes.triangle_grids import ProbeGrid, node_index
 from relume.live.free_camera.ray_scene import OcclusionMesh
+from relume.probes.triangle_grids import ProbeGrid, node_index
 from relume.raytrace.embree import occluded, packet_arguments
 from relume.raytrace.ray_packet import (
     LANES,

@@ -14,8 +14,8 @@ from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.antialiasing import EDGE_SAMPLE_POSITIONS, find_edges, samples_per_edge
 from relume.live.free_camera.glass import GlassLayers, find_glass_layers, trace_glass
-from relume.live.free_camera.probes.stored_scene import StoredScene
-from relume.live.free_camera.probes.triangle_grids import surrounding_nodes
+from relume.probes.stored_scene import StoredScene
+from relume.probes.triangle_grids import surrounding_nodes
 from relume.raytrace.alpha_filter import IGNORE_GLASS, STOP_AT_OPAQUE
 from relume.raytrace.camera_rays import Hits, trace_rays
 from relume.raytrace.embree import EmbreeScene

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.probes.stored_scene import StoredScene
 from relume.raytrace.barycentric import EDGE_OFFSET_FRACTION, min_barycentrics
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.scene_buffers import ray_epsilon

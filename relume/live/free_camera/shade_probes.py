@@ -21,8 +21,8 @@ from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS
 from relume.live.free_camera.basis.material_tables import Tables
 from relume.live.free_camera.basis.outgoing_coefficients import NUM_COLUMNS
 from relume.live.free_camera.basis.table_index import view_direction_local
-from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.math.zernike import recurrence
+from relume.probes.stored_scene import StoredScene
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

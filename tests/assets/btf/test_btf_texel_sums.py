@@ -14,12 +14,13 @@ from relume.live.fixed_camera.jobs import Shade
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
 from relume.live.fixed_camera.strategies.texel_sum import SumTexels
+from relume.live.opened.openers import open_bake
 from relume.look import validate
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume.transport.texture_light import rotated_tables, texture_light_rows
 
 GRAY = {"model": "lambert", "color": [0.5, 0.5, 0.5]}

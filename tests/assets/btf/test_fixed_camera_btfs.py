@@ -15,16 +15,17 @@ from relume.brdf.terms.btf import BtfRef
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import illumination_from_look
 from relume.live.fixed_camera.picture import Picture
+from relume.live.opened.openers import open_bake
 from relume.look import validate
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
 from relume.reference import ReferencePoints, reference_image
 from relume.reference.lobes import cosine_lobe
 from relume.reference.path_tracing import _sample_btf_surfaces, _sample_directions
 from relume.reference.roughness_classes import RoughnessClasses
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume.transport.btf_kernel import _MAX_FOOTPRINT_SAMPLES, _MAX_SPACING, F64, texel_rows
 
 CAMERA = make_camera("front", [0.3, 1.6, 1.9], [0, 0, 0], 0.5)

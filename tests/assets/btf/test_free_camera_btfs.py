@@ -11,7 +11,6 @@ from relume.assets.btf.btf_store import load_btf
 from relume.assets.btf.direction_rings import directions, interpolation_weights_numpy, ubo_grid
 from relume.live.free_camera import frame
 from relume.live.free_camera.primary_visibility import trace_primary
-from relume.live.free_camera.probes.lattice_nodes import LatticeNodes
 from relume.live.free_camera.texel_brdf import texel_tables
 from relume.live.free_camera.texel_brdf.coefficient_packing import COEFFICIENT_AXIS, COEFFICIENT_LANE, FUNCTIONS
 from relume.live.free_camera.texel_brdf.shade_texels import IncidentTexelLight, TextureFootprint, shade_texels
@@ -25,6 +24,7 @@ from relume.live.free_camera.texel_brdf.texture_frame_light import F32, TexelLig
 from relume.look import validate
 from relume.math.zernike import basis_functions, recurrence
 from relume.output.render_image import render_image
+from relume.probes.lattice_nodes import LatticeNodes
 
 SCALE, ROTATION, MEAN = 2.0, 40.0, np.float32(0.02)
 TO_LIGHT = np.array([0.5, 0.8, 0.2]) / np.linalg.norm([0.5, 0.8, 0.2])

@@ -14,11 +14,12 @@ from relume.core.errors import ChunkDamagedError
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.strategies.incremental_light import PrecomputeRows
 from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
-from relume.methods.registry import METHODS, open_transfer
+from relume.live.opened.openers import open_transfer
+from relume.methods.registry import METHODS
 from relume.reference import reference_image
 from relume.scene.model import Material, Texture, TextureEncoding
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 from relume.views.view import open_view
 
 FLOOR = "/materials/Floor/terms/1/"

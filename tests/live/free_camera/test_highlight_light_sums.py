@@ -25,11 +25,12 @@ from relume.live.free_camera.highlights.light_sum_kernel import (
     EnvironmentLights,
     sum_lights,
 )
-from relume.live.free_camera.probes.stored_scene import StoredScene
-from relume.methods.registry import METHODS, open_bake
+from relume.live.opened.openers import open_bake
+from relume.methods.registry import METHODS
+from relume.probes.stored_scene import StoredScene
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 CAMERA = make_camera("front", [0, 0.5, 3], [0, 0, 0], 0.75)
 CAMERA_POSITION = np.array([0.4, 1.5, 3.0], np.float32)

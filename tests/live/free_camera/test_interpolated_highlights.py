@@ -30,18 +30,19 @@ from relume.live.free_camera.highlights.lobe_light_lists import (
     sigma_at_width,
 )
 from relume.live.free_camera.highlights.lobe_visibility import trace_lobe_visibility
-from relume.live.free_camera.probes.density import density_from_distance
-from relume.live.free_camera.probes.mesh_lattice import make_corner_grid, mesh_components, place_probes
-from relume.live.free_camera.probes.visible_sides import visible_sides
 from relume.live.free_camera.shade_pixels import shade_pixels
 from relume.live.free_camera.shade_probes import ProbeRadiance
+from relume.live.opened.openers import open_bake
 from relume.look import complete, validate
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
+from relume.probes.density import density_from_distance
+from relume.probes.mesh_lattice import make_corner_grid, mesh_components, place_probes
+from relume.probes.visible_sides import visible_sides
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 GLOSSY = {"model": "blinn_phong", "color": [0.9, 0.6, 0.3], "params": {"exponent": 30.0}}
 BROAD_TERM = {"model": "ward_anisotropic", "color": [0.9, 0.6, 0.3], "params": {"alpha_x": 0.5, "alpha_y": 0.35}}

@@ -17,15 +17,16 @@ from relume.live.free_camera.environment_lookup import rotation_of
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
 from relume.live.free_camera.highlights.lobe_gradients import F32, F64, gradients_along_lobe
 from relume.live.free_camera.primary_visibility import interpolate_to_nodes, trace_primary
-from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.shade_pixels import InterpolatedProbes, MirrorData, shade_pixels
 from relume.live.free_camera.shade_probes import shade_probes
+from relume.live.opened.openers import open_bake
 from relume.math.zernike import DEGREES, WINDOW_DECAY, basis_functions
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
+from relume.probes.stored_scene import StoredScene
 from relume.raytrace.surface_points import SurfacePoints
 from relume.scene.model import Material
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 CAMERA, SIZE = make_camera("front", [0, 0.5, 3], [0, 0, 0], 0.75), (64, 48)
 CAMERA_POSITION = CAMERA.to_world[:3, 3].astype(np.float32)

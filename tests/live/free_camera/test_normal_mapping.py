@@ -7,14 +7,15 @@ from tiny_scenes import make_camera, make_tiny_scene, quad, studio
 from relume.core.cache import Cache
 from relume.core.color import LUMINANCE
 from relume.live.free_camera.normal_mapping import F32, F64, basis_gradients, light_gradient
-from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.live.opened.openers import open_bake
 from relume.look import complete, validate
 from relume.math.zernike import NUM_FUNCTIONS, basis_functions
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
 from relume.output.render_image import render_image
+from relume.probes.stored_scene import StoredScene
 from relume.scene.model import Material, Texture
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 WAVES = 4
 LAMBERT = ({"model": "lambert", "color": [0.8, 0.7, 0.6]},)

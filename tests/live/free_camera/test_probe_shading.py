@@ -15,19 +15,20 @@ from relume.live.free_camera.basis.material_tables import build_tables
 from relume.live.free_camera.environment_lookup import rotation_of, sample
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
 from relume.live.free_camera.primary_visibility import interpolate_to_nodes, trace_primary
-from relume.live.free_camera.probes.density import density_from_distance
-from relume.live.free_camera.probes.mesh_lattice import make_corner_grid, place_probes
-from relume.live.free_camera.probes.triangle_grids import ProbeDensity, node_index, num_nodes
-from relume.live.free_camera.probes.visible_sides import visible_sides
 from relume.live.free_camera.shade_pixels import InterpolatedProbes, MirrorData, shade_pixels
 from relume.live.free_camera.shade_probes import shade_probes
+from relume.live.opened.openers import open_bake
 from relume.look import EnvironmentKey
-from relume.methods.registry import METHODS, open_bake
+from relume.methods.registry import METHODS
+from relume.probes.density import density_from_distance
+from relume.probes.mesh_lattice import make_corner_grid, place_probes
+from relume.probes.triangle_grids import ProbeDensity, node_index, num_nodes
+from relume.probes.visible_sides import visible_sides
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.raytrace.texture import MipMap
 from relume.scene.model import Camera
-from relume.store import bake_in_process
 from relume.store.bake_protocol import Recipe
+from relume.store.run_bake import bake_in_process
 
 BROAD_WIDTHS = {"alpha_x": 0.45, "alpha_y": 0.3}  # a highlight that the basis can represent
 

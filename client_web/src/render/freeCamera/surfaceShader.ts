@@ -78,7 +78,7 @@ void finish(vec4 pixel) { outColor = vec4(min(pixel.rgb, 65000.0), pixel.a); }
 `;
 const finishGlsl = ({ direct, coverage }: ImageFeatures) => (direct ? encodeGlsl(coverage) : SAMPLES);
 
-/** Trilinear texture lookup, as `relume.live.free_camera.probes.texture_kernels`. */
+/** Trilinear texture lookup, as `relume.live.free_camera.texture_kernels`. */
 const TEXTURES = `
 uniform sampler2D uTexels, uUvs;
 uniform usampler2D uLevels;

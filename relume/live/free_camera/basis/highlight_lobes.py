@@ -18,7 +18,6 @@ averaged over it and get one lobe.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from itertools import compress
@@ -29,6 +28,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
+from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.quadrature import Quadrature
 from relume.brdf.symmetry import has_reflection_symmetry
 from relume.brdf.texture_slots import TEXTURES, texture_slot
@@ -42,8 +42,8 @@ from relume.live.free_camera.basis.outgoing_coefficients import (
     NUM_ROWS,
     OutgoingCoefficients,
     cosines,
+    untextured_white_term,
     white_coefficients,
-    white_term_key,
 )
 from relume.live.free_camera.basis.two_lobes import NUM_PARAMETERS, fit_two_lobes
 
@@ -128,7 +128,7 @@ def is_representable(terms: Sequence[Mapping[str, Any]]) -> bool:
 def _is_term_representable(term: Mapping[str, Any]) -> bool:
     coefficients = white_coefficients(term)
     return coefficients.residual_energy <= _REPRESENTABLE_RESIDUAL or not (
-        is_narrow(coefficients) or _needs_two_lobes(_fit_lobe(white_term_key(term))[:, 6:8])
+        is_narrow(coefficients) or _needs_two_lobes(_fit_lobe(untextured_white_term(term))[:, 6:8])
     )
 
 
@@ -197,12 +197,12 @@ def build_lobes(materials: Sequence[Sequence[Mapping[str, Any]]]) -> Lobes:
         grid_values = np.zeros((NUM_ROWS, NUM_GRID_DIRECTIONS))
         needs_grid = max_ratio[-1] == 1  # else the basis represents it
         for term in compress(terms, is_in_lobe):
-            lobe_parameters = _fit_lobe(white_term_key(term))
+            lobe_parameters = _fit_lobe(untextured_white_term(term))
             term_albedo = lobe_parameters[:, :3] * np.asarray(term["color"], np.float64)
             albedo_by_group[:, texture_slot(term)] += term_albedo
             weighted_parameters += term_albedo.mean(axis=1, keepdims=True) * lobe_parameters[:, 3:]
             if needs_grid:
-                grid_values += np.mean(term["color"]) * _grid_values(white_term_key(term))
+                grid_values += np.mean(term["color"]) * _grid_values(untextured_white_term(term))
         total = albedo_by_group.sum(axis=1).mean(axis=1)[:, None]
         albedo.append(albedo_by_group)
         shape_parameters.append(np.where(total > 0, weighted_parameters / np.maximum(total, 1e-30), 1))
@@ -313,9 +313,9 @@ def _anisotropic_grid_values(document: Mapping[str, Any]) -> F64:
 
 
 @lru_cache(maxsize=_MAX_CACHED)
-def _fit_lobe(term_text: str) -> F64:
+def _fit_lobe(term: FrozenTerm) -> F64:
     """a of each channel; cos θ of both lobes, s_1, σ of both; cos θm, √(1 − R). (`NUM_ROWS`, 10)"""
-    document = json.loads(term_text)
+    document = term.document
     if not white_coefficients(document).is_isotropic:
         moments = _anisotropic_moments(document)
         mean, single_sigma = _single_lobe(moments)
@@ -331,9 +331,9 @@ def _fit_lobe(term_text: str) -> F64:
 
 
 @lru_cache(maxsize=_MAX_CACHED)
-def _grid_values(term_text: str) -> F64:
+def _grid_values(term: FrozenTerm) -> F64:
     """ρ cos θi at grid directions, mean over channels. (`NUM_ROWS`, `NUM_GRID_DIRECTIONS`)"""
-    document, grid = json.loads(term_text), _isotropic_grid()
+    document, grid = term.document, _isotropic_grid()
     if not white_coefficients(document).is_isotropic:
         return _anisotropic_grid_values(document)
     return np.asarray(grid.grid_quadrature.values(document).mean(axis=0) * grid.cosine)

@@ -8,7 +8,6 @@ alone, times cos mφ and sin mφ. Other terms have tables over θo and φo.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,6 +18,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.evaluate import eval_brdf
+from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.quadrature import Quadrature
 from relume.brdf.symmetry import has_reflection_symmetry, is_isotropic
 from relume.live.free_camera.basis.table_symmetry import expand_quarter
@@ -98,17 +98,17 @@ def outgoing_coefficients(term_document: Mapping[str, Any]) -> OutgoingCoefficie
 
 def white_coefficients(term_document: Mapping[str, Any]) -> OutgoingCoefficients:
     """Project a term without its color and texture."""
-    return _white_coefficients(white_term_key(term_document))
+    return _white_coefficients(untextured_white_term(term_document))
 
 
-def white_term_key(term_document: Mapping[str, Any]) -> str:
-    """Return a cache key of a term without its color and texture."""
-    return json.dumps({**term_document, "color": _WHITE, "texture": None}, sort_keys=True)
+def untextured_white_term(term_document: Mapping[str, Any]) -> FrozenTerm:
+    """Return a term without its color and texture, by which results are cached."""
+    return FrozenTerm.from_document(term_document, color=_WHITE, texture=None)
 
 
 @lru_cache(maxsize=_MAX_CACHED)
-def _white_coefficients(term_text: str) -> OutgoingCoefficients:
-    document = json.loads(term_text)
+def _white_coefficients(term: FrozenTerm) -> OutgoingCoefficients:
+    document = term.document
     is_term_isotropic = is_isotropic(document)
     is_quarter = not is_term_isotropic and has_reflection_symmetry(document)
     num_columns = 1 if is_term_isotropic else NUM_COLUMNS // 4 + 1 if is_quarter else NUM_COLUMNS

@@ -20,10 +20,10 @@ from relume.live.free_camera.highlights.lobe_light_lists import (
     SIDE,
 )
 from relume.live.free_camera.normal_mapping import basis_gradients
-from relume.live.free_camera.probes.stored_scene import StoredScene, Textures
-from relume.live.free_camera.probes.triangle_grids import ProbeGrid, num_nodes
 from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.math.zernike import NUM_FUNCTIONS, recurrence
+from relume.probes.stored_scene import StoredScene, Textures
+from relume.probes.triangle_grids import ProbeGrid, num_nodes
 
 Texels = NDArray[Any]
 

@@ -38,8 +38,8 @@ def lobe_shape_array(lobes: Lobes, material: int, normal_variation: Shaped[F32, 
     """Return the table of a material's highlight.
 
     Args:
-        lobes: lobes of all materials. material: one with a lobe. normal_variation: variation of all normals, see
-            `relume.live.free_camera.probes.stored_scene.StoredScene`.
+        lobes: of all materials. material: one with a lobe. normal_variation: of all, see
+            `relume.probes.stored_scene.StoredScene`.
     Returns:
         Of each row 1 − β, α², and the weight of the table for varying normals; then, for each width and ring, the
         values at its first four azimuths, and at its last four. (rows · (1 + widths · rings · 2), 4) float16

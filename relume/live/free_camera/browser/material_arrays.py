@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -11,6 +10,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.texture_slots import TEXTURES
 from relume.live.fixed_camera.illumination import material_emission
 from relume.live.free_camera.basis.highlight_lobes import NUM_GROUPS, Lobes
@@ -19,9 +19,9 @@ from relume.live.free_camera.browser.highlight_arrays import environment_light_a
 from relume.live.free_camera.environment_lookup import rotation_of
 from relume.live.free_camera.frame import FrameRequestState, MaterialState
 from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists, lobe_widths
-from relume.live.free_camera.probes.stored_scene import EMISSION, NORMAL_MAP
 from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.math.zernike import DEGREE, DEGREES, FAST_DEGREE, NUM_FUNCTIONS, num_functions, recurrence
+from relume.probes.stored_scene import EMISSION, NORMAL_MAP
 from relume.views.resolve import encode_pixels
 
 F32 = NDArray[np.float32]
@@ -151,7 +151,7 @@ def _highlight_blocks(transfer: FreeCameraTransfer, state: FrameRequestState) ->
     )
     shapes = {
         f"shapes/{k}": ArrayBlock(
-            (json.dumps(projected[k].terms, sort_keys=True), float(normal_variation[k])),
+            (tuple(map(FrozenTerm.from_document, projected[k].terms)), float(normal_variation[k])),
             partial(lobe_shape_array, lobes, k, normal_variation),
         )
         for k in np.flatnonzero(lobes.lobe_index >= 0).tolist()

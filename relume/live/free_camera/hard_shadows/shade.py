@@ -21,9 +21,9 @@ from relume.live.free_camera.basis.material_tables import Tables
 from relume.live.free_camera.hard_shadows.lights import HardShadowLight
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
 from relume.live.free_camera.primary_visibility import GBuffer, interpolate_to_nodes
-from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.shade_pixels import InterpolatedProbes, MirrorData, shade_pixels
 from relume.live.free_camera.shade_probes import shade_probes
+from relume.probes.stored_scene import StoredScene
 from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]

@@ -28,8 +28,8 @@ from relume.live.free_camera.highlights.environment_lobe_lookup import (
     evaluate_lobe,
     evaluate_two_lobes,
 )
-from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.shade_probes import ProbeRadiance
+from relume.probes.stored_scene import StoredScene
 
 F32 = NDArray[np.float32]
 

@@ -27,7 +27,7 @@ from relume.live.free_camera.basis.lobe_shapes import (
     WIDTHS,
 )
 from relume.live.free_camera.basis.table_index import MIN_COSINE, table_row
-from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.probes.stored_scene import StoredScene
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

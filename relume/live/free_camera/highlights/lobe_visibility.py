@@ -24,7 +24,7 @@ from relume.live.free_camera.highlights.lobe_light_lists import (
     light_weight,
     width_index,
 )
-from relume.live.free_camera.probes.stored_scene import StoredScene
+from relume.probes.stored_scene import StoredScene
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

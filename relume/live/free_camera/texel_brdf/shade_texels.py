@@ -23,7 +23,6 @@ from relume.core.simd import prefetch
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.antialiasing import is_edge
 from relume.live.free_camera.primary_visibility import GBuffer
-from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.texel_brdf.coefficient_packing import NUM_COEFFICIENTS
 from relume.live.free_camera.texel_brdf.lanes import add_texels, integrate, pack_secondary_axes
 from relume.live.free_camera.texel_brdf.texel_tables import BtfMaterial
@@ -45,6 +44,7 @@ from relume.live.free_camera.texel_brdf.texture_coordinates import (
     vector_row,
 )
 from relume.live.free_camera.texel_brdf.texture_frame_light import NodeLight, TexelLight, rotation_from_vector
+from relume.probes.stored_scene import StoredScene
 from relume.transport.btf_kernel import texels_at_level
 
 F32 = NDArray[np.float32]

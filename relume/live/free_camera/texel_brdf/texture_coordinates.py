@@ -16,9 +16,9 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
-from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.shade_pixels import texture_footprint
 from relume.math.fast_math import acos_clamped, azimuth_fraction
+from relume.probes.stored_scene import StoredScene
 from relume.transport.btf_kernel import mip_level
 
 F32 = NDArray[np.float32]

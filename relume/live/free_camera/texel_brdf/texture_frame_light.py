@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
 from relume.live.free_camera.primary_visibility import mark_needed_probes
-from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.texel_brdf.coefficient_packing import EMPTY_LANE, FUNCTIONS, HALF, HAS_ORDER, PAIRS, WIDTH
 from relume.live.free_camera.texel_brdf.texture_coordinates import cross, dot, face_placements, vector_row
+from relume.probes.stored_scene import StoredScene
 
 F32 = NDArray[np.float32]
 U8 = NDArray[np.uint8]

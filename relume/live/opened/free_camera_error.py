@@ -23,8 +23,8 @@ from relume.core.jackknife import JackknifeEstimate, rms_of_parts
 from relume.live.free_camera.camera_paths import pivot_of, turntable
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.refinement.refinement_jobs import StaticViewState
-from relume.methods.free_camera_transfer import BakedFreeCamera
-from relume.methods.static_view import StaticViewBuilder
+from relume.live.opened.free_camera_transfer import BakedFreeCamera
+from relume.live.opened.static_view import StaticViewBuilder
 from relume.scene.model import Camera, Scene
 from relume.store.bake_protocol import StoreReader
 
@@ -34,8 +34,6 @@ _SIZE, _SMALL_SIZE, _BLOCK_SIZE = (64, 48), (32, 24), 8
 _MAX_VIEWS = 3
 _TURNTABLE_STEPS = 18  # of a full turn: as far as one drag rotates a camera
 _BUDGET_BYTES = 1 << 30
-PROBE_BYTES = 2600  # per probe during the measurement: six vectors of 36 coefficients
-BYTES = 300 << 20  # of everything else: tables, environments, static views
 _DIGITS = 4
 
 
@@ -47,7 +45,7 @@ def measure_error(store: StoreReader, scene: Scene, size: tuple[int, int]) -> Sh
         size: default width and height of the images; small ones are measured with fewer rays.
     """
     # no folder: images are not saved beside an unfinished bake
-    transfer = BakedFreeCamera.from_store(store, f"unfinished bake/{scene.id}", Cache(_BUDGET_BYTES))
+    transfer = BakedFreeCamera.from_store(store, f"unfinished bake/{scene.id}", Cache(_BUDGET_BYTES), is_measured=False)
     try:
         rays = _SIZE if size[0] * size[1] >= _SIZE[0] * _SIZE[1] else _SMALL_SIZE
         estimate = _estimate_error(transfer, StaticViewBuilder(transfer.light_transport, scene), rays)

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from relume.core.color import luminance
 from relume.lights.spherical_triangles import TriangleLights
-from relume.live.free_camera.probes.mesh_lattice import NODES_PER_PROBE, PlacedProbes
-from relume.live.free_camera.probes.triangle_grids import (
+from relume.probes.mesh_lattice import NODES_PER_PROBE, PlacedProbes
+from relume.probes.triangle_grids import (
     GridSteps,
     ProbeDensity,
     ProbeGrid,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import Illumination, Normals, equal_up_to_reflectances
-from relume.methods.patch_direct_light import DirectPatchLight
+from relume.live.opened.patch_direct_light import DirectPatchLight
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.radiosity.highlight_transport import outgoing_in_highlights
 from relume.radiosity.outgoing_radiance import OutgoingHighlights, OutgoingRadiance

@@ -1,7 +1,7 @@
-"""Virtual lights of planar mirrors: exact, sharp reflections of the lights whose mirrored shadow rays were traced.
+"""Light of planar mirrors: exact, sharp reflections of the lights whose mirrored shadow rays were traced.
 
-A patch on a mirror reflects light in a low-degree basis, some 30° wide, even that of a small sun. It excludes the
-light of the traced lights to samples that store their mirrored visibility: these receive
+The light that a patch on a mirror reflects excludes that of the traced lights to samples that store their mirrored
+visibility (`relume.methods.mirror_lights`): these receive
 
     E m c F(θ)   from the direction v = d − 2 (d · n) n,   cos θ = |d · n|,
 
@@ -13,140 +13,28 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.albedo import Reflectances, pack_reflectance, unpack_mirrors
-from relume.brdf.specular import specular_terms, split_specular
-from relume.camera.planar_mirrors import (
-    MAX_PLANES,
-    PlanarMirrors,
-    find_planar_mirrors,
-    has_planar_mirrors,
-    mirrored_lights,
-)
+from relume.brdf.albedo import Reflectances, material_reflectance
+from relume.brdf.specular import split_specular
+from relume.brdf.specular_reflectance import specular_terms
+from relume.camera.planar_mirrors import mirrored_lights
 from relume.core.cache import Cache
-from relume.core.color import luminance
-from relume.core.errors import ChunkDamagedError, StoreError
-from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import TriangleLights
 from relume.live.fixed_camera.illumination import Illumination
 from relume.look import EnvironmentKey
 from relume.math.zernike import OUTGOING_DEGREE
-from relume.methods.store_layout import read_lights, read_tiles
+from relume.methods.mirror_lights import NO_PLANE, MirrorLights
 from relume.radiosity.highlight_transport import DirectLobes, outgoing_in_highlights
 from relume.radiosity.outgoing_radiance import OutgoingRadiance, first_bounce
 from relume.radiosity.patch_irradiance import PatchLight
 from relume.radiosity.reflectance_operator import IncidentLight, ReflectanceOperator
-from relume.raytrace.scene_buffers import SceneBuffers
-from relume.scene.model import Scene
-from relume.store.bake_protocol import Recipe, StoreReader
 from relume.transport.shading_points import MirrorRays
 
 F32 = NDArray[np.float32]
-
-NO_PLANE = 255  # of patches
-MAX_GROUPS = 128
-_BRIGHT = 8.0  # times the mean radiance of the environment: gather rays suffice for dimmer light
-
-
-@dataclass(frozen=True)
-class MirrorLights:
-    """The traced lights, grouped by direction.
-
-    Attributes:
-        lights: indices of the T traced lights of the bake. group: group of each.
-        direction: to the G groups. mirrors: the planes, P of them.
-        plane: plane of each patch, `NO_PLANE` if it lies in none.
-    """
-
-    lights: Shaped[NDArray[np.int32], " T"]
-    group: Shaped[NDArray[np.int32], " T"]
-    direction: Shaped[F32, "G 3"]
-    mirrors: PlanarMirrors
-    plane: Shaped[NDArray[np.uint8], " patches"]
-
-    @property
-    def num_mirrored_lights(self) -> int:
-        """Number of virtual lights in all planes, P G."""
-        return self.mirrors.num_planes * len(self.direction)
-
-    @classmethod
-    def from_lights(
-        cls, lights: TriangleLights, tiles: Tiles, mirrors: PlanarMirrors, plane: Shaped[NDArray[np.uint8], " patches"]
-    ) -> MirrorLights:
-        """Select the lights that are too bright for a low-degree basis.
-
-        Args:
-            lights: lights of a bake. tiles: tiles of these lights. mirrors: mirrors of its scene.
-            plane: plane of its patches.
-        """
-        brightness = luminance(lights.irradiance).astype(np.float64)
-        bright_indices = np.flatnonzero(brightness > _BRIGHT * brightness.sum() / (4 * np.pi) * tiles.solid_angles)
-        # neighbors in sequence
-        bright_indices = bright_indices[np.argsort(tiles.traversal_key[bright_indices], kind="stable")]
-        num_groups = min(len(bright_indices), MAX_GROUPS)
-        group = np.arange(len(bright_indices)) * num_groups // max(1, len(bright_indices))
-        summed_direction = np.zeros((num_groups, 3))
-        np.add.at(summed_direction, group, brightness[bright_indices, None] * lights.direction[bright_indices])
-        direction = (summed_direction / np.linalg.norm(summed_direction, axis=1, keepdims=True)).astype(np.float32)
-        selected_groups = bright_indices.astype(np.int32), group.astype(np.int32), direction
-        return cls(*selected_groups, mirrors, plane)
-
-    @property
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """Arrays for a store."""
-        fields = {**vars(self), **self.mirrors._asdict()}
-        del fields["mirrors"]
-        return {f"mirror_lights/{name}": array for name, array in fields.items()}
-
-
-def max_mirror_lights(scene: Scene, recipe: Recipe) -> int:
-    """Maximum number of virtual lights of a sample, P G."""
-    return MAX_PLANES * min(MAX_GROUPS, recipe.num_lights) if has_planar_mirrors(scene) else 0
-
-
-def make_mirror_lights(
-    scene: Scene, geometry: SceneBuffers, store: StoreReader, patch_positions: Shaped[F32, "patches points 3"]
-) -> dict[str, NDArray[Any]]:
-    """Compute the arrays that `read_mirror_lights` reads; empty if no mirror reflects a bright light.
-
-    Args:
-        scene: that is baked. geometry: its triangles. store: with its lights. patch_positions: sample points.
-    """
-    if not has_planar_mirrors(scene):
-        return {}
-    mirrors = find_planar_mirrors(scene, geometry)
-    mirror_lights = MirrorLights.from_lights(
-        read_lights(store), read_tiles(store), mirrors, mirrors.containing_plane(patch_positions, geometry.epsilon)
-    )
-    return mirror_lights.arrays if mirror_lights.num_mirrored_lights else {}
-
-
-def read_mirror_lights(store: StoreReader) -> MirrorLights | None:
-    """Read the mirror lights of a store; None without planar mirrors or bright lights."""
-    try:
-        store.shape("mirror_lights/offset")
-    except StoreError:
-        return None
-
-    def read(name: str) -> NDArray[Any]:
-        return store.read(f"mirror_lights/{name}")
-
-    mirrors = PlanarMirrors(*map(read, PlanarMirrors._fields))
-    mirror_lights = MirrorLights(read("lights"), read("group"), read("direction"), mirrors, read("plane"))
-    limits: list[tuple[NDArray[Any], int]] = [
-        (mirror_lights.lights, store.shape("lights/irradiance")[0]),
-        (mirror_lights.group, len(mirror_lights.direction)),
-        (mirrors.material, len(store.attributes["materials"])),
-    ]
-    are_valid = all(len(indices) == 0 or 0 <= indices.min() <= indices.max() < limit for indices, limit in limits)
-    if not are_valid or mirror_lights.plane.shape != store.shape("patches/material"):
-        raise ChunkDamagedError("mirror_lights", "its arrays do not match the lights, materials or patches")
-    return mirror_lights
 
 
 @dataclass(frozen=True)
@@ -234,7 +122,7 @@ class MirrorLightTransfer:
         for p, material in enumerate(mirror_lights.mirrors.material):
             on_plane = mirror_lights.plane == p
             tint = tints[on_plane].mean(axis=0) if on_plane.any() else np.ones(3)
-            terms = unpack_mirrors(light.reflectances[material])
+            terms = light.reflectances[material].planar_mirrors
             mirror_reflectance[p] = specular_terms(terms, cosine[p], np.broadcast_to(tint, (len(cosine[p]), 3)))
         return np.asarray((mirror_reflectance * incident).reshape(-1, 3), np.float32)
 
@@ -294,6 +182,4 @@ class MirrorLightTransfer:
 
 def _mirror_reflectances(reflectances: Reflectances) -> Reflectances:
     """Return the specular part of materials."""
-    return tuple(
-        pack_reflectance(list(map(split_specular, unpack_mirrors(reflectance)))) for reflectance in reflectances
-    )
+    return tuple(material_reflectance(list(map(split_specular, material.planar_mirrors))) for material in reflectances)

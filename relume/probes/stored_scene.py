@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from relume.brdf.texture_slots import TEXTURES
 from relume.core.errors import ChunkDamagedError, StoreError
-from relume.live.free_camera.probes.lattice_nodes import LatticeNodes
-from relume.live.free_camera.probes.triangle_grids import ProbeGrid, num_nodes
+from relume.probes.lattice_nodes import LatticeNodes
+from relume.probes.triangle_grids import ProbeGrid, num_nodes
 from relume.raytrace.gather_rays import RayPattern, make_pattern
 from relume.raytrace.scene_buffers import SceneBuffers
 from relume.raytrace.surface_points import SurfacePoints

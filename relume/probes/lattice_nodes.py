@@ -1,7 +1,7 @@
 """Merge the nodes of all grids, choose the probes among them, and interpolate the others from nearby probes.
 
 Corners of a mesh that is finer than the probe spacing keep their own normals
-(`relume.live.free_camera.probes.interpolation_weights`).
+(`relume.probes.interpolation_weights`).
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
-from relume.live.free_camera.probes.interpolation_weights import (
+from relume.probes.interpolation_weights import (
     MATERIAL_SEPARATION,
     weights_from_edge_ends,
     weights_from_nearby_probes,
 )
-from relume.live.free_camera.probes.triangle_grids import ProbeGrid
+from relume.probes.triangle_grids import ProbeGrid
 from relume.raytrace.surface_points import SurfacePoints
 
 F32 = NDArray[np.float32]

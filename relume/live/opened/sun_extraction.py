@@ -12,8 +12,8 @@ from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights,
 from relume.lights.sun_disks import SplitEnvironment, remove_sun_disks
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.free_camera.hard_shadows.lights import HardShadowLight, sun_shadow_targets, unoccluded_sun_vectors
+from relume.live.opened.fixed_views import BakedFixedViews, displayed_of
 from relume.look import EnvironmentKey
-from relume.methods.opened.fixed_views import BakedFixedViews, displayed_of
 from relume.raytrace.surface_points import SurfacePoints
 
 F32 = NDArray[np.float32]

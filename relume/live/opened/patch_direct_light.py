@@ -14,10 +14,11 @@ from relume.lights.light_sampling import LightStrata
 from relume.lights.local_lights import LocalLight, emitter_geometry
 from relume.lights.spherical_triangles import TriangleLights
 from relume.live.fixed_camera.illumination import Illumination, LightSource
+from relume.live.opened.harmonic_light import HarmonicLight
+from relume.live.opened.local_lights import LocalLights
 from relume.look import EnvironmentKey, LightGeometry
 from relume.math.zernike import OUTGOING_DEGREE
-from relume.methods.local_lights import LocalLights
-from relume.methods.spherical_harmonic_transfer import PATCH_DEGREE, HarmonicLight
+from relume.methods.spherical_harmonic_transfer import PATCH_DEGREE
 from relume.radiosity.highlight_transport import DirectLobes
 from relume.radiosity.patch_irradiance import PatchLight
 from relume.radiosity.reflectance_operator import IncidentLight, ReflectanceOperator

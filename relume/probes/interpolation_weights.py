@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.spatial import cKDTree
 
-from relume.live.free_camera.probes.triangle_grids import ProbeGrid, enumerate_nodes, find_edge_midpoints
+from relume.probes.triangle_grids import ProbeGrid, enumerate_nodes, find_edge_midpoints
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 
 from relume.core.errors import CancelledError
 from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
+from relume.live.opened.fixed_views import SampledTransfer
+from relume.live.opened.fixed_views_indirect import BakedIndirectViews
+from relume.live.opened.indirect_solver import IndirectSolver
+from relume.live.opened.local_lights import LocalLights
 from relume.methods.gather import GatherMethod
-from relume.methods.indirect_solver import IndirectSolver
-from relume.methods.local_lights import LocalLights
-from relume.methods.opened.fixed_views import SampledTransfer
-from relume.methods.opened.fixed_views_indirect import BakedIndirectViews
 from relume.operators.image_cache import ImageFiles
 from relume.scene.custom_camera import with_cameras
 from relume.scene.model import Camera, Scene
@@ -77,7 +77,7 @@ class StaticView(BakedIndirectViews):
     reflects: bool
 
     @classmethod
-    def from_store(cls, light_transport: BakedIndirectViews, store: ExtendedStore, reflects: bool) -> StaticView:
+    def from_bake(cls, light_transport: BakedIndirectViews, store: ExtendedStore, reflects: bool) -> StaticView:
         """Open the view of an extended store.
 
         Args:
@@ -213,7 +213,7 @@ class StaticViewBuilder:
             )
             tracing = cache.get(key, StaticTracing, new_tracing.num_bytes, lambda: new_tracing)
         tracing.complete_tracing(reflects, progress, is_canceled)
-        return StaticView.from_store(self._light_transport, tracing.store, reflects)
+        return StaticView.from_bake(self._light_transport, tracing.store, reflects)
 
     def _start_tracing(self, method: GatherMethod, camera: Camera, size: tuple[int, int]) -> StaticTracing:
         recipe = Recipe(method.name, (camera.name,), size, self._light_transport.num_lights)

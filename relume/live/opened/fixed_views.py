@@ -12,9 +12,10 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.assets import environments
+from relume.assets.environments.environment_names import load_environment
 from relume.assets.environments.equirect import halve_to_width, lookup, rotate_about_y
 from relume.core.cache import Cache
+from relume.core.errors import ParameterError, StoreError
 from relume.core.source_hash import image_code
 from relume.lights.light_clusters import cluster_lights, num_clusters
 from relume.lights.local_lights import num_samples
@@ -23,11 +24,11 @@ from relume.lights.sphere_tiles import Tiles
 from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
 from relume.live.fixed_camera.illumination import Illumination, with_baked_normals
 from relume.live.fixed_camera.protocols import CameraMode, EditAxis, LightsAndPoints
-from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry
-from relume.methods.indirect_solver import IndirectSolver
-from relume.methods.local_lights import LocalLights, ShadowCache
-from relume.methods.planar_mirror_light import AddedMirrorLights
-from relume.methods.retrace import NormalRetracer
+from relume.live.opened.indirect_solver import IndirectSolver
+from relume.live.opened.local_lights import LocalLights, ShadowCache
+from relume.live.opened.planar_mirror_light import AddedMirrorLights
+from relume.live.opened.retrace import NormalRetracer
+from relume.look import BAKED_ENVIRONMENT, EnvironmentKey, LightGeometry, complete
 from relume.methods.store_layout import read_lights, read_shadow_ray_directions, read_tiles
 from relume.operators.image_cache import ImageFiles
 from relume.raytrace.surface_points import SurfacePoints
@@ -68,6 +69,17 @@ class BakedFixedViews:
     camera_mode = CameraMode.FIXED
     axes = frozenset((EditAxis.CURVE, EditAxis.PARAMETER, EditAxis.LIGHT, EditAxis.ENVIRONMENT))
 
+    @classmethod
+    def from_store(cls, store: StoreReader, key: str, cache: Cache) -> Self:
+        """Open a store: an `Opener`.
+
+        Args:
+            store: an open store. key: of the bake in the cache. cache: of results computed from the bake.
+        Raises:
+            StoreError: its description is invalid. ChunkDamagedError: its arrays do not match.
+        """
+        return cls(**read_fields(store, key, cache))
+
     @cached_property
     def derived(self) -> ImageFiles:
         """Images of the default look, computed once."""
@@ -103,7 +115,7 @@ class BakedFixedViews:
         Raises:
             NotFoundError: it does not exist here. SceneError: its files are damaged.
         """
-        return environments.load_environment(name).radiance if name is not None else self._scene_radiance()
+        return load_environment(name).radiance if name is not None else self._scene_radiance()
 
     def _scene_radiance(self) -> F32:
         def read() -> F32:
@@ -334,3 +346,41 @@ def displayed_of(lights: TriangleLights, light: Illumination) -> TriangleLights:
     if light.environment_gain == (1.0, 1.0, 1.0):
         return lights
     return replace(lights, irradiance=lights.irradiance * np.array(light.environment_gain, np.float32))
+
+
+def read_fields(store: StoreReader, key: str, cache: Cache) -> dict[str, Any]:
+    """Read the fields of `BakedFixedViews` from a store.
+
+    Args:
+        store: an open store. key: of the bake in the cache. cache: of results computed from the bake.
+    Raises:
+        StoreError: its description is invalid. ChunkDamagedError: its arrays do not match.
+    """
+    fields = read_light_fields(store, key, cache)
+    views = (open_view(store, k, cache, key) for k in range(len(store.attributes["views"])))
+    return {**fields, "views": {view.name: view for view in views}}
+
+
+def read_light_fields(store: StoreReader, key: str, cache: Cache) -> dict[str, Any]:
+    """Read the fields that do not depend on views.
+
+    Args:
+        store: an open store. key: of the bake in the cache. cache: of results computed from the bake.
+    Raises:
+        StoreError: its description is invalid.
+    """
+    attributes = store.attributes
+    try:
+        return {
+            "cache": cache,
+            "key": key,
+            "store": store,
+            "scene_id": attributes["scene"],
+            "method": attributes["method"],
+            "num_lights": attributes["num_lights"],
+            "default_look": complete({}, attributes["look"]),
+            "material_names": tuple(attributes["materials"]),
+            "views": {},
+        }
+    except (KeyError, TypeError, IndexError, ParameterError) as error:
+        raise StoreError(f"the store's description is invalid ({error}); delete the bake and bake again") from error

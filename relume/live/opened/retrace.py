@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from relume.camera.planar_mirrors import lights_visible_in_mirrors
 from relume.core.errors import ChunkDamagedError, StoreError
-from relume.methods.local_lights import LocalLights
-from relume.methods.planar_mirror_light import MirrorLights
-from relume.methods.store_layout import read_shadow_ray_directions, read_tree
+from relume.live.opened.local_lights import LocalLights
+from relume.methods.mirror_lights import MirrorLights
+from relume.methods.patch_layout import read_tree
+from relume.methods.store_layout import read_shadow_ray_directions
 from relume.patches.gather_hits import trace_gather_rays
 from relume.patches.patch_kdtree import PatchTree
 from relume.raytrace.gather_rays import RayPattern

@@ -22,17 +22,18 @@ from relume.live.free_camera.hard_shadows.lights import HardShadowLight, hard_sh
 from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLights
 from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists
 from relume.live.free_camera.occluded_probes import find_occluded_probes
-from relume.live.free_camera.probes.stored_scene import StoredScene, ray_pattern, read_stored_scene
-from relume.live.free_camera.probes.texture_overrides import NO_OVERRIDES, ProbeMapOverrides, overridden_textures
 from relume.live.free_camera.ray_scene import OcclusionMesh
+from relume.live.free_camera.texture_overrides import NO_OVERRIDES, ProbeMapOverrides, overridden_textures
+from relume.live.opened.fixed_views import read_light_fields
+from relume.live.opened.fixed_views_indirect import BakedIndirectViews
+from relume.live.opened.prefiltered_environments import PrefilteredEnvironments
+from relume.live.opened.stored_patches import read_patches
+from relume.live.opened.sun_extraction import SunExtractor
 from relume.look import EnvironmentKey, LightGeometry
 from relume.math.zernike import FAST_DEGREE, NUM_FUNCTIONS
-from relume.methods.opened.described import read_light_fields
-from relume.methods.opened.fixed_views_indirect import BakedIndirectViews
-from relume.methods.planar_mirror_light import read_mirror_lights
-from relume.methods.prefiltered_environments import PrefilteredEnvironments
-from relume.methods.store_layout import read_patches
-from relume.methods.sun_extraction import SunExtractor
+from relume.methods.mirror_lights import read_mirror_lights
+from relume.methods.store_layout import read_free_camera_error
+from relume.probes.stored_scene import StoredScene, ray_pattern, read_stored_scene
 from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.gather_rays import RayPattern
 from relume.raytrace.surface_points import SurfacePoints
@@ -70,11 +71,12 @@ class BakedFreeCamera:
     axes = BakedIndirectViews.axes | {EditAxis.CAMERA}
 
     @classmethod
-    def from_store(cls, store: StoreReader, key: str, cache: Cache) -> Self:
-        """Open a store.
+    def from_store(cls, store: StoreReader, key: str, cache: Cache, *, is_measured: bool = True) -> Self:
+        """Open a store: an `Opener`.
 
         Args:
-            store: an open store. key: key of the bake in the cache. cache: cache of results computed from the bake.
+            store: an open store. key: of the bake in the cache. cache: of results computed from the bake.
+            is_measured: False while the bake still lacks the error of its images.
         Raises:
             StoreError: its description is invalid. ChunkDamagedError: its arrays do not match.
         """
@@ -88,7 +90,10 @@ class BakedFreeCamera:
         probe_positions = stored_scene.probes.position
         bounds = probe_positions.min(axis=0).astype(np.float64), probe_positions.max(axis=0).astype(np.float64)
         return cls(
-            light_transport, stored_scene, {camera.name: FreeView(camera, width, height, bounds) for camera in cameras}
+            light_transport,
+            stored_scene,
+            {camera.name: FreeView(camera, width, height, bounds) for camera in cameras},
+            read_free_camera_error(store) if is_measured else None,
         )
 
     @property

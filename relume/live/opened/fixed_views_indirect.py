@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from jaxtyping import Shaped
@@ -13,16 +14,19 @@ from numpy.typing import NDArray
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import Illumination, Normals
 from relume.live.fixed_camera.protocols import EditAxis
-from relume.methods.indirect_solver import IndirectSolver
-from relume.methods.local_lights import LocalLights
-from relume.methods.opened.fixed_views import BakedFixedViews, IntegrateEnvironment, SampledTransfer
-from relume.methods.patch_direct_light import DirectPatchLight
-from relume.methods.planar_mirror_light import AddedMirrorLights, MirrorLights, MirrorLightTransfer
-from relume.methods.retrace import NormalRetracer
-from relume.methods.spherical_harmonic_transfer import HarmonicLight, read_harmonic_light
+from relume.live.opened.fixed_views import BakedFixedViews, IntegrateEnvironment, SampledTransfer, read_fields
+from relume.live.opened.harmonic_light import HarmonicLight, read_harmonic_light
+from relume.live.opened.indirect_solver import IndirectSolver
+from relume.live.opened.local_lights import LocalLights
+from relume.live.opened.patch_direct_light import DirectPatchLight
+from relume.live.opened.planar_mirror_light import AddedMirrorLights, MirrorLightTransfer
+from relume.live.opened.retrace import NormalRetracer
+from relume.live.opened.stored_patches import read_patches
+from relume.methods.mirror_lights import MirrorLights, read_mirror_lights
 from relume.patches.patch_kdtree import NO_PATCH
 from relume.radiosity.normal_mapped_patches import normal_mapped_patches
 from relume.radiosity.patch_irradiance import PatchLight
+from relume.store.bake_protocol import StoreReader
 from relume.transport.outgoing_patch_light import isotropic
 from relume.transport.shading_points import GatherRays, RayList
 from relume.views.view import View
@@ -43,6 +47,12 @@ class BakedIndirectViews(BakedFixedViews):
     mirror_lights: MirrorLights | None
 
     axes = BakedFixedViews.axes | {EditAxis.BOUNCES}
+
+    @classmethod
+    def from_store(cls, store: StoreReader, key: str, cache: Cache) -> Self:
+        """Open a store with patches. See `BakedFixedViews`."""
+        fields = read_fields(store, key, cache)
+        return cls(**fields, patches=read_patches(store), mirror_lights=read_mirror_lights(store))
 
     @cached_property
     def indirect(self) -> IndirectSolver:

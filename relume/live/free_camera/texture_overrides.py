@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relume.brdf.texture_slots import Images, NormalMap
 from relume.images.image_store import load_normal_map, load_texture
-from relume.live.free_camera.probes.stored_scene import MAX_TEXTURE_SIDE, StoredScene, Textures, concatenate_textures
+from relume.probes.stored_scene import MAX_TEXTURE_SIDE, StoredScene, Textures, concatenate_textures
 from relume.raytrace.surface_interaction import triplanar_axes
 from relume.scene.model import WRAPS, Texture
 
@@ -34,7 +34,7 @@ NO_OVERRIDES = ProbeMapOverrides()
 
 
 class OverriddenTextures(NamedTuple):
-    """Fields of `relume.live.free_camera.probes.stored_scene.StoredScene` that overrides change."""
+    """Fields of `relume.probes.stored_scene.StoredScene` that overrides change."""
 
     textures: Textures
     uvs: F32

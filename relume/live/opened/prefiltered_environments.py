@@ -16,8 +16,8 @@ from relume.lights.sun_disks import BRIGHT_LIGHT_BOUNDS, SplitEnvironment, remov
 from relume.live.free_camera.environment_lookup import EnvironmentLookup, build_environment_lookup
 from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLights
 from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists, build_light_lists
+from relume.live.opened.fixed_views import BakedFixedViews
 from relume.look import BAKED_ENVIRONMENT, EnvironmentKey
-from relume.methods.opened.fixed_views import BakedFixedViews
 
 F32 = NDArray[np.float32]
 

@@ -1,11 +1,11 @@
 """Surface probes of a scene: a grid in each face, shared between faces (mesh colors, Yuksel 2010).
 
 A face whose longest edge is R times the finest spacing on it has R rows
-(`relume.live.free_camera.probes.triangle_grids`); where the spacing is 2^l times larger, every 2^l-th node is a probe.
+(`relume.probes.triangle_grids`); where the spacing is 2^l times larger, every 2^l-th node is a probe.
 Nodes of different faces merge if they coincide in position, normal and material, so that light is continuous across
 edges, and a mesh finer than the spacing has fewer probes than corners. Nodes that are no probes are interpolated
-(`relume.live.free_camera.probes.interpolation_weights`). Each visible side of a face has its own nodes
-(`relume.live.free_camera.probes.visible_sides`).
+(`relume.probes.interpolation_weights`). Each visible side of a face has its own nodes
+(`relume.probes.visible_sides`).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from relume.core.errors import PlanError
-from relume.live.free_camera.probes.lattice_nodes import (
+from relume.probes.lattice_nodes import (
     LatticeNodes,
     NodeTable,
     bounding_cube,
@@ -29,7 +29,7 @@ from relume.live.free_camera.probes.lattice_nodes import (
     num_representatives,
     representative_nodes,
 )
-from relume.live.free_camera.probes.triangle_grids import (
+from relume.probes.triangle_grids import (
     ProbeDensity,
     ProbeGrid,
     enumerate_nodes,
@@ -78,8 +78,8 @@ def place_probes(
     """Place about `num_probes` probes on all visible sides.
 
     Args:
-        geometry: geometry of the scene. is_open: True for visible sides. density: spacing relative to the finest, see
-            `relume.live.free_camera.probes.density`; uniform at first. num_probes: at most `MAX_PROBES`.
+        geometry: of the scene. is_open: True for visible sides. density: spacing relative to the finest, see
+            `relume.probes.density`; uniform at first. num_probes: at most `MAX_PROBES`.
     Raises:
         PlanError: no surface has any area.
     """
