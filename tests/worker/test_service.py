@@ -32,7 +32,7 @@ from relume_worker.paths import staging_path
 from relume_worker.scenes import delete_bakes, delete_scene, register_scene
 from relume_worker.service import START_S, BakeService
 from relume_worker.status import BakeStatus, TaskCost, bake_id
-from relume_worker.tasks import Job, run_task
+from relume_worker.tasks import BakeInput, run_task
 
 SCENE = tiny_scene()
 NUM_TASKS = 2 + 2 * 9
@@ -370,7 +370,7 @@ def test_bake_taken_over_by_another_process_is_left_to_it(
 ) -> None:
     has_begun, may_go_on = threading.Event(), threading.Event()
 
-    def stall(job: Job, task: Task) -> TaskCost:
+    def stall(job: BakeInput, task: Task) -> TaskCost:
         has_begun.set()
         assert may_go_on.wait(30)
         return run_task(job, task)
@@ -416,7 +416,7 @@ def test_bake_deleted_during_a_task_is_not_a_defect(
 ) -> None:
     met = threading.Event()
 
-    def run_deleted(job: Job, task: Task) -> TaskCost:
+    def run_deleted(job: BakeInput, task: Task) -> TaskCost:
         delete_bakes(service.data_dir, service.ledger, [job.bake_id])
         met.set()
         raise KeyError("lights/irradiance")  # zarr's error for an array without its folder

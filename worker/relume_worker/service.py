@@ -36,7 +36,7 @@ from relume_worker.status_bus import BlockedBake, StatusBus, Subscription
 from relume_worker.storage import get_storage, is_in_storage, push
 from relume_worker.storage.partial_uploads import delete_partial
 from relume_worker.task_notes import delete_note
-from relume_worker.tasks import Job, idle_timer, load_registered_scene
+from relume_worker.tasks import BakeInput, idle_timer, load_registered_scene
 
 log = logging.getLogger(__name__)
 
@@ -300,7 +300,7 @@ class BakeService:
             return
         runner = BakeRunner(
             ledger=self.ledger,
-            job=Job(self.data_dir, status.id, status.scene, status.recipe, method, bake_code()),
+            bake=BakeInput(self.data_dir, status.id, status.scene, status.recipe, method, bake_code()),
             owner=self._owner,
             executor=executor,
             max_in_flight=(lambda: 1) if tiny else (lambda: 2 * self.executors.num_processes()),

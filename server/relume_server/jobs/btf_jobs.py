@@ -12,9 +12,8 @@ from relume.core.folder_size import folder_bytes
 from relume_server.batch.btf_steps import RESULT_FILE, UPLOAD_FILE
 from relume_server.schemas.btfs import BOUND, BtfRequest
 from relume_worker.jobs.job import Job
-from relume_worker.jobs.job_kind import JobKind
+from relume_worker.jobs.job_kind import JobHost, JobKind
 from relume_worker.jobs.job_run import JobRun
-from relume_worker.jobs.job_service import JobService
 from relume_worker.paths import btfs_path
 
 BtfJob = Job[BtfRequest]
@@ -28,7 +27,7 @@ class BtfJobs(JobKind[BtfRequest]):
 
     def __init__(
         self,
-        service: JobService,
+        service: JobHost,
         data: Path,
         report_ready: Callable[[str, str, int], None],
         report_failed: Callable[[str], None],

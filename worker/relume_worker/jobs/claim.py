@@ -32,8 +32,12 @@ def is_claimed_by(folder: Path, owner: str) -> bool:
 
 
 def canceled_or_taken_over(folder: Path, owner: str, is_canceled: Callable[[], bool]) -> Callable[[], bool]:
-    """Return a check whether to end a step: canceled, or claimed by another owner. Steps poll thousands of times per
-    second; the file is read ten times.
+    """Return a check whether to end a step: canceled, or claimed by another owner.
+
+    Args:
+        folder: folder of the job. owner: owner of its lease. is_canceled: polled too.
+    Returns:
+        A function that steps may call thousands of times per second; it reads the file ten times.
     """
     next_s, is_over = 0.0, False
 

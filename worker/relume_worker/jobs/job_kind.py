@@ -9,14 +9,28 @@ import shutil
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Generic
+from typing import Any, ClassVar, Generic, Protocol
 
 from relume_worker.database.models import JobRow
 from relume_worker.jobs.job import ACTIVE, UNREADABLE, Job, JobFilter, NotReadyError, Request, new_id, read_row
+from relume_worker.jobs.job_ledger import JobLedger
+from relume_worker.jobs.job_run import JobRun
+from relume_worker.jobs.step import RunStep
+from relume_worker.jobs.step_timer import StepTimer
 
-if TYPE_CHECKING:
-    from relume_worker.jobs.job_run import JobRun
-    from relume_worker.jobs.job_service import JobService
+
+class JobHost(Protocol):
+    """What a kind needs of the service, see `relume_worker.jobs.job_service.JobService`."""
+
+    @property
+    def ledger(self) -> JobLedger: ...
+    @property
+    def run_step(self) -> RunStep: ...
+    @property
+    def is_closing(self) -> bool: ...
+    def add_kind(self, kind: Any) -> None: ...
+    def wake(self) -> None: ...
+    def timer(self, identity: str) -> StepTimer | None: ...
 
 
 class JobKind(ABC, Generic[Request]):
@@ -32,7 +46,7 @@ class JobKind(ABC, Generic[Request]):
     resumable: ClassVar[Sequence[str]] = ("stopped", "failed")
     """States from which a job can be resumed: its files are still there."""
 
-    def __init__(self, service: JobService, folder: Path) -> None:
+    def __init__(self, service: JobHost, folder: Path) -> None:
         """
         Args:
             service: runs the jobs. folder: created if missing.

@@ -128,7 +128,9 @@ class JobService:
         """Run one job; every error ends up in its row as a sentence."""
         try:
             with suppress(NotFoundError):  # deleted in the meantime
-                run = JobRun(self, kind, kind.get(waiting.id))
+                job = kind.get(waiting.id)
+                urgency = {"is_first": kind.is_first(job.request), "step_s": kind.step_s(job.request)}
+                run: JobRun[Any] = JobRun(self, kind.name, job, kind.folder / job.id, **urgency)
                 self._runs[waiting.id] = waiting, threading.current_thread(), run
                 self._run_steps(kind, run)
         except Exception as error:  # the database is unavailable: the job is claimed again, and finds its results
