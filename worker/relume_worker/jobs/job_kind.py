@@ -20,7 +20,7 @@ from relume_worker.jobs.step_timer import StepTimer
 
 
 class JobHost(Protocol):
-    """What a kind needs of the service, see `relume_worker.jobs.job_service.JobService`."""
+    """Part of the service that a kind needs, see `relume_worker.jobs.job_service.JobService`."""
 
     @property
     def ledger(self) -> JobLedger: ...
@@ -129,7 +129,13 @@ class JobKind(ABC, Generic[Request]):
     def page(
         self, job_filter: JobFilter, limit: int, after: tuple[float, str] | None = None, *, newest_first: bool = True
     ) -> list[Job[Request]]:
-        """List jobs, see `JobLedger.page`."""
+        """List jobs of this kind, newest first or last.
+
+        Args:
+            job_filter: filter of the list. limit: maximum number.
+            after: time of creation and id of the job before the page; None: start with the first.
+            newest_first: order.
+        """
         rows = self._service.ledger.page(self.name, job_filter, limit, after, newest_first=newest_first)
         return [self.job(row) for row in rows]
 
@@ -158,7 +164,14 @@ class JobKind(ABC, Generic[Request]):
             self.requeue(identity, self.resumable)
 
     def requeue(self, identity: str, states: Sequence[str], prepare: Callable[[], object] = lambda: None) -> None:
-        """Queue a job in one of some states again, see `JobLedger.requeue`. Its request must be readable."""
+        """Queue a job in one of some states again.
+
+        Args:
+            identity: id of the job. states: states from which it may be queued.
+            prepare: called before it can start.
+        Raises:
+            NotReadyError: it is in another state, or its request cannot be read. BusyError, QuotaError: as `submit`.
+        """
         self.check_readable(self.get(identity))
         self._service.ledger.requeue(self._service.ledger.get(self.name, identity), states, prepare)
         self._service.wake()

@@ -18,7 +18,7 @@ _CHECK_INTERVAL_S = 0.1
 
 
 class StepHost(Protocol):
-    """What a run needs of the service, see `relume_worker.jobs.job_service.JobService`."""
+    """Part of the service that a run needs, see `relume_worker.jobs.job_service.JobService`."""
 
     @property
     def ledger(self) -> JobLedger: ...

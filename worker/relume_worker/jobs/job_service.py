@@ -129,8 +129,8 @@ class JobService:
         try:
             with suppress(NotFoundError):  # deleted in the meantime
                 job = kind.get(waiting.id)
-                urgency = {"is_first": kind.is_first(job.request), "step_s": kind.step_s(job.request)}
-                run: JobRun[Any] = JobRun(self, kind.name, job, kind.folder / job.id, **urgency)
+                is_first, step_s = kind.is_first(job.request), kind.step_s(job.request)
+                run: JobRun[Any] = JobRun(self, kind.name, job, kind.folder / job.id, is_first=is_first, step_s=step_s)
                 self._runs[waiting.id] = waiting, threading.current_thread(), run
                 self._run_steps(kind, run)
         except Exception as error:  # the database is unavailable: the job is claimed again, and finds its results
