@@ -69,7 +69,7 @@ def test_a_point_on_a_pixels_ray_is_projected_to_the_pixel(
     point = np.append(camera.to_world[:3, 3] + distance * direction, 1)
     u, v, _, depth = point @ world_to_ndc(camera, size)
     assert depth > 0
-    # directions are float32; at 10 km, coordinates have twelve digits
-    tolerance = 1e-6 / math.tan(camera.yfov / 2) * (1 + math.tan(camera.yfov / 2) * size[0] / size[1]) ** 2 + 1e-7
-    np.testing.assert_allclose([u / depth, v / depth], at, atol=10 * tolerance)
+    half_height = math.tan(camera.yfov / 2)
+    tolerance = 2e-7 * (1 + 4 * half_height**2) / half_height + 2e-7  # directions are float32
+    np.testing.assert_allclose([u / depth, v / depth], at, atol=tolerance)
     np.testing.assert_allclose(np.append(camera.to_world[:3, 3], 1) @ world_to_camera(camera), [0, 0, 0, 1], atol=1e-8)

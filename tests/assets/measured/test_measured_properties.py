@@ -8,7 +8,7 @@ from analytic_terms import ANALYTIC
 from for_all import for_all
 from hypothesis import strategies as st
 from merl_files import make_planes
-from term_documents import COLORS, SEEDS, params, terms
+from term_documents import SEEDS, params, terms
 from term_properties import (
     NOT_RECIPROCAL,
     assert_conserves_energy,
@@ -25,6 +25,7 @@ from relume.brdf.registry import TERMS
 from relume.brdf.symmetry import is_isotropic
 from relume.core.errors import MaterialError
 
+ISOTROPIC = sorted(model for model in ANALYTIC if model != "lafortune" and is_isotropic({"model": model}))
 MODELS = sorted(term.model for term in TERMS.values() if term.data is STORE)
 
 
@@ -54,12 +55,10 @@ def test_any_planes_are_read_as_written(seed, tmp_path_factory):
     np.testing.assert_array_equal(read_merl(path), planes)
 
 
-@for_all(2, random=st.data(), color=COLORS)
-def test_an_exported_term_is_itself_at_the_nodes_of_the_grid(random, color):
-    model = random.draw(st.sampled_from(sorted(ANALYTIC)))
-    document = {"model": model, "params": random.draw(params(model)), "color": color}
-    if not is_isotropic(document):
-        return
+@for_all(2, random=st.data())
+def test_an_exported_term_is_itself_at_the_nodes_of_the_grid(random):
+    model = random.draw(st.sampled_from(ISOTROPIC))
+    document = {"model": model, "params": random.draw(params(model)), "color": [0.2, 0.5, 0.9]}
     try:
         planes = sample_terms([document])
     except MaterialError:  # the peak of a sharp highlight may exceed what the format allows
