@@ -37,10 +37,15 @@ def shared_data() -> Path:
 
 
 def environments() -> list[Environment]:
-    """Three real maps, or the studio and two generated ones if they are missing."""
+    """Three real maps, or the generated ones if they are missing."""
     paths = [shared_data() / "envmaps" / f"{name}.hdr" for name in REAL]
     if all(path.is_file() for path in paths):
         return [read_environment(path, path.stem) for path in paths]
+    return generated_environments()
+
+
+def generated_environments() -> list[Environment]:
+    """The studio and two environments with a sun."""
     return [
         studio(),
         *(make_sun_environment(f"{name} sun (generated)", y) for name, y in (("high", 0.8), ("low", 0.15))),

@@ -123,7 +123,8 @@ def curve_bands(term_document: Mapping[str, Any], curve: Curve) -> Shaped[F64, "
         values = np.maximum(_base_bands(drawn, curve, bands), 0.0)
         if is_relative(drawn):
             factor, offset = curve_edit(drawn, values)
-            values = factor * values + offset
+            # blended handles that reach zero cancel up to rounding
+            values = np.maximum(factor * values + offset, 0.0)
         for channel in _channels(drawn):
             bands[channel] = values[channel]
     return bands
