@@ -38,13 +38,13 @@ class DivisionScratch(NamedTuple):
 
     Attributes:
         local: nodes in the frame of the point. generations: as of listed lights. lights: divided ones of a chunk.
-        count, done: triangles to divide per generation, and how many of them are done. parent: for `_divide`.
+        num, done: triangles to divide per generation, and how many of them are done. parent: for `_divide`.
     """
 
     local: Shaped[F32, "generations 3 6 CHUNK"]
     generations: Chunks
     lights: Shaped[NDArray[np.int32], " CHUNK"]
-    count: Shaped[I64, " generations"]
+    num: Shaped[I64, " generations"]
     done: Shaped[I64, " generations"]
     parent: Shaped[F32, "22 CHUNK/4"]
 
