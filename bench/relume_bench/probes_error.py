@@ -106,6 +106,7 @@ def measure_radiance_rmse(
     probe_indices = visible_probes[np.linspace(0, len(visible_probes) - 1, num).astype(np.int64)]
     is_needed = np.zeros(free_camera_bake.stored_scene.probes.num_points, np.uint8)
     is_needed[probe_indices] = 1
+    viewed = free_camera_bake.stored_scene.viewed_from(camera_position, is_needed)
     incident = combine_all(
         free_camera_bake, illumination_from_look(look, free_camera_bake.material_names, has_bounces=True)
     )
@@ -113,11 +114,7 @@ def measure_radiance_rmse(
     # all light that the hemispherical basis represents
     highlight_tables = tables._replace(table_index=tables.table_index[..., [2, 3, 4, 5, 4, 5]])
     radiance = sum(
-        shade_probes(
-            free_camera_bake.stored_scene, incident.total, None, table, camera_position.astype(np.float32), is_needed
-        )
-        .radiance[probe_indices]
-        .sum(axis=1)
+        shade_probes(viewed, incident.total, None, table).radiance[probe_indices].sum(axis=1)
         for table in (tables, highlight_tables)
     )
     reference_passes = _trace_paths(scene, look, probe_indices, num_paths)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -148,7 +147,7 @@ def trace_layers(
         if len(mirror_rows) and paths.num_mirrors < MAX_MIRROR_BOUNCES and fits():
             queue.append(reflect_rays(geometry, materials, paths, hits, mirror_rows, pixel_angle, num_keys))
             is_mirrored[mirror_rows] = True
-        hits_from_camera = replace(hits, distance=hits.distance + paths.length)
+        hits_from_camera = hits._replace(distance=hits.distance + paths.length)
         key = np.where(is_hit, geometry.face_mesh[face], -1) + paths.path_key * num_keys
         origins = np.broadcast_to(paths.origins, (len(paths.ray), 3))
         layers.append(

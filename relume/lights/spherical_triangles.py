@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from jaxtyping import Shaped
@@ -118,7 +118,7 @@ class LightClusters(NamedTuple):
 NO_LIGHTS = TriangleLights(np.empty((3, 6, 0), np.float32), *np.empty((2, 0, 3), np.float32))
 
 
-def _sum_by_index(index: NDArray[np.integer[Any]], values: F64, num: int) -> F64:
+def _sum_by_index(index: NDArray[np.integer], values: F64, num: int) -> F64:
     """Sum the values (n,) with equal index (n,), in [0, num). (num,)"""
     return np.asarray(np.bincount(index, values, num), np.float64)
 
@@ -174,7 +174,7 @@ def match_moments(
 
 
 def merge_clusters(
-    lights: TriangleLights, group: Shaped[NDArray[np.integer[Any]], " M"], codes: Shaped[NDArray[np.uint64], " G"]
+    lights: TriangleLights, group: Shaped[NDArray[np.integer], " M"], codes: Shaped[NDArray[np.uint64], " G"]
 ) -> TriangleLights:
     """Merge the lights of each cluster into one with the same light, mean direction and spread.
 

@@ -109,6 +109,33 @@ class Textures(NamedTuple):
     material_textures: Shaped[NDArray[np.int64], "materials 4"]
 
 
+class PixelArrays(NamedTuple):
+    """Surfaces of a `StoredScene` as the kernel of pixels reads them. node_normal: of lattice nodes."""
+
+    textures: Textures
+    uvs: F32
+    tangents: F32
+    faces: Shaped[NDArray[np.uint32], "faces 3"]
+    uv_faces: Shaped[NDArray[np.uint32], "faces 3"]
+    face_material: Shaped[NDArray[np.int32], " faces"]
+    face_normal: Shaped[F32, "faces 3"]
+    uv_scale: Shaped[F32, " faces"]
+    node_normal: Shaped[F32, "nodes 3"]
+
+
+class ViewedProbes(NamedTuple):
+    """Probes to shade for a camera, for kernels.
+
+    Attributes:
+        points, material: of all probes. camera_position: meters. rows: the probes to shade.
+    """
+
+    points: SurfacePoints
+    material: Shaped[NDArray[np.uint16], " probes"]
+    camera_position: Shaped[F32, " 3"]
+    rows: Shaped[NDArray[np.intp], " m"]
+
+
 @dataclass(frozen=True)
 class StoredScene:
     """Surfaces of a bake for a free camera.
@@ -135,6 +162,20 @@ class StoredScene:
     uv_scale: Shaped[F32, " faces"]
     textures: Textures
     uv_faces: Shaped[NDArray[np.uint32], "faces 3"]
+
+    def pixel_arrays(self) -> PixelArrays:
+        """Return what the kernel of pixels reads."""
+        return PixelArrays(
+            self.textures, self.uvs, self.tangents, self.faces, self.uv_faces, self.face_material, self.face_normal,
+            self.uv_scale, self.lattice_nodes.normal,
+        )  # fmt: skip
+
+    def viewed_from(
+        self, camera_position: Shaped[NDArray[np.floating], " 3"], is_needed: Shaped[NDArray[np.uint8], " probes"]
+    ) -> ViewedProbes:
+        """Select probes to shade. camera_position: meters. is_needed: nonzero for these probes."""
+        rows = np.flatnonzero(is_needed.view(np.bool_))
+        return ViewedProbes(self.probes, self.material, np.ascontiguousarray(camera_position, np.float32), rows)
 
     @cached_property
     def normal_variation(self) -> Shaped[F32, " materials"]:

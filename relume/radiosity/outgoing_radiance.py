@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
@@ -111,7 +111,7 @@ def first_bounce(
     )
 
 
-def pad(radiance: Shaped[NDArray[np.floating[Any]], "patches 3"]) -> Shaped[F32, "padded 3"]:
+def pad(radiance: Shaped[NDArray[np.floating], "patches 3"]) -> Shaped[F32, "padded 3"]:
     """Extend the radiance of patches by black rows, up to row `NO_PATCH`."""
     out = np.zeros((NO_PATCH + 1, 3), np.float32)
     out[: len(radiance)] = radiance

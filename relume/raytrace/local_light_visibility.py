@@ -16,7 +16,7 @@ from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import for_ranges
 from relume.lights.light_sampling import LightStrata
 from relume.lights.local_lights import LocalLight, light_sample
-from relume.raytrace.embree import EmbreeScene, occluded, packet_arguments
+from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.gather_rays import cranley_patterson_offset
 from relume.raytrace.ray_packet import (
     LANES,
@@ -96,11 +96,9 @@ def _count_unoccluded(packet, width):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True)
-def _trace(  # type: ignore[no-untyped-def]
-    occluded, scene, arguments, light, strata, surface_offset, points, start, stop, bits
-):
+def _trace(tracer, light, strata, surface_offset, points, start, stop, bits):  # type: ignore[no-untyped-def]
     """Trace points [start, stop); start is a multiple of 16."""
-    packet, num = new_packet(scene, arguments), strata.uv.shape[0]
+    packet, num = new_packet(tracer), strata.uv.shape[0]
     for first in range(start, stop, LANES):
         width = min(LANES, stop - first)
         for group in range(0, num, _GROUP_SIZE):
@@ -110,7 +108,7 @@ def _trace(  # type: ignore[no-untyped-def]
                 and _aim_packet(packet, light, strata, surface_offset, points, first, width, group, _GROUP_SIZE)
                 == width
             ):
-                trace_shadows(occluded, packet)
+                trace_shadows(packet)
                 num_unoccluded = _count_unoccluded(packet, width)
                 if num_unoccluded == 0:
                     continue
@@ -119,7 +117,7 @@ def _trace(  # type: ignore[no-untyped-def]
                 if _aim_packet(packet, light, strata, surface_offset, points, first, width, sample, 1) == 0:
                     continue
                 if not all_unoccluded:
-                    trace_shadows(occluded, packet)
+                    trace_shadows(packet)
                 for k in range(width):
                     if packet.is_active[k] != 0 and (all_unoccluded or is_unoccluded(packet, k)):
                         bits[first + k, sample >> 3] |= np.uint8(1 << (sample & 7))
@@ -139,13 +137,8 @@ def trace_light_visibility(
         Visibility of sample k at bit k & 7 of byte k >> 3; ceil(samples / 8) bytes
     """
     bits = np.zeros((points.num_points, (len(strata.uv) + 7) // 8), np.uint8)
-    arguments = packet_arguments(coherent=True)
-    args = (light, strata, np.float32(surface_offset), points)
-    for_ranges(
-        lambda start, stop: _trace(occluded, scene.handle, arguments.ctypes.data, *args, start, stop, bits),
-        points.num_points,
-        _POINTS_PER_RANGE,
-    )
+    args = scene.shadow_tracer(coherent=True), light, strata, np.float32(surface_offset), points
+    for_ranges(lambda start, stop: _trace(*args, start, stop, bits), points.num_points, _POINTS_PER_RANGE)
     return bits
 
 

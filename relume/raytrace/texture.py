@@ -137,7 +137,7 @@ def two_texels(wrap, coordinate, size):  # type: ignore[no-untyped-def]
         coordinate -= math.floor(coordinate)
     texel_coordinate = coordinate * np.float32(size) - np.float32(0.5)
     below = math.floor(texel_coordinate)
-    first: Any = np.int64(below)
+    first = np.int64(below)
     second = first + 1
     if wrap == _REPEAT:
         return (

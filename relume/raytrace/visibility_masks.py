@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from relume.core.color import luminance
 from relume.core.thread_pools import for_ranges
 from relume.lights.neighbors import find_neighbors
-from relume.raytrace.embree import EmbreeScene, occluded, packet_arguments
+from relume.raytrace.embree import EmbreeScene
 from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE
 from relume.raytrace.visibility_kernel import BLOCK, trace_blocks
 
@@ -107,25 +107,12 @@ def trace_visibility_masks(
     Cost: O(n · m) time, plus O(m · log triangles) for each sample on a shadow edge.
     """
     bits = np.zeros((len(origins), (len(targets.directions) + 7) // 8), np.uint8)
-    mixed_arguments, single_light_arguments = (packet_arguments(coherent=is_coherent) for is_coherent in (False, True))
+    tracers = scene.shadow_tracer(coherent=False), scene.shadow_tracer(coherent=True)
     range_counts = [np.zeros(4, np.int64)]
 
     def kernel(start: int, stop: int) -> None:
         counts = np.zeros(4, np.int64)
-        trace_blocks(
-            occluded,
-            scene.handle,
-            mixed_arguments.ctypes.data,
-            single_light_arguments.ctypes.data,
-            origins,
-            normals,
-            alpha_sample,
-            targets,
-            start,
-            stop,
-            bits,
-            counts,
-        )
+        trace_blocks(tracers, origins, normals, alpha_sample, targets, start, stop, bits, counts)
         range_counts.append(counts)
 
     start_time = time.perf_counter()

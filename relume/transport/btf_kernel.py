@@ -38,9 +38,9 @@ _MAX_ELONGATION = np.float32(3)  # footprint length over width: longer ones sum 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _linear_taps(coordinate, count):  # type: ignore[no-untyped-def]
     """Return the two texels of a row around a coordinate in [0, 1], and the fraction of the second."""
-    x: Any = coordinate * np.float32(count) - np.float32(0.5)
+    x = coordinate * np.float32(count) - np.float32(0.5)
     # floor without a call, for any coordinate
-    low: Any = min(max(np.int32(x + np.float32(1)) - 1, np.int32(-1)), np.int32(count - 1))
+    low = min(max(np.int32(x + np.float32(1)) - 1, np.int32(-1)), np.int32(count - 1))
     fraction = np.float32(x - np.float32(low))
     return (low if low >= 0 else count - 1), (low + 1 if low + 1 < count else 0), fraction
 
@@ -74,7 +74,7 @@ def texels_at_level(levels, u, v, level, texel, weight):  # type: ignore[no-unty
         levels, texel, weight: as in `neighbor_texels`. u, v: in [0, 1). level: fractional, see `mip_level`.
     """
     coarsest = levels.shape[0] - 1
-    clamped_level: Any = min(level, np.float32(coarsest))
+    clamped_level = min(level, np.float32(coarsest))
     lower = np.int64(clamped_level)
     level_fraction = np.float32(clamped_level - np.float32(lower))
     num = 0
@@ -164,7 +164,7 @@ def _footprint_samples(levels, heights, footprint_center, x, y, z, slant, out): 
         Number of samples; width of the footprint.
     """
     num, spacing, width = anisotropic_offsets(footprint_center[2], z, np.float32(max(levels[0, 1], levels[0, 2])))
-    across: Any = np.float32(1) / max(np.float32(math.sqrt(x * x + y * y)), _MIN_COSINE)
+    across = np.float32(1) / max(np.float32(math.sqrt(x * x + y * y)), _MIN_COSINE)
     for k in range(num):
         offset = spacing * across * (np.float32(k) - np.float32(0.5) * np.float32(num - 1))
         out[k, 0], out[k, 1] = footprint_center[0] + offset * x, footprint_center[1] - offset * y

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
@@ -104,14 +104,14 @@ def interpolation_weights_at(grid, theta, azimuth_fraction, index, weight):  # t
     lower = 0
     while lower < grid.theta.shape[0] - 2 and theta >= grid.theta[lower + 1]:
         lower += 1
-    theta_fraction: Any = (theta - grid.theta[lower]) / (grid.theta[lower + 1] - grid.theta[lower])
+    theta_fraction = (theta - grid.theta[lower]) / (grid.theta[lower + 1] - grid.theta[lower])
     theta_fraction = np.float32(min(max(theta_fraction, np.float32(0)), np.float32(1)))
     for k in range(2):
         first, count = grid.first[lower + k], grid.first[lower + k + 1] - grid.first[lower + k]
         position = np.float32(azimuth_fraction * count - grid.shift[lower + k])
         if position < 0:
             position += np.float32(count)
-        lower_index: Any = min(np.int64(position), count - 1)
+        lower_index = min(np.int64(position), count - 1)
         phi_fraction = np.float32(position - lower_index)
         ring_weight = theta_fraction if k == 1 else np.float32(1) - theta_fraction
         index[2 * k], index[2 * k + 1] = (

@@ -44,7 +44,7 @@ def compute_shear(grid, x, y, z):  # type: ignore[no-untyped-def]
     """
     across = math.sqrt(x * x + y * y)
     max_slope = np.float32(math.tan(grid.theta[grid.theta.shape[0] - 1]))
-    denominator: Any = max(z, np.float32(1e-6), across / max_slope)
+    denominator = max(z, np.float32(1e-6), across / max_slope)
     return x / denominator, y / denominator
 
 

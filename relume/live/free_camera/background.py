@@ -27,6 +27,7 @@ from relume.probes.stored_scene import StoredScene
 F32 = NDArray[np.float32]
 
 _MAX_CATCHER_RATIO = np.float32(MAX_CATCHER_RATIO)
+_LUMINANCE = np.array(LUMINANCE, np.float32)
 
 
 class ShadowCatcher(NamedTuple):
@@ -98,22 +99,19 @@ def composite_over(
         Coverage along each ray.
     """
     coverage = np.empty(len(out), np.float32)
-    args = (
-        np.array(LUMINANCE, np.float32), gbuffer.hits.face, stored_scene.face_material,
-        shadow_catcher.is_shadow_catcher, shadow_catcher.unoccluded,
-        gbuffer.lattice_node, gbuffer.weight, background, np.asarray(gain, np.float32), is_direct,
-    )  # fmt: skip
+    surface_args = gbuffer, stored_scene.face_material, shadow_catcher
+    args = *surface_args, background, np.asarray(gain, np.float32), is_direct
     parallel_for_chunks(lambda start, stop: _composite_over(*args, start, stop, out, coverage), len(out))
     return coverage
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", **NO_REFCOUNT)
 def _composite_over(  # type: ignore[no-untyped-def]
-    luminance, face, face_material, is_shadow_catcher, unoccluded, lattice_node, weight, background, gain, is_direct,
-    start, stop, out,
-    coverage,
-):  # fmt: skip
+    gbuffer, face_material, shadow_catcher, background, gain, is_direct, start, stop, out, coverage
+):
     """Composite rays [start, stop)."""
+    face, lattice_node, weight = gbuffer.hits.face, gbuffer.lattice_node, gbuffer.weight
+    is_shadow_catcher, unoccluded = shadow_catcher
     direct_factor = np.float32(1) if is_direct else np.float32(0)
     for p in range(start, stop):
         if face[p] < 0:
@@ -137,7 +135,7 @@ def _composite_over(  # type: ignore[no-untyped-def]
                     else direct_factor
                 )
                 out[p, channel] = shadow_ratio * background[p, channel]
-                coverage[p] -= luminance[channel] * min(shadow_ratio, np.float32(1))
+                coverage[p] -= _LUMINANCE[channel] * min(shadow_ratio, np.float32(1))
 
 
 def alpha(coverage: Shaped[F32, " ..."], *, for_display: bool) -> Shaped[F32, " ..."]:

@@ -20,7 +20,7 @@ from relume.live.free_camera.environment_lookup import rotation_of
 from relume.live.free_camera.glass import adjust_alpha, composite_glass
 from relume.live.free_camera.hard_shadows.shade import add_direct_sharp
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
-from relume.live.free_camera.highlights.interpolated_highlights import add_environment_highlights
+from relume.live.free_camera.highlights.interpolated_highlights import ProbeHighlights, add_environment_highlights
 from relume.live.free_camera.highlights.light_sum_kernel import sum_lights
 from relume.live.free_camera.highlights.lobe_gradients import gradients_along_lobe
 from relume.live.free_camera.highlights.lobe_light_lists import MAX_BRIGHT_LIGHTS, lobe_widths
@@ -37,7 +37,7 @@ from relume.live.free_camera.texel_brdf.texel_tables import BtfMaterials, find_b
 from relume.live.free_camera.texel_brdf.texture_frame_light import TexelLight
 from relume.live.free_camera.texture_overrides import ProbeMapOverrides
 from relume.look import Look
-from relume.probes.stored_scene import StoredScene
+from relume.probes.stored_scene import StoredScene, ViewedProbes
 from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]
@@ -320,11 +320,7 @@ def _shade(
     """
     materials, incident = state.materials, state.incident
     stored_scene = transfer.stored_scene_with(materials.overrides)
-    lobes, camera_position, (probe_mask, node_mask, rays) = (
-        materials.lobes,
-        camera.to_world[:3, 3].astype(np.float32),
-        region,
-    )
+    lobes, camera_position, (probe_mask, node_mask, rays) = materials.lobes, camera.to_world[:3, 3], region
     lobe_visibility, outgoing, gradients, node_values, light_gradient, out = buffers or (
         None,
         None,
@@ -333,26 +329,15 @@ def _shade(
         None,
         None,
     )
-    lobe_visibility = _lobe_visibility(transfer, state, camera_position, probe_mask, lobe_visibility)
+    viewed = stored_scene.viewed_from(camera_position, probe_mask)
+    lobe_visibility = _lobe_visibility(transfer, state, viewed, lobe_visibility)
     environment = _prefiltered_environment(transfer, state.light)
-    outgoing = shade_probes(
-        stored_scene, incident.total, incident.non_environment, materials.tables, camera_position, probe_mask, outgoing
-    )
-    light_sums = _highlight_light_sums(transfer, state, camera_position, probe_mask)
+    outgoing = shade_probes(viewed, incident.total, incident.non_environment, materials.tables, outgoing)
+    highlights = ProbeHighlights(lobe_visibility, _highlight_light_sums(transfer, state, viewed))
     add_environment_highlights(
-        stored_scene,
-        lobes,
-        environment,
-        camera_position,
-        lobe_visibility,
-        light_sums,
-        probe_mask,
-        outgoing,
-        is_fine=state.is_fine,
+        viewed, lobes, environment, highlights, stored_scene.normal_variation, outgoing, is_fine=state.is_fine
     )
-    gradients = gradients_along_lobe(
-        stored_scene, incident.non_environment, materials.tables, lobes, camera_position, probe_mask, gradients
-    )
+    gradients = gradients_along_lobe(viewed, incident.non_environment, materials.tables, lobes, gradients)
     probe_values = outgoing.radiance, lobe_visibility, gradients
     node_radiance, node_visibility, node_gradients = (
         interpolate_to_nodes(stored_scene, node_mask, *values) for values in zip(probe_values, node_values, strict=True)
@@ -367,7 +352,7 @@ def _shade(
     out = shade_pixels(stored_scene, gbuffer, pixel_angle, interpolated_probes, emission, mirror_data, rays, out)
     if rays is None:  # otherwise no ray hits a BTF
         footprint, texel_incident = (
-            TextureFootprint(camera_position, pixel_angle, gbuffer),
+            TextureFootprint(viewed.camera_position, pixel_angle, gbuffer),
             IncidentTexelLight(incident.total, state.texel_light),
         )
         shade_texels(
@@ -379,32 +364,24 @@ def _shade(
 
 
 def _lobe_visibility(
-    transfer: FreeCameraTransfer,
-    state: FrameRequestState,
-    camera_position: F32,
-    probe_mask: NDArray[np.uint8],
-    out: F32 | None,
+    transfer: FreeCameraTransfer, state: FrameRequestState, viewed: ViewedProbes, out: F32 | None
 ) -> F32:
     """Return the visibility of probes along their lobes. out: overwritten; None: new."""
     lobes, light = state.materials.lobes, state.light
     widths = lobe_widths(lobes) if light.has_direct_environment else ()
     if not widths:
-        return np.zeros((len(probe_mask), 1 + MAX_BRIGHT_LIGHTS), np.float32) if out is None else out
+        return np.zeros((len(viewed.material), 1 + MAX_BRIGHT_LIGHTS), np.float32) if out is None else out
     lobe_lights = transfer.lobe_lights(light.environment, widths)
-    return trace_lobe_visibility(
-        transfer.stored_scene, transfer.light_visibility_bits, lobe_lights, lobes, camera_position, probe_mask, out
-    )
+    return trace_lobe_visibility(viewed, transfer.light_visibility_bits, lobe_lights, lobes, out)
 
 
-def _highlight_light_sums(
-    transfer: FreeCameraTransfer, state: FrameRequestState, camera_position: F32, probe_mask: NDArray[np.uint8]
-) -> F32:
+def _highlight_light_sums(transfer: FreeCameraTransfer, state: FrameRequestState, viewed: ViewedProbes) -> F32:
     """Return the highlights of probes, summed over visible environment lights."""
     lobes, light = state.materials.lobes, state.light
     if not (lobes.max_ratio == 1).any() or not light.has_direct_environment:
-        return np.zeros((len(probe_mask), 3), np.float32)
+        return np.zeros((len(viewed.material), 3), np.float32)
     lights = transfer.environment_lights(light.environment, is_preview=state.is_coarse)
-    return sum_lights(transfer.stored_scene, transfer.light_visibility_bits, lights, lobes, camera_position, probe_mask)
+    return sum_lights(viewed, transfer.light_visibility_bits, lights, lobes)
 
 
 def _add_hard_shadow_lights(

@@ -58,8 +58,13 @@ def _mark_nodes(lattice_nodes, is_visible, probe_mask, out):  # type: ignore[no-
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _mark_rays(material, is_changed, node_mask, face, lattice_node, weight, owner, out, pixel_mask):  # type: ignore[no-untyped-def]
-    num_pixels = pixel_mask.shape[0]
+def _mark_rays(material, is_changed, node_mask, gbuffer, out, pixel_mask):  # type: ignore[no-untyped-def]
+    face, lattice_node, weight, num_pixels = (
+        gbuffer.hits.face,
+        gbuffer.lattice_node,
+        gbuffer.weight,
+        pixel_mask.shape[0],
+    )
     for r in range(face.shape[0]):
         if face[r] < 0:
             continue
@@ -68,7 +73,7 @@ def _mark_rays(material, is_changed, node_mask, face, lattice_node, weight, owne
             is_dirty |= weight[r, k] != 0 and node_mask[lattice_node[r, k]] != 0
         if is_dirty:
             out[r] = 1
-            pixel_mask[r if r < num_pixels else owner[r - num_pixels]] = 1
+            pixel_mask[r if r < num_pixels else gbuffer.owner[r - num_pixels]] = 1
 
 
 def find_dirty_pixels(
@@ -83,11 +88,8 @@ def find_dirty_pixels(
     probe_mask = (gbuffer.is_needed & is_changed[stored_scene.material]).astype(np.uint8)
     node_mask, ray_mask = np.zeros_like(gbuffer.is_visible), np.zeros(len(gbuffer.directions), np.bool_)
     _mark_nodes(stored_scene.lattice_nodes, gbuffer.is_visible, probe_mask, node_mask)
-    pixel_mask, ray_arrays = (
-        np.zeros(num_pixels, np.bool_),
-        (gbuffer.hits.face, gbuffer.lattice_node, gbuffer.weight, gbuffer.owner),
-    )
-    _mark_rays(stored_scene.face_material, is_changed, node_mask, *ray_arrays, ray_mask, pixel_mask)
+    pixel_mask = np.zeros(num_pixels, np.bool_)
+    _mark_rays(stored_scene.face_material, is_changed, node_mask, gbuffer, ray_mask, pixel_mask)
     region = DirtyRegion(probe_mask, node_mask, np.flatnonzero(ray_mask).astype(np.int32))
     pixels = np.flatnonzero(pixel_mask).astype(np.int32)
     return DirtyPixels(region, pixels, np.searchsorted(gbuffer.owner, pixels))

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any
 
 import numba as nb
 import numpy as np
@@ -104,7 +103,7 @@ def normal_tilt(textures, texture, texture_uv, footprint, n, t, handedness, outw
         The unit normal; n itself if the mapped normal points below the face.
     """
     sample_texture(textures, texture, texture_uv[0], texture_uv[1], footprint, scratch)
-    tangent_dot_normal: Any = t[0] * n[0] + t[1] * n[1] + t[2] * n[2]
+    tangent_dot_normal = t[0] * n[0] + t[1] * n[1] + t[2] * n[2]
     tx, ty, tz = normalize(
         (t[0] - tangent_dot_normal * n[0], t[1] - tangent_dot_normal * n[1], t[2] - tangent_dot_normal * n[2])
     )
@@ -124,6 +123,6 @@ def shading_ratio(gradient, n, perturbed):  # type: ignore[no-untyped-def]
     Args:
         gradient: D, a tuple of three. n: the surface's normal. perturbed: n', the perturbed normal.
     """
-    irradiance: Any = gradient[0] * n[0] + gradient[1] * n[1] + gradient[2] * n[2]
-    perturbed_irradiance: Any = gradient[0] * perturbed[0] + gradient[1] * perturbed[1] + gradient[2] * perturbed[2]
+    irradiance = gradient[0] * n[0] + gradient[1] * n[1] + gradient[2] * n[2]
+    perturbed_irradiance = gradient[0] * perturbed[0] + gradient[1] * perturbed[1] + gradient[2] * perturbed[2]
     return min(max(perturbed_irradiance, np.float32(0)) / max(irradiance, _EPSILON), _MAX_RATIO)

@@ -81,8 +81,9 @@ def _aim(rotation, half_width, half_height, width, height, pixels, offsets, star
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
-def _find_nodes(probe_grid, face_normal, face, uv, directions, start, stop, lattice_node, weight, is_visible):  # type: ignore[no-untyped-def]
+def _find_nodes(probe_grid, face_normal, hits, directions, start, stop, lattice_node, weight, is_visible):  # type: ignore[no-untyped-def]
     """Find the lattice nodes around hits [start, stop); a side without nodes uses those of the other side."""
+    face, uv, _ = hits
     for p in range(start, stop):
         f = face[p]
         weight[p, 0] = weight[p, 1] = weight[p, 2] = 0
@@ -178,7 +179,7 @@ def _make_gbuffer(
     num_rays = len(directions)
     lattice_node, weight = np.zeros((num_rays, 3), np.uint32), np.empty((num_rays, 3), np.float32)
     is_visible = np.zeros(len(stored_scene.lattice_nodes.normal), np.uint8)
-    args = (stored_scene.probe_grid, stored_scene.face_normal, hits.face, hits.uv, directions)
+    args = stored_scene.probe_grid, stored_scene.face_normal, hits, directions
     parallel_for_chunks(lambda start, stop: _find_nodes(*args, start, stop, lattice_node, weight, is_visible), num_rays)
     is_needed = np.zeros(stored_scene.probes.num_points, np.uint8)
     mark_needed_probes(stored_scene.lattice_nodes, is_visible, is_needed)

@@ -192,14 +192,11 @@ def _perturbed_normal(  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy")
-def _shade_pixels(  # type: ignore[no-untyped-def]
-    scene_arrays, pixel_angle, hits, directions, lattice_node, weight, node_radiance, is_reflective, light_gradient,
-    emission, mirror_data, rows,
-    start, stop, out,
-):  # fmt: skip
+def _shade_pixels(scene, pixel_angle, gbuffer, probes, emission, mirror_data, rows, start, stop, out):  # type: ignore[no-untyped-def]
     """Sum the radiance of nodes and lobes, and emission, along rays rows[start:stop]."""
-    textures, uvs, tangents, faces, uv_faces, face_material, face_normal, uv_scale, normals = scene_arrays
-    face, uv, distance = hits
+    textures, uvs, tangents, faces, uv_faces, face_material, face_normal, uv_scale, normals = scene
+    (face, uv, distance), directions, _, lattice_node, weight, _, _, _ = gbuffer
+    node_radiance, is_reflective, light_gradient = probes
     lobes = mirror_data.lobes
     texture_value, light, radiance = np.empty(3, np.float32), np.empty(3, np.float32), np.empty(3, np.float32)
     for r in range(start, stop):
@@ -307,16 +304,8 @@ def shade_pixels(
     """
     radiance = np.empty((len(gbuffer.directions), 3), np.float32) if out is None else out
     ray_indices = np.arange(len(radiance), dtype=np.int32) if rows is None else rows
-    hits = (gbuffer.hits.face, gbuffer.hits.uv, gbuffer.hits.distance)
-    scene_arrays = (
-        stored_scene.textures, stored_scene.uvs, stored_scene.tangents, stored_scene.faces, stored_scene.uv_faces,
-        stored_scene.face_material,
-        stored_scene.face_normal, stored_scene.uv_scale, stored_scene.lattice_nodes.normal,
-    )  # fmt: skip
-    args = (
-        scene_arrays, np.float32(pixel_angle), hits, gbuffer.directions, gbuffer.lattice_node, gbuffer.weight,
-        *interpolated_probes, emission, mirror_data, ray_indices,
-    )  # fmt: skip
+    scene_args = stored_scene.pixel_arrays(), np.float32(pixel_angle), gbuffer
+    args = *scene_args, interpolated_probes, emission, mirror_data, ray_indices
     parallel_for_chunks(
         lambda start, stop: _shade_pixels(*args, start, stop, radiance), len(ray_indices), _CHUNKS_PER_THREAD
     )

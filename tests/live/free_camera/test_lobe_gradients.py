@@ -105,7 +105,7 @@ def test_gradients_equal_finite_differences(free_bake, terms):
     surface, tables, lobes = free_bake.stored_scene, build_tables([terms]), build_lobes([terms])
     others, num = distant_light(surface.probes), surface.probes.num_points
     is_needed = (np.arange(num) % 3 > 0).astype(np.uint8)
-    actual = gradients_along_lobe(surface, others, tables, lobes, CAMERA_POSITION, is_needed)
+    actual = gradients_along_lobe(surface.viewed_from(CAMERA_POSITION, is_needed), others, tables, lobes)
     assert not actual[is_needed == 0].any()
     expected = np.array(
         [gradients_along_lobe_numpy(surface, others, tables, lobes, CAMERA_POSITION, p) for p in range(0, num, 5)]
@@ -120,12 +120,9 @@ def test_gradients_are_zero_without_highlight_or_light(free_bake):
     surface, num = free_bake.stored_scene, free_bake.stored_scene.probes.num_points
     dull, everywhere = [{**METAL, "model": "lambert", "params": {}}], np.ones(num, np.uint8)
     others = distant_light(surface.probes)
-    assert not gradients_along_lobe(
-        surface, others, build_tables([dull]), build_lobes([dull]), CAMERA_POSITION, everywhere
-    ).any()
-    assert not gradients_along_lobe(
-        surface, 0 * others, build_tables([[METAL]]), build_lobes([[METAL]]), CAMERA_POSITION, everywhere
-    ).any()
+    viewed = surface.viewed_from(CAMERA_POSITION, everywhere)
+    assert not gradients_along_lobe(viewed, others, build_tables([dull]), build_lobes([dull])).any()
+    assert not gradients_along_lobe(viewed, 0 * others, build_tables([[METAL]]), build_lobes([[METAL]])).any()
 
 
 def pixels(free_bake, gain):
@@ -133,8 +130,9 @@ def pixels(free_bake, gain):
     surface, tables, lobes = free_bake.stored_scene, build_tables([[METAL]]), build_lobes([[METAL]])
     gbuffer = trace_primary(surface, free_bake.embree, CAMERA, SIZE).pixel_centers(SIZE[0] * SIZE[1])
     others, everywhere = distant_light(surface.probes), np.ones(surface.probes.num_points, np.uint8)
-    outgoing = shade_probes(surface, np.zeros_like(others), others, tables, CAMERA_POSITION, everywhere).radiance
-    gradients = np.float32(gain) * gradients_along_lobe(surface, others, tables, lobes, CAMERA_POSITION, everywhere)
+    viewed = surface.viewed_from(CAMERA_POSITION, everywhere)
+    outgoing = shade_probes(viewed, np.zeros_like(others), others, tables).radiance
+    gradients = np.float32(gain) * gradients_along_lobe(viewed, others, tables, lobes)
     broad, turn = (interpolate_to_nodes(surface, gbuffer.is_visible, values) for values in (outgoing, gradients))
     dark, nothing = np.zeros((1, 3), np.float32), np.empty((0, 3), np.float32)
     no_environment = PrefilteredEnvironment(
@@ -153,8 +151,8 @@ def pixels(free_bake, gain):
     fields = (np.ascontiguousarray(values, np.float32) for values in (position, normal, tangent))
     points = SurfacePoints(*fields, hit.astype(np.uint32))
     exactly = replace(surface, probes=points, material=np.zeros(len(hit), surface.material.dtype))
-    light, every = distant_light(points), np.ones(len(hit), np.uint8)
-    expected = shade_probes(exactly, np.zeros_like(light), light, tables, CAMERA_POSITION, every).radiance[:, 0]
+    light, viewed = distant_light(points), exactly.viewed_from(CAMERA_POSITION, np.ones(len(hit), np.uint8))
+    expected = shade_probes(viewed, np.zeros_like(light), light, tables).radiance[:, 0]
     inside = np.einsum("nc,nc->n", normal, -gbuffer.directions[hit]) > 0.3
     return radiance[hit][inside], expected[inside]
 

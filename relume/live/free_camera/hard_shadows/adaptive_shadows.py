@@ -10,7 +10,6 @@ the mean of nine pixels, whose targets together are `NUM_TARGET_SETS` times as m
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from jaxtyping import Shaped
@@ -30,12 +29,12 @@ from relume.live.free_camera.hard_shadows.shadow_kernels import (
 )
 from relume.live.free_camera.primary_visibility import GBuffer
 from relume.live.free_camera.ray_scene import OcclusionMesh
-from relume.raytrace.embree import occluded, packet_arguments
+from relume.raytrace.embree import PacketTracer
 from relume.scene.model import Camera
 
 F32 = NDArray[np.float32]
 U8 = NDArray[np.uint8]
-_TraceArguments = tuple[Any, int, int, ShadowRays, ShadowTargets]  # first arguments of tracing kernels
+_TraceArguments = tuple[PacketTracer, ShadowRays, ShadowTargets]  # first arguments of tracing kernels
 
 _MAX_ROUNDS = 32  # each follows a shadow edge by two more pixels
 
@@ -51,36 +50,28 @@ def visible_fractions(
     """
     width, height = size
     num_pixels, num_visible = width * height, np.zeros(len(gbuffer.hits.face), np.uint8)
-    arguments = packet_arguments(coherent=True)
-    trace_arguments = (
-        occluded,
-        solid.embree.handle,
-        arguments.ctypes.data,
-        _shadow_rays(solid, gbuffer, camera, height),
-        targets,
-    )
+    tracer, rays = solid.embree.shadow_tracer(coherent=True), _shadow_rays(solid, gbuffer, camera, height)
+    trace_arguments = tracer, rays, targets
     _trace_pixels(trace_arguments, gbuffer, size, num_visible)
     _trace_edge_rays(trace_arguments, gbuffer, num_pixels, width, num_visible)
     out = np.divide(num_visible, NUM_TARGETS, dtype=np.float32)
-    parallel_for_chunks(
-        lambda a, b: smooth_visibility(trace_arguments[3], width, height, num_visible, a, b, out), num_pixels
-    )
+    parallel_for_chunks(lambda a, b: smooth_visibility(rays, width, height, num_visible, a, b, out), num_pixels)
     return out
 
 
 def _shadow_rays(solid: OcclusionMesh, gbuffer: GBuffer, camera: Camera, height: int) -> ShadowRays:
-    stored_scene, hits = solid.stored_scene, gbuffer.hits
+    stored_scene = solid.stored_scene
     pixel = 2 * math.tan(camera.yfov / 2) / height
     right, up = (np.ascontiguousarray(camera.to_world[:3, k] * pixel, np.float32) for k in (0, 1))
     return ShadowRays(
         solid.positions, solid.edge_offset, stored_scene.faces, stored_scene.face_material, stored_scene.face_normal,
-        hits.face, hits.uv, hits.distance, gbuffer.directions, right, up, np.float32(solid.surface_offset),
+        gbuffer.hits, gbuffer.directions, right, up, np.float32(solid.surface_offset),
     )  # fmt: skip
 
 
 def _trace_pixels(trace_arguments: _TraceArguments, gbuffer: GBuffer, size: tuple[int, int], num_visible: U8) -> None:
     """Trace every fourth pixel, and all uncertain ones. num_visible: visible targets, written for pixels. (rays,)"""
-    (width, height), rays, face = size, trace_arguments[3], gbuffer.hits.face
+    (width, height), rays, face = size, trace_arguments[1], gbuffer.hits.face
     is_uncertain, is_refined, is_edge = (np.zeros(width * height, np.bool_) for _ in range(3))
     is_edge[gbuffer.owner] = True
     sparse_grid = np.arange(height)[::2, None] * width + np.arange(width)[::2]
@@ -129,7 +120,7 @@ def _trace_edge_rays(
     trace_arguments: _TraceArguments, gbuffer: GBuffer, num_pixels: int, width: int, num_visible: U8
 ) -> None:
     """Trace the extra rays of edge pixels; all targets if the rays of a pixel disagree."""
-    rays, face = trace_arguments[3], gbuffer.hits.face
+    rays, face = trace_arguments[1], gbuffer.hits.face
     edge_rays = np.flatnonzero(face[num_pixels:] >= 0) + num_pixels
     parallel_for_chunks(
         lambda a, b: trace_single_target(*trace_arguments, edge_rays, width, a, b, num_visible), len(edge_rays)

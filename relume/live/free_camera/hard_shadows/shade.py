@@ -61,7 +61,8 @@ def add_direct_sharp(
         rays: the rays to shade; None: all.
         out: radiance, float32, added to.
     """
-    num_materials, camera_position = len(materials.is_reflective), camera.to_world[:3, 3].astype(np.float32)
+    num_materials = len(materials.is_reflective)
+    viewed = stored_scene.viewed_from(camera.to_world[:3, 3], gbuffer.is_needed)
     dark = np.zeros((num_materials, 3), np.float32)
     lobe_visibility, gradients = np.zeros((0, 3), np.float32), np.zeros((0, 4), np.float32)
     mirror_data = MirrorData(
@@ -69,9 +70,7 @@ def add_direct_sharp(
     )
     for light, visibility in zip(hard_shadow_lights, shadow_visibility, strict=True):
         rows = np.flatnonzero(visibility > 0).astype(np.int32) if rays is None else rays[visibility[rays] > 0]
-        probe_radiance = shade_probes(
-            stored_scene, light.vectors, None, materials.tables, camera_position, gbuffer.is_needed
-        ).radiance
+        probe_radiance = shade_probes(viewed, light.vectors, None, materials.tables).radiance
         interpolated_probes = InterpolatedProbes(
             interpolate_to_nodes(stored_scene, gbuffer.is_visible, probe_radiance),
             materials.is_reflective,

@@ -6,7 +6,7 @@ A target is one of `ShadowTargets.towards`. Visibility is counted in targets, fr
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from relume.core.numba_options import NO_REFCOUNT
 from relume.lights.sun_disks import NUM_TARGETS
 from relume.live.free_camera.antialiasing import is_edge
+from relume.raytrace.camera_rays import Hits
 from relume.raytrace.ray_packet import (
     FAR,
     LANES,
@@ -43,9 +44,7 @@ class ShadowRays(NamedTuple):
     faces: NDArray[np.uint32]
     material: NDArray[np.int32]
     face_normal: F32
-    face: NDArray[np.int32]
-    uv: F32
-    distance: F32
+    hits: Hits
     directions: F32
     right: F32
     up: F32
@@ -57,12 +56,12 @@ def _shadow_origin(rays, p, at):  # type: ignore[no-untyped-def]
     """Write the hit point, offset from its surface, and the face normal on its side. at: (3, 3), the last row is
     scratch
     """
-    f, along, barycentric = rays.face[p], np.float32(0), at[2]
+    f, along, barycentric = rays.hits.face[p], np.float32(0), at[2]
     a, b, c = rays.faces[f, 0], rays.faces[f, 1], rays.faces[f, 2]
     barycentric[0], barycentric[1], barycentric[2] = (
-        np.float32(1) - rays.uv[p, 0] - rays.uv[p, 1],
-        rays.uv[p, 0],
-        rays.uv[p, 1],
+        np.float32(1) - rays.hits.uv[p, 0] - rays.hits.uv[p, 1],
+        rays.hits.uv[p, 0],
+        rays.hits.uv[p, 1],
     )
     for axis in range(3):
         along += rays.face_normal[f, axis] * rays.directions[p, axis]
@@ -100,16 +99,14 @@ def _aim_at_target(packet, lane, targets, target_set, target_index, x, y, z, nor
 
 
 @nb.njit(nogil=True, cache=True)
-def trace_single_target(occluded, scene, arguments, rays, targets, ray_indices, width, start, stop, num_visible):  # type: ignore[no-untyped-def]
+def trace_single_target(tracer, rays, targets, ray_indices, width, start, stop, num_visible):  # type: ignore[no-untyped-def]
     """Trace one target from each of the rays ray_indices[start:stop].
 
     Args:
-        occluded, scene, arguments: Embree's function and its arguments. rays: rays of the camera.
-        targets: targets of the light. ray_indices: the rays. (m,)
-        width: width of the image, pixels. start, stop: the range.
-        num_visible: written, 0 or `NUM_TARGETS`. (rays,) uint8
+        tracer: of shadow rays. rays: of the camera. targets: of the light. ray_indices: the rays. (m,)
+        width: of the image, pixels. start, stop: the range. num_visible: written, 0 or `NUM_TARGETS`. (rays,) uint8
     """
-    packet, at = new_packet(scene, arguments), np.empty((3, 3), np.float32)
+    packet, at = new_packet(tracer), np.empty((3, 3), np.float32)
     is_above = np.zeros(LANES, np.bool_)
     for batch_start in range(start, stop, LANES):
         batch_size = min(LANES, stop - batch_start)
@@ -122,7 +119,7 @@ def trace_single_target(occluded, scene, arguments, rays, targets, ray_indices, 
                 packet, lane, targets, target_set, target_index, at[0, 0], at[0, 1], at[0, 2], at[1]
             )
             enable_lane(packet, lane, is_above[lane] and lane < batch_size)
-        trace_shadows(occluded, packet)
+        trace_shadows(packet)
         for lane in range(batch_size):
             num_visible[ray_indices[batch_start + lane]] = (
                 NUM_TARGETS if is_above[lane] and is_unoccluded(packet, lane) else 0
@@ -130,24 +127,24 @@ def trace_single_target(occluded, scene, arguments, rays, targets, ray_indices, 
 
 
 @nb.njit(nogil=True, cache=True)
-def trace_all_targets(occluded, scene, arguments, rays, targets, ray_indices, is_edge, width, start, stop, num_visible):  # type: ignore[no-untyped-def]
+def trace_all_targets(tracer, rays, targets, ray_indices, is_edge, width, start, stop, num_visible):  # type: ignore[no-untyped-def]
     """Trace all targets of the rays ray_indices[start:stop], from points in their pixel footprints.
 
     Args:
-        occluded, scene, arguments, rays, targets, ray_indices, width, start, stop: as in `trace_single_target`.
+        tracer, rays, targets, ray_indices, width, start, stop: as in `trace_single_target`.
         is_edge: pixels on an edge. (pixels,) num_visible: written, number of visible targets. (rays,) uint8
     """
-    packet, at = new_packet(scene, arguments), np.empty((3, 3), np.float32)
+    packet, at = new_packet(tracer), np.empty((3, 3), np.float32)
     is_above, step = np.zeros(LANES, np.bool_), np.empty((2, 3), np.float32)
     for index in range(start, stop):
         p = ray_indices[index]
-        slant: Any = min(_shadow_origin(rays, p, at), np.float32(-1e-6))
+        slant = min(_shadow_origin(rays, p, at), np.float32(-1e-6))
         reach = np.float32(0)
         if p < len(is_edge) and not is_edge[p]:
-            reach = np.float32(0.25) * rays.distance[p] * min(-slant / _MIN_SLANT, np.float32(1))
+            reach = np.float32(0.25) * rays.hits.distance[p] * min(-slant / _MIN_SLANT, np.float32(1))
         for side in range(2):  # footprint of the pixel in the plane through its center
             across = rays.right if side == 0 else rays.up
-            normal_component: Any = across[0] * at[1, 0] + across[1] * at[1, 1] + across[2] * at[1, 2]
+            normal_component = across[0] * at[1, 0] + across[1] * at[1, 1] + across[2] * at[1, 2]
             for axis in range(3):
                 step[side, axis] = reach * (across[axis] - rays.directions[p, axis] * normal_component / slant)
         target_set = p % width % 3 + 3 * (p // width % 3)
@@ -163,7 +160,7 @@ def trace_all_targets(occluded, scene, arguments, rays, targets, ray_indices, is
                 x, y = at[0, 0] + dx + lift * at[1, 0], at[0, 1] + dy + lift * at[1, 1]
                 z, target_index = at[0, 2] + dz + lift * at[1, 2], 4 * ((column + row) & 3) + row
                 is_above[lane] = _aim_at_target(packet, lane, targets, target_set, target_index, x, y, z, at[1])
-            trace_shadows(occluded, packet)
+            trace_shadows(packet)
             for lane in range(LANES):
                 if is_above[lane] and is_unoccluded(packet, lane):
                     num_visible[p] += 1
@@ -172,9 +169,7 @@ def trace_all_targets(occluded, scene, arguments, rays, targets, ray_indices, is
 @nb.njit(nogil=True, cache=True, inline="always")
 def _is_same_surface(rays, p, q):  # type: ignore[no-untyped-def]
     """Return whether two pixels show one surface."""
-    return rays.face[q] >= 0 and not is_edge(
-        rays.material, rays.face_normal, rays.face, rays.distance, rays.directions, p, q
-    )
+    return rays.hits.face[q] >= 0 and not is_edge(rays.material, rays.face_normal, rays.hits, rays.directions, p, q)
 
 
 @nb.njit(nogil=True, cache=True, **NO_REFCOUNT)
@@ -197,7 +192,7 @@ def predict(rays, width, height, start, stop, num_visible, is_uncertain):  # typ
                 p = y * width + x
                 if agree:
                     num_visible[p] = value
-                elif rays.face[p] >= 0:
+                elif rays.hits.face[p] >= 0:
                     _predict_pixel(rays, width, height, x, y, num_visible, is_uncertain)
 
 
@@ -249,7 +244,7 @@ def needs_refinement_at_edges(rays, owner, num_pixels, rays_per_pixel, num_visib
         pixel = owner[first]
         for k in range(first, first + rays_per_pixel):
             p = num_pixels + k
-            if rays.face[p] < 0:
+            if rays.hits.face[p] < 0:
                 continue
             if num_visible[p] != num_visible[pixel]:
                 is_uncertain[k] = _is_same_surface(rays, p, pixel)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
@@ -84,7 +84,7 @@ def evaluate_two_lobes(lobes, lobe, n, d):  # type: ignore[no-untyped-def]
 def _lobe_frame(n, d):  # type: ignore[no-untyped-def]
     """Return the table row of θo, and the unit projection of d onto the surface."""
     facing = -(n[0] * d[0] + n[1] * d[1] + n[2] * d[2])
-    cosine: Any = min(max(facing, MIN_COSINE), np.float32(1))
+    cosine = min(max(facing, MIN_COSINE), np.float32(1))
     row, fraction = table_row(cosine)
     x, y, z = d[0] + facing * n[0], d[1] + facing * n[1], d[2] + facing * n[2]
     inverse_length = np.float32(1) / math.sqrt(max(x * x + y * y + z * z, np.float32(1e-20)))

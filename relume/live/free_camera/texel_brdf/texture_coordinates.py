@@ -8,7 +8,6 @@ aliasing.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numba as nb
 import numpy as np
@@ -97,14 +96,14 @@ def _projected_axes(face_normal):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
-def gather_hits(placements, normals, face, uv, distance, directions, lattice_node, weight, rows, start, num, columns):  # type: ignore[no-untyped-def]
+def gather_hits(placements, normals, gbuffer, rows, start, num, columns):  # type: ignore[no-untyped-def]
     """Gather the hits of rays rows[start:start + num] into columns; at most `BATCH_SIZE` rays.
 
     Args:
-        placements: from `face_placements`. normals: normals of lattice nodes. face, uv, distance: hits of the rays.
-        directions: directions of the rays. lattice_node, weight: interpolation nodes of the hits and their weights.
+        placements: from `face_placements`. normals: of lattice nodes. gbuffer: of the rays.
         columns: written. (NUM_COLUMNS · BATCH_SIZE,)
     """
+    (face, uv, distance), directions, _, lattice_node, weight, _, _, _ = gbuffer
     for j in range(num):
         ray = rows[start + j]
         f, a, b, c = face[ray], lattice_node[ray, 0], lattice_node[ray, 1], lattice_node[ray, 2]
@@ -179,7 +178,7 @@ def _project_uv(columns, camera_position, num):  # type: ignore[no-untyped-def]
 @nb.njit(nogil=True, cache=True, fastmath=True, error_model="numpy", forceinline=True, **NO_REFCOUNT)
 def _repeat_fraction(coordinate):  # type: ignore[no-untyped-def]
     """Return the fraction of a repeat; written out, because floor would be a call."""
-    clamped: Any = min(max(coordinate, -_MAX_REPEATS), _MAX_REPEATS)
+    clamped = min(max(coordinate, -_MAX_REPEATS), _MAX_REPEATS)
     fraction = np.float32(clamped - np.float32(np.int32(clamped)))
     return fraction + np.float32(1) if fraction < 0 else fraction
 
