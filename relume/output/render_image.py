@@ -14,7 +14,7 @@ from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
 from relume.live.fixed_camera.picture import Picture
 from relume.live.fixed_camera.protocols import FixedViewTransfer, OpenBake
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.live.free_camera.refinement.refinement_jobs import StaticViewState
+from relume.live.free_camera.static_view_jobs import StaticViewState
 from relume.look import Look
 from relume.methods.free_camera_transfer import BakedFreeCamera
 from relume.methods.static_view import StaticViewBuilder

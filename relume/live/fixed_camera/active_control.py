@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from relume.live.fixed_camera.edit_pointers import ROTATION, ColorPointer, LightPointer, Pointer, TransportPointer
-from relume.live.fixed_camera.jobs import TermTarget
 from relume.live.fixed_camera.live_term import LiveTerm
+from relume.live.fixed_camera.view_images import TermTarget
 from relume.look import LightGeometry, Look
 from relume.operators.edit_basis import EditBasis
 

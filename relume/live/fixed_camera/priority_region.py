@@ -7,70 +7,38 @@ complete image costs no more.
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.live.fixed_camera.displayed import DisplayedImage
-from relume.live.fixed_camera.fidelity import Fidelity, FidelityLabel
+from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination
-from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback, Shade, TermTarget
+from relume.live.fixed_camera.view_images import TermTarget
 from relume.operators.shade import ShadedTerm
 from relume.views.view import Tile
 
 F32 = NDArray[np.float32]
 
-_MIN_HIDDEN_SAMPLES = 20_000  # samples outside the region; with fewer, an extra frame does not pay off
 
+def replace_region(target: TermTarget, key: tuple[Hashable, ...], region: Tile, rows: Shaped[F32, "n 3"]) -> None:
+    """Replace the samples of a term in a region by exact ones, if its target is still the same.
 
-@dataclass(frozen=True, eq=False)
-class ShadeRegion:
-    """Shade the samples of a term in a region first.
-
-    Attributes:
-        whole: the job of the complete image. region: x, y, width, height in pixels.
+    Args:
+        target: the term. key: of the exact image. region: x, y, width, height in pixels. rows: valid in the region.
     """
-
-    whole: Shade
-    region: Tile
-    state: Literal["precomputing", "shading"] = "shading"
-    is_resumable = True
-
-    @property
-    def label(self) -> str:
-        """Text for the user."""
-        return self.whole.label
-
-    @property
-    def key(self) -> tuple[Hashable, ...]:
-        """See `Job`."""
-        return (*self.whole.key, "region", self.region)
-
-    @property
-    def is_refinement(self) -> bool:
-        """See `Job`."""
-        return self.whole.is_refinement
-
-    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> Shaped[F32, "n 3"]:
-        """See `Job`. Returns rows of the image, valid in the region."""
-        return self.whole.shade_samples(self.whole.target.material.lies_in(self.region), progress, is_canceled)
-
-    def install(self, result: Shaped[F32, "n 3"]) -> None:
-        """See `Job`; replaces the samples in the region."""
-        images, material, live = self.whole.target
-        key = images.image_key(material, live, live.light)
-        if not self.whole.target.exists() or self.whole.key != key or not _allows_partial(live.ready, live.light):
-            return
-        image = with_samples(live.ready.image, result, material.lies_in(self.region))
-        live.set_ready(replace(live.ready, image=image, exact_region=(key, self.region)))
+    images, material, live = target
+    current_key = images.image_key(material, live, live.light)
+    if target.exists() and key == current_key and allows_partial(live.ready, live.light):
+        image = with_samples(live.ready.image, rows, material.lies_in(region))
+        live.set_ready(replace(live.ready, image=image, exact_region=(key, region)))
 
 
-def _allows_partial(ready: DisplayedImage, light: Illumination) -> bool:
+def allows_partial(ready: DisplayedImage, light: Illumination) -> bool:
     """Return whether a part of an image may be replaced: it is shown in this light, and no steps are added to it."""
-    return ready.fidelity in (Fidelity.PREVIEW, Fidelity.INCREMENTAL) and ready.light == light
+    return not ready.is_converged and ready.light == light
 
 
 def with_samples(
@@ -93,11 +61,11 @@ def is_exact_within(target: TermTarget, region: Tile | None) -> bool:
     return exact_region[0] == images.image_key(material, live, live.light)
 
 
-def fidelity_label_in(target: TermTarget, region: Tile | None) -> FidelityLabel:
+def fidelity_in(target: TermTarget, region: Tile | None) -> Fidelity:
     """Return the fidelity of the displayed image of a term in a region; None: everywhere."""
     live = target.live
     is_exact = live.displayed is live.ready and is_exact_within(target, region)
-    return "exact" if is_exact or not is_visible(target, region) else live.fidelity_label
+    return Fidelity.EXACT if is_exact or not is_visible(target, region) else live.fidelity
 
 
 def is_visible(target: TermTarget, region: Tile | None) -> bool:
@@ -105,21 +73,9 @@ def is_visible(target: TermTarget, region: Tile | None) -> bool:
     return region is None or bool(target.material.lies_in(region).any())
 
 
-def make_region_job(whole: Shade, candidates: Iterable[TermTarget], region: Tile | None) -> ShadeRegion | None:
-    """Return the job that shades the visible region first; None if the complete image is shaded at once.
-
-    Args:
-        whole: job of the complete image. candidates: terms to be shaded, including this one. region: the visible
-            region.
-    """
-    images, material, live = target = whole.target
-    if region is None or is_exact_within(target, region) or not _allows_partial(live.ready, live.light):
-        return None
-    if images.is_cached(material, live):
-        return None
-    num_hidden = sum(np.count_nonzero(~candidate.material.lies_in(region)) for candidate in candidates)
-    is_split = 0 < np.count_nonzero(material.lies_in(region)) < material.num_samples
-    return ShadeRegion(whole, region) if is_split and num_hidden > _MIN_HIDDEN_SAMPLES else None
+def num_hidden_samples(targets: Iterable[TermTarget], region: Tile) -> int:
+    """Return the number of samples of some terms outside a region."""
+    return sum(int(np.count_nonzero(~target.material.lies_in(region))) for target in targets)
 
 
 def _contains(outer: Tile, inner: Tile) -> bool:

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from session_edits import kind_of
 from test_fixed_camera_btfs import CAMERA, GRAY, SIZE
 from tiny_scenes import make_tiny_scene, quad, studio
 
@@ -18,7 +19,6 @@ from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.texel_brdf import texel_tables
-from relume.live.free_camera.texel_brdf.job import TablesJob
 from relume.look import validate
 from relume.methods.registry import METHODS, open_bake
 from relume.scene.model import Material
@@ -74,7 +74,7 @@ def run_to_the_end(picture):
         picture.advance(None)
         if (job := picture.next_job()) is None:
             return picture
-        picture.install(job, job.run(lambda fraction: None, lambda: False))
+        job.apply(job.run(lambda fraction: None, lambda: False))
     raise AssertionError("it never rests")
 
 
@@ -118,8 +118,8 @@ def test_frames_show_the_mean_until_the_tables_are_ready(opened, records, monkey
         during.setattr(texel_tables, "compute_texel_tables", lambda whole: pytest.fail("made by a frame"))
         picture.advance(None)
         mean = picture.image()
-        while not isinstance(job := picture.next_job(), TablesJob):
-            picture.install(job, job.run(lambda fraction: None, lambda: False))
+        while kind_of(job := picture.next_job()) != "BTF tables":
+            job.apply(job.run(lambda fraction: None, lambda: False))
             picture.advance(None)
             mean = picture.image()
     image = run_to_the_end(picture).image()

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from relume.core.thread_pools import parallel_for_chunks
 from relume.lights.spherical_triangles import NO_LIGHTS
+from relume.live.fixed_camera.displayed import weighted_sum
 from relume.live.fixed_camera.illumination import Illumination, LightSource, direct_from
-from relume.live.fixed_camera.jobs import TermTarget, weighted_sum
 from relume.live.fixed_camera.live_term import LiveTerm
 from relume.live.fixed_camera.material_image import MaterialImage
-from relume.live.fixed_camera.view_images import ViewImages
+from relume.live.fixed_camera.view_images import TermTarget, ViewImages
 from relume.look import LightGeometry
 from relume.operators.shade import ShadedTerm, shade_rows, shaded_bytes
 from relume.raytrace.light_visibility import compute_irradiance
@@ -77,7 +77,7 @@ class MovedLights:
         """Direct light from a light before it moved, as exact as in the converged image; cached, since every frame uses
         it.
 
-        Usually the scheduler has prefetched it (`StrategyScheduler`).
+        Usually `incremental_light` has prefetched it.
         """
         images = self._images
         key = images.image_key(material, live, light)

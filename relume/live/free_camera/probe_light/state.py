@@ -2,18 +2,22 @@
 
 Exact coefficients are computed when a drag ends. During a drag, direct light is computed in every frame for visible
 probes. Indirect light takes longer than a frame: it is computed in the background, and frames use the latest result
-(`relume.live.free_camera.probe_light.jobs.IncrementalProbeLightJob`).
+(`Priority.UPDATE`).
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.core.errors import CancelledError
+from relume.core.thread_pools import low_priority
 from relume.live.fixed_camera.illumination import Illumination, element_gains, equal_up_to_reflectances
+from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
 from relume.live.free_camera.probe_light.incident import IncidentCoefficients, PartialCoefficients, combine, combine_all
 from relume.live.free_camera.probe_light.indirect import (
     IndirectCoefficients,
@@ -23,7 +27,6 @@ from relume.live.free_camera.probe_light.indirect import (
     same_indirect,
     update_reflectances,
 )
-from relume.live.free_camera.probe_light.jobs import IncrementalProbeLightJob, ProbeLightJob
 from relume.live.free_camera.protocol import FreeCameraTransfer
 
 
@@ -149,26 +152,30 @@ class ProbeLightState:
             last = indirect_of(transfer, before if is_reusable else light, is_needed)
         return extend(transfer, last, is_needed)
 
-    def next_job(
-        self, request: LightRequest, is_needed: Shaped[NDArray[np.uint8], " probes"]
-    ) -> IncrementalProbeLightJob | ProbeLightJob:
+    def next_job(self, request: LightRequest, is_needed: Shaped[NDArray[np.uint8], " probes"]) -> Job:
         """Return the job for missing light: indirect light of some probes first, then all exact coefficients.
 
         Args:
             request, is_needed: as in `fast`, which must have been called.
         """
-        transfer, (light, has_hard_shadows) = self._transfer, request
+        transfer, light = self._transfer, request.light
         if self.only_indirect_pending(request):
             assert self._exact is not None
             before, base = self._exact[0].light, self._exact[1]
             last = self._updated
             if last is None or last.light != light or (is_needed & ~last.is_complete).any():
-                return IncrementalProbeLightJob(
+                return _update_job(
                     light, lambda: self._update_reflectances(before, base, light, is_needed), self._set_updated
                 )
         elif self._indirect is not None and light.paths.has_indirect and not same_indirect(self._indirect.light, light):
-            return IncrementalProbeLightJob(light, lambda: indirect_of(transfer, light, is_needed), self._set_indirect)
-        return ProbeLightJob(transfer, light, has_hard_shadows, self.restart_from)
+            return _update_job(light, lambda: indirect_of(transfer, light, is_needed), self._set_indirect)
+        return Job(
+            ("probe light", transfer.key, *request),
+            "light at the probes",
+            Priority.REFINEMENT,
+            lambda progress, is_canceled: _exact_coefficients(transfer, request, progress, is_canceled),
+            lambda incident: self.restart_from(*request, incident),
+        )
 
     def _update_reflectances(
         self, before: Illumination, base: IncidentCoefficients, light: Illumination, is_needed: NDArray[np.uint8]
@@ -183,3 +190,36 @@ class ProbeLightState:
     def _set_indirect(self, indirect: IndirectCoefficients) -> None:
         if self._indirect is not None:  # else all is exact by now
             self._indirect, self.version = indirect, self.version + 1
+
+
+def _update_job(light: Illumination, compute: Callable[[], Any], apply: Callable[[Any], None]) -> Job:
+    """Return the job for approximate indirect light during a drag, in threads with lower priority than frames.
+
+    Args:
+        light: of the look when the job was created. compute: computes it. apply: receives the result.
+    """
+
+    def run(progress: ProgressCallback, is_canceled: CancelCheck) -> Any:
+        with low_priority():
+            return compute()
+
+    return Job(("indirect light", light), "indirect light", Priority.UPDATE, run, apply)
+
+
+def _exact_coefficients(
+    transfer: FreeCameraTransfer, request: LightRequest, progress: ProgressCallback, is_canceled: CancelCheck
+) -> IncidentCoefficients:
+    """Compute exact coefficients source by source; `is_canceled` is polled before each."""
+    (light, has_hard_shadows), done = request, 0
+    num = len(element_gains(light))
+
+    def get_vectors(element: Illumination) -> PartialCoefficients:
+        nonlocal done
+        if is_canceled():
+            raise CancelledError("the light at the probes was canceled")
+        vectors, done = transfer.vectors(element, has_hard_shadows), done + 1
+        progress(done / num)
+        return PartialCoefficients(vectors)
+
+    hard_shadow_lights = transfer.hard_shadow_lights(light, None) if has_hard_shadows else ()
+    return combine(transfer, light, get_vectors, hard_shadow_lights)

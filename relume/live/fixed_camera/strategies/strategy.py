@@ -1,0 +1,108 @@
+"""A strategy: one way to bring the image of a term to its target."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+from relume.live.fixed_camera.active_control import ActiveControl
+from relume.live.fixed_camera.fidelity import Fidelity
+from relume.live.fixed_camera.illumination import Illumination
+from relume.live.fixed_camera.jobs import Job
+from relume.live.fixed_camera.view_images import TermTarget, ViewImages
+from relume.look import Look
+from relume.look.model import Rgb
+
+
+class Urgency(IntEnum):
+    """Why a job is needed, most urgent first."""
+
+    DRAGGED_LIGHT = 0  # only this job can follow the drag
+    PREVIEW = 1  # nothing of the target is shown
+    LIGHT_SOURCE = 2  # the image of one source
+    IMAGE = 3  # the image of the target
+    PREPARED_CONTROL = 4  # the next edit
+    BETTER_OPERATOR = 5  # a drag continues more exactly
+    REFINEMENT = 6  # the image is nearly exact
+    PREFETCH = 7  # a later edit
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What strategies know when they ask for a job.
+
+    Attributes:
+        images: the terms. control: the active control. look: the target.
+        is_watched: a user waits for the picture. displayed_light: the light that it shows.
+        can_reach: a strategy brings a term to the target light without a job.
+        on_preview: called with the light and gain of an applied preview.
+    """
+
+    images: ViewImages
+    control: ActiveControl
+    look: Look
+    is_watched: bool
+    displayed_light: Illumination
+    can_reach: Callable[[TermTarget], bool]
+    on_preview: Callable[[Illumination, Rgb], None]
+
+    @property
+    def targets(self) -> list[TermTarget]:
+        """All terms that are visible in this view."""
+        return list(self.images.targets())
+
+    @property
+    def unconverged(self) -> list[TermTarget]:
+        """Terms without a converged image in the target light."""
+        return [target for target in self.targets if not target.live.is_converged]
+
+    @property
+    def is_opening(self) -> bool:
+        """True if the picture shows nothing yet."""
+        return all(target.live.latest.is_empty for target in self.targets)
+
+
+JobFinder = Callable[[Situation], Job | None]
+
+
+def _never(target: TermTarget, light: Illumination) -> bool:
+    return False
+
+
+def _no_update(target: TermTarget, light: Illumination, max_coefficients: int | None) -> None:
+    """Leave the image to the strategy's jobs."""
+
+
+@dataclass(frozen=True)
+class Strategy:
+    """One way to bring the image of a term to its target; a row of `table.STRATEGIES`.
+
+    Attributes:
+        name: as in docs/frame-terms.md. needs: what it needs. cost: of a frame.
+        fidelity: of its best image.
+        changes_light: it leads from the reference image to another light. Such strategies update all terms together,
+            so that a picture shows one light; the others update each term by itself.
+        is_ready: whether it can update a term to a light at once.
+        update: updates the image in place, with at most some coefficients per channel, None for all.
+        jobs: for each urgency, returns the next job that it needs, or None.
+    """
+
+    name: str
+    needs: str
+    cost: str
+    fidelity: Fidelity
+    changes_light: bool = False
+    is_ready: Callable[[TermTarget, Illumination], bool] = _never
+    update: Callable[[TermTarget, Illumination, int | None], None] = _no_update
+    jobs: Mapping[Urgency, JobFinder] = field(default_factory=dict)
+
+
+def smallest_material(jobs: Iterable[tuple[TermTarget, Job | None]]) -> Job | None:
+    """Return the job of the material with the fewest samples; None if there is none.
+
+    Args:
+        jobs: of each term, its job or None.
+    """
+    missing = [(target, job) for target, job in jobs if job is not None]
+    return min(missing, key=lambda item: item[0].material.num_samples)[1] if missing else None
