@@ -50,7 +50,7 @@ def run_next_job(picture):
 
 
 def kind_of(job):
-    """What a job computes; None for no job."""
+    """The kind of a job; None for no job."""
     return None if job is None else job.kind
 
 

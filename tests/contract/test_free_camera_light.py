@@ -147,7 +147,7 @@ def test_edits_and_indirect_light_do_not_wait_for_each_other(free_bake, monkeypa
         job, before = picture.next_job(), picture.image()
         with monkeypatch.context() as nothing_whole:
             nothing_whole.setattr("relume.live.free_camera.free_camera_picture.render_frame", None)
-            nothing_whole.setattr("relume.live.free_camera.probe_light.state.update_reflectances", None)
+            nothing_whole.setattr("relume.live.free_camera.probe_light.update_reflectances", None)
             picture.set_look(make_look(free_bake, add_lights(other, set_exponent(step))))
             assert picture.advance(None).changed
         edited = picture.image()

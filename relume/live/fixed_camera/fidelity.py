@@ -1,4 +1,4 @@
-"""How exact an image is: one word, inside and on the wire."""
+"""Fidelity of images: one word, inside and on the wire."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class Fidelity(StrEnum):
-    """How exactly an image shows its look, worst first; of several images, the worst counts.
+    """Exactness of an image with respect to its look, worst first; of several images, the worst counts.
 
     - PREVIEW: few samples of the target are shaded, and the others interpolated; or nothing is shown yet.
     - APPROXIMATE: an older look, the most important coefficients of the target, or a free-camera image.

@@ -56,7 +56,7 @@ class Job:
 
     @property
     def kind(self) -> Hashable:
-        """What it computes, for example "operator"."""
+        """The kind of computation, for example "operator"."""
         return self.key[0]
 
     @property

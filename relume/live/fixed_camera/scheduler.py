@@ -23,7 +23,7 @@ from relume.look.model import Rgb
 
 _TERM_STRATEGIES = tuple(strategy for strategy in STRATEGIES if not strategy.changes_light)
 _LIGHT_STRATEGIES = tuple(strategy for strategy in STRATEGIES if strategy.changes_light)
-_JOB_FINDERS = tuple(
+_JOB_REQUESTS = tuple(
     strategy.jobs[urgency] for urgency in Urgency for strategy in STRATEGIES if urgency in strategy.jobs
 )
 
@@ -60,7 +60,7 @@ class StrategyScheduler:
         situation = Situation(
             images, control, look, self._is_watched, self.light, self._can_reach_target, self._on_preview
         )
-        job = next((job for find in _JOB_FINDERS if (job := find(situation)) is not None), None)
+        job = next((job for request in _JOB_REQUESTS if (job := request(situation)) is not None), None)
         return None if job is None else replace(job, apply=lambda result: self._apply(job, result))
 
     def _apply(self, job: Job, result: object) -> None:

@@ -16,26 +16,26 @@ from relume.live.fixed_camera.illumination import Illumination, Solo, illuminati
 from relume.live.fixed_camera.jobs import Job, Priority
 from relume.live.fixed_camera.picture import Progress
 from relume.live.fixed_camera.view_images import material_documents
+from relume.live.free_camera.adaptive_shadows import visible_fractions
 from relume.live.free_camera.background import alpha
 from relume.live.free_camera.browser.material_arrays import ArrayBlock, ShaderConstants, array_blocks, shader_constants
 from relume.live.free_camera.frame import (
     Frame,
     FrameRequestState,
     MaterialState,
+    PreviousImage,
     only_materials_differ,
     render_frame,
     shows_btf,
     update_for_materials,
 )
-from relume.live.free_camera.hard_shadows.adaptive_shadows import visible_fractions
-from relume.live.free_camera.hard_shadows.lights import HardShadowLight
+from relume.live.free_camera.hard_shadow_lights import HardShadowLight
 from relume.live.free_camera.highlight_edges import render_fine_frame
+from relume.live.free_camera.incident_light import IncidentCoefficients
 from relume.live.free_camera.incremental_frame import DirtyPixels, find_dirty_pixels
 from relume.live.free_camera.occluded_probes import reweight
-from relume.live.free_camera.previous_frame import PreviousImage
 from relume.live.free_camera.primary_visibility import GBuffer, trace_primary
-from relume.live.free_camera.probe_light.incident import IncidentCoefficients
-from relume.live.free_camera.probe_light.state import LightRequest, ProbeLightState
+from relume.live.free_camera.probe_light import LightRequest, ProbeLightState
 from relume.live.free_camera.probes.stored_scene import StoredScene
 from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.live.free_camera.residual_correction import apply_residual

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from relume.core.cache import Cache
 from relume.core.errors import CancelledError, RelumeError, ResultUnavailableError
-from relume.live.fixed_camera.finish import render_exact
 from relume.live.fixed_camera.illumination import Solo
 from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
-from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.picture import Picture, render_exact
 from relume.live.fixed_camera.protocols import FixedViewTransfer
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.residual_correction import CorrectionSamples, residual

@@ -77,7 +77,7 @@ def test_a_rotated_texture_is_followed_and_then_exact(bake, small_btf, active_pi
 
 def test_light_missing_from_the_cache_gives_a_preview_that_is_not_exact(bake, small_btf, monkeypatch):
     """As in a look that was opened with images from disk."""
-    monkeypatch.setattr("relume.live.fixed_camera.texel_light_cache._BUDGET_DIVISOR", 1 << 20)
+    monkeypatch.setattr("relume.live.fixed_camera.strategies.texel_sum._BUDGET_DIVISOR", 1 << 20)
     picture = Picture(bake, "front", Cache(1 << 28), is_watched=True)
     picture.set_look(covered(bake, small_btf.record, scale=2.0))
     before = run_until_exact(picture).image()

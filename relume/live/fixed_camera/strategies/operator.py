@@ -146,7 +146,11 @@ def _continues(target: TermTarget, basis: EditBasis | None) -> bool:
 
 
 def job_for(target: TermTarget, basis: EditBasis, form: OperatorForm) -> Job:
-    """Return an operator job; a coarse operator comes first if the exact one takes long and the edit can use it."""
+    """Return an operator job; a coarse operator comes first if the exact one takes long and the edit can use it.
+
+    Args:
+        target, basis, form: as in `OperatorPrecompute.for_target`.
+    """
     images, material, live = target
     if form == EXACT and not images.cache.contains(images.operator_key(material, live, basis, live.target_bands)):
         lights = images.transfer.num_lights if live.light.has_direct_environment else 0

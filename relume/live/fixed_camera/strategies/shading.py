@@ -16,7 +16,7 @@ from relume.live.fixed_camera.displayed import DisplayedImage, weighted_sum
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination, split_for_shading
 from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
-from relume.live.fixed_camera.texel_light_cache import is_cacheable, put_texel_light
+from relume.live.fixed_camera.strategies.texel_sum import is_cacheable, put_texel_light
 from relume.live.fixed_camera.view_images import TermTarget
 from relume.look.model import Rgb
 from relume.operators.shade import PartialImage, ShadedTerm, shaded_bytes
@@ -100,16 +100,16 @@ class Shading:
             incident = put_texel_light(images, material, btf_ref, self.light, progress, is_canceled)
             return incident.shade(btf_ref, images.unlit_samples(material))
         if len(self.light_components) < 2:
-            return self.complete_image(self.key, self.light, progress, is_canceled)
+            return self._complete_image(self.key, self.light, progress, is_canceled)
         weighted_images: list[tuple[F32, Rgb]] = []
         for done, (key, light, gain) in enumerate(self.light_components):
             shade_component = partial(
-                self.complete_image, key, light, partial(self._report, progress, done), is_canceled
+                self._complete_image, key, light, partial(self._report, progress, done), is_canceled
             )
             weighted_images.append((images.cache.get(key, ShadedTerm, self.num_bytes, shade_component).image, gain))
         return ShadedTerm(weighted_sum(np.zeros_like(live.ready.image), weighted_images))
 
-    def complete_image(
+    def _complete_image(
         self, key: tuple[Hashable, ...], light: Illumination, progress: ProgressCallback, is_canceled: CancelCheck
     ) -> ShadedTerm:
         """Complete the image in a light from its partial result."""

@@ -158,14 +158,23 @@ class SparsePreview:
     def for_targets(
         cls, images: ViewImages, targets: Iterable[TermTarget], light: Illumination, detail: int = 0
     ) -> SparsePreview:
-        """Return the preview of terms of `images` in a light, with their current curves."""
+        """Return the preview of terms, with their current curves.
+
+        Args:
+            images, targets: the terms. light: the illumination. detail: number of refinements.
+        """
         snapshots = [_TermSnapshot(target, target.live.term, target.live.target_bands) for target in targets]
         return cls(images, light, images.gain, snapshots, detail)
 
     def job(
         self, label: str, on_preview: Callable[[Illumination, Rgb], None], priority: Priority = Priority.IMAGE
     ) -> Job:
-        """Return the job. label: text for the user. on_preview: called when it is applied."""
+        """Return the job.
+
+        Args:
+            label: text for the user. on_preview: called with its light and gain when it is applied.
+            priority: when it starts.
+        """
         images, targets = self.images, [snapshot.target for snapshot in self.snapshots]
         image_keys = [images.image_key(target.material, target.live, images.light) for target in targets]
         key = "preview", images.transfer.key, images.view.name, self.light, self.detail, *image_keys

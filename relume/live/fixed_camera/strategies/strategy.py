@@ -30,7 +30,7 @@ class Urgency(IntEnum):
 
 @dataclass(frozen=True)
 class Situation:
-    """What strategies know when they ask for a job.
+    """Input of strategies that ask for a job.
 
     Attributes:
         images: the terms. control: the active control. look: the target.
@@ -63,7 +63,7 @@ class Situation:
         return all(target.live.latest.is_empty for target in self.targets)
 
 
-JobFinder = Callable[[Situation], Job | None]
+JobRequest = Callable[[Situation], Job | None]
 
 
 def _never(target: TermTarget, light: Illumination) -> bool:
@@ -95,7 +95,7 @@ class Strategy:
     changes_light: bool = False
     is_ready: Callable[[TermTarget, Illumination], bool] = _never
     update: Callable[[TermTarget, Illumination, int | None], None] = _no_update
-    jobs: Mapping[Urgency, JobFinder] = field(default_factory=dict)
+    jobs: Mapping[Urgency, JobRequest] = field(default_factory=dict)
 
 
 def smallest_material(jobs: Iterable[tuple[TermTarget, Job | None]]) -> Job | None:
