@@ -80,8 +80,7 @@ class FreeCameraPicture:
         self._is_stale = False  # the frame is outdated: its pixels were not requested
         self._texel_light = TexelLight()
         self._residual_image: F32 | None = None  # residual that is added to the frame
-        self._is_corrected = False  # the displayed image includes the residual
-        self._is_refined = False  # the frame has been refined since it was sent
+        self._is_refined = False  # a job has refined the frame since the last step
         self.renders_pixels = True
         self._published_vectors: IncidentCoefficients | None = None
         self._vectors_version = self._materials_version = 0
@@ -104,7 +103,7 @@ class FreeCameraPicture:
         light = illumination_from_look(look, self._transfer.material_names, has_bounces=True, solo=solo)
         self._transfer.environment_map(light.environment.map)  # raises now if it is not available
         self._look, self._light, self._solo = look, light, solo
-        self._residual_image = None
+        self.correct(None)
 
     def set_camera(self, camera: Camera, size: tuple[int, int]) -> None:
         """Set the camera and the image size; nothing is computed yet.
@@ -114,7 +113,7 @@ class FreeCameraPicture:
         """
         self._camera, self._size = camera, size
         self._camera_seq += 1
-        self._residual_image = None
+        self.correct(None)
 
     def correct(self, residual_image: Shaped[F32, "height width 3"] | None) -> None:
         """Add a residual until the look or camera changes, see `relume.live.free_camera.residual_correction`.
@@ -122,6 +121,7 @@ class FreeCameraPicture:
         Args:
             residual_image: per pixel, float32; None: none.
         """
+        self._is_refined |= residual_image is not None or self.is_corrected
         self._residual_image = residual_image
 
     @property
@@ -207,9 +207,9 @@ class FreeCameraPicture:
         """Update the image to its look and camera."""
         target = self._target
         is_displayed = target == self._displayed and self._is_coarse == self._must_be_coarse()
-        if self._look is None or (is_displayed and self._is_corrected == self.is_corrected and not self._is_refined):
+        if self._look is None or (is_displayed and not self._is_refined):
             return Progress([], exact=False, fidelity=self._fidelity, complete=True)
-        self._is_corrected, self._is_refined = self.is_corrected, False
+        self._is_refined = False
         if not is_displayed:
             self._is_coarse = self._must_be_coarse()
             self._is_stale, self._displayed = True, target

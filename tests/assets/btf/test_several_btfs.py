@@ -18,6 +18,7 @@ from relume.core import cache as memories
 from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
+from relume.live.free_camera.progressive_picture import ProgressivePicture
 from relume.live.free_camera.texel_brdf import texel_tables
 from relume.look import validate
 from relume.methods.registry import METHODS, open_bake
@@ -129,6 +130,18 @@ def test_frames_show_the_mean_until_the_tables_are_ready(opened, records, monkey
     expected = alone.image()
     size = np.linalg.norm(expected)
     assert np.linalg.norm(image - expected) < 0.02 * size < 0.05 * size < np.linalg.norm(mean - expected)
+
+
+@pytest.mark.parametrize("opened", ["probes"], indirect=True)
+def test_a_moving_camera_computes_tables_once(opened, records):
+    picture = ProgressivePicture(FreeCameraPicture(opened, "front", is_watched=True), refuse_static_view, opened.cache)
+    picture.set_look(look_of(opened, records))
+    picture.set_camera(opened.views["front"].camera, (32, 24), is_idle=False)
+    run_to_the_end(picture)
+
+
+def refuse_static_view(*args, **kwargs):
+    pytest.fail("the camera moves")
 
 
 @pytest.mark.parametrize("opened", ["probes"], indirect=True)
