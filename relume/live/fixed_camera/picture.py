@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from relume.brdf.curves import curve_bands, generated_bands
 from relume.core.cache import Cache
 from relume.core.errors import CancelledError, ParameterError
-from relume.live.fixed_camera.active_control import ActiveControl, HeldControl
 from relume.live.fixed_camera.background import Background
 from relume.live.fixed_camera.edit_pointers import CurvePointer, ParameterPointer, Pointer, parse_curve, parse_pointer
 from relume.live.fixed_camera.fidelity import Fidelity
@@ -23,6 +22,7 @@ from relume.live.fixed_camera.pixel_probe import highlight_pixels, probe
 from relume.live.fixed_camera.priority_region import fidelity_in
 from relume.live.fixed_camera.protocols import FixedViewTransfer
 from relume.live.fixed_camera.scheduler import StrategyScheduler
+from relume.live.fixed_camera.strategies.strategy import ActiveControl, HeldControl
 from relume.live.fixed_camera.view_images import TermTarget, ViewImages, material_documents
 from relume.look import Look
 from relume.operators.shade import shaded_bytes

@@ -11,11 +11,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from relume.live.fixed_camera.active_control import ActiveControl
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.jobs import Job
-from relume.live.fixed_camera.strategies.strategy import Situation, Strategy, Urgency
+from relume.live.fixed_camera.strategies.strategy import ActiveControl, Situation, Strategy, Urgency
 from relume.live.fixed_camera.strategies.table import STRATEGIES
 from relume.live.fixed_camera.view_images import TermTarget, ViewImages
 from relume.look import Look
