@@ -15,6 +15,7 @@ from relume.live.fixed_camera.illumination import Illumination
 from relume.look.model import Rgb
 from relume.operators.edit_basis import EditBasis
 from relume.operators.operator import Operator
+from relume.operators.shade import ShadedTerm
 from relume.views.view import Tile
 
 F32 = NDArray[np.float32]
@@ -66,6 +67,12 @@ class DisplayedImage:
     def is_converged(self) -> bool:
         """True if steps may be added: it is the sum of known coefficients in a known light."""
         return not self.is_empty and self.reference is None and self.fidelity > Fidelity.PREVIEW
+
+    def with_samples(
+        self, rows: Shaped[F32, "n 3"], mask: Shaped[NDArray[np.bool_], " n"]
+    ) -> Shaped[F32, "tiles 3 samples"]:
+        """Return a copy of the image with some samples replaced. rows: new values. mask: the samples to replace."""
+        return ShadedTerm.from_rows(np.where(mask[:, None], rows, ShadedTerm(self.image).rows(len(mask)))).image
 
     def changed_curves(self, target_bands: Mapping[str, F64]) -> list[str]:
         """Return the names of the target curves that the image does not show."""

@@ -19,7 +19,6 @@ from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Solo
 from relume.live.fixed_camera.jobs import CancelCheck, Job, ProgressCallback
 from relume.live.fixed_camera.pixel_probe import highlight_pixels, probe
-from relume.live.fixed_camera.priority_region import fidelity_in
 from relume.live.fixed_camera.protocols import FixedViewTransfer
 from relume.live.fixed_camera.scheduler import StrategyScheduler
 from relume.live.fixed_camera.strategies.strategy import ActiveControl, HeldControl
@@ -178,7 +177,7 @@ class Picture:
             tiles.update(self._view.all_tiles)
         targets = list(images.targets())
         exact = all(target.live.fidelity == Fidelity.EXACT for target in targets)
-        fidelity = min((fidelity_in(target, images.region) for target in targets), default=Fidelity.EXACT)
+        fidelity = min((target.fidelity_in(images.region) for target in targets), default=Fidelity.EXACT)
         complete = not any(target.live.latest.is_empty for target in targets)
         in_order = sorted(tiles, key=lambda tile: (tile[1], tile[0]))
         return Progress(in_order, exact, fidelity, complete)

@@ -17,6 +17,7 @@ from relume.core.cache import Cache
 from relume.core.errors import ParameterError
 from relume.lights.spherical_triangles import TriangleLights
 from relume.live.fixed_camera.edit_pointers import CurvePointer, ParameterPointer
+from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import (
     Illumination,
     Solo,
@@ -312,3 +313,26 @@ class TermTarget(NamedTuple):
     def exists(self) -> bool:
         """Return whether the look still contains this term."""
         return any(self.live is term for term in self.material.terms)
+
+    def is_visible(self, region: Tile | None) -> bool:
+        """Return whether any sample of its material lies in a region; None: in the image."""
+        return region is None or bool(self.material.lies_in(region).any())
+
+    def is_exact_within(self, region: Tile | None) -> bool:
+        """Return whether its newest image is exact in a region, though not everywhere."""
+        images, material, live = self
+        exact_region = live.ready.exact_region
+        if region is None or exact_region is None or not _contains(exact_region[1], region):
+            return False
+        return exact_region[0] == images.image_key(material, live, live.light)
+
+    def fidelity_in(self, region: Tile | None) -> Fidelity:
+        """Return the fidelity of its displayed image in a region; None: everywhere."""
+        live = self.live
+        is_exact = live.displayed is live.ready and self.is_exact_within(region)
+        return Fidelity.EXACT if is_exact or not self.is_visible(region) else live.fidelity
+
+
+def _contains(outer: Tile, inner: Tile) -> bool:
+    (x, y, width, height), (left, top, across, down) = outer, inner
+    return x <= left and y <= top and left + across <= x + width and top + down <= y + height

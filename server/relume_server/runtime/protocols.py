@@ -11,42 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relume.core.cache import CacheOwner
-from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.protocols import OpenBake
 
 if TYPE_CHECKING:
     from relume.live.fixed_camera.jobs import Job
+    from relume.live.fixed_camera.picture import Progress
     from relume.live.free_camera.browser.material_arrays import ArrayBlock, ShaderConstants
     from relume.reference import ReferenceImage
     from relume.scene.model import Camera
 
 Tile = tuple[int, int, int, int]
 F32 = NDArray[np.float32]
-
-
-class Progress(Protocol):
-    """Result of one step."""
-
-    @property
-    def tiles(self) -> Sequence[Tile]: ...
-    @property
-    def exact(self) -> bool: ...
-    @property
-    def fidelity(self) -> Fidelity:
-        """Fidelity of the visible region."""
-        ...
-
-    @property
-    def complete(self) -> bool:
-        """True if every term is shown."""
-        ...
-
-    @property
-    def changed(self) -> bool: ...
-    @property
-    def previous_error(self) -> float | None:
-        """Error of the approximate image that an exact one replaces, relative RMS, after the camera stopped."""
-        ...
 
 
 class Picture(Protocol):

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from relume.live.fixed_camera.fidelity import Fidelity
-from relume.live.fixed_camera.jobs import Job, Priority
-from relume.live.fixed_camera.priority_region import (
-    allows_partial,
-    is_exact_within,
-    is_visible,
-    num_hidden_samples,
-    replace_region,
-)
+from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
+from relume.live.fixed_camera.live_term import LiveTerm
 from relume.live.fixed_camera.strategies import operator, sparse_preview
 from relume.live.fixed_camera.strategies.shading import Shading
 from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
@@ -23,6 +19,8 @@ from relume.live.fixed_camera.view_images import TermTarget
 from relume.operators.edit_basis import EditBasis
 from relume.transport.roughness_ranges import contract_levels
 from relume.views.view import Tile
+
+F32 = NDArray[np.float32]
 
 _MIN_HIDDEN_SAMPLES = 20_000  # samples outside the region; with fewer, an extra frame does not pay off
 
@@ -38,7 +36,7 @@ def _image_job(situation: Situation) -> Job | None:
 
     def rank(item: tuple[TermTarget, EditBasis | None]) -> tuple[int, ...]:
         target, basis = item
-        return not is_visible(target, region) or is_exact_within(target, region), *_cost(target, basis, situation)
+        return not target.is_visible(region) or target.is_exact_within(region), *_cost(target, basis, situation)
 
     target, basis = min(candidates, key=rank)
     form = None if basis is None else operator.form_of(target, basis)
@@ -78,26 +76,40 @@ def _early_job(
 
 
 def _early_region(whole: Shading, candidates: Sequence[TermTarget], region: Tile | None) -> Tile | None:
-    """Return the visible region if it is shaded first; None if the complete image is shaded at once."""
+    """Return the visible region if it is shaded first; None if the complete image is shaded at once.
+
+    If a large image is zoomed or exceeds its window, most samples are not visible. Partial results are cached, so the
+    complete image costs no more.
+    """
     images, material, live = target = whole.target
-    if region is None or is_exact_within(target, region) or not allows_partial(live.ready, live.light):
+    if region is None or target.is_exact_within(region) or not _allows_partial(live):
         return None
-    is_split = 0 < np.count_nonzero(material.lies_in(region)) < material.num_samples
-    if images.is_cached(material, live) or not is_split:
+    num_visible = np.count_nonzero(material.lies_in(region))
+    if images.is_cached(material, live) or not 0 < num_visible < material.num_samples:
         return None
-    return region if num_hidden_samples(candidates, region) > _MIN_HIDDEN_SAMPLES else None
+    num_hidden = sum(np.count_nonzero(~candidate.material.lies_in(region)) for candidate in candidates)
+    return region if num_hidden > _MIN_HIDDEN_SAMPLES else None
+
+
+def _allows_partial(live: LiveTerm) -> bool:
+    """Return whether a part of the newest image may be replaced: no steps are added to it, and its light is current."""
+    return not live.is_converged and live.ready.light == live.light
 
 
 def _region_job(whole: Shading, region: Tile, priority: Priority) -> Job:
     """Return the job that shades the samples of a term in a region; its result is rows of the image, valid there."""
-    return Job(
-        ("region", region, *whole.key),
-        whole.label,
-        priority,
-        lambda progress, is_canceled: whole.shade_samples(whole.target.material.lies_in(region), progress, is_canceled),
-        lambda rows: replace_region(whole.target, whole.key, region, rows),
-        is_resumable=True,
-    )
+    images, material, live = target = whole.target
+
+    def run(progress: ProgressCallback, is_canceled: CancelCheck) -> F32:
+        return whole.shade_samples(material.lies_in(region), progress, is_canceled)
+
+    def apply(rows: F32) -> None:
+        is_current = target.exists() and whole.key == images.image_key(material, live, live.light)
+        if is_current and _allows_partial(live):
+            image = live.ready.with_samples(rows, material.lies_in(region))
+            live.set_ready(replace(live.ready, image=image, exact_region=(whole.key, region)))
+
+    return Job(("region", region, *whole.key), whole.label, priority, run, apply, is_resumable=True)
 
 
 def _refinement_job(situation: Situation) -> Job | None:

@@ -22,7 +22,6 @@ from relume.live.fixed_camera.displayed import DisplayedImage
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination, direct_only
 from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
-from relume.live.fixed_camera.priority_region import with_samples
 from relume.live.fixed_camera.protocols import FixedViewTransfer, SampledShading
 from relume.live.fixed_camera.strategies import incremental_light
 from relume.live.fixed_camera.strategies.strategy import Situation, Strategy, Urgency
@@ -223,7 +222,7 @@ class SparsePreview:
         if ready.exact_region is None or ready.light != self.light:
             return replace(preview, exact_region=None, detail=self.detail)
         mask = material.lies_in(ready.exact_region[1])
-        merged = with_samples(image, ShadedTerm(ready.image).rows(len(mask)), mask)
+        merged = preview.with_samples(ShadedTerm(ready.image).rows(len(mask)), mask)
         return replace(preview, image=merged, detail=self.detail)
 
 

@@ -19,11 +19,12 @@ from relume.image_io.write_image import to_bytes
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.look.model import DisplayLook
 from relume_server.client_state.target import CameraState, Target
-from relume_server.runtime.protocols import FixedPicture, FreeCameraPicture, Picture, Progress, Tile
+from relume_server.runtime.protocols import FixedPicture, FreeCameraPicture, Picture, Tile
 from relume_server.schemas.protocol import ArrayInfo, FrameHeader, FrameTimes, SceneUpdate
 
 if TYPE_CHECKING:
     from relume.live.fixed_camera.jobs import Job
+    from relume.live.fixed_camera.picture import Progress
     from relume.live.free_camera.browser.material_arrays import ArrayBlock, ShaderConstants
 
 Format = Literal["rgb9e5", "jpeg"]
@@ -212,7 +213,7 @@ def _pack_scene_update(
     """Pack the parts that the client's shader lacks; nothing if it has all, and knows that the look is shown."""
     blocks, shader_arrays = shader_data
     client_keys: Mapping[str, Hashable] = request.client_keys or {}
-    progress = replace(cast("Any", progress), tiles=[])
+    progress = replace(progress, tiles=[])
     updated_s = time.perf_counter()
     update_ms = (updated_s - start_s) * 1e3
     missing_blocks = [block for name, block in blocks.items() if client_keys.get(name, _NOTHING) != block.key]

@@ -10,7 +10,7 @@ from relume.live.fixed_camera.fidelity import Fidelity
 from relume_server.client_state.flow_control import FrameWindow
 from relume_server.client_state.pending_requests import PendingRequests
 from relume_server.client_state.target import CameraState, Target
-from relume_server.runtime.protocols import FreeCameraPicture, Picture, Progress, Tile
+from relume_server.runtime.protocols import FreeCameraPicture, Picture, Tile
 from relume_server.schemas.protocol import HighlightMessage
 from relume_server.session.frames.client_render_state import ClientRenderState
 from relume_server.session.frames.coefficient_budget import CoefficientBudget
@@ -18,6 +18,7 @@ from relume_server.session.frames.painter import Format, FrameRequest, Painted
 
 if TYPE_CHECKING:
     from relume.live.fixed_camera.jobs import Job
+    from relume.live.fixed_camera.picture import Progress
     from relume.live.fixed_camera.protocols import CameraView
 
 REFINE_SEND_INTERVAL_S = 0.100
