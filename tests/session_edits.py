@@ -46,8 +46,18 @@ def run_until_exact(picture):
 def run_next_job(picture):
     """Run the pending job and return it."""
     need = picture.next_job()
-    picture.install(need, need.run(lambda fraction: None, lambda: False))
+    need.apply(need.run(lambda fraction: None, lambda: False))
     return need
+
+
+def kind_of(job):
+    """The kind of a job; None for no job."""
+    return None if job is None else job.kind
+
+
+def task_of(job):
+    """The target that a job's `run` is a method of."""
+    return job.run.__self__
 
 
 def has_pending_job(picture):

@@ -73,7 +73,7 @@ class _Session:
         self._picture.set_look(self._look((0.5, 0.5, 0.5)))
         self._picture.advance(None)
         while (job := self._picture.next_job()) is not None:
-            self._picture.install(job, job.run(lambda share: None, lambda: False))
+            job.apply(job.run(lambda share: None, lambda: False))
             self._picture.advance(None)
         self._picture.encode(self._picture.all_tiles(), "rgb9e5")
 

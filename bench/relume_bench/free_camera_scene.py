@@ -16,7 +16,6 @@ from relume.core.cache import Cache
 from relume.live.fixed_camera.picture import Picture
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.free_camera.primary_visibility import trace_primary as look_around
-from relume.live.free_camera.refine_job import RefineHighlights
 from relume.live.opened.free_camera_transfer import BakedFreeCamera
 from relume.live.opened.openers import open_bake, open_transfer
 from relume.look import Look, complete, validate
@@ -65,12 +64,12 @@ def run_update_jobs(picture: FreeCameraPicture) -> None:
 
 def run_light_jobs(picture: FreeCameraPicture | Picture) -> None:
     """Run the light jobs after a drag: all light is computed, without the refined frame, which is independent of it."""
-    while (job := picture.next_job()) is not None and not isinstance(job, RefineHighlights):
+    while (job := picture.next_job()) is not None and job.kind != "highlights":
         _run_job(picture, job)
 
 
 def _run_job(picture: FreeCameraPicture | Picture, job: Any) -> None:
-    picture.install(job, job.run(lambda share: None, lambda: False))
+    job.apply(job.run(lambda share: None, lambda: False))
     picture.advance(None)
 
 

@@ -20,7 +20,7 @@ from relume.assets.environments.equirect import texel_directions, texel_solid_an
 from relume.live.fixed_camera.illumination import illumination_from_look
 from relume.live.fixed_camera.view_images import material_documents
 from relume.live.free_camera.basis.material_tables import build_tables
-from relume.live.free_camera.probe_light.incident import combine_all
+from relume.live.free_camera.incident_light import combine_all
 from relume.live.free_camera.shade_probes import shade_probes
 from relume.look import Look
 from relume.raytrace.camera_rays import trace_rays

@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from relume.core.cache import Cache
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.live.free_camera.refine_job import RefineHighlights
 from relume.live.opened.free_camera_transfer import BakedFreeCamera
 from relume.live.opened.openers import open_bake, open_transfer
 from relume.look import Look, complete, validate
@@ -91,8 +90,8 @@ def _while_it_moves(bake: BakedFreeCamera, view: str, look: Look) -> NDArray[np.
     picture = FreeCameraPicture(bake, view, is_watched=True)
     picture.set_look(look)
     picture.advance(None)
-    while (job := picture.next_job()) is not None and not isinstance(job, RefineHighlights):
-        picture.install(job, job.run(lambda share: None, lambda: False))
+    while (job := picture.next_job()) is not None and job.kind != "highlights":
+        job.apply(job.run(lambda share: None, lambda: False))
         picture.advance(None)
     return picture.image()
 

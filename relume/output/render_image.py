@@ -9,12 +9,11 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.errors import PlanError
-from relume.live.fixed_camera.finish import render_exact
 from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
-from relume.live.fixed_camera.picture import Picture
+from relume.live.fixed_camera.picture import Picture, render_exact
 from relume.live.fixed_camera.protocols import FixedViewTransfer, OpenBake
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.live.free_camera.refinement.refinement_jobs import StaticViewState
+from relume.live.free_camera.static_view_jobs import StaticViewState
 from relume.live.opened.free_camera_transfer import BakedFreeCamera
 from relume.live.opened.static_view import StaticViewBuilder
 from relume.look import Look

@@ -16,7 +16,7 @@ from relume.camera.refraction import MAX_GLASS_HITS, dielectric
 from relume.camera.transparency_layers import trace_layers
 from relume.camera.view_samples import sample_view
 from relume.core.cache import Cache
-from relume.live.fixed_camera.background.coverage import Coverage
+from relume.live.fixed_camera.coverage import Coverage
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
 from relume.live.opened.openers import open_bake
 from relume.methods.registry import METHODS

@@ -16,13 +16,13 @@ from relume.math import daubechies
 from relume.math.haar import haar, padded_length
 from relume.math.pca import decompose
 from relume.math.spherical_harmonics import NUM_HARMONICS, harmonics
-from relume.math.zernike import NUM_FUNCTIONS, num_functions, project
+from relume.math.zernike import NUM_FUNCTIONS, basis_functions, num_functions
 
 NUMBERS = st.floats(-100.0, 100.0, allow_subnormal=False)
 SIZES = st.sampled_from([4, 8, 64, 256])
 ROWS = SIZES.flatmap(lambda size: arrays(np.float64, (2, size), elements=NUMBERS))
 WI, COSINE_WEIGHTS = hemisphere()
-ZERNIKE = project(WI)
+ZERNIKE = basis_functions(WI)
 
 
 @for_all(40, bands=ROWS)

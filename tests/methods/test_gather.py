@@ -11,7 +11,7 @@ import numpy_reference as ref
 import pytest
 from analytic_terms import ANALYTIC
 from exact_pictures import render_uncached
-from session_edits import BUDGET, bake_corner_scene, make_look, relative_rmse, run_until_exact
+from session_edits import BUDGET, bake_corner_scene, kind_of, make_look, relative_rmse, run_until_exact
 from tiny_scenes import make_camera, make_tiny_scene, quad
 
 from relume.assets.environments.equirect import texel_directions
@@ -23,7 +23,6 @@ from relume.core.cache import Cache
 from relume.lights.spherical_triangles import tessellate_environment
 from relume.live.fixed_camera.illumination import illumination_from_look
 from relume.live.fixed_camera.picture import Picture
-from relume.live.fixed_camera.strategies.sparse_preview import SparsePreview
 from relume.live.opened.openers import open_transfer
 from relume.look import LightPaths, validate
 from relume.math.zernike import OUTGOING_DEGREE
@@ -406,8 +405,8 @@ def test_the_displayed_paths_can_change_in_a_session(gathered, monkeypatch):
         if show == "all":
             picture.advance(None)
             need = picture.next_job()
-            assert isinstance(need, SparsePreview)
-            picture.install(need, need.run(lambda fraction: None, lambda: False))
+            assert kind_of(need) == "preview"
+            need.apply(need.run(lambda fraction: None, lambda: False))
             picture.advance(None)
             preview = picture.image()
             exact = run_until_exact(picture).image()
@@ -438,8 +437,8 @@ def test_a_rotation_is_previewed_with_its_indirect_light(gathered, monkeypatch):
     picture.set_look(make_look(gathered, turn))
     picture.advance(None)
     still, need = picture.image(), picture.next_job()
-    assert isinstance(need, SparsePreview)
-    picture.install(need, need.run(lambda fraction: None, lambda: False))
+    assert kind_of(need) == "preview"
+    need.apply(need.run(lambda fraction: None, lambda: False))
     assert not picture.advance(None).exact
     preview, exact = picture.image(), run_until_exact(picture).image()
     assert relative_rmse(preview, exact) < 0.7 * relative_rmse(still, exact)

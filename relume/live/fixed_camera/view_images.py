@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from copy import copy
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
+from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.brdf.roughness_levels import uses_roughness_map
@@ -16,6 +17,7 @@ from relume.core.cache import Cache
 from relume.core.errors import ParameterError
 from relume.lights.spherical_triangles import TriangleLights
 from relume.live.fixed_camera.edit_pointers import CurvePointer, ParameterPointer
+from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import (
     Illumination,
     Solo,
@@ -27,7 +29,7 @@ from relume.live.fixed_camera.illumination import (
 from relume.live.fixed_camera.live_term import LiveTerm
 from relume.live.fixed_camera.material_image import MaterialImage
 from relume.live.fixed_camera.mirror_samples import MirrorFactors
-from relume.live.fixed_camera.protocols import EditAxis, FixedViewTransfer
+from relume.live.fixed_camera.protocols import EditAxis, FixedViewTransfer, MirrorLightsDelta
 from relume.look import Look, TermLook, validate
 from relume.operators.edit_basis import CurveBasis, EditBasis
 from relume.operators.operator import Operator
@@ -52,6 +54,20 @@ def material_documents(look: Look, material: str) -> Sequence[TermLook]:
     return (cast(TermLook, _WHITE),) if material_look.shadow_catcher else material_look.terms
 
 
+class OutgoingChange(NamedTuple):
+    """Change of outgoing radiance between two lights, equal for all terms.
+
+    Attributes:
+        before, after: the lights. coefficients: of the change per patch, in the Haar basis.
+        mirrors: change of the light that planar mirrors reflect.
+    """
+
+    before: Illumination
+    after: Illumination
+    coefficients: Shaped[F32, "patches 3"]
+    mirrors: MirrorLightsDelta | None
+
+
 class ViewImages:
     """Material images of one view, by name, by pointer, and with their cache keys.
 
@@ -60,6 +76,7 @@ class ViewImages:
         light: the illumination. default_light: that of the scene's own look.
         gain: gain of the finished image. mirrors: the mirrors of the image.
         region: visible pixels of the image: x, y, width, height; None: all.
+        outgoing_change: of the last incremental update, for the next term.
     """
 
     def __init__(self, transfer: FixedViewTransfer, view_name: str, cache: Cache) -> None:
@@ -74,6 +91,7 @@ class ViewImages:
         self.gain = picture_gain(self.default)
         self.mirrors = MirrorFactors(self.view)
         self.region: Tile | None = None
+        self.outgoing_change: OutgoingChange | None = None
 
     def view_with_overrides(self, look: Look) -> ViewImages:
         """Return the images of the view with the roughness- and normal-map overrides of a look; self if they are
@@ -119,6 +137,10 @@ class ViewImages:
         """Yield the terms that are visible in this view."""
         materials = self.by_name.values()
         return ((material, image) for material in materials if material.num_samples for image in material.terms)
+
+    def targets(self) -> Iterator[TermTarget]:
+        """Yield the same terms as targets of strategies and jobs."""
+        return (TermTarget(self, material, live) for material, live in self.terms())
 
     def image_bytes(self) -> int:
         """Return the memory of one image of every term."""
@@ -270,3 +292,48 @@ class ViewImages:
         key = self.operator_key(material, live, ready.basis, ready.bands)
         candidates = (self.cache.get_cached(name, Operator) for name in (key, (*key, MERGED_LIGHT_SUFFIX)))  # type: ignore[type-abstract]
         return next((operator for operator in candidates if operator is not None), None)
+
+
+class TermTarget(NamedTuple):
+    """A term of a picture: its view and material, and its state."""
+
+    images: ViewImages
+    material: MaterialImage
+    live: LiveTerm
+
+    @property
+    def name(self) -> str:
+        """The name of the material."""
+        return self.images.transfer.material_names[self.material.index]
+
+    @property
+    def label(self) -> str:
+        """Text for the user."""
+        return f"{self.name}, {self.live.term.label}"
+
+    def exists(self) -> bool:
+        """Return whether the look still contains this term."""
+        return any(self.live is term for term in self.material.terms)
+
+    def is_visible(self, region: Tile | None) -> bool:
+        """Return whether any sample of its material lies in a region; None: in the image."""
+        return region is None or bool(self.material.lies_in(region).any())
+
+    def is_exact_within(self, region: Tile | None) -> bool:
+        """Return whether its newest image is exact in a region, though not everywhere."""
+        images, material, live = self
+        exact_region = live.ready.exact_region
+        if region is None or exact_region is None or not _contains(exact_region[1], region):
+            return False
+        return exact_region[0] == images.image_key(material, live, live.light)
+
+    def fidelity_in(self, region: Tile | None) -> Fidelity:
+        """Return the fidelity of its displayed image in a region; None: everywhere."""
+        live = self.live
+        is_exact = live.displayed is live.ready and self.is_exact_within(region)
+        return Fidelity.EXACT if is_exact or not self.is_visible(region) else live.fidelity
+
+
+def _contains(outer: Tile, inner: Tile) -> bool:
+    (x, y, width, height), (left, top, across, down) = outer, inner
+    return x <= left and y <= top and left + across <= x + width and top + down <= y + height

@@ -1,6 +1,6 @@
 """Background compositing for the free camera, and on shadow catchers.
 
-As in fixed views (`relume.live.fixed_camera.background.background`), a shadow catcher shows the background times the
+As in fixed views (`relume.live.fixed_camera.background`), a shadow catcher shows the background times the
 ratio of incident light with and without the objects; if no light would arrive, nothing is occluded.
 """
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from relume.core.color import LUMINANCE, srgb_encode
 from relume.core.numba_options import NO_REFCOUNT
 from relume.core.thread_pools import parallel_for_chunks
-from relume.live.fixed_camera.background.background import MAX_CATCHER_RATIO
+from relume.live.fixed_camera.background import MAX_CATCHER_RATIO
 from relume.live.fixed_camera.illumination import Illumination
 from relume.live.free_camera.environment_lookup import sample
 from relume.live.free_camera.primary_visibility import GBuffer

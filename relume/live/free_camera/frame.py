@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -18,18 +19,18 @@ from relume.live.free_camera.basis.highlight_lobes import Lobes, build_lobes
 from relume.live.free_camera.basis.material_tables import Tables, build_tables
 from relume.live.free_camera.environment_lookup import rotation_of
 from relume.live.free_camera.glass import adjust_alpha, composite_glass
-from relume.live.free_camera.hard_shadows.shade import add_direct_sharp
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
 from relume.live.free_camera.highlights.interpolated_highlights import ProbeHighlights, add_environment_highlights
 from relume.live.free_camera.highlights.light_sum_kernel import sum_lights
 from relume.live.free_camera.highlights.lobe_gradients import gradients_along_lobe
 from relume.live.free_camera.highlights.lobe_light_lists import MAX_BRIGHT_LIGHTS, lobe_widths
 from relume.live.free_camera.highlights.lobe_visibility import trace_lobe_visibility
+from relume.live.free_camera.incident_light import IncidentCoefficients
 from relume.live.free_camera.incremental_frame import DirtyPixels, DirtyRegion, resolve_subset
 from relume.live.free_camera.normal_mapping import light_gradient
 from relume.live.free_camera.primary_visibility import GBuffer, interpolate_to_nodes
-from relume.live.free_camera.probe_light.incident import IncidentCoefficients
 from relume.live.free_camera.protocol import FreeCameraTransfer
+from relume.live.free_camera.shade_hard_shadows import add_direct_sharp
 from relume.live.free_camera.shade_pixels import InterpolatedProbes, MirrorData, shade_pixels
 from relume.live.free_camera.shade_probes import ProbeRadiance, shade_probes
 from relume.live.free_camera.texel_brdf.shade_texels import IncidentTexelLight, TextureFootprint, shade_texels
@@ -39,6 +40,7 @@ from relume.live.free_camera.texture_overrides import ProbeMapOverrides
 from relume.look import Look
 from relume.probes.stored_scene import StoredScene, ViewedProbes
 from relume.scene.model import Camera
+from relume.views.resolve import pack_pixels
 
 F32 = NDArray[np.float32]
 
@@ -436,3 +438,28 @@ def _shadow_catcher(transfer: FreeCameraTransfer, state: FrameRequestState, gbuf
     for material in np.flatnonzero(is_shadow_catcher):
         unoccluded += transfer.unoccluded(state.light, int(material), is_preview=state.is_coarse)
     return ShadowCatcher(is_shadow_catcher, interpolate_to_nodes(transfer.stored_scene, gbuffer.is_visible, unoccluded))
+
+
+@dataclass
+class PreviousImage:
+    """The last rendered image.
+
+    Attributes:
+        state: its target. gbuffer: of its rays. frame: the finished frame.
+        shadow_visibility: of hard-shadow lights along its rays. has_highlight_edges: its highlight edges are
+            antialiased.
+        rgb9e5: its pixels, encoded as RGB9_E5; None until requested.
+    """
+
+    state: FrameRequestState
+    gbuffer: GBuffer
+    frame: Frame
+    shadow_visibility: Sequence[F32]
+    has_highlight_edges: bool
+    rgb9e5: Shaped[NDArray[np.uint32], " pixels"] | None = None
+
+    def to_rgb9e5(self) -> Shaped[NDArray[np.uint32], " pixels"]:
+        """Return its pixels encoded as RGB9_E5; cached."""
+        if self.rgb9e5 is None:
+            self.rgb9e5 = pack_pixels(self.frame.image.reshape(-1, 3))
+        return self.rgb9e5

@@ -13,7 +13,7 @@ from relume.live.fixed_camera.illumination import Illumination
 from relume.live.fixed_camera.protocols import OpenBake
 from relume.live.free_camera.environment_lookup import EnvironmentLookup
 from relume.live.free_camera.free_view import FreeView
-from relume.live.free_camera.hard_shadows.lights import HardShadowLight
+from relume.live.free_camera.hard_shadow_lights import HardShadowLight
 from relume.live.free_camera.highlights.light_sum_kernel import EnvironmentLights
 from relume.live.free_camera.highlights.lobe_light_lists import LobeLightLists
 from relume.live.free_camera.ray_scene import OcclusionMesh

@@ -22,7 +22,7 @@ from relume.core.errors import RelumeError
 from relume.core.jackknife import JackknifeEstimate, rms_of_parts
 from relume.live.free_camera.camera_paths import pivot_of, turntable
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.live.free_camera.refinement.refinement_jobs import StaticViewState
+from relume.live.free_camera.static_view_jobs import StaticViewState
 from relume.live.opened.free_camera_transfer import BakedFreeCamera
 from relume.live.opened.static_view import StaticViewBuilder
 from relume.scene.model import Camera, Scene

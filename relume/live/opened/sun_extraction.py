@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relume.lights.spherical_triangles import EnvironmentTexels, TriangleLights, integrate_environment
 from relume.lights.sun_disks import SplitEnvironment, remove_sun_disks
 from relume.live.fixed_camera.illumination import Illumination
-from relume.live.free_camera.hard_shadows.lights import HardShadowLight, sun_shadow_targets, unoccluded_sun_vectors
+from relume.live.free_camera.hard_shadow_lights import HardShadowLight, sun_shadow_targets, unoccluded_sun_vectors
 from relume.live.opened.fixed_views import BakedFixedViews, displayed_of
 from relume.look import EnvironmentKey
 from relume.raytrace.surface_points import SurfacePoints

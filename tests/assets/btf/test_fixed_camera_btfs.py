@@ -220,7 +220,7 @@ def test_other_methods_show_btfs_and_follow_edits(small_btf, tmp_path, method):
         look = covered(bake, small_btf.record, (red, 1, 1), scale=3.0)
         live.set_look(look, active_pointer="/materials/Floor/terms/0/color")
         while (job := live.next_job()) is not None:
-            live.install(job, job.run(lambda fraction: None, lambda: False))
+            job.apply(job.run(lambda fraction: None, lambda: False))
         live.advance(None)
         live.set_look(look)
         run_until_exact(live)

@@ -21,7 +21,6 @@ from relume.brdf.evaluate import eval_brdf
 from relume.brdf.frozen_term import FrozenTerm
 from relume.brdf.quadrature import Quadrature
 from relume.brdf.symmetry import has_reflection_symmetry, is_isotropic
-from relume.live.free_camera.basis.table_symmetry import expand_quarter
 from relume.math.zernike import DEGREE, NUM_FUNCTIONS, basis_functions, num_functions, recurrence
 
 F32 = NDArray[np.float32]
@@ -122,7 +121,7 @@ def _white_coefficients(term: FrozenTerm) -> OutgoingCoefficients:
         else np.ones(num_columns)
     )
     by_degree = np.average(np.average(residual, weights=ends, axis=1), weights=cosines(), axis=0)
-    full_table = expand_quarter(table) if is_quarter else table
+    full_table = _expand_quarter(table) if is_quarter else table
     return OutgoingCoefficients(full_table.astype(np.float32), tuple(by_degree.tolist()))
 
 
@@ -164,3 +163,21 @@ def _project_anisotropic(document: Mapping[str, Any], phi: F64) -> tuple[F64, F6
         table[row] = value @ weighted_functions
         energy[row] = (value**2 @ weight).sum(axis=-1)
     return table, energy
+
+
+def _expand_quarter(quarter: Shaped[F64, "rows quarter_columns channels K"]) -> Shaped[F64, "rows columns channels K"]:
+    """Return the outgoing coefficients of a reflection-symmetric term for all φo from those of a quadrant.
+
+    Args:
+        quarter: for φo from 0 to π/2, both included.
+    Returns:
+        For φo from 0 to 2π, end excluded: four times as many columns less the repeated ones.
+    """
+    recurrence_table = recurrence()
+    across, along = np.ones((2, NUM_FUNCTIONS))  # signs of the functions under x → −x and y → −y
+    across[recurrence_table.cosine] = (-1.0) ** recurrence_table.order
+    odd = recurrence_table.order > 0
+    across[recurrence_table.sine[odd]] = -((-1.0) ** recurrence_table.order[odd])
+    along[recurrence_table.sine[odd]] = -1
+    half = np.concatenate([quarter, across * quarter[:, -2::-1]], axis=1)
+    return np.concatenate([half, along * half[:, -2:0:-1]], axis=1)

@@ -34,7 +34,7 @@ def trace_fields(
         "room_revision": request.target.room_revision,
         "active_control": request.target.active_pointer or "",
         "format": request.form,
-        "fidelity": painted.progress.fidelity,
+        "fidelity": painted.progress.fidelity.value,
         "bytes": num_bytes,
     }
     return "edit" if request.camera_state is None else "camera", times, attributes

@@ -6,10 +6,11 @@ import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
+from relume.live.fixed_camera.fidelity import Fidelity
 from relume_server.client_state.flow_control import FrameWindow
 from relume_server.client_state.pending_requests import PendingRequests
 from relume_server.client_state.target import CameraState, Target
-from relume_server.runtime.protocols import FreeCameraPicture, Picture, Progress, Tile
+from relume_server.runtime.protocols import FreeCameraPicture, Picture, Tile
 from relume_server.schemas.protocol import HighlightMessage
 from relume_server.session.frames.client_render_state import ClientRenderState
 from relume_server.session.frames.coefficient_budget import CoefficientBudget
@@ -17,6 +18,7 @@ from relume_server.session.frames.painter import Format, FrameRequest, Painted
 
 if TYPE_CHECKING:
     from relume.live.fixed_camera.jobs import Job
+    from relume.live.fixed_camera.picture import Progress
     from relume.live.fixed_camera.protocols import CameraView
 
 REFINE_SEND_INTERVAL_S = 0.100
@@ -191,7 +193,7 @@ class Viewport:
             return
         self._missing_tiles = self._all_tiles if request.form == "jpeg" else painted.deferred_tiles
         self._has_unsent, self._answered_target, self.is_exact = False, request.target, exact
-        self._visible_exact_target = request.target if painted.progress.fidelity == "exact" else None
+        self._visible_exact_target = request.target if painted.progress.fidelity == Fidelity.EXACT else None
         self._is_blank = self._is_blank and not exact
         self.is_converged = is_done and not self._has_unsent_data(pending)
         self.not_before_s = 0.0

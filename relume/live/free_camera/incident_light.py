@@ -10,7 +10,7 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.live.fixed_camera.illumination import Illumination, element_gains
-from relume.live.free_camera.hard_shadows.lights import HardShadowLight
+from relume.live.free_camera.hard_shadow_lights import HardShadowLight
 from relume.live.free_camera.protocol import FreeCameraTransfer
 from relume.look.model import Rgb
 from relume.transport.incident_coefficients import add_scaled

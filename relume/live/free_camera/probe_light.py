@@ -2,29 +2,117 @@
 
 Exact coefficients are computed when a drag ends. During a drag, direct light is computed in every frame for visible
 probes. Indirect light takes longer than a frame: it is computed in the background, and frames use the latest result
-(`relume.live.free_camera.probe_light.jobs.IncrementalProbeLightJob`).
+(`Priority.UPDATE`).
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
+from relume.core.errors import CancelledError
+from relume.core.thread_pools import low_priority
 from relume.live.fixed_camera.illumination import Illumination, element_gains, equal_up_to_reflectances
-from relume.live.free_camera.probe_light.incident import IncidentCoefficients, PartialCoefficients, combine, combine_all
-from relume.live.free_camera.probe_light.indirect import (
-    IndirectCoefficients,
-    extend,
-    indirect_of,
-    is_cached,
-    same_indirect,
-    update_reflectances,
-)
-from relume.live.free_camera.probe_light.jobs import IncrementalProbeLightJob, ProbeLightJob
+from relume.live.fixed_camera.jobs import CancelCheck, Job, Priority, ProgressCallback
+from relume.live.free_camera.incident_light import IncidentCoefficients, PartialCoefficients, combine, combine_all
 from relume.live.free_camera.protocol import FreeCameraTransfer
+from relume.look.model import Rgb
+from relume.transport.incident_coefficients import add_scaled
+
+F32 = NDArray[np.float32]
+
+
+class IndirectCoefficients(NamedTuple):
+    """Indirect illumination of probes.
+
+    Attributes:
+        light: the illumination. is_complete: nonzero for evaluated probes.
+        exact: cached coefficients of some elements, with their gains. approximate: of the others, for evaluated probes.
+    """
+
+    light: Illumination
+    is_complete: Shaped[NDArray[np.uint8], " probes"]
+    exact: Mapping[Illumination, tuple[PartialCoefficients, Rgb]]
+    approximate: Sequence[tuple[PartialCoefficients, Rgb]]
+
+    @property
+    def contributions(self) -> Sequence[tuple[PartialCoefficients, Rgb]]:
+        """All coefficients, with their gains."""
+        return [*self.exact.values(), *self.approximate]
+
+
+def _indirect_only(light: Illumination) -> Illumination:
+    return light._replace(paths=light.paths.without_direct())
+
+
+def _indirect_elements(light: Illumination) -> dict[Illumination, Rgb]:
+    """Indirect elements of a light, with their gains."""
+    return {element: gain for element, gain in element_gains(light).items() if element.paths.has_indirect}
+
+
+def _is_cached(transfer: FreeCameraTransfer, light: Illumination) -> bool:
+    """Return whether all indirect illumination of a light is cached."""
+    return all(transfer.has_vectors(element, without_sun_disks=False) for element in _indirect_elements(light))
+
+
+def _indirect_of(
+    transfer: FreeCameraTransfer, light: Illumination, is_needed: Shaped[NDArray[np.uint8], " probes"]
+) -> IndirectCoefficients:
+    """Return the indirect illumination of some probes, exact if cached, else approximate.
+
+    Args:
+        transfer: of the probes. light: the illumination. is_needed: nonzero for probes to evaluate.
+    """
+    exact = {
+        element: (PartialCoefficients(transfer.vectors(element, without_sun_disks=False)), gain)
+        for element, gain in _indirect_elements(light).items()
+        if transfer.has_vectors(element, without_sun_disks=False)
+    }
+    return _extend(transfer, IndirectCoefficients(light, np.zeros_like(is_needed), exact, ()), is_needed)
+
+
+def _extend(
+    transfer: FreeCameraTransfer, indirect: IndirectCoefficients, is_needed: Shaped[NDArray[np.uint8], " probes"]
+) -> IndirectCoefficients:
+    """Evaluate indirect illumination for probes that became visible.
+
+    Args:
+        transfer, is_needed: as in `_indirect_of`. indirect: the current result.
+    """
+    new = np.flatnonzero(is_needed & ~indirect.is_complete)
+    if not len(new):
+        return indirect
+    contributions = [
+        (PartialCoefficients(transfer.fast_vectors(element, new, without_sun_disks=False), new), gain)
+        for element, gain in _indirect_elements(indirect.light).items()
+        if element not in indirect.exact
+    ]
+    return indirect._replace(
+        is_complete=indirect.is_complete | is_needed, approximate=[*indirect.approximate, *contributions]
+    )
+
+
+def update_reflectances(
+    transfer: FreeCameraTransfer,
+    before: Illumination,
+    previous: IncidentCoefficients,
+    light: Illumination,
+    rows: Shaped[NDArray[np.intp], " n"],
+) -> IncidentCoefficients:
+    """Return approximate coefficients of some probes after a change of reflectances: the previous ones plus the change.
+
+    Args:
+        transfer: of the probes. before: a light of the same sources. previous: its exact coefficients.
+        light: the illumination. rows: the probes.
+    """
+    delta, incident = transfer.indirect_delta(before, light, rows), previous.copy()
+    for into in (incident.total, incident.non_environment):
+        add_scaled(into, delta, np.ones(3, np.float32), rows)
+    return incident
 
 
 class LightRequest(NamedTuple):
@@ -145,30 +233,39 @@ class ProbeLightState:
         transfer, last = self._transfer, self._indirect
         if last is None or last.light.paths.has_indirect != light.paths.has_indirect:
             before = light if self._exact is None else self._exact[0].light
-            is_reusable = before.paths.has_indirect == light.paths.has_indirect and is_cached(transfer, before)
-            last = indirect_of(transfer, before if is_reusable else light, is_needed)
-        return extend(transfer, last, is_needed)
+            is_reusable = before.paths.has_indirect == light.paths.has_indirect and _is_cached(transfer, before)
+            last = _indirect_of(transfer, before if is_reusable else light, is_needed)
+        return _extend(transfer, last, is_needed)
 
-    def next_job(
-        self, request: LightRequest, is_needed: Shaped[NDArray[np.uint8], " probes"]
-    ) -> IncrementalProbeLightJob | ProbeLightJob:
+    def next_job(self, request: LightRequest, is_needed: Shaped[NDArray[np.uint8], " probes"]) -> Job:
         """Return the job for missing light: indirect light of some probes first, then all exact coefficients.
 
         Args:
             request, is_needed: as in `fast`, which must have been called.
         """
-        transfer, (light, has_hard_shadows) = self._transfer, request
+        transfer, light = self._transfer, request.light
         if self.only_indirect_pending(request):
             assert self._exact is not None
             before, base = self._exact[0].light, self._exact[1]
             last = self._updated
             if last is None or last.light != light or (is_needed & ~last.is_complete).any():
-                return IncrementalProbeLightJob(
+                return _update_job(
                     light, lambda: self._update_reflectances(before, base, light, is_needed), self._set_updated
                 )
-        elif self._indirect is not None and light.paths.has_indirect and not same_indirect(self._indirect.light, light):
-            return IncrementalProbeLightJob(light, lambda: indirect_of(transfer, light, is_needed), self._set_indirect)
-        return ProbeLightJob(transfer, light, has_hard_shadows, self.restart_from)
+        elif self._is_indirect_outdated(light):
+            return _update_job(light, lambda: _indirect_of(transfer, light, is_needed), self._set_indirect)
+        return Job(
+            ("probe light", transfer.key, *request),
+            "light at the probes",
+            Priority.REFINEMENT,
+            lambda progress, is_canceled: _exact_coefficients(transfer, request, progress, is_canceled),
+            lambda incident: self.restart_from(*request, incident),
+        )
+
+    def _is_indirect_outdated(self, light: Illumination) -> bool:
+        """Return whether frames use indirect illumination of another light."""
+        last = self._indirect
+        return last is not None and light.paths.has_indirect and _indirect_only(last.light) != _indirect_only(light)
 
     def _update_reflectances(
         self, before: Illumination, base: IncidentCoefficients, light: Illumination, is_needed: NDArray[np.uint8]
@@ -183,3 +280,36 @@ class ProbeLightState:
     def _set_indirect(self, indirect: IndirectCoefficients) -> None:
         if self._indirect is not None:  # else all is exact by now
             self._indirect, self.version = indirect, self.version + 1
+
+
+def _update_job(light: Illumination, compute: Callable[[], Any], apply: Callable[[Any], None]) -> Job:
+    """Return the job for approximate indirect light during a drag, in threads with lower priority than frames.
+
+    Args:
+        light: of the look when the job was created. compute: computes it. apply: receives the result.
+    """
+
+    def run(progress: ProgressCallback, is_canceled: CancelCheck) -> Any:
+        with low_priority():
+            return compute()
+
+    return Job(("indirect light", light), "indirect light", Priority.UPDATE, run, apply)
+
+
+def _exact_coefficients(
+    transfer: FreeCameraTransfer, request: LightRequest, progress: ProgressCallback, is_canceled: CancelCheck
+) -> IncidentCoefficients:
+    """Compute exact coefficients source by source; `is_canceled` is polled before each."""
+    (light, has_hard_shadows), done = request, 0
+    num = len(element_gains(light))
+
+    def get_vectors(element: Illumination) -> PartialCoefficients:
+        nonlocal done
+        if is_canceled():
+            raise CancelledError("the light at the probes was canceled")
+        vectors, done = transfer.vectors(element, has_hard_shadows), done + 1
+        progress(done / num)
+        return PartialCoefficients(vectors)
+
+    hard_shadow_lights = transfer.hard_shadow_lights(light, None) if has_hard_shadows else ()
+    return combine(transfer, light, get_vectors, hard_shadow_lights)

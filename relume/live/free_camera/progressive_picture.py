@@ -18,18 +18,19 @@ from numpy.typing import NDArray
 
 from relume.core.cache import Cache
 from relume.core.errors import ParameterError
+from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Solo
+from relume.live.fixed_camera.jobs import Job
 from relume.live.fixed_camera.picture import Picture, Progress
 from relume.live.free_camera.browser.material_arrays import ArrayBlock, ShaderConstants
 from relume.live.free_camera.free_camera_picture import FreeCameraPicture
-from relume.live.free_camera.probe_light.jobs import IncrementalProbeLightJob, ProbeLightJob
-from relume.live.free_camera.refine_job import RefineHighlights
-from relume.live.free_camera.refinement.refinement_jobs import (
+from relume.live.free_camera.static_view_jobs import (
     SizedCamera,
-    SparseExactJob,
     StaticViewFactory,
-    StaticViewJob,
     StaticViewState,
+    residual_job,
+    should_correct,
+    static_view_job,
 )
 from relume.look import Look
 from relume.scene.model import Camera
@@ -126,7 +127,7 @@ class ProgressivePicture:
         self._displayed.prepare(pointer)
         self._prepared_pointer = pointer
 
-    def next_job(self) -> Any:
+    def next_job(self) -> Job | None:
         """Return the job that must run next, or None; a static view last."""
         if self._static_picture is not None:
             return self._static_picture.next_job()
@@ -137,18 +138,16 @@ class ProgressivePicture:
             self._make_static_view, self._cache, self._free_camera_picture.sized_camera, self._look, self._solo
         )
         request = self._camera_seq, self._look_seq
-        if self._corrected_for != request and SparseExactJob.should_refine(view_state):
-            return SparseExactJob(
-                view_state, copy(self._free_camera_picture), ("sparse", *request), partial(self._correct, request)
-            )
-        return StaticViewJob(view_state, ("still", *request), partial(self._install_static_picture, self._camera_seq))
+        if self._corrected_for != request and should_correct(view_state):
+            return residual_job(view_state, copy(self._free_camera_picture), request, partial(self._correct, request))
+        return static_view_job(view_state, request, partial(self._set_static_picture, self._camera_seq))
 
     def _correct(self, request: tuple[int, int], residual_image: F32 | None) -> None:
         if request == (self._camera_seq, self._look_seq):  # else the camera or the look has changed
             self._corrected_for = request
             self._free_camera_picture.correct(residual_image)
 
-    def _install_static_picture(self, camera_seq: int, has_indirect: bool, static_picture: Picture | None) -> None:
+    def _set_static_picture(self, camera_seq: int, has_indirect: bool, static_picture: Picture | None) -> None:
         if camera_seq != self._camera_seq or self._look is None:
             return
         if static_picture is None:
@@ -161,15 +160,6 @@ class ProgressivePicture:
             with suppress(ParameterError):  # an edit may have removed the target
                 static_picture.prepare(self._prepared_pointer)
         self._static_picture, self._has_indirect = static_picture, has_indirect
-
-    def install(self, job: Any, result: Any) -> None:
-        """Take over the result of a job."""
-        if isinstance(
-            job, StaticViewJob | SparseExactJob | IncrementalProbeLightJob | ProbeLightJob | RefineHighlights
-        ):
-            job.install(result)
-        elif self._static_picture is not None:  # else it belongs to a discarded static view
-            self._static_picture.install(job, result)
 
     def advance(self, max_coefficients: int | None) -> Progress:
         """Advance the displayed picture toward its look and camera; the static view is displayed once it is exact."""
@@ -195,7 +185,7 @@ class ProgressivePicture:
     def _relative_error(self, static_picture: Picture) -> float | None:
         """Relative RMSE of the free-camera image against the static view; None if it lags behind, or all is dark."""
         self._free_camera_picture.correct(None)
-        if self._free_camera_picture.advance(None).fidelity != "approximate":
+        if self._free_camera_picture.advance(None).fidelity != Fidelity.APPROXIMATE:
             return None
         exact = static_picture.image()
         size = float(np.mean(np.square(exact, dtype=np.float64)))

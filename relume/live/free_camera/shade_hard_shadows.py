@@ -4,7 +4,7 @@
 
 S is a probe's light from the source with the probe's own visibility; U is the unoccluded light. Incident coefficients
 used with hard-shadow lights exclude S; V is the visible fraction from
-`relume.live.free_camera.hard_shadows.adaptive_shadows`.
+`relume.live.free_camera.adaptive_shadows`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from relume.live.free_camera.basis.highlight_lobes import build_lobes
 from relume.live.free_camera.basis.material_tables import Tables
-from relume.live.free_camera.hard_shadows.lights import HardShadowLight
+from relume.live.free_camera.hard_shadow_lights import HardShadowLight
 from relume.live.free_camera.highlights.environment_lobe_lookup import PrefilteredEnvironment
 from relume.live.free_camera.primary_visibility import GBuffer, interpolate_to_nodes
 from relume.live.free_camera.shade_pixels import InterpolatedProbes, MirrorData, shade_pixels

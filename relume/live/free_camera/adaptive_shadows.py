@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 
 from relume.core.thread_pools import parallel_for_chunks
 from relume.lights.sun_disks import NUM_TARGETS
-from relume.live.free_camera.hard_shadows.lights import ShadowTargets
-from relume.live.free_camera.hard_shadows.shadow_kernels import (
+from relume.live.free_camera.hard_shadow_lights import ShadowTargets
+from relume.live.free_camera.primary_visibility import GBuffer
+from relume.live.free_camera.ray_scene import OcclusionMesh
+from relume.live.free_camera.shadow_kernels import (
     ShadowRays,
     needs_refinement,
     needs_refinement_at_edges,
@@ -27,8 +29,6 @@ from relume.live.free_camera.hard_shadows.shadow_kernels import (
     trace_all_targets,
     trace_single_target,
 )
-from relume.live.free_camera.primary_visibility import GBuffer
-from relume.live.free_camera.ray_scene import OcclusionMesh
 from relume.raytrace.embree import PacketTracer
 from relume.scene.model import Camera
 
