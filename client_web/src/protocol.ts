@@ -53,8 +53,26 @@ export type {
   ComparisonRequest,
   Turntable,
 } from "./protocol.gen";
-export type { BackgroundLook as Background, DrawnCurve, LightLook as Light, OcioView, TransportLook as Transport } from "./look.gen";
-export { FIDELITIES, LUT_GAIN, LUT_SIZE, MAX_COMMENT, MAX_CAMERA_PIXELS, MAX_MESSAGE_BYTES, MAX_PERSON_NAME, MAX_VISIBLE_VIEWS, ROOM_PREFIX, SUBPROTOCOL, PROBES_LAYOUT } from "./protocol.gen";
+export type {
+  BackgroundLook as Background,
+  DrawnCurve,
+  LightLook as Light,
+  OcioView,
+  TransportLook as Transport,
+} from "./look.gen";
+export {
+  FIDELITIES,
+  LUT_GAIN,
+  LUT_SIZE,
+  MAX_COMMENT,
+  MAX_CAMERA_PIXELS,
+  MAX_MESSAGE_BYTES,
+  MAX_PERSON_NAME,
+  MAX_VISIBLE_VIEWS,
+  ROOM_PREFIX,
+  SUBPROTOCOL,
+  PROBES_LAYOUT,
+} from "./protocol.gen";
 
 export type Rgb = [number, number, number];
 export type Triple = [x: number, y: number, z: number];

@@ -16,7 +16,9 @@ beforeEach(() => {
   vi.stubGlobal("cancelAnimationFrame", () => undefined);
   bake.value = "b".repeat(16);
   look.value = LOOK;
-  views.value = [{ name: "front", width: 4, height: 3, camera: FIRST, camera_mode: "free" }] as unknown as typeof views.value;
+  views.value = [
+    { name: "front", width: 4, height: 3, camera: FIRST, camera_mode: "free" },
+  ] as unknown as typeof views.value;
   shownViews.value = ["front"];
   activeViewName.value = "front";
 });

@@ -3,7 +3,14 @@ import { cancelBake } from "../src/session/net/api";
 import { bakeProgressText, hasProgress, phaseText } from "../src/session/scene/bakeStatus";
 import type { BakeStatus } from "../src/state/bakes";
 
-const running: BakeStatus = { id: "b", state: "running", progress: 0, phase: "tracing", seconds_left: null, problem: null };
+const running: BakeStatus = {
+  id: "b",
+  state: "running",
+  progress: 0,
+  phase: "tracing",
+  seconds_left: null,
+  problem: null,
+};
 
 describe("progress text of a bake", () => {
   test("shows the phase and elapsed time before tracing", () => {
@@ -14,7 +21,9 @@ describe("progress text of a bake", () => {
 
   test("shows no remaining time without an estimate", () => {
     expect(bakeProgressText({ ...running, progress: 0.034 }, 5)).toBe("baking, 3 %, estimating time…");
-    expect(bakeProgressText({ ...running, progress: 0.5, seconds_left: 41.2 }, 5)).toBe("baking, 50 %, about 41 s left");
+    expect(bakeProgressText({ ...running, progress: 0.5, seconds_left: 41.2 }, 5)).toBe(
+      "baking, 50 %, about 41 s left",
+    );
     expect(hasProgress(running)).toBe(true);
   });
 

@@ -52,7 +52,16 @@ const VIEWS = ["front", "left"].map((name) => ({ name, width: 1, height: 1, aspe
 function greet(bake: string): FakeSession {
   connectToBake(bake);
   const session = opened.at(-1) as FakeSession;
-  const hello = { type: "hello", views: VIEWS, view: "front", method: "direct", look: LOOK, revision: 0, resume: "", room: null };
+  const hello = {
+    type: "hello",
+    views: VIEWS,
+    view: "front",
+    method: "direct",
+    look: LOOK,
+    revision: 0,
+    resume: "",
+    room: null,
+  };
   session.handlers.hello(hello as unknown as HelloMessage);
   return session;
 }

@@ -6,7 +6,13 @@ import { shownViews, views } from "../src/state/views";
 
 vi.hoisted(() => vi.stubGlobal("localStorage", { getItem: () => null, setItem: () => undefined }));
 
-const material = (name: string, is_projected: boolean) => ({ name, is_projected, terms: [], shadow_catcher: false, is_glass: false });
+const material = (name: string, is_projected: boolean) => ({
+  name,
+  is_projected,
+  terms: [],
+  shadow_catcher: false,
+  is_glass: false,
+});
 
 test("notes about tri-planar mapping and about average texels in client rendering", async () => {
   const { coverText } = await import("../src/panels/inspector/ZernikeFit");

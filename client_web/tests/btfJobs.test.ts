@@ -1,5 +1,13 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import { trackJobs, deleteJob, importImages, isBeingMade, btfJobs, jobText, stopJob } from "../src/panels/library/btfJobs";
+import {
+  trackJobs,
+  deleteJob,
+  importImages,
+  isBeingMade,
+  btfJobs,
+  jobText,
+  stopJob,
+} from "../src/panels/library/btfJobs";
 import type { BtfJobBody } from "../src/protocol";
 import { libraryOpen } from "../src/state/panels";
 

@@ -7,12 +7,20 @@ import { onePixel } from "./exampleFrames";
 
 /** Ends the image that is being drawn. */
 let finish: () => void = () => undefined;
-const draw = vi.fn(() => new Promise((done) => (finish = () => done({ width: 1, height: 1, encoded: new Uint8Array(4), coverage: null }))));
+const draw = vi.fn(
+  () =>
+    new Promise((done) => (finish = () => done({ width: 1, height: 1, encoded: new Uint8Array(4), coverage: null }))),
+);
 
 vi.hoisted(() => {
   vi.stubGlobal("localStorage", { getItem: () => "client", setItem: () => undefined });
   vi.stubGlobal("window", { setTimeout: () => 0 });
-  vi.stubGlobal("OffscreenCanvas", class { getContext = () => ({}); });
+  vi.stubGlobal(
+    "OffscreenCanvas",
+    class {
+      getContext = () => ({});
+    },
+  );
   vi.stubGlobal("fetch", () => Promise.resolve(Response.json({ has_holes: false, arrays: [] })));
 });
 vi.mock("../src/render/freeCamera/freeCameraRenderer", () => ({
@@ -30,13 +38,26 @@ test("tables are taken when their picture is drawn, however many more are wanted
   const { renderIfPossible, isClientRendering, onFrame } = await import("../src/session/clientRendering");
   const session = { send: () => true, hasPendingEdits: false, revision: 0 };
   const hello = { views: [{ name: "front", camera_mode: "free" }] };
-  const connection = { bake: "b", hello, session, isRenderingAnnounced: false, cameraSeqs: new Map(), pendingFrames: { isDisplayed: () => true } } as unknown as BakeConnection;
+  const connection = {
+    bake: "b",
+    hello,
+    session,
+    isRenderingAnnounced: false,
+    cameraSeqs: new Map(),
+    pendingFrames: { isDisplayed: () => true },
+  } as unknown as BakeConnection;
   connections.shown = connection;
-  views.value = [{ name: "front", width: 1, height: 1, camera_mode: "free", camera: { to_world: [], yfov: 1 } } as never];
+  views.value = [
+    { name: "front", width: 1, height: 1, camera_mode: "free", camera: { to_world: [], yfov: 1 } } as never,
+  ];
   await onFrame(connection, onePixel("front", true));
   await vi.waitFor(() => expect(isClientRendering.value).toBe(true));
   const { header } = onePixel("front", true);
-  const tables = { header: { ...header, kind: "scene_update", scene_update: { arrays: [] } }, payload: new Uint8Array(0), alpha: null };
+  const tables = {
+    header: { ...header, kind: "scene_update", scene_update: { arrays: [] } },
+    payload: new Uint8Array(0),
+    alpha: null,
+  };
   const taken = onFrame(connection, tables as unknown as Frame);
   await vi.waitFor(() => expect(draw).toHaveBeenCalledTimes(1));
   expect(renderIfPossible("front")).toBe(true); // the drag goes on
@@ -50,11 +71,23 @@ test("a disposed renderer shows nothing more, reports no failure, and nobody wai
   const failed = vi.fn();
   const gpu = { setTables: () => undefined, draw, dispose: vi.fn() } as never;
   const session = { hasPendingEdits: false, revision: 0 };
-  const renderer = new ClientRenderer({ session } as never, gpu, () => Promise.resolve(), () => undefined, failed);
-  views.value = ["front", "back"].map((name) => ({ name, width: 1, height: 1, camera: { to_world: [], yfov: 1 } }) as never);
+  const renderer = new ClientRenderer(
+    { session } as never,
+    gpu,
+    () => Promise.resolve(),
+    () => undefined,
+    failed,
+  );
+  views.value = ["front", "back"].map(
+    (name) => ({ name, width: 1, height: 1, camera: { to_world: [], yfov: 1 } }) as never,
+  );
   draw.mockClear();
   showFrame.mockClear();
-  const tables = (name: string) => ({ ...onePixel(name, true), header: { ...onePixel(name, true).header, scene_update: { arrays: [] } } }) as unknown as Frame;
+  const tables = (name: string) =>
+    ({
+      ...onePixel(name, true),
+      header: { ...onePixel(name, true).header, scene_update: { arrays: [] } },
+    }) as unknown as Frame;
   const waiting = [renderer.applyTables(tables("front")), renderer.applyTables(tables("back"))];
   await vi.waitFor(() => expect(draw).toHaveBeenCalledTimes(1));
   finish();

@@ -55,7 +55,8 @@ class Editor {
   }
 
   hear(): void {
-    for (const { patch, revision } of this.fromServer.splice(0)) this.look = this.queue.applyRemote(patch, revision) as Look;
+    for (const { patch, revision } of this.fromServer.splice(0))
+      this.look = this.queue.applyRemote(patch, revision) as Look;
   }
 }
 

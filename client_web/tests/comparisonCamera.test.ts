@@ -15,7 +15,10 @@ beforeEach(() => {
   bake.value = "b".repeat(16);
   look.value = LOOK;
   const info = { width: 4, height: 3, camera: FROM };
-  views.value = [{ ...info, name: "front", camera_mode: "free" }, { ...info, name: "left", camera_mode: "fixed" }] as unknown as typeof views.value;
+  views.value = [
+    { ...info, name: "front", camera_mode: "free" },
+    { ...info, name: "left", camera_mode: "fixed" },
+  ] as unknown as typeof views.value;
   vi.stubGlobal("requestAnimationFrame", () => 1);
   vi.stubGlobal("cancelAnimationFrame", () => undefined);
   vi.stubGlobal("fetch", (_path: string, init?: RequestInit) => {

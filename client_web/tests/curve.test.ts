@@ -210,8 +210,19 @@ describe("points", () => {
 });
 
 describe("channels", () => {
-  const red: DrawnCurve = { points: [[0, 1], [90, 0]] };
-  const rest: DrawnCurve = { handles: [[0, 2, 2], [90, 1, 3]], factors: [1, 0.5] };
+  const red: DrawnCurve = {
+    points: [
+      [0, 1],
+      [90, 0],
+    ],
+  };
+  const rest: DrawnCurve = {
+    handles: [
+      [0, 2, 2],
+      [90, 1, 3],
+    ],
+    factors: [1, 0.5],
+  };
 
   test("equal channels share one object, and reading gives back what was written", () => {
     expect(writeChannels([rest, rest, { ...rest }])).toEqual({ ...rest, channels: "rgb" });

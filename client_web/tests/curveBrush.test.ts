@@ -10,7 +10,10 @@ vi.mock("../src/state/views", () => ({ hasFreeCamera: { peek: () => true } }));
 
 test("an interval is requested when the camera stops, unless the pointer has left", async () => {
   vi.useFakeTimers();
-  const [{ requestBrush, clearBrush }, { fidelity }] = [await import("../src/curve/curveBrush"), await import("../src/state/fidelity")];
+  const [{ requestBrush, clearBrush }, { fidelity }] = [
+    await import("../src/curve/curveBrush"),
+    await import("../src/state/fidelity"),
+  ];
   fidelity.value = "approximate";
   for (let k = 0; k < 2; k += 1) {
     requestBrush(3, 7);
@@ -21,11 +24,16 @@ test("an interval is requested when the camera stops, unless the pointer has lef
   requestBrush(3, 7);
   fidelity.value = "exact";
   vi.advanceTimersByTime(1000);
-  expect(send.mock.calls).toEqual([[{ type: "highlight_curve_range", curve: "/materials/A/terms/0/curves/theta_h", from: 3, to: 7 }]]);
+  expect(send.mock.calls).toEqual([
+    [{ type: "highlight_curve_range", curve: "/materials/A/terms/0/curves/theta_h", from: 3, to: 7 }],
+  ]);
 });
 
 test("an interval is requested when its curve's operator is precomputed", async () => {
-  const [{ requestBrush, clearBrush }, { fidelity }] = [await import("../src/curve/curveBrush"), await import("../src/state/fidelity")];
+  const [{ requestBrush, clearBrush }, { fidelity }] = [
+    await import("../src/curve/curveBrush"),
+    await import("../src/state/fidelity"),
+  ];
   const { freezeStatus } = await import("../src/state/connection");
   send.mockClear();
   fidelity.value = "exact";

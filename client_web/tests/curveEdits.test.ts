@@ -5,7 +5,13 @@ import { applyLayer, layerOf, sampleBands } from "../src/curve/model/edits";
 import { MAX_POINTS, BrushStroke } from "../src/curve/model/fit";
 import { bendCurve, curveModel, pointsOf } from "../src/curve/model/model";
 import { addPoint, movePoint, removePoint } from "../src/curve/model/points";
-import { bandsWithin, drawInterval, scaleInterval, shiftInterval, type EditBase } from "../src/curve/model/intervalEdits";
+import {
+  bandsWithin,
+  drawInterval,
+  scaleInterval,
+  shiftInterval,
+  type EditBase,
+} from "../src/curve/model/intervalEdits";
 import type { CurveBody, CurveEdits, CurveMessage, Handle, Point } from "../src/protocol";
 
 const BANDS = 256;
@@ -43,7 +49,12 @@ test("bends curves as the server does", () => {
   const drawn: DrawnChannels = {
     factors: [1, 1, 2, 0, 1, 1, 1, 1],
     offsets: [0, 0, 0, 3, 0, 0, 0, 0],
-    handles: [[0, 8, 12], [20, 4, 2], [45, 3, 9], [90, 0, 0]],
+    handles: [
+      [0, 8, 12],
+      [20, 4, 2],
+      [45, 3, 9],
+      [90, 0, 0],
+    ],
   };
   const ground = [8, 6, 4, 3, 2, 1, 0.5, 0];
   const expected = [
@@ -129,7 +140,13 @@ test("a parameter that moves the curve keeps the edit in proportion", () => {
 });
 
 test("points that a person wrote stay, and are bent from where they are", () => {
-  const points: Point[] = [[0, 4], [5, 3.8], [12, 1.5], [40, 2], [90, 0]];
+  const points: Point[] = [
+    [0, 4],
+    [5, 3.8],
+    [12, 1.5],
+    [40, 2],
+    [90, 0],
+  ];
   const model = modelOf(CURVES.ggx, { points });
   const shown = pointsOf(model, 1, LINEAR);
   expect(shown).toBe(points);
@@ -147,7 +164,8 @@ describe("stretches", () => {
     const model = modelOf(generated, edits);
     return { curve: model.channels[0], baseline: generated, points: pointsOf(model, 0, axes), axes };
   }
-  const valuesOf = ({ baseline }: EditBase, drawn: DrawnChannels | null) => applyLayer(layerOf(drawn, baseline), baseline);
+  const valuesOf = ({ baseline }: EditBase, drawn: DrawnChannels | null) =>
+    applyLayer(layerOf(drawn, baseline), baseline);
 
   function stroke(from: number, to: number, height: (x: number) => number): BrushStroke {
     const made = new BrushStroke(BANDS, LINEAR);
@@ -169,7 +187,15 @@ describe("stretches", () => {
     const base = make(CURVES.sharp);
     const before = valuesOf(base, base.curve);
     const edits: [string, DrawnChannels | null, number, number][] = [
-      ["draw", drawInterval(base, stroke(10, 20, () => 0.3)), 10, 20],
+      [
+        "draw",
+        drawInterval(
+          base,
+          stroke(10, 20, () => 0.3),
+        ),
+        10,
+        20,
+      ],
       ["scale", scaleInterval(base, 10, 20, 1.5), 10, 20],
       ["shift", shiftInterval(base, 10, 20, 5), 10, 25],
       ["shift back", shiftInterval(base, 10, 20, -7), 3, 20],
@@ -189,19 +215,25 @@ describe("stretches", () => {
 
   test("a stroke is what was drawn, and its points lie on it", () => {
     const base = clothOf(CURVES.metal);
-    const drawn = drawInterval(base, stroke(30, 60, (x) => x / 90)) as DrawnChannels;
+    const drawn = drawInterval(
+      base,
+      stroke(30, 60, (x) => x / 90),
+    ) as DrawnChannels;
     const values = valuesOf(base, drawn);
     expect(sampleBands(values, 45)).toBeCloseTo(0.5 * LINEAR.top, -2);
     const within = drawn.handles?.filter(([x]) => x >= 30 && x <= 60) ?? [];
     expect(within.length).toBeGreaterThanOrEqual(2);
-    for (const [x, was, becomes] of within) expect([was, becomes]).toEqual([was, Number(sampleBands(values, x).toPrecision(6))]);
+    for (const [x, was, becomes] of within)
+      expect([was, becomes]).toEqual([was, Number(sampleBands(values, x).toPrecision(6))]);
   });
 
   test("scaling multiplies, and back again is where it was", () => {
     const base = clothOf(CURVES.ggx);
     const twice = scaleInterval(base, 15, 35, 2);
     const [first, last] = bandsWithin(15, 35, BANDS);
-    valuesOf(base, twice).forEach((v, j) => expect(v).toBe((j < first || j > last ? 1 : 2) * (CURVES.ggx[j] as number)));
+    valuesOf(base, twice).forEach((v, j) =>
+      expect(v).toBe((j < first || j > last ? 1 : 2) * (CURVES.ggx[j] as number)),
+    );
     const back = scaleInterval({ ...base, curve: twice }, 15, 35, 0.5);
     expect(valuesOf(base, back)).toEqual(CURVES.ggx);
     expect(back.factors).toBeUndefined();
@@ -220,7 +252,10 @@ describe("stretches", () => {
   test("many of them stay bounded and valid", () => {
     let base = clothOf(CURVES.sharp);
     for (let pass = 0; pass < 30; pass++) {
-      const made = drawInterval(base, stroke((pass * 7) % 50, 60 + (pass % 25), (x) => 0.4 + 0.3 * Math.sin(x / 2 + pass)));
+      const made = drawInterval(
+        base,
+        stroke((pass * 7) % 50, 60 + (pass % 25), (x) => 0.4 + 0.3 * Math.sin(x / 2 + pass)),
+      );
       const drawn = pass % 3 ? made : shiftInterval({ ...base, curve: made }, 5, 30, 11);
       const handles = drawn?.handles as Handle[];
       expect(handles.length).toBeLessThanOrEqual(MAX_POINTS);

@@ -18,5 +18,13 @@ test("a point at zero comes off it upwards, and what is next to nothing is zero"
 });
 
 test("tooltips and the shortcut list format keys alike", () => {
-  expect(["p", "Ctrl+z", "Ctrl+Shift+z", "+", "\\", "1", "Enter"].map(keyName)).toEqual(["P", "Ctrl+Z", "Ctrl+Shift+Z", "+", "\\", "1", "Enter"]);
+  expect(["p", "Ctrl+z", "Ctrl+Shift+z", "+", "\\", "1", "Enter"].map(keyName)).toEqual([
+    "P",
+    "Ctrl+Z",
+    "Ctrl+Shift+Z",
+    "+",
+    "\\",
+    "1",
+    "Enter",
+  ]);
 });

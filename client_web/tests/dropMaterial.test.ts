@@ -3,7 +3,11 @@ import { expect, it, vi } from "vitest";
 import type { ImageCanvas } from "../src/render/canvas";
 
 const put = vi.hoisted(() => vi.fn());
-const state = vi.hoisted((): { here: string | null; there: string | null; camera: object | null } => ({ here: null, there: "Cone", camera: {} }));
+const state = vi.hoisted((): { here: string | null; there: string | null; camera: object | null } => ({
+  here: null,
+  there: "Cone",
+  camera: {},
+}));
 vi.mock("../src/panels/library/libraryItems", () => ({ DRAG_TYPE: "material", applyEntry: put }));
 vi.mock("../src/viewport/cameras/freeCamera", () => ({ freeCameraOf: () => state.camera }));
 vi.mock("../src/render/materialPicking", () => ({ pickMaterial: () => ({ px: 3, py: 4, material: state.here }) }));

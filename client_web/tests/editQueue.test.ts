@@ -9,7 +9,12 @@ import { LOOK, lookWith } from "./exampleLook";
 const SIGMA = "/materials/Teapot/terms/1/params/sigma";
 const sigma = (value: number): Look => lookWith(LOOK, SIGMA, value);
 
-const targetOf = (look: Look, inputTime: number, activeControl: string | null = null) => ({ look, activeControl, solo: null, inputTime });
+const targetOf = (look: Look, inputTime: number, activeControl: string | null = null) => ({
+  look,
+  activeControl,
+  solo: null,
+  inputTime,
+});
 
 function opened(): EditQueue {
   const queue = new EditQueue();
@@ -21,7 +26,15 @@ describe("EditQueue", () => {
   test("only the newest value travels", () => {
     const queue = opened();
     for (let i = 1; i <= 100; i++) queue.setTarget(targetOf(sigma(i / 100), i));
-    expect(queue.takeEdits()).toEqual([{ revision: 5, patch: [{ op: "replace", path: SIGMA, value: 1 }], activeControl: null, solo: null, inputTime: 100 }]);
+    expect(queue.takeEdits()).toEqual([
+      {
+        revision: 5,
+        patch: [{ op: "replace", path: SIGMA, value: 1 }],
+        activeControl: null,
+        solo: null,
+        inputTime: 100,
+      },
+    ]);
     expect(queue.hasPending).toBe(false);
     expect(queue.takeEdits()).toEqual([]);
   });
@@ -35,16 +48,29 @@ describe("EditQueue", () => {
       queue.setTarget(targetOf(look, 1), change);
     };
     queue.setTarget(targetOf(LOOK, 0));
-    const light = { kind: "point", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], position: [0, 1, 0] };
+    const light = {
+      kind: "point",
+      intensity: 1,
+      color: [1, 1, 1],
+      enabled: true,
+      emission: [1, 1, 1],
+      position: [0, 1, 0],
+    };
     edit("/lights/Point", light);
     for (let i = 1; i <= 50; i++) edit("/lights/Point/position", [i, 1, 0]);
     for (let i = 1; i <= 50; i++) edit(SIGMA, i / 100);
     const [first] = queue.takeEdits();
     expect(first?.patch).toHaveLength(2);
-    expect(first?.patch).toContainEqual({ op: "add", path: "/lights/Point", value: { ...light, position: [50, 1, 0] } });
+    expect(first?.patch).toContainEqual({
+      op: "add",
+      path: "/lights/Point",
+      value: { ...light, position: [50, 1, 0] },
+    });
     expect(first?.patch).toContainEqual({ op: "replace", path: SIGMA, value: 0.5 });
     edit("/lights/Point", undefined);
-    expect(queue.takeEdits()).toEqual([{ revision: 6, patch: [{ op: "remove", path: "/lights/Point" }], activeControl: null, solo: null, inputTime: 1 }]);
+    expect(queue.takeEdits()).toEqual([
+      { revision: 6, patch: [{ op: "remove", path: "/lights/Point" }], activeControl: null, solo: null, inputTime: 1 },
+    ]);
     queue.reset(LOOK, 6);
     edit("/display/exposure", 2);
     expect(applyPatch(LOOK, queue.takeEdits()[0]?.patch ?? [])).toEqual(look);
@@ -85,7 +111,15 @@ describe("EditQueue", () => {
     queue.takeEdits();
     queue.setTarget(targetOf(sigma(0.6), 2));
     queue.reset(LOOK, 0);
-    expect(queue.takeEdits()).toEqual([{ revision: 6, patch: [{ op: "replace", path: SIGMA, value: 0.6 }], activeControl: null, solo: null, inputTime: 2 }]);
+    expect(queue.takeEdits()).toEqual([
+      {
+        revision: 6,
+        patch: [{ op: "replace", path: SIGMA, value: 0.6 }],
+        activeControl: null,
+        solo: null,
+        inputTime: 2,
+      },
+    ]);
   });
 
   test("after a refusal the last confirmed look is known and the whole look goes out", () => {

@@ -23,12 +23,19 @@ describe("the power of a light", () => {
   test("is what it sends into all directions", () => {
     expect(wattsOf(light({ kind: "point" }))).toBeCloseTo(4 * Math.PI, 6);
     expect(wattsOf(light({ kind: "rectangle", size: [2, 0.5] }))).toBeCloseTo(Math.PI, 6);
-    for (const cone of [[20, 30], [0, 90], [5, 60]] as [number, number][])
+    for (const cone of [
+      [20, 30],
+      [0, 90],
+      [5, 60],
+    ] as [number, number][])
       expect(wattsOf(light({ kind: "spot", cone }))).toBeCloseTo(addedUp(cone), 2);
   });
 
   test("counts intensity and tint, and luminance alone", () => {
-    expect(wattsOf(light({ kind: "directional", intensity: 3, color: [0, 1, 0] }))).toBeCloseTo(3 * luminance([0, 1, 0]), 9);
+    expect(wattsOf(light({ kind: "directional", intensity: 3, color: [0, 1, 0] }))).toBeCloseTo(
+      3 * luminance([0, 1, 0]),
+      9,
+    );
     expect(unitsOf(light({ kind: "directional" })).lumens).toBe("lx");
   });
 
@@ -48,7 +55,10 @@ describe("the power of a light", () => {
 describe("the temperature of a light", () => {
   test("has the chromaticities of the tables", () => {
     // illuminant A, and the black body at 6,500 K
-    for (const [kelvin, x, y] of [[2856, 0.4476, 0.4074], [6500, 0.3135, 0.3237]] as const) {
+    for (const [kelvin, x, y] of [
+      [2856, 0.4476, 0.4074],
+      [6500, 0.3135, 0.3237],
+    ] as const) {
       const [u, v] = planckian(kelvin);
       const scale = 2 * u - 8 * v + 4;
       expect((3 * u) / scale).toBeCloseTo(x, 3);

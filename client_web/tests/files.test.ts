@@ -8,7 +8,8 @@ const dropped = (path: string, content: BlobPart = ""): DroppedFile => ({
   path,
   file: new File([content], path.replace(/^.*\//, "")),
 });
-const gltf = (...uris: string[]) => JSON.stringify({ buffers: uris.map((uri) => ({ uri })), images: [{ bufferView: 0 }] });
+const gltf = (...uris: string[]) =>
+  JSON.stringify({ buffers: uris.map((uri) => ({ uri })), images: [{ bufferView: 0 }] });
 
 test("dropped files find their role", async () => {
   const files = [dropped("a.GLB"), dropped("b.ply"), dropped("sky.exr"), dropped("red.PNG")];
@@ -72,11 +73,17 @@ test("a preview has the shape of what was asked for and is never larger", () => 
 
 test("recipes are whole numbers within bounds", () => {
   expect(validateRecipe({ size: [16, 16384], lights: 1 })).toBeNull();
-  for (const size of [[0, 9], [640, Number.NaN], [20.5, 20], [99999, 100]] as [number, number][])
+  for (const size of [
+    [0, 9],
+    [640, Number.NaN],
+    [20.5, 20],
+    [99999, 100],
+  ] as [number, number][])
     expect(validateRecipe({ size, lights: 9 })).toMatch("width and height in pixels");
   expect(validateRecipe({ size: [640, 480], lights: 0 })).toMatch("environment detail");
   const good = { size: [640, 480] as [number, number], lights: 9 };
   expect(validateRecipe({ ...good, patches: 64, gather_rays: 4096 })).toBeNull();
   expect(validateRecipe({ ...good, patches: 63 })).toMatch("64–65,535 bounce samples");
-  for (const gather_rays of [15, 4097, 20.5, Number.NaN]) expect(validateRecipe({ ...good, gather_rays })).toMatch("rays per sample");
+  for (const gather_rays of [15, 4097, 20.5, Number.NaN])
+    expect(validateRecipe({ ...good, gather_rays })).toMatch("rays per sample");
 });

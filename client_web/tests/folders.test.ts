@@ -27,14 +27,23 @@ function importsOf(sources: readonly (readonly [file: string, text: string])[]):
 function circles(imports: ReadonlyMap<string, ReadonlySet<string>>): string[] {
   const left = new Map(imports);
   for (;;) {
-    const free = [...left.keys()].filter((folder) => [...(left.get(folder) ?? [])].every((importedFolder) => !left.has(importedFolder)));
-    if (free.length === 0) return [...left].map(([folder, importedFolders]) => `${folder} → ${[...importedFolders].filter((o) => left.has(o)).join(", ")}`);
+    const free = [...left.keys()].filter((folder) =>
+      [...(left.get(folder) ?? [])].every((importedFolder) => !left.has(importedFolder)),
+    );
+    if (free.length === 0)
+      return [...left].map(
+        ([folder, importedFolders]) => `${folder} → ${[...importedFolders].filter((o) => left.has(o)).join(", ")}`,
+      );
     for (const folder of free) left.delete(folder);
   }
 }
 
 test("a circle between folders is found", () => {
-  const sources = [["a/x.ts", 'import { y } from "../b/y";'], ["b/y.ts", 'import type { X } from "../a/x";'], ["c/z.ts", ""]] as const;
+  const sources = [
+    ["a/x.ts", 'import { y } from "../b/y";'],
+    ["b/y.ts", 'import type { X } from "../a/x";'],
+    ["c/z.ts", ""],
+  ] as const;
   expect(circles(importsOf(sources))).toEqual(["a → b", "b → a"]);
 });
 

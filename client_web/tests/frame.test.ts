@@ -83,15 +83,29 @@ describe("parseFrame", () => {
 
 describe("scene updates", () => {
   const array = { name: "even", dtype: "float32", shape: [2, 4] };
-  const tables = (arrays: unknown) => ({ ...HEADER, tiles: [], format: "arrays", kind: "scene_update", scene_update: { arrays } });
+  const tables = (arrays: unknown) => ({
+    ...HEADER,
+    tiles: [],
+    format: "arrays",
+    kind: "scene_update",
+    scene_update: { arrays },
+  });
 
   test("keep their payload whole", () => {
-    const frame = parseFrame(pack(tables([array, { name: "vectors", dtype: "float16", shape: [1, 4] }]), new Uint8Array(40)));
+    const frame = parseFrame(
+      pack(tables([array, { name: "vectors", dtype: "float16", shape: [1, 4] }]), new Uint8Array(40)),
+    );
     expect(frame.payload.byteLength).toBe(40);
   });
 
   test("are refused where arrays and bytes do not agree, or a form is unknown", () => {
-    const bad = [[], [{ ...array, dtype: "float64" }], [{ ...array, shape: [2, 3] }], [{ ...array, shape: [-2, 4] }], undefined];
+    const bad = [
+      [],
+      [{ ...array, dtype: "float64" }],
+      [{ ...array, shape: [2, 3] }],
+      [{ ...array, shape: [-2, 4] }],
+      undefined,
+    ];
     for (const arrays of bad) expect(() => parseFrame(pack(tables(arrays), new Uint8Array(32)))).toThrow(FrameError);
     expect(() => parseFrame(pack({ ...tables([array]), scene_update: null }, new Uint8Array(32)))).toThrow(FrameError);
   });

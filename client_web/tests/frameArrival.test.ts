@@ -22,7 +22,11 @@ describe("a view's first picture", () => {
 
   test("keeps how much it covers", () => {
     const [tilePart, rest] = [frame("front", false, 1), frame("front", true, 2)];
-    const clear = (source: Frame): Frame => ({ ...source, header: { ...source.header, alpha: true }, alpha: new Uint8Array([7]) });
+    const clear = (source: Frame): Frame => ({
+      ...source,
+      header: { ...source.header, alpha: true },
+      alpha: new Uint8Array([7]),
+    });
     const arrivals = new PendingFrames();
     arrivals.addFrame(clear(tilePart));
     expect([...(arrivals.addFrame(clear(rest)).alpha ?? [])]).toEqual([255, 7, 7, 255]);
@@ -32,7 +36,11 @@ describe("a view's first picture", () => {
   test("is the image that the server has tone-mapped, unless tiles have come since", () => {
     const arrivals = new PendingFrames();
     const tiles = frame("front", true, 2);
-    const jpeg: Frame = { header: { ...tiles.header, format: "jpeg", revision: 3 }, payload: new Uint8Array(9), alpha: null };
+    const jpeg: Frame = {
+      header: { ...tiles.header, format: "jpeg", revision: 3 },
+      payload: new Uint8Array(9),
+      alpha: null,
+    };
     expect(arrivals.addFrame(jpeg)).toMatchObject({ isComplete: true, jpeg, pixels: null });
     expect(arrivals.addFrame(tiles)).toMatchObject({ jpeg: null, header: { revision: 2 } });
   });

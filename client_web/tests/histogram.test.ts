@@ -47,7 +47,9 @@ describe("histogram", () => {
   });
 
   test("percentiles are stops about middle gray", () => {
-    const encoded = Uint32Array.from({ length: 100 }, (_, i) => encodeRgb9e5(...gray(i < 50 ? MIDDLE_GRAY : 4 * MIDDLE_GRAY)));
+    const encoded = Uint32Array.from({ length: 100 }, (_, i) =>
+      encodeRgb9e5(...gray(i < 50 ? MIDDLE_GRAY : 4 * MIDDLE_GRAY)),
+    );
     const histogram = computeHistogram(encoded, 0.01);
     expect(percentile(histogram, 0.25)).toBeCloseTo(0, 0);
     expect(percentile(histogram, 0.75)).toBeCloseTo(2, 0);
@@ -61,5 +63,9 @@ function gray(value: number): [number, number, number] {
 test("solo takes the selected material, and ends on itself or without one", () => {
   expect(toggledSolo(null, "Teapot")).toBe("Teapot");
   expect(toggledSolo("Teapot", "Cloth")).toBe("Cloth");
-  expect([toggledSolo("Teapot", "Teapot"), toggledSolo("Teapot", null), toggledSolo(null, null)]).toEqual([null, null, null]);
+  expect([toggledSolo("Teapot", "Teapot"), toggledSolo("Teapot", null), toggledSolo(null, null)]).toEqual([
+    null,
+    null,
+    null,
+  ]);
 });

@@ -2,7 +2,16 @@ import { crc32, deflateSync } from "node:zlib";
 import { describe, expect, test } from "vitest";
 import { srgbDecode, srgbEncode, toDisplay, type DisplayedToneMap } from "../src/render/color/tonemap";
 import { decodeIds } from "../src/render/png16";
-import { FIT, fitWidth, panTransform, visibleRegion, displayedWidth, toImagePoint, toScreenPoint, zoomAt } from "../src/render/zoomTransform";
+import {
+  FIT,
+  fitWidth,
+  panTransform,
+  visibleRegion,
+  displayedWidth,
+  toImagePoint,
+  toScreenPoint,
+  zoomAt,
+} from "../src/render/zoomTransform";
 import type { Rgb } from "../src/protocol";
 
 describe("tone maps", () => {
@@ -53,7 +62,12 @@ describe("transform", () => {
   test("the visible region is in pixels, and omitted if everything is visible", () => {
     expect(visibleRegion(FIT, canvas, 1920, 1440)).toBe(null);
     const zoomed = zoomAt(FIT, canvas, 4, 400, 300);
-    const [x, y, width, height] = visibleRegion(zoomed, canvas, 1920, 1440) as number[] as [number, number, number, number];
+    const [x, y, width, height] = visibleRegion(zoomed, canvas, 1920, 1440) as number[] as [
+      number,
+      number,
+      number,
+      number,
+    ];
     expect(Math.abs(2 * x + width - 1920)).toBeLessThanOrEqual(1);
     expect(width / 1920).toBeCloseTo(800 / displayedWidth(zoomed, canvas), 2);
     expect(Math.abs(2 * y + height - 1440)).toBeLessThanOrEqual(1);

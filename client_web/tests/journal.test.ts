@@ -9,7 +9,10 @@ const LONG = 1 << 20;
 const SIGMA = "/materials/Teapot/terms/1/params/sigma";
 const EDITS: [path: string, value: unknown][] = [
   [SIGMA, 0.3],
-  ["/lights/Point", { kind: "point", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], position: [0, 1, 0] }],
+  [
+    "/lights/Point",
+    { kind: "point", intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1], position: [0, 1, 0] },
+  ],
   ["/lights/Point/position", [1, 2, 3]],
   ["/materials/a~1b~0c/terms", [LOOK.materials.Teapot?.terms[0], LOOK.materials.Teapot?.terms[1]]],
   ["/lights/Point", undefined],

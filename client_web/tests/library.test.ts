@@ -1,5 +1,15 @@
 import { afterEach, describe, expect, it, vi } from "vitest";
-import { otherGroupMatches, group, importMaterial, matchesSearch, library, model, query, showGroup, visibleEntries } from "../src/panels/library/libraryItems";
+import {
+  otherGroupMatches,
+  group,
+  importMaterial,
+  matchesSearch,
+  library,
+  model,
+  query,
+  showGroup,
+  visibleEntries,
+} from "../src/panels/library/libraryItems";
 import { highlightOf, positionOf, highlightAt, mapRange } from "../src/panels/library/navigationMap";
 
 const POINTS = [
@@ -31,12 +41,15 @@ describe("the map of materials", () => {
 });
 
 describe("the highlight of a material on the map", () => {
-  const term = (model: string, params: object) => ({ model, color: [1, 1, 1], texture: null, params, curves: {} }) as never;
+  const term = (model: string, params: object) =>
+    ({ model, color: [1, 1, 1], texture: null, params, curves: {} }) as never;
 
   it("is that of its Cook–Torrance term, of several channels their mean", () => {
     expect(highlightOf([])).toBeNull();
     expect(highlightOf([term("lambert", {}), term("ggx", { roughness: 0.3 })])).toBeNull();
-    const { f0, sigma } = highlightOf([term("lambert", {}), term("cook_torrance", { sigma: [0.1, 0.2, 0.3], ior: 3, extinction: 0 })]) ?? {};
+    const { f0, sigma } =
+      highlightOf([term("lambert", {}), term("cook_torrance", { sigma: [0.1, 0.2, 0.3], ior: 3, extinction: 0 })]) ??
+      {};
     expect([f0, sigma]).toEqual([expect.closeTo(0.25), expect.closeTo(0.2)]);
   });
 });
@@ -45,19 +58,24 @@ describe("the search in the library", () => {
   const brass = { name: "alum-bronze", description: "alum-bronze. Cook–Torrance, Ngan 2005" };
 
   it("finds by any part of the words, in any order, with a blank for a hyphen", () => {
-    for (const typed of ["", "bronze", "ALUM BR", "bronze alum", "ngan", "alum-bronze "]) expect(matchesSearch(brass, typed)).toBe(true);
+    for (const typed of ["", "bronze", "ALUM BR", "bronze alum", "ngan", "alum-bronze "])
+      expect(matchesSearch(brass, typed)).toBe(true);
     for (const typed of ["brass", "bronze 2006"]) expect(matchesSearch(brass, typed)).toBe(false);
   });
 });
 
 describe("what is found elsewhere", () => {
-  const fitted = (id: string, name: string, model: string, group: string) => ({ id, name, source: "", model, group, terms: [] }) as never;
+  const fitted = (id: string, name: string, model: string, group: string) =>
+    ({ id, name, source: "", model, group, terms: [] }) as never;
 
   it("is offered if no listed entry matches", () => {
     library.value = [fitted("a", "Gold", "ward", "metal"), fitted("b", "Felt", "cook_torrance", "fabric")];
     [query.value, group.value] = ["felt", "all"];
     expect(otherGroupMatches.value).toEqual([]);
-    for (const [typed, groupName, model] of [["gold", "all", "ward"], ["felt", "metal", "cook_torrance"]] as const) {
+    for (const [typed, groupName, model] of [
+      ["gold", "all", "ward"],
+      ["felt", "metal", "cook_torrance"],
+    ] as const) {
       [query.value, group.value] = [typed, groupName];
       expect(otherGroupMatches.value).toEqual([[model, 1]]);
       showGroup(model);

@@ -2,7 +2,14 @@ import { describe, expect, test } from "vitest";
 import { stepLabel } from "../src/edit/stepLabel";
 import { projectionCameraOf, project, pushPoint, slidePoint } from "../src/panels/lights/lightProjection";
 import { angleFieldsOf, numbersFieldsOf } from "../src/panels/lights/lightFields";
-import { spotEdgePoint, aimLight, anchorsOf, moveLight, lightOutline, placeLight } from "../src/panels/lights/handleGeometry";
+import {
+  spotEdgePoint,
+  aimLight,
+  anchorsOf,
+  moveLight,
+  lightOutline,
+  placeLight,
+} from "../src/panels/lights/handleGeometry";
 import { offsetCopy, completeLight, nextLightName, createLight, changeKind } from "../src/panels/lights/lightKinds";
 import { add, cross, dot, length, subtract, normalize } from "../src/panels/lights/vector";
 import type { Light, Triple } from "../src/protocol";
@@ -20,9 +27,16 @@ const camera = projectionCameraOf({
   bounds: null,
   camera: { to_world: [1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 1, 5, 0, 0, 0, 1], yfov: Math.PI / 2 },
 });
-const close = (a: readonly number[], b: readonly number[]) => a.forEach((v, i) => expect(v).toBeCloseTo(b[i] as number, 9));
+const close = (a: readonly number[], b: readonly number[]) =>
+  a.forEach((v, i) => expect(v).toBeCloseTo(b[i] as number, 9));
 const common = { intensity: 1, color: [1, 1, 1], enabled: true, emission: [1, 1, 1] } as const;
-const spot = { kind: "spot", ...common, position: [0, 2, 0], direction: [0, -2, 0], cone: [20, 45] } as unknown as Light;
+const spot = {
+  kind: "spot",
+  ...common,
+  position: [0, 2, 0],
+  direction: [0, -2, 0],
+  cone: [20, 45],
+} as unknown as Light;
 const sun = { kind: "directional", ...common, direction: [0, -1, 0] } as unknown as Light;
 
 describe("a point in the picture", () => {
@@ -69,7 +83,10 @@ describe("handles", () => {
   test("a rectangle's height lies in the plane of its direction and up, turned by its rotation", () => {
     const [width, height] = spotEdgePoint([0, 0, -3], 0);
     close(height, [0, 1, 0]);
-    for (const direction of [[0, -1, 0], [1, -2, 0.5]] as Triple[]) {
+    for (const direction of [
+      [0, -1, 0],
+      [1, -2, 0.5],
+    ] as Triple[]) {
       const [w, h] = spotEdgePoint(direction, 30);
       close([dot(w, h), dot(w, direction), dot(h, direction), length(w), length(h)], [0, 0, 0, 1, 1]);
     }
@@ -78,7 +95,14 @@ describe("handles", () => {
   });
 
   test("outlines are as large as what they stand for", () => {
-    const panel = { kind: "rectangle", ...common, position: [0, 1, 0], direction: [0, -1, 0], rotation: 0, size: [2, 1] };
+    const panel = {
+      kind: "rectangle",
+      ...common,
+      position: [0, 1, 0],
+      direction: [0, -1, 0],
+      rotation: 0,
+      size: [2, 1],
+    };
     const [a, b, c] = lightOutline(panel as unknown as Light) as [Triple, Triple, Triple];
     expect([length(subtract(a, b)), length(subtract(b, c))]).toEqual([2, 1]);
     for (const point of lightOutline(spot)) expect(length(point)).toBeCloseTo(2, 9); // 45° from 2 m above
@@ -99,7 +123,8 @@ describe("a new light", () => {
   });
 
   test("a panel beside a low object stands no lower than what was clicked, and one under a ceiling hangs", () => {
-    const panel = (normal: Triple) => createLight("rectangle", { position: [0, 0.03, 0], normal, distance: 5, radiance: 0.5 });
+    const panel = (normal: Triple) =>
+      createLight("rectangle", { position: [0, 0.03, 0], normal, distance: 5, radiance: 0.5 });
     const lowest = (light: Light) => Math.min(...lightOutline(light).map(([, y]) => y));
     expect(lowest(panel([0, 0, 1]))).toBeGreaterThan(0.02);
     expect(lowest(panel([0.6, 0, 0.8]))).toBeGreaterThan(0.02);
@@ -161,7 +186,11 @@ describe("one light alone", () => {
   test("shines, the others and the environment do not", () => {
     soloLight.value = "Spot";
     const alone = visibleLookOf(lit);
-    expect([alone.lights["Spot"]?.enabled, alone.lights["Sun"]?.enabled, alone.environment.intensity]).toEqual([true, false, 0]);
+    expect([alone.lights["Spot"]?.enabled, alone.lights["Sun"]?.enabled, alone.environment.intensity]).toEqual([
+      true,
+      false,
+      0,
+    ]);
     expect(soloSources(lit)).toEqual(["Spot"]);
     soloLight.value = ENVIRONMENT_SOURCE;
     expect(visibleLookOf(lit).environment).toBe(lit.environment);

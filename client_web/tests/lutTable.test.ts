@@ -10,7 +10,9 @@ const LAST = LUT_SIZE - 1;
 function tableFrom(transform: (rgb: Rgb) => Rgb) {
   const view = new DataView(new ArrayBuffer(2 * 3 * LUT_SIZE ** 3));
   for (let at = 0; at < LUT_SIZE ** 3; at++) {
-    const node = [Math.floor(at / LUT_SIZE ** 2), Math.floor(at / LUT_SIZE) % LUT_SIZE, at % LUT_SIZE].map((k) => k / LAST);
+    const node = [Math.floor(at / LUT_SIZE ** 2), Math.floor(at / LUT_SIZE) % LUT_SIZE, at % LUT_SIZE].map(
+      (k) => k / LAST,
+    );
     transform(node as Rgb).forEach((v, c) => view.setUint16(2 * (3 * at + c), Math.round(65535 * v), true));
   }
   return parseLut(view.buffer);

@@ -20,14 +20,36 @@ test("a material uses what its rows say", () => {
   const [first, second, third, fourth] = read([diffuse, textured, glossy, mirror]);
   const none = { isotropic: NEVER, anisotropic: NEVER };
   const plain = { isotropic: [true, false, false], anisotropic: NEVER };
-  expect(first?.points).toEqual({ functions: 15, plain, environment: none, otherLight: none, lobe: false, otherFunctions: 0, map: false });
+  expect(first?.points).toEqual({
+    functions: 15,
+    plain,
+    environment: none,
+    otherLight: none,
+    lobe: false,
+    otherFunctions: 0,
+    map: false,
+  });
   expect(first?.pixels).toEqual({ groups: false, textures: false, lobes: false, catchesShadows: false });
   expect(second?.points).toMatchObject({ functions: 16, plain: { isotropic: [true, true, false] }, map: true });
   expect(second?.pixels).toEqual({ groups: true, textures: true, lobes: false, catchesShadows: false });
-  expect(third?.points).toMatchObject({ functions: 17, plain: { anisotropic: [true, false, false] }, lobe: true, otherFunctions: 32 });
-  expect(third?.points).toMatchObject({ environment: { isotropic: [true, false, false], anisotropic: NEVER }, otherLight: { isotropic: NEVER, anisotropic: [true, false, false] } });
+  expect(third?.points).toMatchObject({
+    functions: 17,
+    plain: { anisotropic: [true, false, false] },
+    lobe: true,
+    otherFunctions: 32,
+  });
+  expect(third?.points).toMatchObject({
+    environment: { isotropic: [true, false, false], anisotropic: NEVER },
+    otherLight: { isotropic: NEVER, anisotropic: [true, false, false] },
+  });
   expect(third?.tables).toEqual({ plain: [3, 0, -1, -1, -1, -1], highlights: [4, -1, -1, 5, ...NO, ...NO] });
-  expect(fourth?.points).toMatchObject({ functions: 0, lobe: true, environment: none, otherLight: { isotropic: [false, false, true] }, otherFunctions: 33 });
+  expect(fourth?.points).toMatchObject({
+    functions: 0,
+    lobe: true,
+    environment: none,
+    otherLight: { isotropic: [false, false, true] },
+    otherFunctions: 33,
+  });
   expect(fourth?.pixels).toEqual({ groups: true, textures: false, lobes: true, catchesShadows: true });
 });
 
@@ -55,7 +77,10 @@ test.each([
   [2 * TEXELS_PER_ROW + 1, 2 * TEXELS_PER_ROW + 9],
 ])("texels from %i to %i are covered once by rectangles of rows", (start, end) => {
   const covered = rectanglesOf(start, end).flatMap(([left, top, width, height]) =>
-    Array.from({ length: width * height }, (_, k) => (top + Math.floor(k / width)) * TEXELS_PER_ROW + left + (k % width)),
+    Array.from(
+      { length: width * height },
+      (_, k) => (top + Math.floor(k / width)) * TEXELS_PER_ROW + left + (k % width),
+    ),
   );
   expect(covered.sort((a, b) => a - b)).toEqual(Array.from({ length: end - start }, (_, k) => start + k));
 });

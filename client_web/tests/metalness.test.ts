@@ -12,8 +12,17 @@ models.value = [
   { model: "phong", texture: "specular", parameters: [] },
 ] as unknown as ModelBody[];
 
-const lambert = (texture: string | null, color: Term["color"] = [0.5, 0.2, 0.1]): Term => ({ model: "lambert", texture, color });
-const ggx = (texture: string | null, f0: number | Term["color"] = 0.04): Term => ({ model: "ggx", texture, color: [1, 1, 1], params: { f0 } });
+const lambert = (texture: string | null, color: Term["color"] = [0.5, 0.2, 0.1]): Term => ({
+  model: "lambert",
+  texture,
+  color,
+});
+const ggx = (texture: string | null, f0: number | Term["color"] = 0.04): Term => ({
+  model: "ggx",
+  texture,
+  color: [1, 1, 1],
+  params: { f0 },
+});
 const imageNamed = (base: string | null) => (texture: string) =>
   (texture === COLOR ? { texture, metalness: null, base: null } : { texture, metalness: METAL, base }) as ImageBody;
 const made = [lambert(SCATTERS), ggx(SHINES, [0.5, 0.3, 0.2])];
@@ -35,7 +44,10 @@ test("without it the base color that was under it is back, and the scene's own h
   const own = [lambert("diffuse", [1, 1, 1]), ggx(null)];
   expect(withoutMetalness(made, own, imageNamed(COLOR))).toEqual([lambert(COLOR), ggx(null)]);
   expect(withoutMetalness(made, own, imageNamed("diffuse"))).toEqual([lambert("diffuse"), ggx(null)]);
-  expect(withoutMetalness(made, [lambert(null, [1, 1, 1]), ggx(null)], imageNamed(null))).toEqual([lambert(null), ggx(null)]);
+  expect(withoutMetalness(made, [lambert(null, [1, 1, 1]), ggx(null)], imageNamed(null))).toEqual([
+    lambert(null),
+    ggx(null),
+  ]);
 });
 
 test("what the file shared out between both is back as it was", () => {

@@ -12,8 +12,12 @@ models.value = [
 
 const color: Term["color"] = [1, 1, 1];
 const lambert: Term = { model: "lambert", color };
-const ggx = (roughness: number, follows?: Term["roughness_map"]): Term =>
-  ({ model: "ggx", color, params: { roughness }, ...(follows === undefined ? {} : { roughness_map: follows }) });
+const ggx = (roughness: number, follows?: Term["roughness_map"]): Term => ({
+  model: "ggx",
+  color,
+  params: { roughness },
+  ...(follows === undefined ? {} : { roughness_map: follows }),
+});
 const own: MaterialLook = { terms: [lambert, ggx(0.3), ggx(0.01), { model: "ward", color, params: { alpha: 0.2 } }] };
 
 test("bumps widen highlights that are no mirrors, as of files that have a normal map", () => {
@@ -23,7 +27,10 @@ test("bumps widen highlights that are no mirrors, as of files that have a normal
 });
 
 test("another image is as strong as the one before it", () => {
-  expect(withNormals({ ...own, normal_map: { image: "image:other", scale: 0.4 } }, IMAGE).normal_map).toEqual({ image: IMAGE, scale: 0.4 });
+  expect(withNormals({ ...own, normal_map: { image: "image:other", scale: 0.4 } }, IMAGE).normal_map).toEqual({
+    image: IMAGE,
+    scale: 0.4,
+  });
 });
 
 test("without it terms follow what they did", () => {

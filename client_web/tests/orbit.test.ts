@@ -3,7 +3,18 @@ import { nextCameraName } from "../src/viewport/cameras/cameraRequests";
 import { TouchGestures } from "../src/viewport/cameras/touchGestures";
 import { saveCameraAs } from "../src/viewport/cameras/savedCameras";
 import { PlacementImages } from "../src/viewport/cameras/placementImages";
-import { dollyOrbit, interpolateOrbits, poseOf, isClose, levelOrbit, orbitOf, panOrbit, rotateOrbit, withFieldOfView, type Orbit } from "../src/viewport/cameras/orbit";
+import {
+  dollyOrbit,
+  interpolateOrbits,
+  poseOf,
+  isClose,
+  levelOrbit,
+  orbitOf,
+  panOrbit,
+  rotateOrbit,
+  withFieldOfView,
+  type Orbit,
+} from "../src/viewport/cameras/orbit";
 
 const bounds = { lowest: [-1, 0, -1] as const, highest: [1, 2, 1] as const } as never;
 const orbit: Orbit = { target: [0, 1, 0], distance: 4, azimuth: 0.4, elevation: 0.3, roll: 0, yfov: 40 };
@@ -15,7 +26,12 @@ describe("a camera that goes round a place", () => {
   it("is a rigid frame that looks at its target and stands upright", () => {
     const [x, y, z] = [0, 1, 2].map((k) => column(orbit, k)) as [number[], number[], number[]];
     for (const axis of [x, y, z]) expect(dot(axis, axis)).toBeCloseTo(1, 12);
-    for (const [a, b] of [[x, y], [y, z], [z, x]] as const) expect(dot(a, b)).toBeCloseTo(0, 12);
+    for (const [a, b] of [
+      [x, y],
+      [y, z],
+      [z, x],
+    ] as const)
+      expect(dot(a, b)).toBeCloseTo(0, 12);
     expect(x[1]).toBe(0);
     expect(y[1]).toBeGreaterThan(0);
     const position = positionOf(orbit);
@@ -35,7 +51,10 @@ describe("a camera that goes round a place", () => {
   });
 
   it("is found again from a tilted frame and from one that looks straight down", () => {
-    for (const target of [{ ...orbit, roll: 0.5 }, { ...orbit, roll: -3 }]) {
+    for (const target of [
+      { ...orbit, roll: 0.5 },
+      { ...orbit, roll: -3 },
+    ]) {
       const again = orbitOf(poseOf(target), bounds);
       expect(again.roll).toBeCloseTo(target.roll, 9);
       poseOf(again).to_world.forEach((value, k) => expect(value).toBeCloseTo(poseOf(target).to_world[k] as number, 9));
@@ -45,7 +64,9 @@ describe("a camera that goes round a place", () => {
     }
     const [cosine, sine] = [Math.cos(0.7), Math.sin(0.7)];
     const down = { to_world: [cosine, -sine, 0, 0, 0, 0, 1, 5, -sine, -cosine, 0, 0, 0, 0, 0, 1], yfov: 40 };
-    poseOf(orbitOf(down, bounds)).to_world.forEach((value, k) => expect(value).toBeCloseTo(down.to_world[k] as number, 1));
+    poseOf(orbitOf(down, bounds)).to_world.forEach((value, k) =>
+      expect(value).toBeCloseTo(down.to_world[k] as number, 1),
+    );
   });
 
   it("turns about what the middle of the picture shows", () => {
@@ -136,7 +157,13 @@ describe("fingers", () => {
     fingers.press(at(1, 0, 0));
     expect(fingers.move(at(1, 10, 4))).toMatchObject({ count: 1, across: 10, down: 4, spread: 1 });
     fingers.press(at(2, 30, 4));
-    expect(fingers.move(at(2, 50, 4))).toMatchObject({ count: 2, across: 10, down: 0, spread: 2, center: { x: 30, y: 4 } });
+    expect(fingers.move(at(2, 50, 4))).toMatchObject({
+      count: 2,
+      across: 10,
+      down: 0,
+      spread: 2,
+      center: { x: 30, y: 4 },
+    });
     expect(fingers.only).toBeNull();
     expect(fingers.lift(at(1, 0, 0))).toBe(true);
     expect(fingers.lift(at(1, 0, 0))).toBe(false);
@@ -149,7 +176,11 @@ describe("cameras that are kept", () => {
   const frame = poseOf(orbit);
   vi.stubGlobal("fetch", (path: string, { method = "GET" } = {}) => {
     calls.push(`${method} ${path.split("/").at(-1)}`);
-    const cameras = [{ name: "A", is_placed: true }, { name: "B", is_placed: true }, { name: "Own", is_placed: false }];
+    const cameras = [
+      { name: "A", is_placed: true },
+      { name: "B", is_placed: true },
+      { name: "Own", is_placed: false },
+    ];
     return Promise.resolve(method === "DELETE" ? new Response(null, { status: 204 }) : Response.json(cameras));
   });
 

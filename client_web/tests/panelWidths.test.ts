@@ -26,7 +26,11 @@ describe("panels beside the picture", () => {
   const widths = { outline: 240, library: 280, inspector: 325 };
 
   test("stay as long as there is room, the newest always", () => {
-    expect(fittingPanels(["library", "inspector", "outline"], widths, 845)).toEqual(["library", "inspector", "outline"]);
+    expect(fittingPanels(["library", "inspector", "outline"], widths, 845)).toEqual([
+      "library",
+      "inspector",
+      "outline",
+    ]);
     expect(fittingPanels(["library", "inspector", "outline"], widths, 844)).toEqual(["library", "inspector"]);
     expect(fittingPanels(["outline", "inspector"], widths, 400)).toEqual(["outline"]);
     expect(fittingPanels(["inspector"], widths, 10)).toEqual(["inspector"]);

@@ -21,8 +21,19 @@ describe("pointers", () => {
   });
 });
 
-const POINTS = { points: [[0, 4], [90, 0]] };
-const MORE_POINTS = { points: [[0, 4], [12, 1], [90, 0]] };
+const POINTS = {
+  points: [
+    [0, 4],
+    [90, 0],
+  ],
+};
+const MORE_POINTS = {
+  points: [
+    [0, 4],
+    [12, 1],
+    [90, 0],
+  ],
+};
 const EDITS: [path: string, value: unknown][] = [
   [SIGMA, [0.1, 0.2, 0.3]],
   ["/materials/Teapot/terms/0/model", "ggx"],
@@ -51,7 +62,9 @@ describe("a change", () => {
     const drawn = changeValue(LOOK, CURVE, POINTS);
     expect(drawn.patch).toEqual([{ op: "add", path: CURVE, value: POINTS }]);
     expect(drawn.inverse).toEqual([{ op: "remove", path: CURVE }]);
-    expect(changeValue(drawn.after, CURVE, MORE_POINTS).patch).toEqual([{ op: "replace", path: CURVE, value: MORE_POINTS }]);
+    expect(changeValue(drawn.after, CURVE, MORE_POINTS).patch).toEqual([
+      { op: "replace", path: CURVE, value: MORE_POINTS },
+    ]);
     const removed = changeValue(drawn.after, CURVE, undefined);
     expect(removed.patch).toEqual([{ op: "remove", path: CURVE }]);
     expect(removed.after).toEqual(LOOK);
@@ -59,7 +72,9 @@ describe("a change", () => {
 
   test("to what is there already is none", () => {
     expect(changeValue(LOOK, "/environment/color", [1, 1, 1]).patch).toEqual([]);
-    expect(changeValue(LOOK, "/environment", { rotation: 0, intensity: 1, color: [1, 1, 1], map: null }).patch).toEqual([]);
+    expect(changeValue(LOOK, "/environment", { rotation: 0, intensity: 1, color: [1, 1, 1], map: null }).patch).toEqual(
+      [],
+    );
     expect(changeValue(LOOK, CURVE, undefined).patch).toEqual([]);
     expect(changeValue(LOOK, CURVE, undefined).after).toBe(LOOK);
   });
@@ -87,8 +102,28 @@ describe("a change", () => {
 
   test("of one place, made often, stays one operation", () => {
     let all = changeValue(LOOK, CURVE, POINTS);
-    for (let i = 0; i < 20; i++) all = joinChanges(all, changeValue(all.after, CURVE, { points: [[0, i], [90, 0]] }));
-    expect(all.patch).toEqual([{ op: "add", path: CURVE, value: { points: [[0, 19], [90, 0]] } }]);
+    for (let i = 0; i < 20; i++)
+      all = joinChanges(
+        all,
+        changeValue(all.after, CURVE, {
+          points: [
+            [0, i],
+            [90, 0],
+          ],
+        }),
+      );
+    expect(all.patch).toEqual([
+      {
+        op: "add",
+        path: CURVE,
+        value: {
+          points: [
+            [0, 19],
+            [90, 0],
+          ],
+        },
+      },
+    ]);
     expect(all.inverse).toEqual([{ op: "remove", path: CURVE }]);
   });
 });

@@ -5,7 +5,9 @@ import { addSrgbChunk } from "../src/panels/looks/displayImage";
 
 test("the tag is a chunk of its own, and the picture is as it was", async () => {
   const data = new Uint8Array([255, 0, 0, 0, 255, 0]);
-  const png = new Blob([encode({ width: 2, height: 1, data, channels: 3 }) as Uint8Array<ArrayBuffer>], { type: "image/png" });
+  const png = new Blob([encode({ width: 2, height: 1, data, channels: 3 }) as Uint8Array<ArrayBuffer>], {
+    type: "image/png",
+  });
   const tagged = addSrgbChunk(png);
   const bytes = await tagged.arrayBuffer();
   expect(tagged.type).toBe("image/png");

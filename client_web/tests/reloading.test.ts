@@ -18,7 +18,14 @@ beforeEach(() => {
     removeItem: (key: string) => storage.delete(key),
   });
   vi.stubGlobal("window", globalThis);
-  vi.stubGlobal("document", { createElement: () => ({ href: "", click() { saved.push(this.href); } }) });
+  vi.stubGlobal("document", {
+    createElement: () => ({
+      href: "",
+      click() {
+        saved.push(this.href);
+      },
+    }),
+  });
   vi.stubGlobal("fetch", (path: string, init?: RequestInit) => {
     if (init?.method === "POST") posted.push(path);
     return new Promise((done) => setTimeout(done, 10)).then(() => answer());
@@ -27,7 +34,8 @@ beforeEach(() => {
 
 afterEach(() => vi.useRealTimers());
 
-const state = (stateName: string) => () => Response.json({ id: "a", bake: REQUEST.bake, state: stateName, progress: 0.5, seconds_left: 90, found: null });
+const state = (stateName: string) => () =>
+  Response.json({ id: "a", bake: REQUEST.bake, state: stateName, progress: 0.5, seconds_left: 90, found: null });
 const away = () => {
   throw new TypeError("Failed to fetch");
 };

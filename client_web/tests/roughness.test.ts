@@ -1,6 +1,12 @@
 import { expect, test } from "vitest";
 import { detectMap } from "../src/panels/inspector/images/mapNames";
-import { roughTermIndices, roughnessImage, withMap, withoutRoughnessImage, withRoughnessImage } from "../src/panels/inspector/images/roughness";
+import {
+  roughTermIndices,
+  roughnessImage,
+  withMap,
+  withoutRoughnessImage,
+  withRoughnessImage,
+} from "../src/panels/inspector/images/roughness";
 import type { ImageBody, ModelBody, Term } from "../src/protocol";
 import { models } from "../src/state/scene";
 
@@ -28,7 +34,12 @@ test("an image is for the terms that follow the scene's map, else for all that h
 });
 
 test("sliders show the mean of the image, in their own measure where that is a power of it", () => {
-  const given = [term("lambert"), term("ggx", { roughness: 0.2 }), term("ward", { alpha: 0.1 }), term("phong", { exponent: 30 })];
+  const given = [
+    term("lambert"),
+    term("ggx", { roughness: 0.2 }),
+    term("ward", { alpha: 0.1 }),
+    term("phong", { exponent: 30 }),
+  ];
   expect(withRoughnessImage(given, [1, 2, 3], image)).toEqual([
     term("lambert"),
     term("ggx", { roughness: 0.6 }, image.texture),

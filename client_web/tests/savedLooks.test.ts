@@ -1,7 +1,13 @@
 import { beforeEach, expect, test, vi } from "vitest";
 import { history } from "../src/edit/history";
 import { cacheThumbnail, thumbnailOf } from "../src/panels/looks/namedThumbnails";
-import { exchangeSavedLook, refreshSavedLooks, renameLook, savedLooks, unusedName } from "../src/panels/looks/savedLooks";
+import {
+  exchangeSavedLook,
+  refreshSavedLooks,
+  renameLook,
+  savedLooks,
+  unusedName,
+} from "../src/panels/looks/savedLooks";
 import type { SavedLook } from "../src/panels/looks/savedLooks";
 import { undo } from "../src/panels/looks/undoRedo";
 import { scene } from "../src/state/scene";
@@ -20,7 +26,8 @@ beforeEach(() => {
 });
 
 /** A new look's entry: saved when it says, else now. */
-const saved = (path: string) => JSON.stringify({ created: new URL(path, "http://here").searchParams.get("created") ?? "2" });
+const saved = (path: string) =>
+  JSON.stringify({ created: new URL(path, "http://here").searchParams.get("created") ?? "2" });
 
 const old = { name: "Old", look: LOOK, created: "1" };
 const names = () => savedLooks.value.map(({ name }) => name);
@@ -57,12 +64,19 @@ test("a look that is renamed, or comes back, stands where it stood", async () =>
 
 test("looks come in the order in which they were saved first, with their thumbnails, whatever was changed last", async () => {
   const entries = [
-    { name: "Studio", etag: '"s"', created: "2026-01-02T00:00:00+00:00", thumbnail: "/api/looks/Studio/thumbnail.webp?version=s" },
+    {
+      name: "Studio",
+      etag: '"s"',
+      created: "2026-01-02T00:00:00+00:00",
+      thumbnail: "/api/looks/Studio/thumbnail.webp?version=s",
+    },
     { name: "Night", etag: '"n"', created: "2026-01-01T00:00:00+00:00", thumbnail: null },
   ];
   scene.value = { id: "s", materials: [], lights: [] } as never;
   vi.stubGlobal("fetch", (path: string) =>
-    Promise.resolve(path === "/api/looks" ? Response.json(entries) : new Response("{}", { headers: { etag: `"${path.at(-1)}"` } })),
+    Promise.resolve(
+      path === "/api/looks" ? Response.json(entries) : new Response("{}", { headers: { etag: `"${path.at(-1)}"` } }),
+    ),
   );
   await refreshSavedLooks();
   expect(names()).toEqual(["Night", "Studio"]);
@@ -93,8 +107,12 @@ test("a look is called otherwise than those of other scenes, which are not shown
 
 test("a name that is taken is said to be, not that somebody changed it", async () => {
   vi.stubGlobal("fetch", () => Promise.resolve(new Response("{}", { status: 412 })));
-  await expect(exchangeSavedLook(old, { name: "Taken", look: LOOK })).rejects.toThrow("A look named “Taken” already exists");
-  await expect(exchangeSavedLook(old, { ...old, look: { ...LOOK, lights: {} } })).rejects.toThrow("was changed elsewhere");
+  await expect(exchangeSavedLook(old, { name: "Taken", look: LOOK })).rejects.toThrow(
+    "A look named “Taken” already exists",
+  );
+  await expect(exchangeSavedLook(old, { ...old, look: { ...LOOK, lights: {} } })).rejects.toThrow(
+    "was changed elsewhere",
+  );
 });
 
 test("undo, pressed while a look is being renamed, takes the renaming back and not the step before", async () => {

@@ -83,7 +83,16 @@ function greet(): void {
 /** A frame without tiles, number 7. */
 function frameOf(revision: number): ArrayBuffer {
   const header = new TextEncoder().encode(
-    JSON.stringify({ frame: 7, revision, view: "v", width: 1, height: 1, tiles: [], format: "rgb9e5", kind: "picture" }),
+    JSON.stringify({
+      frame: 7,
+      revision,
+      view: "v",
+      width: 1,
+      height: 1,
+      tiles: [],
+      format: "rgb9e5",
+      kind: "picture",
+    }),
   );
   const bytes = new Uint8Array(4 + header.length);
   new DataView(bytes.buffer).setUint32(0, header.length, true);
@@ -129,7 +138,13 @@ test("the first edit goes at once, more of them once in an animation frame", () 
   look = edit(look, SIGMA, 0.4);
   edit(look, SIGMA, 0.5);
   expect(socket().edits).toEqual([
-    { type: "edit", revision: 1, patch: [{ op: "replace", path: SIGMA, value: 0.3 }], active_control: SIGMA, solo: null },
+    {
+      type: "edit",
+      revision: 1,
+      patch: [{ op: "replace", path: SIGMA, value: 0.3 }],
+      active_control: SIGMA,
+      solo: null,
+    },
   ]);
   animate();
   expect(socket().edits[1]).toMatchObject({ revision: 2, patch: [{ op: "replace", path: SIGMA, value: 0.5 }] });
@@ -197,7 +212,13 @@ test("who may only look sends no edits and takes hold of nothing", () => {
     { type: "prepare", curve: "/materials/A/terms/0/curves/theta_h" },
     { type: "edit", revision: 1, patch: [], active_control: null, solo: ["environment"] },
     { type: "inspect", x: 1, y: 2 },
-    { type: "edit", revision: 2, patch: [{ op: "replace", path: "/transport/show", value: "direct" }], active_control: null, solo: ["environment"] },
+    {
+      type: "edit",
+      revision: 2,
+      patch: [{ op: "replace", path: "/transport/show", value: "direct" }],
+      active_control: null,
+      solo: ["environment"],
+    },
   ]);
 });
 

@@ -29,7 +29,16 @@ beforeEach(() => {
   vi.stubGlobal("navigator", { clipboard: { writeText: () => Promise.resolve() } });
   vi.stubGlobal("fetch", (_path: string, init?: RequestInit) => {
     if (init?.method !== "POST") {
-      const body: ShareBody = { solo: null, solo_light: null, paths: null, cameras: {}, sizes: {}, ...saved, ...OF_THE_SERVER, look: LOOK };
+      const body: ShareBody = {
+        solo: null,
+        solo_light: null,
+        paths: null,
+        cameras: {},
+        sizes: {},
+        ...saved,
+        ...OF_THE_SERVER,
+        look: LOOK,
+      };
       return Promise.resolve(Response.json(body));
     }
     saved = JSON.parse(init.body as string) as ShareRequest;
@@ -53,7 +62,10 @@ test("a link carries what is looked at, and a visitor's own gives way to it", as
 test("a link carries the cameras of free-camera views", async () => {
   const turned = { to_world: [0, 0, 1, 4, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 0, 1], yfov: Math.PI / 6 };
   const info = { name: "front", width: 4, height: 3, camera: turned };
-  views.value = [{ ...info, camera_mode: "free" }, { ...info, name: "left", camera_mode: "fixed" }] as unknown as typeof views.value;
+  views.value = [
+    { ...info, camera_mode: "free" },
+    { ...info, name: "left", camera_mode: "fixed" },
+  ] as unknown as typeof views.value;
   shownViews.value = ["front", "left"];
   await copyShareLink();
   expect(Object.keys(saved.cameras ?? {})).toEqual(["front"]);

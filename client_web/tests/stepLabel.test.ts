@@ -23,10 +23,15 @@ test("a parameter's step names material and parameter", () => {
 
 test("what belongs to no material keeps its own name; an unknown curve is called as it is", () => {
   expect(stepLabel("/display/exposure", "Exposure", shiny, models)).toBe("Exposure");
-  expect(stepLabel("/materials/Tea~1pot/terms/3/curves/x", "Draw curve", shiny, models)).toBe("Tea/pot · x · draw curve");
+  expect(stepLabel("/materials/Tea~1pot/terms/3/curves/x", "Draw curve", shiny, models)).toBe(
+    "Tea/pot · x · draw curve",
+  );
 });
 
 test("a label is read as what was edited and what was done", () => {
-  expect(splitStepLabel("Tea/pot · half angle θh · move point")).toEqual({ subject: "Tea/pot", action: "half angle θh · move point" });
+  expect(splitStepLabel("Tea/pot · half angle θh · move point")).toEqual({
+    subject: "Tea/pot",
+    action: "half angle θh · move point",
+  });
   expect(splitStepLabel("Opened")).toEqual({ subject: null, action: "Opened" });
 });

@@ -7,7 +7,13 @@ import { models, scene } from "../src/state/scene";
 
 test("a material offers the images that its own terms take, in their order", () => {
   const materials = [
-    { name: "Tray", terms: [{ model: "ggx", texture: "specular" }, { model: "lambert", texture: "diffuse" }] },
+    {
+      name: "Tray",
+      terms: [
+        { model: "ggx", texture: "specular" },
+        { model: "lambert", texture: "diffuse" },
+      ],
+    },
     { name: "Wall", terms: [{ model: "lambert", texture: null }, { model: "phong" }] },
   ];
   scene.value = { materials } as unknown as SceneBody;
@@ -18,9 +24,15 @@ test("a material offers the images that its own terms take, in their order", () 
 
 test("a material that was no mirror when it was baked reflects softly once it is polished", () => {
   const curves = ["theta_h", "theta_d", "theta_i"].map((name) => ({ name, angle: name }));
-  models.value = [{ model: "ggx", width_parameter: "roughness", specular_below: 0.06, curves }] as unknown as ModelBody[];
+  models.value = [
+    { model: "ggx", width_parameter: "roughness", specular_below: 0.06, curves },
+  ] as unknown as ModelBody[];
   const ggx = (roughness: number | Rgb, fields: Partial<Term> = {}): Term => ({
-    model: "ggx", color: [1, 1, 1], params: { roughness }, texture: "specular", ...fields,
+    model: "ggx",
+    color: [1, 1, 1],
+    params: { roughness },
+    texture: "specular",
+    ...fields,
   });
   const materials = [
     { name: "Chrome", terms: [ggx(0.03)] },
@@ -56,5 +68,9 @@ test("the quality of a texture from all sides goes as far as it has components",
   const scale = { name: "scale", maximum: 200, default: 1 } as ParameterBody;
   expect(limitToStored(scale, 5)).toBe(scale);
   expect(isWithinStored(scale, 300)).toBe(300);
-  expect([btfOf({ data: "btf:12" } as Term), btfOf({ data: "merl:12" } as Term), btfOf({} as Term)]).toEqual(["12", null, null]);
+  expect([btfOf({ data: "btf:12" } as Term), btfOf({ data: "merl:12" } as Term), btfOf({} as Term)]).toEqual([
+    "12",
+    null,
+    null,
+  ]);
 });

@@ -2,7 +2,14 @@
 import { expect, test } from "vitest";
 import { editorRejection, startPageRejection } from "../src/start/files/rejections";
 import { isTextureFile } from "../src/panels/inspector/images/importImages";
-import { planSet, setName, setMessage, withColorAndRoughness, withSet, type Slot } from "../src/panels/inspector/images/textureSet";
+import {
+  planSet,
+  setName,
+  setMessage,
+  withColorAndRoughness,
+  withSet,
+  type Slot,
+} from "../src/panels/inspector/images/textureSet";
 import type { ImageBody, ModelBody, Term } from "../src/protocol";
 import { models } from "../src/state/scene";
 
@@ -14,7 +21,9 @@ function slotsOf(...names: string[]): Record<string, string> {
 }
 
 test("each map of a set has its place, in whatever order the files come", () => {
-  const names = ["Color", "Displacement", "Metalness", "Normal", "Roughness", "AmbientOcclusion"].map((map) => `Metal007_1K_${map}.jpg`);
+  const names = ["Color", "Displacement", "Metalness", "Normal", "Roughness", "AmbientOcclusion"].map(
+    (map) => `Metal007_1K_${map}.jpg`,
+  );
   const slots = {
     "base color": "Metal007_1K_Color.jpg",
     metalness: "Metal007_1K_Metalness.jpg",
@@ -44,11 +53,17 @@ test("one image may be roughness and metalness, unless one of them has its own",
     roughness: "rust_OcclusionRoughnessMetallic.png",
     metalness: "rust_OcclusionRoughnessMetallic.png",
   });
-  expect(slotsOf("rust_arm_2k.jpg", "rust_rough_2k.jpg")).toEqual({ roughness: "rust_rough_2k.jpg", metalness: "rust_arm_2k.jpg" });
+  expect(slotsOf("rust_arm_2k.jpg", "rust_rough_2k.jpg")).toEqual({
+    roughness: "rust_rough_2k.jpg",
+    metalness: "rust_arm_2k.jpg",
+  });
 });
 
 test("a preview beside the color is not used, and what cannot be read says how to save it", () => {
-  const { slots, rejected } = planSet(["Marble006.png", "Marble006_1K_Color.jpg", "Marble006_Roughness.tga"].map(file), isTextureFile);
+  const { slots, rejected } = planSet(
+    ["Marble006.png", "Marble006_1K_Color.jpg", "Marble006_Roughness.tga"].map(file),
+    isTextureFile,
+  );
   expect([...slots.values()].map(({ name }) => name)).toEqual(["Marble006_1K_Color.jpg"]);
   expect(rejected).toEqual([
     { name: "Marble006_Roughness.tga", reason: "save it as PNG, JPG, WebP or EXR" },
@@ -70,10 +85,20 @@ test("one message says what is used and what is not, and a step has the name tha
 test("a material with a set has all of it at once", () => {
   models.value = [
     { model: "lambert", texture: "diffuse", parameters: [] },
-    { model: "ggx", texture: "specular", width_parameter: "roughness", width_power: 1, parameters: [{ name: "roughness", minimum: 0, maximum: 1 }] },
+    {
+      model: "ggx",
+      texture: "specular",
+      width_parameter: "roughness",
+      width_power: 1,
+      parameters: [{ name: "roughness", minimum: 0, maximum: 1 }],
+    },
   ] as unknown as ModelBody[];
   const image = (name: string) => ({ texture: `image:${name}`, roughness: 0.7 }) as ImageBody;
-  const set = new Map<Slot, ImageBody>([["base color", image("c")], ["roughness", image("r")], ["normals", image("n")]]);
+  const set = new Map<Slot, ImageBody>([
+    ["base color", image("c")],
+    ["roughness", image("r")],
+    ["normals", image("n")],
+  ]);
   const terms = [
     { model: "lambert", color: [0.5, 0.2, 0.1], texture: null },
     { model: "ggx", color: [1, 1, 1], texture: null, params: { roughness: 0.2 } },
@@ -87,7 +112,9 @@ test("a material with a set has all of it at once", () => {
 test("what was dropped on the wrong place is named, with where it belongs", () => {
   const dropped = (path: string) => [{ path, file: file(path) }];
   for (const refusal of [editorRejection, startPageRejection]) {
-    expect(refusal(dropped("cayman.brdf"))).toMatch(/^Can't (use|open) cayman\.brdf.* drop measured materials on the Library/);
+    expect(refusal(dropped("cayman.brdf"))).toMatch(
+      /^Can't (use|open) cayman\.brdf.* drop measured materials on the Library/,
+    );
     expect(refusal(dropped("car.fbx"))).toMatch(/^Can't (use|open) car\.fbx.*Export a GLB/);
   }
   expect(editorRejection(dropped("car.glb"))).toMatch(/^Can't use car\.glb here\. Import scenes on the start page/);

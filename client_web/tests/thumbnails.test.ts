@@ -11,9 +11,20 @@ import { storeThumbnail, lookThumbnail } from "../src/state/thumbnails";
 import { LOOK, lookWith } from "./exampleLook";
 
 const screen = vi.hoisted(() => ({ encoded: new Uint32Array([1]) }));
-vi.mock("../src/panels/looks/displayImage", () => ({ renderThumbnail: (pixels: { encoded: Uint32Array }) => `screen ${pixels.encoded[0]}` }));
+vi.mock("../src/panels/looks/displayImage", () => ({
+  renderThumbnail: (pixels: { encoded: Uint32Array }) => `screen ${pixels.encoded[0]}`,
+}));
 vi.mock("../src/render/renderStage", () => ({
-  stage: { active: { hasPixels: true, get pixels() { return { width: 1, height: 1, encoded: screen.encoded }; } }, imageOf: () => ({ revision: 0 }), displayed: [] },
+  stage: {
+    active: {
+      hasPixels: true,
+      get pixels() {
+        return { width: 1, height: 1, encoded: screen.encoded };
+      },
+    },
+    imageOf: () => ({ revision: 0 }),
+    displayed: [],
+  },
 }));
 
 let sent: string[];
@@ -31,15 +42,29 @@ afterEach(() => vi.useRealTimers());
 
 test("a look gives its picture to what it is the look of, once, and to everybody", async () => {
   const stored = new Map<string, string>();
-  vi.stubGlobal("localStorage", { getItem: (key: string) => stored.get(key) ?? null, setItem: (key: string, text: string) => stored.set(key, text) });
+  vi.stubGlobal("localStorage", {
+    getItem: (key: string) => stored.get(key) ?? null,
+    setItem: (key: string, text: string) => stored.set(key, text),
+  });
   const bright = lookWith(LOOK, "/display/exposure", 2);
   defaultLook.value = LOOK;
-  scene.value = { id: "s", materials: [], variants: [{ name: "Own", look: {} }, { name: "Bright", look: bright }] } as never;
+  scene.value = {
+    id: "s",
+    materials: [],
+    variants: [
+      { name: "Own", look: {} },
+      { name: "Bright", look: bright },
+    ],
+  } as never;
   savedLooks.value = [{ name: "Bright", etag: '"b"', created: "1", look: bright }];
   attachThumbnail(bright, "data:bright");
   attachThumbnail(bright, "data:another");
   await vi.waitFor(() => expect(sent).toEqual(['PUT /api/looks/Bright/thumbnail "b" {"picture":"data:bright"}']));
-  expect([thumbnailOf('"b"'), variantThumbnail("Bright"), variantThumbnail("Own")]).toEqual(["data:bright", "data:bright", null]);
+  expect([thumbnailOf('"b"'), variantThumbnail("Bright"), variantThumbnail("Own")]).toEqual([
+    "data:bright",
+    "data:bright",
+    null,
+  ]);
   attachThumbnail(LOOK, "data:own");
   expect(variantThumbnail("Own")).toBe("data:own");
 });

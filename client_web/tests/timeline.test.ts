@@ -22,7 +22,16 @@ import { look } from "../src/state/look";
 import { placedCameraOf } from "../src/state/cameras";
 import { timelineOpen } from "../src/state/panels";
 import { shownViews, activeViewName, views } from "../src/state/views";
-import { playhead as place, frameLookList, numFrames, renderPath, play, isPlaying, seek, togglePlay } from "../src/panels/timeline/playback";
+import {
+  playhead as place,
+  frameLookList,
+  numFrames,
+  renderPath,
+  play,
+  isPlaying,
+  seek,
+  togglePlay,
+} from "../src/panels/timeline/playback";
 import { LOOK, lookWith } from "./exampleLook";
 
 const EXPOSURE = "/display/exposure";
@@ -54,7 +63,9 @@ async function press(key: () => Promise<void>): Promise<void> {
 
 /** A timeline from dark to bright with the frames' looks and cameras from the server. */
 async function prepared(cameras: { to_world: number[]; yfov: number }[] | null = null): Promise<void> {
-  const looks = Array.from({ length: numFrames.value }, (_, k) => lookWith(LOOK, EXPOSURE, -2 + (4 * k) / (numFrames.value - 1)));
+  const looks = Array.from({ length: numFrames.value }, (_, k) =>
+    lookWith(LOOK, EXPOSURE, -2 + (4 * k) / (numFrames.value - 1)),
+  );
   vi.stubGlobal("fetch", () => Promise.resolve(new Response(JSON.stringify({ looks, cameras }))));
   bake.value = "b";
   timelineOpen.value = true;
@@ -185,7 +196,10 @@ test("a pause and a play within one frame do not play twice as fast", async () =
 
 test("the camera moves from keyframe to keyframe and stays where playback ends", async () => {
   const at = (x: number, yfov = 40) => ({ to_world: [1, 0, 0, x, 0, 1, 0, 0, 0, 0, 1, 4, 0, 0, 0, 1], yfov });
-  const bounds = [[-1, -1, -1], [1, 1, 1]];
+  const bounds = [
+    [-1, -1, -1],
+    [1, 1, 1],
+  ];
   views.value = [{ name: "front", width: 4, height: 3, camera_mode: "free", bounds, camera: at(0, 0.5) } as never];
   [shownViews.value, activeViewName.value, cameraPathMode.value] = [["front"], "front", "along"];
   const path = Array.from({ length: numFrames.value }, (_, k) => at(k));

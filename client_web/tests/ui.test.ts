@@ -67,7 +67,14 @@ describe("numbers", () => {
   });
 
   test("are short on an axis and keep their noughts", () => {
-    expect([0.0001, 0.375, 12.5, 20, 1000, 200000].map(tickLabel)).toEqual(["0.0001", "0.375", "12.5", "20", "1000", "2e5"]);
+    expect([0.0001, 0.375, 12.5, 20, 1000, 200000].map(tickLabel)).toEqual([
+      "0.0001",
+      "0.375",
+      "12.5",
+      "20",
+      "1000",
+      "2e5",
+    ]);
   });
 
   test("are read with point or comma, and only when they are numbers", () => {
@@ -143,7 +150,12 @@ describe("terms", () => {
   });
 
   test("measured models are offered to terms that name a material, and keep it between them", () => {
-    const measured = models.map((m) => ({ ...m, model: `measured_${m.model}`, needs_data: true, data_prefix: "merl:" }));
+    const measured = models.map((m) => ({
+      ...m,
+      model: `measured_${m.model}`,
+      needs_data: true,
+      data_prefix: "merl:",
+    }));
     const all = [...models, ...measured];
     const term = { model: "ggx", color: [1, 1, 1] as Rgb };
     const otherTerm = { ...term, model: "measured_ggx", data: "merl:0123456789abcdef" };
@@ -201,7 +213,8 @@ test("free names are free", () => {
 });
 
 test("chords name Shift only beside Ctrl", () => {
-  const key = (k: string, ctrlKey = false, shiftKey = false) => formatShortcut({ key: k, ctrlKey, shiftKey, metaKey: false });
+  const key = (k: string, ctrlKey = false, shiftKey = false) =>
+    formatShortcut({ key: k, ctrlKey, shiftKey, metaKey: false });
   expect([key("?", false, true), key("Z", true, true), key("z", true), key("W")]).toEqual([
     "?",
     "Ctrl+Shift+z",

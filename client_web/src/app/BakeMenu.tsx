@@ -34,7 +34,11 @@ export function BakeMenu() {
       {open && current !== null && (
         <div class="menu-body">
           <p>Bake this scene again. The picture stays; the new bake replaces it when ready and keeps your edits.</p>
-          {isOutdatedBake && <p>This bake was made by another version of relume. It still works; a new bake may look slightly different.</p>}
+          {isOutdatedBake && (
+            <p>
+              This bake was made by another version of relume. It still works; a new bake may look slightly different.
+            </p>
+          )}
           <Presets
             scene={current}
             method={methodLabels.name}

@@ -1,6 +1,13 @@
 /** Export: PNG and EXR with one click each; more EXR variants, and turntables of free-camera views. */
 import { useState } from "preact/hooks";
-import { exportExr, exportPng, exportTurntable, TURNTABLE_FRAMES, turntableRotation, type TurntableRotation } from "../panels/looks/exportImage";
+import {
+  exportExr,
+  exportPng,
+  exportTurntable,
+  TURNTABLE_FRAMES,
+  turntableRotation,
+  type TurntableRotation,
+} from "../panels/looks/exportImage";
 import { exporting } from "../panels/looks/renderJob";
 import { stage } from "../render/renderStage";
 import { lightFilterText } from "../state/visibility/activeFilters";
@@ -60,7 +67,10 @@ function TurntableSelect() {
     <li>
       <label>
         Turntable
-        <select value={turntableRotation.value} onChange={(event) => (turntableRotation.value = event.currentTarget.value as TurntableRotation)}>
+        <select
+          value={turntableRotation.value}
+          onChange={(event) => (turntableRotation.value = event.currentTarget.value as TurntableRotation)}
+        >
           {Object.entries(TURNTABLE_LABELS).map(([value, label]) => (
             <option key={value} value={value}>
               {label}
@@ -78,7 +88,10 @@ function ColorSpaceSelect() {
     <li>
       <label>
         EXR color space
-        <select value={availableExrSpace.value ?? ""} onChange={(event) => (exrSpace.value = event.currentTarget.value)}>
+        <select
+          value={availableExrSpace.value ?? ""}
+          onChange={(event) => (exrSpace.value = event.currentTarget.value)}
+        >
           <option value="">Linear Rec. 709</option>
           {exrSpaces.value.map((name) => (
             <option key={name} value={name}>
@@ -118,26 +131,33 @@ export function ExportMenu() {
         >
           EXR
         </button>
-        <button aria-label="More export formats" title="More export formats" aria-expanded={open} onClick={() => setOpen(!open)}>
+        <button
+          aria-label="More export formats"
+          title="More export formats"
+          aria-expanded={open}
+          onClick={() => setOpen(!open)}
+        >
           ▾
         </button>
       </div>
       {open && (
         <ul class="menu-body export-menu">
-          {(hasFreeCamera.value ? [...IMAGE_EXPORTS, ...TURNTABLE_EXPORTS] : IMAGE_EXPORTS).map(({ label, help, run }) => (
-            <li key={label}>
-              <button
-                disabled={busy}
-                onClick={() => {
-                  setOpen(false);
-                  void run();
-                }}
-              >
-                {label}
-              </button>
-              <span>{help}</span>
-            </li>
-          ))}
+          {(hasFreeCamera.value ? [...IMAGE_EXPORTS, ...TURNTABLE_EXPORTS] : IMAGE_EXPORTS).map(
+            ({ label, help, run }) => (
+              <li key={label}>
+                <button
+                  disabled={busy}
+                  onClick={() => {
+                    setOpen(false);
+                    void run();
+                  }}
+                >
+                  {label}
+                </button>
+                <span>{help}</span>
+              </li>
+            ),
+          )}
           {hasFreeCamera.value && <TurntableSelect />}
           {exrSpaces.value.length > 0 && <ColorSpaceSelect />}
         </ul>

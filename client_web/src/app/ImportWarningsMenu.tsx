@@ -11,7 +11,11 @@ export function ImportWarningsMenu() {
   return (
     <div class="menu" onKeyDown={(event) => event.key === "Escape" && setOpen(false)}>
       <button
-        class={warnings.some(({ severity }) => severity === "unsupported") ? "warnings-button has-differences" : "warnings-button"}
+        class={
+          warnings.some(({ severity }) => severity === "unsupported")
+            ? "warnings-button has-differences"
+            : "warnings-button"
+        }
         aria-expanded={open}
         aria-label={label}
         title={label}

@@ -21,9 +21,12 @@ function useOverflow(controls: readonly OverflowControl[]) {
   const [out, setOut] = useState<readonly string[]>([]);
   useLayoutEffect(() => {
     const element = row.current as HTMLDivElement;
-    const controlElements = [...element.children].filter((child) => child instanceof HTMLElement && child.dataset.control);
+    const controlElements = [...element.children].filter(
+      (child) => child instanceof HTMLElement && child.dataset.control,
+    );
     const measure = () => {
-      for (const child of controlElements as HTMLElement[]) widths.current.set(child.dataset.control as string, child.offsetWidth);
+      for (const child of controlElements as HTMLElement[])
+        widths.current.set(child.dataset.control as string, child.offsetWidth);
       const rowItems = controls.map(({ name, rank }) => ({ name, rank, width: widths.current.get(name) ?? 0 }));
       const next = overflowingItems(rowItems, element.clientWidth, GAP, BUTTON_WIDTH);
       setOut((previous) => (previous.join() === next.join() ? previous : next));

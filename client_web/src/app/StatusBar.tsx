@@ -52,7 +52,8 @@ export function StatusBar() {
       .join(". "),
   );
   const canTryNow = connection.value === "silent" || (connection.value === "reconnecting" && retryInMs.value > 0);
-  const running = pendingBake.value !== null && (pendingBake.value.state === "running" || pendingBake.value.state === "queued");
+  const running =
+    pendingBake.value !== null && (pendingBake.value.state === "running" || pendingBake.value.state === "queued");
   return (
     <footer class="status">
       <span class={`state ${connection.value}`}>
@@ -64,7 +65,7 @@ export function StatusBar() {
         Latency {latencyMs.value === null ? "–" : `${latencyMs.value.toFixed(0)} ms`}
       </span>
       <span class={`exactness ${isConverged.value ? "is-exact" : ""}`}>{imageStatusText()}</span>
-      <button 
+      <button
         aria-pressed={shownPanels.value.includes("comparison")}
         title="Measure this picture’s error against path tracing"
         disabled={look.value === null}
@@ -72,7 +73,9 @@ export function StatusBar() {
       >
         Compare with reference
       </button>
-      {freezeStatus.value !== null && <progress max={1} value={freezeStatus.value.progress} aria-label={imageStatusText()} />}
+      {freezeStatus.value !== null && (
+        <progress max={1} value={freezeStatus.value.progress} aria-label={imageStatusText()} />
+      )}
       <span class="spacer" />
       {exporting.value !== null && (
         <span class="bake">
@@ -88,8 +91,14 @@ export function StatusBar() {
           {bakeStatusText(elapsed)}
           {running && (
             <>
-              <progress max={1} value={hasProgress(pendingBake.value) ? pendingBake.value.progress : undefined} aria-label="Bake" />
-              <button onClick={() => pendingBake.value && void reportErrors(() => cancelBake(pendingBake.value?.id ?? ""))}>
+              <progress
+                max={1}
+                value={hasProgress(pendingBake.value) ? pendingBake.value.progress : undefined}
+                aria-label="Bake"
+              />
+              <button
+                onClick={() => pendingBake.value && void reportErrors(() => cancelBake(pendingBake.value?.id ?? ""))}
+              >
                 Cancel
               </button>
             </>

@@ -144,7 +144,13 @@ function HistoryButtons() {
   return (
     <div class="group" role="group" aria-label="History">
       <IconButton icon="undo" label="Undo" keys="Ctrl+Z" disabled={!history.canUndo} onClick={() => void undo()} />
-      <IconButton icon="redo" label="Redo" keys="Ctrl+Shift+Z" disabled={!history.canRedo} onClick={() => void redo()} />
+      <IconButton
+        icon="redo"
+        label="Redo"
+        keys="Ctrl+Shift+Z"
+        disabled={!history.canRedo}
+        onClick={() => void redo()}
+      />
     </div>
   );
 }

@@ -19,7 +19,9 @@ export function handleDrop(dropped: readonly DroppedFile[]): void {
   if (images.some(isTextureFile)) void applyImageFiles(images, targetMaterial);
   const accepted = new Set([...environments, ...measured, ...(images.some(isTextureFile) ? images : [])]);
   // a folder may also hold unrelated files
-  const rejected = dropped.filter(({ path, file }) => !accepted.has(file) && (accepted.size === 0 || !path.includes("/")));
+  const rejected = dropped.filter(
+    ({ path, file }) => !accepted.has(file) && (accepted.size === 0 || !path.includes("/")),
+  );
   if (rejected.length > 0) showError(editorRejection(rejected), "files");
   else if (dropped.length === 0) showError("This folder is empty. Nothing changed.", "files");
 }

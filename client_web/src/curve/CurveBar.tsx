@@ -5,7 +5,16 @@ import type { IconName } from "../ui/Icon";
 import { ToggleButton } from "../ui/ToggleButton";
 import { CHANNELS, type ActiveChannels } from "./model/channels";
 import { copyCurve, applyChannels } from "./model/model";
-import { activeChannels, isStretched, isIntervalLit, logarithmic, stretchedCurves, tableOpen, curveTool, type Tool } from "./curveView";
+import {
+  activeChannels,
+  isStretched,
+  isIntervalLit,
+  logarithmic,
+  stretchedCurves,
+  tableOpen,
+  curveTool,
+  type Tool,
+} from "./curveView";
 import type { CurveContext } from "./curveTools";
 
 const TOOLS: { name: Tool; icon: IconName; label: string; keys: string }[] = [
@@ -46,10 +55,12 @@ export function CurveTools({ context }: { context: CurveContext }) {
       </div>
       {!context.model.areJoined && activeChannels.value === "rgb" && (
         <button
-          onClick={() => applyChannels(context.model, "Link channels", () => copyCurve(context.model, 1, context.axes), [0, 1, 2])}
+          onClick={() =>
+            applyChannels(context.model, "Link channels", () => copyCurve(context.model, 1, context.axes), [0, 1, 2])
+          }
           title="Use the green curve for all channels"
         >
-        Link
+          Link
         </button>
       )}
       <span class="spacer" />

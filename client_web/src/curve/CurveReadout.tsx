@@ -42,7 +42,8 @@ function readoutText({ axes, spot, ready, blocked, contributions }: Props): stri
   }
   if (blocked) return "R, G and B differ: pick one or Link them.";
   if (curveTool.value === "points" && pickedPoint.value?.carried) return "Click to place the point. Escape cancels.";
-  if (curveTool.value === "stretch" && selectedInterval.value !== null) return "↑ ↓ scale, ← → move, Shift for fine steps.";
+  if (curveTool.value === "stretch" && selectedInterval.value !== null)
+    return "↑ ↓ scale, ← → move, Shift for fine steps.";
   return HINTS[curveTool.value];
 }
 

@@ -78,7 +78,8 @@ function onHandleKey(event: KeyboardEvent, context: CurveContext, points: Point[
   if (move !== undefined) nudgePoint(context, points, index, ...move);
   else if (event.key === "Delete" || event.key === "Backspace") deletePoint(context, points, index);
   else if (event.key === "r" || event.key === "R") resetPoint(context, points, index);
-  else if (event.key === "Enter" || event.key === " ") pickedPoint.value = { index, carried: !pickedPoint.value?.carried };
+  else if (event.key === "Enter" || event.key === " ")
+    pickedPoint.value = { index, carried: !pickedPoint.value?.carried };
   else if (event.key === "Escape" && pickedPoint.value !== null) pickedPoint.value = null;
   else return;
   event.preventDefault();
@@ -94,7 +95,11 @@ export function PointHandles({ frame, context, points }: Props) {
           data-index={index}
           role="slider"
           tabindex={0}
-          class={pickedPoint.value?.index === index ? `handle picked ${pickedPoint.value.carried ? "carried" : ""}` : "handle"}
+          class={
+            pickedPoint.value?.index === index
+              ? `handle picked ${pickedPoint.value.carried ? "carried" : ""}`
+              : "handle"
+          }
           aria-label={`Point ${index + 1} of ${points.length}`}
           aria-orientation="vertical"
           aria-valuemin={0}

@@ -35,11 +35,7 @@ export function PointTable({ context, points }: { context: CurveContext; points:
             <th scope="col">Angle °</th>
             <th scope="col">Value</th>
             <th scope="col">
-              <IconButton
-                icon="plus"
-                label="Add point in the widest gap"
-                onClick={add}
-              />
+              <IconButton icon="plus" label="Add point in the widest gap" onClick={add} />
             </th>
           </tr>
         </thead>

@@ -51,7 +51,12 @@ export function drawGesture(context: CurveContext, start: PlotSpot): PlotGesture
   const bases = context.channels.map((c) => editBaseOf(context, c));
   const move = (spot: PlotSpot) => {
     stroke.add(spot.degrees, Math.max(0, spot.height));
-    applyChannels(context.model, "Draw curve", (c) => drawInterval(bases[context.channels.indexOf(c)] as EditBase, stroke), context.channels);
+    applyChannels(
+      context.model,
+      "Draw curve",
+      (c) => drawInterval(bases[context.channels.indexOf(c)] as EditBase, stroke),
+      context.channels,
+    );
   };
   stroke.add(start.degrees, Math.max(0, start.height));
   return { move, up: () => undefined };
@@ -69,7 +74,8 @@ export function pointsGesture(context: CurveContext, start: PlotSpot, hit: numbe
   const band = bandOf(context);
   let base = original;
   let index = hit;
-  const write = (points: Point[], label: string) => applyPoints(context.model, label, original, points, context.channels);
+  const write = (points: Point[], label: string) =>
+    applyPoints(context.model, label, original, points, context.channels);
   if (hit < 0 && draggedPoints >= 0) {
     index = draggedPoints;
     write(movePoint(base, index, start.degrees, valueOf(context, start), band), "Move point");
@@ -101,12 +107,22 @@ export function pointsGesture(context: CurveContext, start: PlotSpot, hit: numbe
 }
 
 export function applyScale(context: CurveContext, [from, to]: [number, number], factor: number): void {
-  applyChannels(context.model, "Scale range", (c) => scaleInterval(editBaseOf(context, c), from, to, factor), context.channels);
+  applyChannels(
+    context.model,
+    "Scale range",
+    (c) => scaleInterval(editBaseOf(context, c), from, to, factor),
+    context.channels,
+  );
 }
 
 export function applyShift(context: CurveContext, [from, to]: [number, number], degrees: number): [number, number] {
   const shift = Math.min(MAX_DEGREES - to, Math.max(-from, degrees));
-  applyChannels(context.model, "Move range", (c) => shiftInterval(editBaseOf(context, c), from, to, shift), context.channels);
+  applyChannels(
+    context.model,
+    "Move range",
+    (c) => shiftInterval(editBaseOf(context, c), from, to, shift),
+    context.channels,
+  );
   return [from + shift, to + shift];
 }
 

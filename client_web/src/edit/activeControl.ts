@@ -10,7 +10,8 @@ export const activeControl = signal<string | null>(null);
  * field of the environment or of the light paths. */
 export function activePath(path: string, look: Look): string | null {
   const [table, name, , , member, field] = pointerTokens(path);
-  if (table === "lights") return name !== undefined && Object.hasOwn(look.lights, name) ? jsonPointer(table, name) : null;
+  if (table === "lights")
+    return name !== undefined && Object.hasOwn(look.lights, name) ? jsonPointer(table, name) : null;
   if (table === "environment" || table === "transport") return name === undefined ? null : path;
   if (table !== "materials") return null;
   if (member === "color" || member === "texture") return path;

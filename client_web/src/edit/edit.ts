@@ -52,7 +52,8 @@ export function previewStep(label: string, next: Look): void {
 export function cancelPreview(): void {
   const [preview, current] = [previewedStep.peek(), look.peek()];
   previewedStep.value = null;
-  if (preview !== null && current !== null && current !== preview.before) applyChange(changeToLook(current, preview.before));
+  if (preview !== null && current !== null && current !== preview.before)
+    applyChange(changeToLook(current, preview.before));
 }
 
 /** Make the previewed look a step. */

@@ -52,7 +52,8 @@ function reverseSteps(steps: readonly Step[], label: string): Step[] {
   const otherSteps = steps.filter((step) => step.kind !== "look").reverse();
   const reversed = otherSteps.map((step): Step => ({ ...step, label, before: step.after, after: step.before }) as Step);
   const [first, lastStep] = [lookSteps[0], lookSteps.at(-1)];
-  if (first !== undefined && lastStep !== undefined) reversed.push({ kind: "look", label, ...changeToLook(lastStep.after, first.before) });
+  if (first !== undefined && lastStep !== undefined)
+    reversed.push({ kind: "look", label, ...changeToLook(lastStep.after, first.before) });
   return reversed;
 }
 
@@ -80,7 +81,14 @@ export class History {
     const done = this.steps.value.slice(0, this.cursor.value);
     const last = done.at(-1);
     const idle = this.now() - this.lastTime > IDLE_MS;
-    if (step.kind === "look" && last?.kind === "look" && step.key !== undefined && step.key === last.key && !this.isGestureEnded && !idle) {
+    if (
+      step.kind === "look" &&
+      last?.kind === "look" &&
+      step.key !== undefined &&
+      step.key === last.key &&
+      !this.isGestureEnded &&
+      !idle
+    ) {
       done[done.length - 1] = { ...step, ...joinChanges(last, step) };
     } else done.push(step);
     this.steps.value = done.slice(-MAX_STEPS);

@@ -72,7 +72,11 @@ function currentLookOf({ steps, cursor }: HistorySnapshot): Look | null {
 
 /** Parse a history; null if it does not lead to `look`. In a room `look` is null: the history then has only this user's
  * edits. `addThumbnail` receives the thumbnails of its looks. */
-export function parseHistory(text: string, look: Look | null, addThumbnail: (snapshotLook: Look, thumbnail: string) => void): HistorySnapshot | null {
+export function parseHistory(
+  text: string,
+  look: Look | null,
+  addThumbnail: (snapshotLook: Look, thumbnail: string) => void,
+): HistorySnapshot | null {
   const stored = JSON.parse(text) as StoredHistory;
   const thumbnails: [Look, string | null][] = [];
   let last = stored.start as Look;

@@ -19,5 +19,7 @@ export function stepLabel(path: string, action: string, look: Look, models: read
 /** Split a label into its material or light (null without one) and the action. */
 export function splitStepLabel(label: string): { subject: string | null; action: string } {
   const end = label.indexOf(SEPARATOR);
-  return end < 0 ? { subject: null, action: label } : { subject: label.slice(0, end), action: label.slice(end + SEPARATOR.length) };
+  return end < 0
+    ? { subject: null, action: label }
+    : { subject: label.slice(0, end), action: label.slice(end + SEPARATOR.length) };
 }

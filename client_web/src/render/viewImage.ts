@@ -6,7 +6,16 @@ import type { Fidelity, Rgb } from "../protocol";
 import { brushedRange } from "../state/curvePreview";
 import { materialNames } from "../state/scene";
 import type { PendingFrame } from "./frameArrival";
-import { applyFrame, brushImage, copyPixels, emptyPixels, normalizeWeights, readAlpha, wholeImage, type PixelBuffer } from "./pixels";
+import {
+  applyFrame,
+  brushImage,
+  copyPixels,
+  emptyPixels,
+  normalizeWeights,
+  readAlpha,
+  wholeImage,
+  type PixelBuffer,
+} from "./pixels";
 import type { MaterialIds } from "./png16";
 import type { DisplayRenderer } from "./displayRenderer";
 import type { CanvasGeometry } from "./zoomTransform";
@@ -144,8 +153,7 @@ export class ViewImage {
     const { reference, referenceAlpha, screen } = this;
     if (reference === null) return;
     screen?.renderer.setReference(reference);
-    if (referenceAlpha !== null)
-      screen?.renderer.setReferenceAlpha(reference.width, reference.height, referenceAlpha);
+    if (referenceAlpha !== null) screen?.renderer.setReferenceAlpha(reference.width, reference.height, referenceAlpha);
   }
 
   /** Linear radiance of a pixel; null outside the image. */

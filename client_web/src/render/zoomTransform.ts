@@ -33,13 +33,23 @@ export function displayedWidth(transform: ZoomTransform, canvas: CanvasGeometry)
 }
 
 /** The image position under a canvas point; outside [0, 1] beside the image. */
-export function toImagePoint(transform: ZoomTransform, canvas: CanvasGeometry, x: number, y: number): [u: number, v: number] {
+export function toImagePoint(
+  transform: ZoomTransform,
+  canvas: CanvasGeometry,
+  x: number,
+  y: number,
+): [u: number, v: number] {
   const width = displayedWidth(transform, canvas);
   const [cu, cv] = transform.center;
   return [cu + (x - canvas.width / 2) / width, cv + ((y - canvas.height / 2) * canvas.aspect) / width];
 }
 
-export function toScreenPoint(transform: ZoomTransform, canvas: CanvasGeometry, u: number, v: number): [x: number, y: number] {
+export function toScreenPoint(
+  transform: ZoomTransform,
+  canvas: CanvasGeometry,
+  u: number,
+  v: number,
+): [x: number, y: number] {
   const width = displayedWidth(transform, canvas);
   const [cu, cv] = transform.center;
   return [canvas.width / 2 + (u - cu) * width, canvas.height / 2 + ((v - cv) * width) / canvas.aspect];
@@ -55,13 +65,22 @@ export function visibleRegion(
   const [left, top] = toImagePoint(transform, canvas, 0, 0);
   const [right, bottom] = toImagePoint(transform, canvas, canvas.width, canvas.height);
   const [x, y] = [Math.max(0, Math.floor(left * width)), Math.max(0, Math.floor(top * height))];
-  const [across, down] = [Math.min(width, Math.ceil(right * width)) - x, Math.min(height, Math.ceil(bottom * height)) - y];
+  const [across, down] = [
+    Math.min(width, Math.ceil(right * width)) - x,
+    Math.min(height, Math.ceil(bottom * height)) - y,
+  ];
   const isAll = across === width && down === height;
   return isAll || across < 1 || down < 1 ? null : [x, y, across, down];
 }
 
 /** Zoom by `factor` around the canvas point (x, y). */
-export function zoomAt(transform: ZoomTransform, canvas: CanvasGeometry, factor: number, x: number, y: number): ZoomTransform {
+export function zoomAt(
+  transform: ZoomTransform,
+  canvas: CanvasGeometry,
+  factor: number,
+  x: number,
+  y: number,
+): ZoomTransform {
   const previousWidth = displayedWidth(transform, canvas);
   const width = Math.min(MAX_WIDTH, Math.max(MIN_WIDTH, previousWidth * factor));
   const [u, v] = toImagePoint(transform, canvas, x, y);

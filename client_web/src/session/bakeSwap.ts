@@ -30,7 +30,8 @@ export async function showFrame(source: BakeConnection, frame: Frame): Promise<v
   const { view, kind } = frame.header;
   const isShown = source === connections.shown;
   if (source !== connections.incoming && !(isShown && shownViews.peek().includes(view))) return;
-  if (!source.pendingFrames.isDisplayed(view)) return kind === "highlight" ? undefined : receiveFirstFrames(source, frame);
+  if (!source.pendingFrames.isDisplayed(view))
+    return kind === "highlight" ? undefined : receiveFirstFrames(source, frame);
   await stage.imageOf(view).show(frame).catch(showError);
   if (kind === "picture" && source === connections.shown) recordShownFrame(source, frame.header);
 }
@@ -41,7 +42,8 @@ async function receiveFirstFrames(source: BakeConnection, frame: Frame): Promise
   const isNew = source.pendingFrames.get(view) === undefined;
   const pendingFrame = source.pendingFrames.addFrame(frame);
   const isFixed = source.hello?.views.find(({ name }) => name === view)?.camera_mode !== "free"; // material ids only fit a fixed camera
-  if (isNew && isFixed && stage.imageOf(view).idsOf !== source.bake) void loadMaterialIds(source.bake, view, pendingFrame);
+  if (isNew && isFixed && stage.imageOf(view).idsOf !== source.bake)
+    void loadMaterialIds(source.bake, view, pendingFrame);
   if (!pendingFrame.isComplete) return;
   if (source === connections.shown) return showCompleteView(source, view);
   await swapWhenComplete();

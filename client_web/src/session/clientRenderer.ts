@@ -161,10 +161,21 @@ export class ClientRenderer {
   private async drawFrame(name: string, { header }: RenderedView): Promise<Frame | null> {
     const view = views.peek().find((candidate) => candidate.name === name);
     if (view === undefined || header === null) return null;
-    const { width, height, encoded, coverage } = await this.gpu.draw(view.camera, ...limitRenderSize(view.width, view.height));
+    const { width, height, encoded, coverage } = await this.gpu.draw(
+      view.camera,
+      ...limitRenderSize(view.width, view.height),
+    );
     recordClientFrame();
-    const fullFrame = { tiles: [[0, 0, width, height]] as FrameHeader["tiles"], format: "rgb9e5" as const, kind: "picture" as const };
-    return { header: { ...header, ...fullFrame, width, height, alpha: coverage !== null, scene_update: null }, payload: encoded, alpha: coverage };
+    const fullFrame = {
+      tiles: [[0, 0, width, height]] as FrameHeader["tiles"],
+      format: "rgb9e5" as const,
+      kind: "picture" as const,
+    };
+    return {
+      header: { ...header, ...fullFrame, width, height, alpha: coverage !== null, scene_update: null },
+      payload: encoded,
+      alpha: coverage,
+    };
   }
 
   private recordDuration(ms: number): void {

@@ -26,7 +26,9 @@ export const rendererChoice = signal<RendererMode>(loadRendererChoice());
 /** True if this browser draws them. */
 export const isClientRendering = signal(false);
 /** True if the server draws: chosen, or automatic with features that this browser cannot draw. */
-const isServerRendering = computed(() => rendererChoice.value === "server" || (rendererChoice.value === "auto" && usesTexelShading.value));
+const isServerRendering = computed(
+  () => rendererChoice.value === "server" || (rendererChoice.value === "auto" && usesTexelShading.value),
+);
 
 let clientRenderer: ClientRenderer | null = null;
 let loadingConnection: BakeConnection | null = null;
@@ -55,7 +57,8 @@ export const isMoving = (view: string): boolean => clientRenderer?.isMoving(view
 
 /** Draw a view from its current camera; false if the server has to. */
 export function renderIfPossible(view: string): boolean {
-  if (clientRenderer?.connection !== connections.shown || !isClientRendering.peek() || !clientRenderer.canDraw(view)) return false;
+  if (clientRenderer?.connection !== connections.shown || !isClientRendering.peek() || !clientRenderer.canDraw(view))
+    return false;
   void clientRenderer.draw(view);
   return true;
 }
@@ -115,7 +118,8 @@ function releaseToServer(): void {
 /** Called when a view's image is shown: from now on this browser may draw it. */
 async function offerClientRendering(bakeConnection: BakeConnection, view: string): Promise<void> {
   const isFree = bakeConnection.hello?.views.find(({ name }) => name === view)?.camera_mode === "free";
-  if (!isFree || bakeConnection !== connections.shown || isServerRendering.peek() || bakeConnection.isRenderingRejected) return;
+  if (!isFree || bakeConnection !== connections.shown || isServerRendering.peek() || bakeConnection.isRenderingRejected)
+    return;
   if (clientRenderer?.connection === bakeConnection) return announceClientRendering(clientRenderer);
   if (loadingConnection === bakeConnection) return;
   loadingConnection = bakeConnection;
@@ -173,5 +177,6 @@ effect(() => {
   if (isServerRendering.value || (choice === "auto" && clientRenderer?.isSoftware)) fallBackToServer(null);
   if (shown === null) return;
   if (choice !== "server") shown.isRenderingRejected = false;
-  for (const view of shown.hello?.views ?? []) if (shown.pendingFrames.isDisplayed(view.name)) void offerClientRendering(shown, view.name);
+  for (const view of shown.hello?.views ?? [])
+    if (shown.pendingFrames.isDisplayed(view.name)) void offerClientRendering(shown, view.name);
 });

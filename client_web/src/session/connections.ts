@@ -14,7 +14,12 @@ function openParametersOf(): ReturnType<OpenParameters> {
   const currentJoin = joinState.peek();
   if (currentJoin !== null && currentJoin.scene === sceneId) {
     const { room: id, watch, share } = currentJoin;
-    return { ...(id !== null ? { room: id } : { view_token: watch }), share, participant_token: loadMemberToken(currentJoin), name: ownName.peek() || null };
+    return {
+      ...(id !== null ? { room: id } : { view_token: watch }),
+      share,
+      participant_token: loadMemberToken(currentJoin),
+      name: ownName.peek() || null,
+    };
   }
   const { scene: watchedScene, ...look } = joinTarget.peek() ?? { scene: null };
   return watchedScene !== null && watchedScene === sceneId ? look : {};

@@ -34,7 +34,9 @@ export function recordShownFrame(bakeConnection: BakeConnection, header: FrameHe
 /** Update whether all shown images are exact for the sent edits and the room's version of the look. */
 export function updateExactness(bakeConnection: BakeConnection): void {
   const { revision, sharedRevision } = bakeConnection.session;
-  isFrameExact.value = stage.displayed.every((each) => each.exactRevision >= revision && each.exactShared >= sharedRevision);
+  isFrameExact.value = stage.displayed.every(
+    (each) => each.exactRevision >= revision && each.exactShared >= sharedRevision,
+  );
   if (hasLatestRevision(bakeConnection)) isOutdated.value = false;
   if (isFrameExact.value) for (const done of exactWaiters.splice(0)) done();
 }

@@ -18,9 +18,19 @@ import { untilExact } from "./fidelityState";
 
 /** Request frames of a look with the visible light; `change` is the edit that made it. Without one, no control is
  * active. */
-export function requestFrames(bakeConnection: BakeConnection | null, targetLook: Look, inputTime: number, change: LookChange | null = null): void {
+export function requestFrames(
+  bakeConnection: BakeConnection | null,
+  targetLook: Look,
+  inputTime: number,
+  change: LookChange | null = null,
+): void {
   const visibleLook = withVisiblePaths(targetLook);
-  const target = { look: visibleLook, activeControl: change && activeControl.peek(), solo: soloSources(targetLook), inputTime };
+  const target = {
+    look: visibleLook,
+    activeControl: change && activeControl.peek(),
+    solo: soloSources(targetLook),
+    inputTime,
+  };
   bakeConnection?.session.setTarget(target, visibleLook === targetLook ? change : null);
 }
 

@@ -48,7 +48,8 @@ export function onRoomUpdate(bakeConnection: BakeConnection, message: RoomUpdate
   const preview = previewedStep.peek();
   if (preview !== null) previewedStep.value = { ...preview, before: rebasePatch(preview.before, message.patch) };
   const ownLook = look.peek();
-  look.value = ownLook === null || shared.transport === ownLook.transport ? shared : { ...shared, transport: ownLook.transport };
+  look.value =
+    ownLook === null || shared.transport === ownLook.transport ? shared : { ...shared, transport: ownLook.transport };
   updateExactness(bakeConnection);
 }
 

@@ -8,7 +8,11 @@ import { resetExactness } from "./fidelityState";
 /** The views of a bake that the user wants to see. */
 export function shownViewsOf({ views, focused_view }: HelloMessage): string[] {
   const names = views.map(({ name }) => name);
-  return availableViews(shownViews.peek(), names, names.includes(focused_view) ? focused_view : (names[0] ?? focused_view));
+  return availableViews(
+    shownViews.peek(),
+    names,
+    names.includes(focused_view) ? focused_view : (names[0] ?? focused_view),
+  );
 }
 
 /** The view that becomes active when a bake is shown. */
@@ -36,6 +40,14 @@ export function sendCameras(bakeConnection: BakeConnection, hello: HelloMessage)
     const placedCamera = cameraMode === "free" && shownNames.includes(name) ? placedCameraOf(name) : null;
     if (placedCamera === null) continue;
     const { camera, size } = placedCamera;
-    bakeConnection.session.send({ type: "camera", view: name, seq: Date.now(), ...camera, size, active_control: null, refine: "exact" });
+    bakeConnection.session.send({
+      type: "camera",
+      view: name,
+      seq: Date.now(),
+      ...camera,
+      size,
+      active_control: null,
+      refine: "exact",
+    });
   }
 }

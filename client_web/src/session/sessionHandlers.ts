@@ -46,7 +46,8 @@ export function onComment(callback: typeof onComments): void {
 function adoptLook(serverLook: Look): void {
   const currentLook = look.peek();
   if (!mayEdit.peek()) look.value = serverLook;
-  else if (currentLook === null || !Object.keys(serverLook).every((section) => section in currentLook)) look.value = { ...serverLook, ...currentLook };
+  else if (currentLook === null || !Object.keys(serverLook).every((section) => section in currentLook))
+    look.value = { ...serverLook, ...currentLook };
 }
 
 /** Send a new connection its settings: views, streaming, and the look if it differs. */
@@ -131,7 +132,6 @@ export function makeSessionHandlers(source: BakeConnection): SessionHandlers {
       if (code === LOGIN_CODE) loginMessage.value = `${reason}. Your edits are kept in this tab.`;
       else showError(`Session ended: ${reason}. Your look is kept. Reload the page or bake again.`);
     },
-    invalidMessage: (text) =>
-      showError(`Something went wrong (${text}). Reload if the picture stops updating.`),
+    invalidMessage: (text) => showError(`Something went wrong (${text}). Reload if the picture stops updating.`),
   };
 }

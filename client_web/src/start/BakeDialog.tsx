@@ -33,9 +33,7 @@ export function BakeDialog({ scene, onClose, onOpen }: BakeDialogProps) {
         <h2>Bake “{scene.name}”</h2>
         <IconButton icon="close" label="Close" onClick={onClose} />
       </header>
-      <p>
-        You can start on a quick preview; the full bake replaces it when ready and keeps your edits.
-      </p>
+      <p>You can start on a quick preview; the full bake replaces it when ready and keeps your edits.</p>
       {scene.warnings.length > 0 && <ImportWarnings warnings={scene.warnings} />}
       <Presets
         key={scene.id}

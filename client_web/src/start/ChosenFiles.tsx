@@ -39,7 +39,11 @@ export function ChosenFiles({ scenes, numParts, problems, onLeaveOut }: ChosenFi
           </span>
           {scene.missing.length > 0 && <span class="wrong">{missingText(scene)}</span>}
           {problems.has(scene.path) && <span class="wrong">{problems.get(scene.path)}</span>}
-          <IconButton icon="close" label={`Remove ${fileBaseName(scene.path)}`} onClick={() => onLeaveOut(scene.path)} />
+          <IconButton
+            icon="close"
+            label={`Remove ${fileBaseName(scene.path)}`}
+            onClick={() => onLeaveOut(scene.path)}
+          />
         </li>
       ))}
     </ul>

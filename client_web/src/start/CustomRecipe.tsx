@@ -2,7 +2,14 @@
 import { useEffect, useState } from "preact/hooks";
 import { planBake } from "../session/net/api";
 import type { BakeRequest } from "../protocol";
-import { GATHER_RAYS_RANGE, PATCHES_RANGE, LIGHTS_RANGE, validateRecipe, SIDE_RANGE, type CustomBakeRecipe as Recipe } from "../session/scene/recipe";
+import {
+  GATHER_RAYS_RANGE,
+  PATCHES_RANGE,
+  LIGHTS_RANGE,
+  validateRecipe,
+  SIDE_RANGE,
+  type CustomBakeRecipe as Recipe,
+} from "../session/scene/recipe";
 import { PlanText, type BakePlan } from "./PlanText";
 
 const TYPING_DELAY_MS = 300;
@@ -87,9 +94,27 @@ export function CustomRecipe({ request, initial, action, onChoose }: CustomRecip
         <b>Custom</b> a wider frame shows more at the sides
       </span>
       <div class="recipe-fields" role="group" aria-label="Custom bake">
-        <RecipeField label="Width" value={width} range={SIDE_RANGE} step={1} onChange={(side) => setRecipe({ ...recipe, size: [side, height] })} />
-        <RecipeField label="Height" value={height} range={SIDE_RANGE} step={1} onChange={(side) => setRecipe({ ...recipe, size: [width, side] })} />
-        <RecipeField label="Environment detail" value={recipe.lights} range={LIGHTS_RANGE} step={1} onChange={(lights) => setRecipe({ ...recipe, lights })} />
+        <RecipeField
+          label="Width"
+          value={width}
+          range={SIDE_RANGE}
+          step={1}
+          onChange={(side) => setRecipe({ ...recipe, size: [side, height] })}
+        />
+        <RecipeField
+          label="Height"
+          value={height}
+          range={SIDE_RANGE}
+          step={1}
+          onChange={(side) => setRecipe({ ...recipe, size: [width, side] })}
+        />
+        <RecipeField
+          label="Environment detail"
+          value={recipe.lights}
+          range={LIGHTS_RANGE}
+          step={1}
+          onChange={(lights) => setRecipe({ ...recipe, lights })}
+        />
         {gathers &&
           GATHER_FIELDS.map(({ name, label, range }) => (
             <RecipeField

@@ -33,7 +33,15 @@ function useSortedFiles(files: readonly DroppedFile[]): ImportSelection {
   return selection;
 }
 
-function FileInput({ label, folder, onFiles }: { label: string; folder?: boolean; onFiles: (files: DroppedFile[]) => void }) {
+function FileInput({
+  label,
+  folder,
+  onFiles,
+}: {
+  label: string;
+  folder?: boolean;
+  onFiles: (files: DroppedFile[]) => void;
+}) {
   const accept = [...SCENE_SUFFIXES, ...ENVIRONMENT_SUFFIXES, ...COMPANION_SUFFIXES].join(",");
   return (
     <label class="file">
@@ -56,7 +64,11 @@ function UploadStatus({ name, fraction, number, count }: UploadState) {
   return (
     <>
       <progress max={1} value={fraction} aria-label="Upload" />
-      <span>{fraction < 1 ? `Uploading “${name}”${countText}, ${Math.round(100 * fraction)} %` : `Importing “${name}”${countText}…`}</span>
+      <span>
+        {fraction < 1
+          ? `Uploading “${name}”${countText}, ${Math.round(100 * fraction)} %`
+          : `Importing “${name}”${countText}…`}
+      </span>
     </>
   );
 }
@@ -90,8 +102,8 @@ export function DropZone({ onImported }: { onImported: (scenes: SceneBody[]) => 
   return (
     <section class={`drop ${isDropTarget ? "over" : ""}`} aria-label="Import a scene">
       <p>
-        <b>Drop a scene file, a folder or an HDRI anywhere</b>, or <FileInput label="choose files" onFiles={addFiles} />, or{" "}
-        <FileInput label="choose a folder" folder onFiles={addFiles} />.
+        <b>Drop a scene file, a folder or an HDRI anywhere</b>, or <FileInput label="choose files" onFiles={addFiles} />
+        , or <FileInput label="choose a folder" folder onFiles={addFiles} />.
       </p>
       <p class="quiet">
         Scenes: GLB, glTF, OBJ, PLY (with textures) or ZIP. HDRI: HDR or EXR. Without one, studio lighting is used.
@@ -103,9 +115,15 @@ export function DropZone({ onImported }: { onImported: (scenes: SceneBody[]) => 
         onLeaveOut={(path) => setFiles((before) => before.filter((each) => each.path !== path))}
       />
       <div class="chosen">
-        <span class={environment ? "" : "quiet"}>{environment === null ? "Default studio lighting" : `HDRI: ${environment.name}`}</span>
+        <span class={environment ? "" : "quiet"}>
+          {environment === null ? "Default studio lighting" : `HDRI: ${environment.name}`}
+        </span>
         <label class="on-ground">
-          <input type="checkbox" checked={withGround} onChange={(event) => setWithGround(event.currentTarget.checked)} />
+          <input
+            type="checkbox"
+            checked={withGround}
+            onChange={(event) => setWithGround(event.currentTarget.checked)}
+          />
           Add a ground plane (shadow catcher)
         </label>
         {upload !== null ? (

@@ -32,7 +32,11 @@ export function ExampleScenes({ onOpen }: ExampleScenesProps) {
       <ul>
         {examples.map((builtIn) => (
           <li key={builtIn.name}>
-            <button disabled={creating !== null} aria-busy={creating === builtIn.name} onClick={() => void createScene(builtIn)}>
+            <button
+              disabled={creating !== null}
+              aria-busy={creating === builtIn.name}
+              onClick={() => void createScene(builtIn)}
+            >
               <img
                 src={`/built-in/${builtIn.name}.webp`}
                 alt=""

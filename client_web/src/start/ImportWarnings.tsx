@@ -12,7 +12,10 @@ const WARNING_GROUPS: readonly { severity: Severity; title: string; short: reado
 
 /** Number of warnings by severity: "1 difference, 2 simplifications". */
 export function warningCounts(warnings: readonly ImportWarning[]): string {
-  const counts = WARNING_GROUPS.map(({ severity, short }) => ({ count: warnings.filter((each) => each.severity === severity).length, short }));
+  const counts = WARNING_GROUPS.map(({ severity, short }) => ({
+    count: warnings.filter((each) => each.severity === severity).length,
+    short,
+  }));
   return counts
     .filter(({ count }) => count !== 0)
     .map(({ count, short: [one, many] }) => `${count} ${count === 1 ? one : many}`)

@@ -10,7 +10,10 @@ export function PlanText({ plan }: { plan: BakePlan }) {
   const [width, height] = plan.recipe.size;
   const time = plan.plan.seconds === null ? "time unknown" : formatEstimatedTime(plan.plan.seconds);
   return (
-    <span class="plan" title={`${formatCount(plan.recipe.lights)} environment triangles, up to ${formatCount(plan.plan.rays)} rays`}>
+    <span
+      class="plan"
+      title={`${formatCount(plan.recipe.lights)} environment triangles, up to ${formatCount(plan.plan.rays)} rays`}
+    >
       {width}×{height} · {time} · {formatBytes(plan.plan.store_bytes)} memory
     </span>
   );

@@ -27,7 +27,13 @@ type PresetPlans = Partial<Record<BakePreset, BakePlan>>;
 const DEFAULT_SIZE: BakeSize = [640, 480];
 const DEFAULT_NUM_LIGHTS = 2000;
 
-function usePlans(scene: string, method: BakeMethod, views: readonly string[], relightable: boolean, aspect: number): PresetPlans {
+function usePlans(
+  scene: string,
+  method: BakeMethod,
+  views: readonly string[],
+  relightable: boolean,
+  aspect: number,
+): PresetPlans {
   const [plans, setPlans] = useState<PresetPlans>({});
   useEffect(() => {
     let stale = false;
@@ -94,11 +100,21 @@ interface PresetsProps {
   onChoose: (choice: BakeSettings) => void;
 }
 
-export function Presets({ scene, method: initialMethod, views, action, size = null, from = null, onChoose }: PresetsProps) {
+export function Presets({
+  scene,
+  method: initialMethod,
+  views,
+  action,
+  size = null,
+  from = null,
+  onChoose,
+}: PresetsProps) {
   const [method, setMethod] = useState(initialMethod);
   const [selectedViews, setSelectedViews] = useState([...views]);
   const [relightable, setRelightable] = useState(false);
-  const { shapes, selected: initialShape } = aspectChoicesFor(size === null ? aspectOf(scene, selectedViews[0]) : size[0] / size[1]);
+  const { shapes, selected: initialShape } = aspectChoicesFor(
+    size === null ? aspectOf(scene, selectedViews[0]) : size[0] / size[1],
+  );
   const [shape, setShape] = useState(initialShape);
   const { aspect } = shape;
   const plans = usePlans(scene.id, method, selectedViews, relightable, aspect);
@@ -135,7 +151,11 @@ export function Presets({ scene, method: initialMethod, views, action, size = nu
         <CustomRecipe
           key={aspect}
           request={{ scene: scene.id, method, views: selectedViews, relightable }}
-          initial={{ size: shape.label === initialShape.label && size !== null ? size : resizeToAspect(size ?? DEFAULT_SIZE, aspect), lights: DEFAULT_NUM_LIGHTS }}
+          initial={{
+            size:
+              shape.label === initialShape.label && size !== null ? size : resizeToAspect(size ?? DEFAULT_SIZE, aspect),
+            lights: DEFAULT_NUM_LIGHTS,
+          }}
           action={action}
           onChoose={(recipe) => onChoose({ method, views: selectedViews, relightable, ...recipe })}
         />

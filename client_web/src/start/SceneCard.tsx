@@ -23,7 +23,13 @@ function CardImage({ url }: { url: string }) {
   return (
     <>
       <span class="no-picture">{placeholder}</span>
-      <img src={url} alt="" loading="lazy" onLoad={() => setPlaceholder("")} onError={() => setPlaceholder("No preview")} />
+      <img
+        src={url}
+        alt=""
+        loading="lazy"
+        onLoad={() => setPlaceholder("")}
+        onError={() => setPlaceholder("No preview")}
+      />
     </>
   );
 }
@@ -33,12 +39,17 @@ export function SceneCard({ scene, onOpen, onBake, onDelete, onAddGround, onRead
   return (
     <li class="scene-card">
       <button class="scene-open" onClick={onOpen} aria-label={`Open ${scene.name}`}>
-        {scene.thumbnail === null ? <BakeProgress scene={scene} onReady={onReady} /> : <CardImage url={scene.thumbnail} />}
+        {scene.thumbnail === null ? (
+          <BakeProgress scene={scene} onReady={onReady} />
+        ) : (
+          <CardImage url={scene.thumbnail} />
+        )}
       </button>
       <div class="scene-text">
         <b title={scene.name}>{scene.name}</b>
         <small>
-          {formatCount(scene.triangles)}&nbsp;{scene.triangles === 1 ? "triangle" : "triangles"} · {scene.materials.length}&nbsp;
+          {formatCount(scene.triangles)}&nbsp;{scene.triangles === 1 ? "triangle" : "triangles"} ·{" "}
+          {scene.materials.length}&nbsp;
           {scene.materials.length === 1 ? "material" : "materials"} · {scene.views.length}&nbsp;
           {scene.views.length === 1 ? "view" : "views"}
         </small>
@@ -57,7 +68,7 @@ export function SceneCard({ scene, onOpen, onBake, onDelete, onAddGround, onRead
             aria-label={`Add ground plane to ${scene.name}`}
             title="Creates a copy with a ground plane (shadow catcher)"
           >
-          Add ground
+            Add ground
           </button>
         )}
         <IconButton icon="trash" label={`Delete ${scene.name}`} onClick={onDelete} />

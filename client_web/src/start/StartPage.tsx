@@ -46,7 +46,11 @@ export function StartPage() {
       <ReadOnly />
       {mayEdit.value && <DropZone onImported={onImported} />}
       {sceneToBake !== null && (
-        <BakeDialog scene={sceneToBake} onClose={() => setSceneToBake(null)} onOpen={(choice) => openInEditor(sceneToBake, choice)} />
+        <BakeDialog
+          scene={sceneToBake}
+          onClose={() => setSceneToBake(null)}
+          onOpen={(choice) => openInEditor(sceneToBake, choice)}
+        />
       )}
       {mayEdit.value && <ExampleScenes onOpen={openInEditor} />}
       <h2>Scenes</h2>

@@ -37,7 +37,12 @@ export function ViewPicker({ scene, from, selected, onChoose }: ViewPickerProps)
   }, [scene.id]);
   useEffect(() => void reportErrors(reloadViews), [reloadViews]); // cameras may have changed since the scene was listed
   const toggle = (name: string) =>
-    onChoose((isSelected) => sortByScene(isSelected.includes(name) ? isSelected.filter((each) => each !== name) : [...isSelected, name], views));
+    onChoose((isSelected) =>
+      sortByScene(
+        isSelected.includes(name) ? isSelected.filter((each) => each !== name) : [...isSelected, name],
+        views,
+      ),
+    );
   const onCameraSaved = async (name: string) => {
     setOpen(null);
     const all = await reportErrors(reloadViews);
@@ -61,13 +66,16 @@ export function ViewPicker({ scene, from, selected, onChoose }: ViewPickerProps)
   const isLast = (name: string) => selected.length === 1 && selected[0] === name;
   return (
     <fieldset class="bake-views">
-      <legend>
-        Views{views.length > MAX_VISIBLE_VIEWS && ` (up to ${MAX_VISIBLE_VIEWS} shown at once)`}
-      </legend>
+      <legend>Views{views.length > MAX_VISIBLE_VIEWS && ` (up to ${MAX_VISIBLE_VIEWS} shown at once)`}</legend>
       {views.map(({ name, is_placed }) => (
         <span class="bake-view" key={name}>
           <label>
-            <input type="checkbox" checked={selected.includes(name)} disabled={isLast(name)} onChange={() => toggle(name)} />
+            <input
+              type="checkbox"
+              checked={selected.includes(name)}
+              disabled={isLast(name)}
+              onChange={() => toggle(name)}
+            />
             {name}
           </label>
           {is_placed && <IconButton icon="handles" label={`Move or rename ${name}`} onClick={() => void move(name)} />}

@@ -15,12 +15,15 @@ export const toneMap = signal<DisplayedToneMap>("agx");
 /** The chosen color space of EXR files; "": linear Rec. 709. */
 export const exrSpace = signal("");
 /** Color spaces of the server's config, without its linear Rec. 709. */
-export const exrSpaces = computed(() => colorConfig.value?.spaces.filter((name) => name !== colorConfig.value?.working) ?? []);
+export const exrSpaces = computed(
+  () => colorConfig.value?.spaces.filter((name) => name !== colorConfig.value?.working) ?? [],
+);
 /** The chosen color space; null for Rec. 709 or if this server does not have it. */
 export const availableExrSpace = computed(() => (exrSpaces.value.includes(exrSpace.value) ? exrSpace.value : null));
 
 /** A tone map's key: its name, or a view as JSON. */
-export const toneMapKey = (value: ToneMap): string => (typeof value === "string" ? value : JSON.stringify([value.display, value.view]));
+export const toneMapKey = (value: ToneMap): string =>
+  typeof value === "string" ? value : JSON.stringify([value.display, value.view]);
 
 export function parseToneMapKey(key: string): ToneMap {
   if (!key.startsWith("[")) return key as ToneMap;

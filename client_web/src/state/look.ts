@@ -15,8 +15,11 @@ export const usesBakedEnvironment = computed(() => (look.value?.environment.map 
 export const isBtfTerm = (term: Term): boolean => term.model === "measured_btf";
 /** True if a material without UVs has a tri-planar texture, which this browser cannot draw. */
 const usesTriPlanarMaps = (name: string, { terms, normal_map }: MaterialLook) =>
-  materialOf(name)?.is_projected === true && ((normal_map ?? null) !== null || terms.some(({ texture }) => isImageReference(texture)));
+  materialOf(name)?.is_projected === true &&
+  ((normal_map ?? null) !== null || terms.some(({ texture }) => isImageReference(texture)));
 /** True if any material has a BTF or a tri-planar texture. */
 export const usesTexelShading = computed(() =>
-  Object.entries(look.value?.materials ?? {}).some(([name, material]) => material.terms.some(isBtfTerm) || usesTriPlanarMaps(name, material)),
+  Object.entries(look.value?.materials ?? {}).some(
+    ([name, material]) => material.terms.some(isBtfTerm) || usesTriPlanarMaps(name, material),
+  ),
 );

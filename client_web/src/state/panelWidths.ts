@@ -40,7 +40,11 @@ export const panelWidths = computed<Record<SidePanel, number>>(() => ({
 }));
 
 /** The panels that fit into `available`, newest first; always includes the newest. */
-export function fittingPanels<Name extends string>(newest: readonly Name[], widths: Record<Name, number>, available: number): Name[] {
+export function fittingPanels<Name extends string>(
+  newest: readonly Name[],
+  widths: Record<Name, number>,
+  available: number,
+): Name[] {
   let remaining = available;
   const fitting: Name[] = [];
   for (const name of newest) {

@@ -40,7 +40,8 @@ function loadPanels(): void {
     const stored = JSON.parse(localStorage.getItem(PANELS_KEY) ?? "{}") as Record<string, unknown>;
     for (const [name, panel] of Object.entries(STORED_PANELS)) {
       const value = stored[name];
-      if (typeof value === typeof panel.value && Array.isArray(value) === Array.isArray(panel.value)) panel.value = value;
+      if (typeof value === typeof panel.value && Array.isArray(value) === Array.isArray(panel.value))
+        panel.value = value;
     }
   } catch {
     // storage is forbidden or invalid: use the defaults
@@ -51,7 +52,9 @@ function loadPanels(): void {
 export function trackPanels(): void {
   loadPanels();
   effect(() => {
-    const text = JSON.stringify(Object.fromEntries(Object.entries(STORED_PANELS).map(([name, panel]) => [name, panel.value])));
+    const text = JSON.stringify(
+      Object.fromEntries(Object.entries(STORED_PANELS).map(([name, panel]) => [name, panel.value])),
+    );
     try {
       localStorage.setItem(PANELS_KEY, text);
     } catch {

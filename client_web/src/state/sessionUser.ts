@@ -3,7 +3,13 @@ import { computed, signal } from "@preact/signals";
 import type { MeBody } from "../protocol";
 import { ownName, isWatching } from "./collaboration";
 
-export const sessionUser = signal<MeBody>({ login: false, name: "", role: "admin", auth_method: "open", allow_viewer_comments: false });
+export const sessionUser = signal<MeBody>({
+  login: false,
+  name: "",
+  role: "admin",
+  auth_method: "open",
+  allow_viewer_comments: false,
+});
 
 const hasEditRole = computed(() => sessionUser.value.role === "edit" || sessionUser.value.role === "admin");
 
@@ -13,16 +19,14 @@ const WATCHING_MESSAGE = "View-only link: you see others' edits live. Ask the se
 
 /** Reason why editing is off; null if it is on. */
 export const readOnlyMessage = computed(() =>
-  mayEdit.value
-    ? null
-    : hasEditRole.value
-      ? WATCHING_MESSAGE
-      : "View-only access. Ask an admin for edit rights.",
+  mayEdit.value ? null : hasEditRole.value ? WATCHING_MESSAGE : "View-only access. Ask an admin for edit rights.",
 );
 
 /** True if a user may comment: read-only users need the server's permission and a name. */
 export const mayComment = computed(
-  () => mayEdit.value || (sessionUser.value.allow_viewer_comments && (sessionUser.value.name !== "" || ownName.value !== "")),
+  () =>
+    mayEdit.value ||
+    (sessionUser.value.allow_viewer_comments && (sessionUser.value.name !== "" || ownName.value !== "")),
 );
 
 /** Reason why commenting is off; null if it is on. */

@@ -53,4 +53,6 @@ export function setFocus(name: string): void {
 }
 
 /** True if a shown view has a free camera. */
-export const hasFreeCamera = computed(() => views.value.some(({ name, camera_mode: cameraMode }) => cameraMode === "free" && shownViews.value.includes(name)));
+export const hasFreeCamera = computed(() =>
+  views.value.some(({ name, camera_mode: cameraMode }) => cameraMode === "free" && shownViews.value.includes(name)),
+);

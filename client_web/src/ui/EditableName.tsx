@@ -22,7 +22,14 @@ export function EditableName({ name, class: className, maximum, editing = false,
   }, [open]);
   if (!open) {
     return (
-      <button ref={button} type="button" class={className} title={`Rename ${name}`} aria-label={`Rename ${name}`} onClick={() => setOpen(true)}>
+      <button
+        ref={button}
+        type="button"
+        class={className}
+        title={`Rename ${name}`}
+        aria-label={`Rename ${name}`}
+        onClick={() => setOpen(true)}
+      >
         {name}
       </button>
     );

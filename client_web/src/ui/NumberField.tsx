@@ -20,7 +20,18 @@ interface Props {
   onDone?: (isKeyboard: boolean) => void;
 }
 
-export function NumberField({ value, label, minimum, maximum, step, isInteger = false, autoFocus, initialText, onChange, onDone }: Props) {
+export function NumberField({
+  value,
+  label,
+  minimum,
+  maximum,
+  step,
+  isInteger = false,
+  autoFocus,
+  initialText,
+  onChange,
+  onDone,
+}: Props) {
   const input = useRef<HTMLInputElement>(null);
   const [draft, setDraft] = useState<string | null>(initialText ?? null);
   const isRejected = useRef(false);
@@ -33,14 +44,17 @@ export function NumberField({ value, label, minimum, maximum, step, isInteger = 
   }, [autoFocus, initialText]);
 
   const displayedText = isInteger ? String(Math.round(value)) : formatNumber(value);
-  const setValue = (next: number) => onChange(Math.min(maximum, Math.max(minimum, isInteger ? Math.round(next) : next)));
+  const setValue = (next: number) =>
+    onChange(Math.min(maximum, Math.max(minimum, isInteger ? Math.round(next) : next)));
   const submit = () => {
     const typed = draft !== null && draft !== displayedText && !isRejected.current;
     const next = typed ? parseNumber(draft) : null;
     if (next !== null) {
       const clamped = Math.min(maximum, Math.max(minimum, next));
       if (clamped !== next)
-        showNote(`${label}: ${formatNumber(next)} is out of range (${formatNumber(minimum)}–${formatNumber(maximum)}); set to ${formatNumber(clamped)}.`);
+        showNote(
+          `${label}: ${formatNumber(next)} is out of range (${formatNumber(minimum)}–${formatNumber(maximum)}); set to ${formatNumber(clamped)}.`,
+        );
       // a typed number is its own history step
       history.endGesture();
       setValue(next);

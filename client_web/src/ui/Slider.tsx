@@ -67,7 +67,8 @@ export function Slider(props: SliderProps) {
   const begin = (typed: string) => setTyping((now) => ({ initialText: `${now?.initialText ?? ""}${typed}` }));
   const key = (event: KeyboardEvent) => {
     const step = STEPS[event.key];
-    if (step !== undefined) set(fraction + step * keyStep(props) * (event.shiftKey && props.step === undefined ? FINE : 1));
+    if (step !== undefined)
+      set(fraction + step * keyStep(props) * (event.shiftKey && props.step === undefined ? FINE : 1));
     else if (event.key === "Home") set(0);
     else if (event.key === "End") set(1);
     else if (event.key === "Enter") setTyping({});

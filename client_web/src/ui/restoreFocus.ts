@@ -2,7 +2,8 @@
  * panel opened. */
 import { useLayoutEffect } from "preact/hooks";
 
-const FOCUSABLE = "button:not(:disabled), input:not(:disabled), select:not(:disabled), textarea, a[href], canvas[tabindex='0'], [tabindex='0']";
+const FOCUSABLE =
+  "button:not(:disabled), input:not(:disabled), select:not(:disabled), textarea, a[href], canvas[tabindex='0'], [tabindex='0']";
 
 /** The focused element and its ancestors, each with its index among its siblings. */
 interface PathStep {
@@ -15,7 +16,10 @@ let isKeyboardFocus = false;
 
 function pathToRoot(element: Element | null): PathStep[] {
   if (element?.parentElement == null) return [];
-  return [{ element, index: [...element.parentElement.children].indexOf(element) }, ...pathToRoot(element.parentElement)];
+  return [
+    { element, index: [...element.parentElement.children].indexOf(element) },
+    ...pathToRoot(element.parentElement),
+  ];
 }
 
 const isReachable = (element: HTMLElement): boolean => element.checkVisibility() && element.closest("[inert]") === null;
@@ -38,7 +42,13 @@ export function nearestFocusable(steps: readonly PathStep[]): HTMLElement | unde
 function restoreFocus(): void {
   const [last] = focusPath;
   const { activeElement, body } = document;
-  if (!isKeyboardFocus || last === undefined || last.element.isConnected || (activeElement !== null && activeElement !== body)) return;
+  if (
+    !isKeyboardFocus ||
+    last === undefined ||
+    last.element.isConnected ||
+    (activeElement !== null && activeElement !== body)
+  )
+    return;
   nearestFocusable(focusPath)?.focus();
 }
 

@@ -33,7 +33,8 @@ function addToast(toast: Omit<Toast, "id">): void {
   const id = nextId++;
   const remaining = toasts.value.filter((current) => current.text !== toast.text);
   toasts.value = [...remaining, { ...toast, id }].slice(-MAX_SHOWN);
-  if (toast.kind === "note") window.setTimeout(() => dismissToast(id), Math.max(NOTE_MS, NOTE_MS_PER_CHARACTER * toast.text.length));
+  if (toast.kind === "note")
+    window.setTimeout(() => dismissToast(id), Math.max(NOTE_MS, NOTE_MS_PER_CHARACTER * toast.text.length));
 }
 
 export function showNote(text: string, action?: Toast["action"]): void {
@@ -48,7 +49,8 @@ export function showError(error: unknown, topic?: ToastTopic): void {
 
 /** Remove the errors of a topic. */
 export function clearErrors(topic: ToastTopic): void {
-  if (toasts.peek().some((toast) => toast.topic === topic)) toasts.value = toasts.value.filter((toast) => toast.topic !== topic);
+  if (toasts.peek().some((toast) => toast.topic === topic))
+    toasts.value = toasts.value.filter((toast) => toast.topic !== topic);
 }
 
 /** Run an action and show its error; on success, remove errors of its topic. */

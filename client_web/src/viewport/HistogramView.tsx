@@ -86,7 +86,10 @@ function HistogramBars() {
   useLayoutEffect(() => {
     if (histogram !== null) paintHistogram(canvas.current as HTMLCanvasElement, histogram.histogram);
   }, [histogram]);
-  const summaryText = histogram === null ? "Waiting for the picture…" : `${histogram.isExact ? "" : "Approximate: "}${summarize(histogram.histogram)}`;
+  const summaryText =
+    histogram === null
+      ? "Waiting for the picture…"
+      : `${histogram.isExact ? "" : "Approximate: "}${summarize(histogram.histogram)}`;
   return (
     <figure class="histogram" aria-label="Histogram, stops relative to middle gray">
       <canvas ref={canvas} aria-hidden="true" style={{ width: `${WIDTH}px`, height: `${HEIGHT}px` }} />

@@ -27,7 +27,8 @@ function onWheel(screen: ImageCanvas, event: WheelEvent): void {
   event.preventDefault();
   const { view } = screen.image;
   const freeCamera = freeCameraOf(view);
-  if (freeCamera !== null && !event.ctrlKey) return freeCamera.change((orbit) => dollyOrbit(orbit, zoomIn(event), freeCamera.bounds));
+  if (freeCamera !== null && !event.ctrlKey)
+    return freeCamera.change((orbit) => dollyOrbit(orbit, zoomIn(event), freeCamera.bounds));
   const { x, y } = pickMaterial(screen, event);
   const lines = event.deltaMode === 1 ? 30 : 1;
   const factor = Math.exp((-event.deltaY * lines * (event.ctrlKey ? 4 : 1)) / 500);
@@ -145,8 +146,8 @@ export function ViewCell({ view }: { view: string }) {
       {failure !== null && <p class="failure">{failure}</p>}
       {screen?.isLost.value === true && (
         <p class="failure" role="status">
-          The browser lost its graphics context. Your work is safe; the picture returns automatically or when you reload the
-          page.
+          The browser lost its graphics context. Your work is safe; the picture returns automatically or when you reload
+          the page.
         </p>
       )}
       {screen !== null && <LightHandles screen={screen} />}

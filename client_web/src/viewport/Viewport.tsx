@@ -29,7 +29,11 @@ function useElementSize() {
 export function Viewport() {
   const { element, size } = useElementSize();
   const visibleViews = shownViews.value;
-  const columns = columnsFor(visibleViews.length, ...size, activeView.value === null ? 1 : activeView.value.width / activeView.value.height);
+  const columns = columnsFor(
+    visibleViews.length,
+    ...size,
+    activeView.value === null ? 1 : activeView.value.width / activeView.value.height,
+  );
   return (
     <main class="picture">
       <div class="canvas" ref={element}>

@@ -22,7 +22,8 @@ const MARKS: Record<Exclude<Fidelity, "exact">, FidelityMark> = {
 };
 const OTHER_LIGHT_MARK: FidelityMark = {
   label: "Baked for a different environment",
-  title: "This environment was added after baking, so shadows of small light sources are approximate. Bake again to fix this.",
+  title:
+    "This environment was added after baking, so shadows of small light sources are approximate. Bake again to fix this.",
 };
 
 const DIRECT_ONLY_MARK: FidelityMark = {
@@ -38,7 +39,8 @@ const PLAYBACK_MARK: FidelityMark = {
 const FREE_CAMERA_REASON = "While the camera moves, fine shadows and sharp highlights are softer.";
 const WHEN_STOPPED = "The exact picture follows when the camera stops.";
 
-const formatPercent = (fraction: number) => (fraction < 0.095 ? (100 * fraction).toFixed(1) : `${Math.round(100 * fraction)}`);
+const formatPercent = (fraction: number) =>
+  fraction < 0.095 ? (100 * fraction).toFixed(1) : `${Math.round(100 * fraction)}`;
 
 /** Label with the error at the last camera stop, else as measured in the bake. */
 function freeCameraMark(): FidelityMark {
@@ -46,9 +48,15 @@ function freeCameraMark(): FidelityMark {
   const error = errorWhenStopped ?? baked?.value ?? null;
   if (error === null) return { label: "Approximate while moving", title: `${FREE_CAMERA_REASON} ${WHEN_STOPPED}` };
   const measured =
-    baked === null ? "" : ` Error in the original look: ${formatPercent(baked.value)} ± ${formatPercent(baked.standard_error)} % RMS (surfaces only).`;
-  const idleError = errorWhenStopped === null ? "" : ` Error at the last stop: ${formatPercent(errorWhenStopped)} % RMS.`;
-  return { label: `Approximate while moving (about ${formatPercent(error)} % error)`, title: `${FREE_CAMERA_REASON}${measured}${idleError} ${WHEN_STOPPED}` };
+    baked === null
+      ? ""
+      : ` Error in the original look: ${formatPercent(baked.value)} ± ${formatPercent(baked.standard_error)} % RMS (surfaces only).`;
+  const idleError =
+    errorWhenStopped === null ? "" : ` Error at the last stop: ${formatPercent(errorWhenStopped)} % RMS.`;
+  return {
+    label: `Approximate while moving (about ${formatPercent(error)} % error)`,
+    title: `${FREE_CAMERA_REASON}${measured}${idleError} ${WHEN_STOPPED}`,
+  };
 }
 
 const SHOWN_AFTER_MS = 300;
@@ -80,7 +88,10 @@ effect(() => {
 
 // change a displayed label only after another one has lasted
 effect(() => {
-  const timer = fidelity.value !== roughSince.peek() && roughSince.peek() !== null ? setTimeout(updateRoughMark, SHOWN_AFTER_MS) : undefined;
+  const timer =
+    fidelity.value !== roughSince.peek() && roughSince.peek() !== null
+      ? setTimeout(updateRoughMark, SHOWN_AFTER_MS)
+      : undefined;
   return () => clearTimeout(timer);
 });
 
@@ -92,6 +103,9 @@ function viewMark(now: Exclude<Fidelity, "exact">): FidelityMark {
 export function fidelityMarks(): FidelityMark[] {
   const phrase = isLate.value ? "approximate" : roughSince.value;
   const ofImage = phrase === null ? [] : [isPlaying.value ? PLAYBACK_MARK : viewMark(phrase)];
-  const ofBake = [...(usesBakedEnvironment.value ? [] : [OTHER_LIGHT_MARK]), ...(method.value === "direct" ? [DIRECT_ONLY_MARK] : [])];
+  const ofBake = [
+    ...(usesBakedEnvironment.value ? [] : [OTHER_LIGHT_MARK]),
+    ...(method.value === "direct" ? [DIRECT_ONLY_MARK] : []),
+  ];
   return [...ofImage, ...ofBake];
 }

@@ -38,11 +38,16 @@ function pinchCamera(screen: ImageCanvas, view: string, { across, down, center, 
   if (freeCamera === null) {
     const box = screen.canvas.getBoundingClientRect();
     panView(screen, across, down);
-    return setTransform(view, zoomAt(transformOf(view), screen.size(), spread, center.x - box.left, center.y - box.top));
+    return setTransform(
+      view,
+      zoomAt(transformOf(view), screen.size(), spread, center.x - box.left, center.y - box.top),
+    );
   }
   clearProbe();
   const { height } = screen.size();
-  freeCamera.change((orbit) => dollyOrbit(panOrbit(orbit, across / height, down / height), 1 / spread, freeCamera.bounds));
+  freeCamera.change((orbit) =>
+    dollyOrbit(panOrbit(orbit, across / height, down / height), 1 / spread, freeCamera.bounds),
+  );
 }
 
 export function useViewPointer(screen: ImageCanvas | null, view: string) {
@@ -64,8 +69,12 @@ export function useViewPointer(screen: ImageCanvas | null, view: string) {
     if (freeCamera === null) return panView(screen, dx, dy);
     clearProbe(); // the probed point has moved away from the pointer
     const { height } = screen.size();
-    if (event.shiftKey || (event.buttons & 6) !== 0) freeCamera.change((orbit) => panOrbit(orbit, dx / height, dy / height));
-    else freeCamera.change((orbit) => rotateOrbit(orbit, (-RADIANS_PER_PIXEL * dx) / height, (RADIANS_PER_PIXEL * dy) / height));
+    if (event.shiftKey || (event.buttons & 6) !== 0)
+      freeCamera.change((orbit) => panOrbit(orbit, dx / height, dy / height));
+    else
+      freeCamera.change((orbit) =>
+        rotateOrbit(orbit, (-RADIANS_PER_PIXEL * dx) / height, (RADIANS_PER_PIXEL * dy) / height),
+      );
   };
   const hover = (event: PointerEvent) => {
     if (screen === null) return;

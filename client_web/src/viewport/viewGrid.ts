@@ -6,6 +6,7 @@ export function columnsFor(count: number, width: number, height: number, aspect:
   const displayedSize = (columns: number) =>
     fitWidth({ width: width / columns, height: height / Math.ceil(count / columns), aspect, margin: MARGIN_GRID });
   let best = count;
-  for (let columns = count - 1; columns > 0; columns--) if (displayedSize(columns) > displayedSize(best)) best = columns;
+  for (let columns = count - 1; columns > 0; columns--)
+    if (displayedSize(columns) > displayedSize(best)) best = columns;
   return best;
 }

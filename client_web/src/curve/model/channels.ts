@@ -22,7 +22,11 @@ function rowOf(rows: number[] | number[][], channel: number, numBands: number): 
   return flat.length === 3 * numBands ? flat.slice(channel * numBands, (channel + 1) * numBands) : flat;
 }
 
-function drawnOf({ points, bands, factors, offsets, handles }: DrawnCurve, channel: number, num: number): DrawnChannels {
+function drawnOf(
+  { points, bands, factors, offsets, handles }: DrawnCurve,
+  channel: number,
+  num: number,
+): DrawnChannels {
   return {
     ...(points && { points }),
     ...(bands && { bands: rowOf(bands, channel, num) }),

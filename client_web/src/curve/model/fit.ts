@@ -113,8 +113,6 @@ export class BrushStroke {
   /** Fraction of the plot's width that the stroke covers; it determines the number of points. */
   mergeAxes(): number {
     const [first, last] = this.range() ?? [0, 0];
-    return (
-      xFraction(this.axes, (90 * (last + 1)) / this.numBands) - xFraction(this.axes, (90 * first) / this.numBands)
-    );
+    return xFraction(this.axes, (90 * (last + 1)) / this.numBands) - xFraction(this.axes, (90 * first) / this.numBands);
   }
 }

@@ -20,7 +20,10 @@ const DIGITS = 9;
 /** First and last band with its center in an interval; the last precedes the first if there is none. */
 export function bandsWithin(from: number, to: number, numBands: number): [first: number, last: number] {
   const bandPosition = (degrees: number) => (degrees / MAX_DEGREES) * numBands - 0.5;
-  return [Math.max(0, Math.ceil(bandPosition(from) - 1e-9)), Math.min(numBands - 1, Math.floor(bandPosition(to) + 1e-9))];
+  return [
+    Math.max(0, Math.ceil(bandPosition(from) - 1e-9)),
+    Math.min(numBands - 1, Math.floor(bandPosition(to) + 1e-9)),
+  ];
 }
 
 /** Numbers of an edit layer as the look stores them; undefined if they change nothing. */
@@ -85,8 +88,12 @@ export function scaleInterval(base: EditBase, from: number, to: number, factor: 
   const values = applyLayer(layer, baseline);
   const [first, last] = bandsWithin(from, to, baseline.length);
   // values stay within the document's limits
-  const factorAt = (j: number) => (j < first || j > last ? 1 : Math.min(factor, MAX_CURVE_VALUE / (values[j] as number)));
-  const scaled = { factors: layer.factors.map((v, j) => v * factorAt(j)), offsets: layer.offsets.map((v, j) => v * factorAt(j)) };
+  const factorAt = (j: number) =>
+    j < first || j > last ? 1 : Math.min(factor, MAX_CURVE_VALUE / (values[j] as number));
+  const scaled = {
+    factors: layer.factors.map((v, j) => v * factorAt(j)),
+    offsets: layer.offsets.map((v, j) => v * factorAt(j)),
+  };
   return rebuildCurve(base, scaled, addIntervalEnds(points, from, to, MAX_DEGREES / baseline.length));
 }
 

@@ -51,7 +51,9 @@ export function curveModel(
 ): CurveModel {
   const channels = readChannels(edits, info.bands);
   const baselines = channels.map((drawn, c) => baselineOf(drawn, shape?.generated[c] ?? null, info.bands));
-  const curves = baselines.map((baseline, c) => baseline && applyLayer(layerOf(channels[c] ?? null, baseline), baseline));
+  const curves = baselines.map(
+    (baseline, c) => baseline && applyLayer(layerOf(channels[c] ?? null, baseline), baseline),
+  );
   const lines = curves.map((bands) => (bands === null ? [] : bandSamples(bands)));
   const generated = shape?.generated ?? null;
   const generatedLines = generated?.map((bands) => bandSamples(bands)) ?? null;

@@ -80,7 +80,11 @@ function RoomLinks() {
     if (link === null) return;
     try {
       await navigator.clipboard.writeText(link);
-      showNote(kind === "edit" ? "Link copied. Anyone with this link can edit." : "Link copied. Anyone with this link can watch.");
+      showNote(
+        kind === "edit"
+          ? "Link copied. Anyone with this link can edit."
+          : "Link copied. Anyone with this link can watch.",
+      );
     } catch {
       setVisibleLink(link);
     }
@@ -136,7 +140,12 @@ export function CollaborationMenu() {
       {joinState.value === null ? (
         <IconButton icon="people" label="Work together" expanded={open} onClick={toggle} />
       ) : (
-        <button class="chips" aria-label={`Work together: ${members.value.length} online`} aria-expanded={open} onClick={toggle}>
+        <button
+          class="chips"
+          aria-label={`Work together: ${members.value.length} online`}
+          aria-expanded={open}
+          onClick={toggle}
+        >
           <MemberChips />
         </button>
       )}

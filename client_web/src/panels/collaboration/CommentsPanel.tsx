@@ -1,12 +1,27 @@
 /** The comments on a scene, oldest first, and a new one. */
 import { useEffect, useRef, useState } from "preact/hooks";
 import { MAX_COMMENT, type CommentBody } from "../../protocol";
-import { comments, shownComments, commentNumber, openComments, pendingPin, showResolved, selectedComment } from "../../state/comments";
+import {
+  comments,
+  shownComments,
+  commentNumber,
+  openComments,
+  pendingPin,
+  showResolved,
+  selectedComment,
+} from "../../state/comments";
 import { mayComment, mayEdit, noCommentMessage } from "../../state/sessionUser";
 import { togglePanel } from "../../state/panelWidths";
 import { IconButton } from "../../ui/IconButton";
 import { useReturnFocus } from "../../ui/restoreFocus";
-import { beginComment, cancelComment, saveComment, showComment, deleteCommentWithUndo, setCommentResolved } from "./commentActions";
+import {
+  beginComment,
+  cancelComment,
+  saveComment,
+  showComment,
+  deleteCommentWithUndo,
+  setCommentResolved,
+} from "./commentActions";
 
 const DATE_FORMAT = new Intl.DateTimeFormat(undefined, { dateStyle: "medium", timeStyle: "short" });
 
@@ -78,7 +93,11 @@ function CommentEntry({ comment }: { comment: CommentBody }) {
   }, [isSelected]);
   return (
     <li ref={item} class={`comment ${isSelected ? "selected" : ""} ${resolved ? "resolved" : ""}`}>
-      <button class="comment-show" aria-label={`Show comment ${number} in the picture`} onClick={() => showComment(comment)}>
+      <button
+        class="comment-show"
+        aria-label={`Show comment ${number} in the picture`}
+        onClick={() => showComment(comment)}
+      >
         {snapshot === null ? <span>{view}</span> : <img src={snapshot} alt="" loading="lazy" />}
         {snapshot !== null && <i class="comment-place" style={pinPosition(comment)} aria-hidden="true" />}
       </button>
@@ -92,7 +111,11 @@ function CommentEntry({ comment }: { comment: CommentBody }) {
       {mayEdit.value && (
         <div class="group" role="group" aria-label={`Comment ${number}`}>
           <button onClick={() => void setCommentResolved(comment, !resolved)}>{resolved ? "Reopen" : "Resolve"}</button>
-          <IconButton icon="trash" label={`Delete comment ${number}`} onClick={() => void deleteCommentWithUndo(comment)} />
+          <IconButton
+            icon="trash"
+            label={`Delete comment ${number}`}
+            onClick={() => void deleteCommentWithUndo(comment)}
+          />
         </div>
       )}
     </li>
@@ -116,7 +139,9 @@ export function CommentsPanel() {
         </button>
       )}
       {pendingPin.value !== null && <CommentForm />}
-      {shownComments.value.length === 0 && <p class="quiet">{numResolved > 0 ? "All comments are resolved." : "No comments yet."}</p>}
+      {shownComments.value.length === 0 && (
+        <p class="quiet">{numResolved > 0 ? "All comments are resolved." : "No comments yet."}</p>
+      )}
       <ol aria-label="Comments, oldest first">
         {shownComments.value.map((comment) => (
           <CommentEntry key={comment.id} comment={comment} />
@@ -124,7 +149,11 @@ export function CommentsPanel() {
       </ol>
       {numResolved > 0 && (
         <label class="check">
-          <input type="checkbox" checked={showResolved.value} onChange={() => (showResolved.value = !showResolved.value)} />
+          <input
+            type="checkbox"
+            checked={showResolved.value}
+            onChange={() => (showResolved.value = !showResolved.value)}
+          />
           Show {numResolved} resolved
         </label>
       )}

@@ -70,7 +70,14 @@ export async function saveComment(text: string): Promise<boolean> {
   const isSaved = await reportErrors(async () => {
     const memberName = members.peek().find(({ id }) => id === selfNumber.peek())?.name; // the name that others see
     const author = ownName.peek() || memberName || null;
-    const created = await api.addComment(sceneId, { ...pin, bake: bakeId, camera: cameraOf(pin.view), text, author, picture: snapshot });
+    const created = await api.addComment(sceneId, {
+      ...pin,
+      bake: bakeId,
+      camera: cameraOf(pin.view),
+      text,
+      author,
+      picture: snapshot,
+    });
     pendingPin.value = null;
     selectedComment.value = created.id;
     await refreshComments();
@@ -97,11 +104,24 @@ export async function deleteCommentWithUndo(comment: CommentBody): Promise<void>
   const sceneId = scene.peek()?.id ?? "";
   await reportErrors(async () => {
     const { bake: bakeId, view, x, y, size, camera, text, author } = comment;
-    const commentToRestore: CommentRequest = { bake: bakeId, view, x, y, size, camera, text, author, picture: await snapshotBase64(comment) };
+    const commentToRestore: CommentRequest = {
+      bake: bakeId,
+      view,
+      x,
+      y,
+      size,
+      camera,
+      text,
+      author,
+      picture: await snapshotBase64(comment),
+    };
     const label = `Comment ${commentNumber(comment.id)} deleted.`;
     await api.deleteComment(sceneId, comment.id);
     await refreshComments();
-    showNote(label, { label: "Undo", run: () => void reportErrors(() => api.addComment(sceneId, commentToRestore).then(refreshComments)) });
+    showNote(label, {
+      label: "Undo",
+      run: () => void reportErrors(() => api.addComment(sceneId, commentToRestore).then(refreshComments)),
+    });
   });
 }
 
@@ -121,5 +141,7 @@ const CAMERA_TOLERANCE = 1e-3;
 export function isCameraAtComment({ view, camera }: CommentBody): boolean {
   const currentCamera = cameraOf(view);
   if (camera === null || currentCamera == null) return camera === null && currentCamera == null;
-  return camera.to_world.every((value, k) => Math.abs(value - (currentCamera.to_world[k] as number)) < CAMERA_TOLERANCE);
+  return camera.to_world.every(
+    (value, k) => Math.abs(value - (currentCamera.to_world[k] as number)) < CAMERA_TOLERANCE,
+  );
 }

@@ -34,9 +34,11 @@ export async function createRoomLink(kind: "edit" | "watch"): Promise<string | n
   const room = joinState.value;
   const key = kind === "edit" ? room?.room : room?.watch;
   if (key == null) return null;
-  return (await reportErrors(async () => {
-    const url = new URL((await createShareLink()).url, location.href);
-    url.hash = keyFragment(kind === "edit" ? "room" : "watch", key);
-    return url.href;
-  })) ?? null;
+  return (
+    (await reportErrors(async () => {
+      const url = new URL((await createShareLink()).url, location.href);
+      url.hash = keyFragment(kind === "edit" ? "room" : "watch", key);
+      return url.href;
+    })) ?? null
+  );
 }

@@ -5,8 +5,24 @@ import type { ComparisonBody } from "../../protocol";
 import { IconButton } from "../../ui/IconButton";
 import { useReturnFocus } from "../../ui/restoreFocus";
 import { type RadioOption, RadioRow } from "../../ui/RadioRow";
-import { beginComparison, continueComparison, haltComparison, isInProgress, comparedState, toggleComparison, activeComparison, comparisonPlan } from "./comparison";
-import { mapSentences, omittedPathSentences, type ComparedPaths, comparisonPlanText, comparisonProgressText, errorSentences } from "./comparisonMessages";
+import {
+  beginComparison,
+  continueComparison,
+  haltComparison,
+  isInProgress,
+  comparedState,
+  toggleComparison,
+  activeComparison,
+  comparisonPlan,
+} from "./comparison";
+import {
+  mapSentences,
+  omittedPathSentences,
+  type ComparedPaths,
+  comparisonPlanText,
+  comparisonProgressText,
+  errorSentences,
+} from "./comparisonMessages";
 
 type ComparisonView = "error" | "reference";
 
@@ -63,9 +79,21 @@ function ComparisonResult({ body }: { body: ComparisonBody }) {
           <li key={sentence}>{sentence}</li>
         ))}
       </ul>
-      {body.omitted_paths.length > 0 && <RadioRow label="Light paths" choices={COMPARED_PATHS} selected={selectedPaths} onSelect={(value) => setPaths(value)} />}
+      {body.omitted_paths.length > 0 && (
+        <RadioRow
+          label="Light paths"
+          choices={COMPARED_PATHS}
+          selected={selectedPaths}
+          onSelect={(value) => setPaths(value)}
+        />
+      )}
       <img src={comparisonImageUrl(body.id, file, body.completed)} alt={view === "error" ? "Error map" : "Reference"} />
-      <RadioRow label="Displayed picture" choices={COMPARISON_VIEWS} selected={view} onSelect={(value) => setView(value)} />
+      <RadioRow
+        label="Displayed picture"
+        choices={COMPARISON_VIEWS}
+        selected={view}
+        onSelect={(value) => setView(value)}
+      />
       {view === "error" && <ErrorScale />}
       <ul class="comparison-notes" aria-live="polite" aria-label="Notes">
         {[...mapSentences(errorStats), ...omittedPathSentences(body)].map((sentence) => (
@@ -82,8 +110,8 @@ function FirstPass({ body }: { body: ComparisonBody }) {
     <>
       <img src={comparisonImageUrl(body.id, "reference", body.completed)} alt="Reference" />
       <p class="comparison-scale">
-        {body.completed === 0 ? "Low-resolution preview of the reference." : "Reference after one pass."} Results follow after
-        the second pass.
+        {body.completed === 0 ? "Low-resolution preview of the reference." : "Reference after one pass."} Results follow
+        after the second pass.
       </p>
     </>
   );

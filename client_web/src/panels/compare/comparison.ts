@@ -2,7 +2,15 @@
  * and server restarts. */
 import { effect, signal } from "@preact/signals";
 import { currentPose, currentSize } from "../looks/exportImage";
-import { deleteComparison, getComparison, planComparison, resumeComparison, startComparison, stopComparison, nullIfUnavailable } from "../../session/net/api";
+import {
+  deleteComparison,
+  getComparison,
+  planComparison,
+  resumeComparison,
+  startComparison,
+  stopComparison,
+  nullIfUnavailable,
+} from "../../session/net/api";
 import type { ComparisonBody, ComparisonPlanBody, ComparisonRequest } from "../../protocol";
 import { pathOverride } from "../../state/visibility/lightPaths";
 import { visibleLookOf } from "../../state/visibility/displayState";
@@ -36,7 +44,14 @@ export function comparedState(): string {
   const visibleLight = [pathOverride.value, soloLight.value];
   void views.value; // the camera has moved
   const camera = [currentPose(), currentSize()];
-  return JSON.stringify({ ...look.value, display: null, bake: bake.value, view: activeViewName.value, light: visibleLight, camera });
+  return JSON.stringify({
+    ...look.value,
+    display: null,
+    bake: bake.value,
+    view: activeViewName.value,
+    light: visibleLight,
+    camera,
+  });
 }
 
 export function isInProgress(body: ComparisonBody): boolean {
@@ -56,12 +71,23 @@ async function pollComparison(id: string): Promise<void> {
 function comparisonRequest(): ComparisonRequest | null {
   const [id, current] = [bake.value, look.value];
   if (id === null || current === null) return null;
-  return { bake: id, view: activeViewName.value, look: { ...visibleLookOf(current) }, camera: currentPose(), size: currentSize() };
+  return {
+    bake: id,
+    view: activeViewName.value,
+    look: { ...visibleLookOf(current) },
+    camera: currentPose(),
+    size: currentSize(),
+  };
 }
 
 /** Store the comparison for a reload. */
 function trackComparison(): void {
-  effect(() => saveInTab(COMPARISON_KEY, activeComparison.value && { id: activeComparison.value.body.id, look: activeComparison.value.look }));
+  effect(() =>
+    saveInTab(
+      COMPARISON_KEY,
+      activeComparison.value && { id: activeComparison.value.body.id, look: activeComparison.value.look },
+    ),
+  );
 }
 
 /** Continue with the comparison of a bake that was displayed before a reload. */

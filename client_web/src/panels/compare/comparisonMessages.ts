@@ -5,7 +5,8 @@ import { formatEstimatedTime, formatSeconds } from "../../ui/scale";
 /** A fraction in percent, with only the digits that its standard error supports. */
 export function formatPercentWithError(fraction: number, standardError?: number): string {
   const size = 100 * (standardError ?? fraction);
-  const digits = size > 0 ? Math.min(4, Math.max(0, (standardError === undefined ? 1 : 0) - Math.floor(Math.log10(size)))) : 2;
+  const digits =
+    size > 0 ? Math.min(4, Math.max(0, (standardError === undefined ? 1 : 0) - Math.floor(Math.log10(size)))) : 2;
   const uncertainty = standardError === undefined ? "" : ` ± ${(100 * standardError).toFixed(digits)}`;
   return `${(100 * fraction).toFixed(digits)}${uncertainty} %`;
 }
@@ -18,7 +19,10 @@ export function comparisonPlanText(plan: ComparisonPlanBody | "unknown" | null):
   return `${plan.passes} passes, ${formatEstimatedTime(plan.seconds)}${estimateNote}.`;
 }
 
-type ComparisonProgress = Pick<ComparisonBody, "state" | "completed" | "total" | "progress" | "problem" | "seconds_left">;
+type ComparisonProgress = Pick<
+  ComparisonBody,
+  "state" | "completed" | "total" | "progress" | "problem" | "seconds_left"
+>;
 
 /** Current progress; `elapsed`: seconds since the start. */
 export function comparisonProgressText(progress: ComparisonProgress, elapsed: number): string {
@@ -29,7 +33,9 @@ export function comparisonProgressText(progress: ComparisonProgress, elapsed: nu
     case "running": {
       if (progress.progress === 0) return `Preparing the picture, ${soFar}`;
       const left = progress.seconds_left === null ? "" : `, ${formatSeconds(progress.seconds_left)} left`;
-      const passPercent = Math.round(100 * Math.min(1, Math.max(0, progress.progress * progress.total - progress.completed)));
+      const passPercent = Math.round(
+        100 * Math.min(1, Math.max(0, progress.progress * progress.total - progress.completed)),
+      );
       return `Reference: pass ${Math.min(progress.completed + 1, progress.total)} of ${progress.total} (${passPercent} %), ${soFar}${left}`;
     }
     case "ready":
@@ -54,7 +60,9 @@ function errorText(stats: ErrorStats): string {
 }
 
 /** Error of the frame against the reference with all light paths and with the simulated ones. */
-export function errorSentences(body: Pick<ComparisonBody, "error_all_paths" | "error_method_paths" | "omitted_paths">): string[] {
+export function errorSentences(
+  body: Pick<ComparisonBody, "error_all_paths" | "error_method_paths" | "omitted_paths">,
+): string[] {
   const { error_all_paths: errorOfAll, error_method_paths: errorOfMethod } = body;
   if (errorOfAll === null || errorOfMethod === null) return [];
   if (body.omitted_paths.length === 0) return [`Error: ${errorText(errorOfAll)} (relative RMSE).`];
@@ -80,5 +88,8 @@ function lowerFirst(sentence: string): string {
 export function mapSentences(stats: ErrorStats): string[] {
   const noise = `Reference noise: ${formatPercentWithError(stats.noise)}; more passes reduce it.`;
   if (stats.significant_pixel_fraction === 0) return ["No visible difference found.", noise];
-  return [`${formatPercentWithError(stats.significant_pixel_fraction)} of the pixels differ by more than the noise (colored in the map).`, noise];
+  return [
+    `${formatPercentWithError(stats.significant_pixel_fraction)} of the pixels differ by more than the noise (colored in the map).`,
+    noise,
+  ];
 }

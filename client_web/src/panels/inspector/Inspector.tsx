@@ -59,11 +59,15 @@ function ShadowCatcherToggle({ material }: { material: string }) {
           checked={catcher}
           onChange={(event) => {
             const only = event.currentTarget.checked;
-            editValue(only ? "Shadow catcher on" : "Shadow catcher off", jsonPointer("materials", material, "shadow_catcher"), only);
+            editValue(
+              only ? "Shadow catcher on" : "Shadow catcher off",
+              jsonPointer("materials", material, "shadow_catcher"),
+              only,
+            );
           }}
         />
         Shadow catcher
-        </label>
+      </label>
       {catcher && (
         <p>
           Shows only the shadows, over the background. Turn it off to see and edit the material; indirect light still
@@ -82,7 +86,8 @@ function GlassToggle({ material }: { material: string }) {
 
 export function Inspector() {
   const [light, displayedMaterial] = [openLight.value, selectedLight.value];
-  if (light !== null && displayedMaterial !== null) return <LightInspector key={displayedMaterial} name={displayedMaterial} light={light} />;
+  if (light !== null && displayedMaterial !== null)
+    return <LightInspector key={displayedMaterial} name={displayedMaterial} light={light} />;
   return <MaterialInspector />;
 }
 
@@ -97,9 +102,7 @@ function MaterialInspector() {
             Library
           </button>
         </header>
-        <p class="hint">
-          Click an object or pick a material to edit it.
-        </p>
+        <p class="hint">Click an object or pick a material to edit it.</p>
       </div>
     );
   }
@@ -123,33 +126,38 @@ function MaterialInspector() {
       <ShadowCatcherToggle material={material} />
       <GlassToggle material={material} />
       {!isShadowCatcher && <BaseColorImage key={material} material={material} terms={selectedTerms.value} />}
-      {!isShadowCatcher && selectedTerms.value.map((term, index) => (
-        <TermCard
-          key={index}
-          material={material}
-          term={term}
-          index={index}
-          onRemove={
-            selectedTerms.value.length > 1
-              ? () => {
-                  selectedCurve.value = null;
-                  selectedTerm.value = 0;
-                  replaceTerms(
-                    "Remove layer",
-                    material,
-                    selectedTerms.value.filter((_, i) => i !== index),
-                  );
-                }
-              : null
-          }
-        />
-      ))}
+      {!isShadowCatcher &&
+        selectedTerms.value.map((term, index) => (
+          <TermCard
+            key={index}
+            material={material}
+            term={term}
+            index={index}
+            onRemove={
+              selectedTerms.value.length > 1
+                ? () => {
+                    selectedCurve.value = null;
+                    selectedTerm.value = 0;
+                    replaceTerms(
+                      "Remove layer",
+                      material,
+                      selectedTerms.value.filter((_, i) => i !== index),
+                    );
+                  }
+                : null
+            }
+          />
+        ))}
       {!isShadowCatcher && <AlbedoInfo key={material} terms={selectedTerms.value} />}
       {!isShadowCatcher && <AddTerm material={material} />}
       {!isShadowCatcher && materialLook !== undefined && (
         <Section title="Metalness and normals">
           <MetalnessImage material={material} terms={selectedTerms.value} />
-          <NormalImage material={material} materialLook={materialLook} mirrors={materialOf(material)?.terms.some(isMirror) === true} />
+          <NormalImage
+            material={material}
+            materialLook={materialLook}
+            mirrors={materialOf(material)?.terms.some(isMirror) === true}
+          />
         </Section>
       )}
     </div>

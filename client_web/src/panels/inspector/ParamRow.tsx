@@ -23,14 +23,18 @@ function meanOf(value: ParamValue): number {
 
 export function ParamRow({ info, value, initial, onChange, onHold }: Props) {
   const channelsDiffer = typeof value !== "number";
-  const range = { minimum: info.minimum, maximum: info.maximum, scale: info.scale, unit: info.unit, ...(info.step === null ? {} : { step: info.step }) };
+  const range = {
+    minimum: info.minimum,
+    maximum: info.maximum,
+    scale: info.scale,
+    unit: info.unit,
+    ...(info.step === null ? {} : { step: info.step }),
+  };
   const toggle = () => onChange(channelsDiffer ? meanOf(value) : [value, value, value]);
   const link = (
     <IconButton
       icon={channelsDiffer ? "unlink" : "link"}
-      label={
-        channelsDiffer ? `${info.label}: link red, green and blue` : `${info.label}: separate red, green and blue`
-      }
+      label={channelsDiffer ? `${info.label}: link red, green and blue` : `${info.label}: separate red, green and blue`}
       pressed={channelsDiffer}
       onClick={toggle}
     />
@@ -56,7 +60,14 @@ export function ParamRow({ info, value, initial, onChange, onHold }: Props) {
           ))}
         </div>
       ) : (
-        <Slider {...range} label={info.label} value={value} initial={meanOf(initial)} onChange={onChange} onHold={onHold} />
+        <Slider
+          {...range}
+          label={info.label}
+          value={value}
+          initial={meanOf(initial)}
+          onChange={onChange}
+          onHold={onHold}
+        />
       )}
       {info.requires_new_operator ? null : link}
     </div>

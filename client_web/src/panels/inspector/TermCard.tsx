@@ -56,9 +56,7 @@ function TermCurves({ model, term, index }: { model: ModelBody; term: Term; inde
             }}
           >
             {curve.name === open ? curve.label : termSymbol(curve.label)}
-            {term.curves?.[curve.name] !== undefined && (
-              <span class="dot" title="Edited" aria-label="edited" />
-            )}
+            {term.curves?.[curve.name] !== undefined && <span class="dot" title="Edited" aria-label="edited" />}
           </button>
         ))}
       </div>
@@ -81,7 +79,10 @@ function TextureRow({ channels, value, onChange }: TextureProps) {
   return (
     <label class="param texture">
       <span class="param-label">Texture</span>
-      <select value={image ?? channels.find((name) => name === value) ?? ""} onChange={(event) => onChange(event.currentTarget.value || null)}>
+      <select
+        value={image ?? channels.find((name) => name === value) ?? ""}
+        onChange={(event) => onChange(event.currentTarget.value || null)}
+      >
         <option value="">None</option>
         {image !== null && <option value={image}>{imageOf(image)?.name ?? "Texture"}</option>}
         {channels.map((name) => (
@@ -159,7 +160,13 @@ export function TermCard({ material, term, index, onRemove }: Props) {
           <TextureRow
             channels={texturesOf(material)}
             value={term.texture ?? null}
-            onChange={(value) => editValue("Texture", jsonPointer("materials", material, "terms"), withTexture(selectedTerms.value, index, value))}
+            onChange={(value) =>
+              editValue(
+                "Texture",
+                jsonPointer("materials", material, "terms"),
+                withTexture(selectedTerms.value, index, value),
+              )
+            }
           />
           {model?.width_parameter != null && (
             <RoughnessImage
@@ -167,22 +174,33 @@ export function TermCard({ material, term, index, onRemove }: Props) {
               index={index}
               value={term.roughness_map ?? null}
               hasOwn={hasRoughnessMap(material)}
-              onChange={(value) => editValue("Roughness map", jsonPointer("materials", material, "terms"), withMap(selectedTerms.value, index, value))}
+              onChange={(value) =>
+                editValue(
+                  "Roughness map",
+                  jsonPointer("materials", material, "terms"),
+                  withMap(selectedTerms.value, index, value),
+                )
+              }
             />
           )}
           {model?.width_parameter != null && follows && <MapWidthRow term={term} model={model} />}
-          {model?.parameters.map((declared) => limitToStored(declared, storedQuality)).map((info) => (
-            <ParamRow
-              key={info.name}
-              info={info}
-              value={isWithinStored(info, term.params?.[info.name])}
-              initial={same?.params?.[info.name] ?? info.default}
-              onChange={(value) => editValue(info.label, `${path}/params/${info.name}`, value)}
-              onHold={() => beginDrag(`${path}/params/${info.name}`)}
-            />
-          ))}
+          {model?.parameters
+            .map((declared) => limitToStored(declared, storedQuality))
+            .map((info) => (
+              <ParamRow
+                key={info.name}
+                info={info}
+                value={isWithinStored(info, term.params?.[info.name])}
+                initial={same?.params?.[info.name] ?? info.default}
+                onChange={(value) => editValue(info.label, `${path}/params/${info.name}`, value)}
+                onHold={() => beginDrag(`${path}/params/${info.name}`)}
+              />
+            ))}
           {isSoftMirror(material, term) && (
-            <p class="aside">This material was not a mirror when the scene was baked, so sharp reflections are blurred. Bake again to see them.</p>
+            <p class="aside">
+              This material was not a mirror when the scene was baked, so sharp reflections are blurred. Bake again to
+              see them.
+            </p>
           )}
           {model !== undefined && <TermCurves model={model} term={term} index={index} />}
           <ZernikeFit term={term} material={material} />

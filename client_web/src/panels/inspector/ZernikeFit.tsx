@@ -10,7 +10,12 @@ import { useServerQuery } from "./useServerQuery";
 function fitMessage({ functions, residual, required_functions, is_mirror }: ZernikeFitBody): string {
   const percent = residual < 0.01 ? "less than 1 %" : `${Math.round(100 * residual)} %`;
   if (is_mirror) return "Drawn as a blurred mirror while the camera moves.";
-  const enough = required_functions === null || required_functions === functions ? "" : required_functions === 1 ? "; 1 is enough for under 5 %" : `; under 5 % needs ${required_functions}`;
+  const enough =
+    required_functions === null || required_functions === functions
+      ? ""
+      : required_functions === 1
+        ? "; 1 is enough for under 5 %"
+        : `; under 5 % needs ${required_functions}`;
   return `While the camera moves: error ${percent} with ${functions} basis functions${enough}.`;
 }
 
@@ -19,7 +24,9 @@ export function coverText(material: string): string | null {
   const isProjected = materialOf(material)?.is_projected === true;
   const sentences = [
     isProjected && "The object has no UVs: the texture is projected along the world axes (tri-planar, 1 m per repeat).",
-    hasFreeCamera.value && isClientRendering.value && "While the camera moves, this browser draws the average of all texels.",
+    hasFreeCamera.value &&
+      isClientRendering.value &&
+      "While the camera moves, this browser draws the average of all texels.",
   ].filter(Boolean);
   return sentences.length > 0 ? sentences.join(" ") : null;
 }

@@ -5,7 +5,10 @@ const AFTER_MS = 250; // one query per slider drag
 
 /** The response to `query`, or the previous one until then; null without a query or if it was rejected, which the
  * edit itself reports. `fetchAnswer` stays the same function: another one asks again. */
-export function useServerQuery<T>(query: string | null, fetchAnswer: (queryText: string) => Promise<T | null>): T | null {
+export function useServerQuery<T>(
+  query: string | null,
+  fetchAnswer: (queryText: string) => Promise<T | null>,
+): T | null {
   const [answer, setAnswer] = useState<T | null>(null);
   useEffect(() => {
     if (query === null) return undefined;

@@ -1,7 +1,15 @@
 /** Jobs that import or generate BTFs, and their progress. */
 import { useRef } from "preact/hooks";
 import type { BtfJobBody } from "../../protocol";
-import { BTFS, resumeJob, importMaterial, generateBtf, makeBtfOfMesh, model, materialUploadProgress } from "./libraryItems";
+import {
+  BTFS,
+  resumeJob,
+  importMaterial,
+  generateBtf,
+  makeBtfOfMesh,
+  model,
+  materialUploadProgress,
+} from "./libraryItems";
 import { deleteJob, GEOMETRIES, isRunning, isBeingMade, btfJobs, jobText, btfUploadProgress, stopJob } from "./btfJobs";
 
 export const MATERIAL_FILES = ".binary,.zip,.btf";
@@ -38,7 +46,14 @@ function ImageImport() {
   const label = fraction !== null && fraction < 1 ? `Uploading, ${Math.round(100 * fraction)} %` : "Factorizing…";
   return (
     <div class="library-import">
-      <input ref={picker} type="file" accept={MATERIAL_FILES} aria-label="Measured material" hidden onChange={onImport} />
+      <input
+        ref={picker}
+        type="file"
+        accept={MATERIAL_FILES}
+        aria-label="Measured material"
+        hidden
+        onChange={onImport}
+      />
       <button disabled={fraction !== null} onClick={() => picker.current?.click()}>
         Import measured material…
       </button>
@@ -69,8 +84,8 @@ function MeshImport() {
         From mesh…
       </button>
       <label title="Width of one repeat; empty: the width of the mesh">
-      Repeat
-      <input
+        Repeat
+        <input
           ref={period}
           type="number"
           min={0}

@@ -65,7 +65,9 @@ export function NavigationMap() {
   const range = map === null ? null : mapRange(map.points);
   const choose = useMaterialChoice(range, () => setPendingPoint(null));
   const currentHighlight = highlightOf(selectedTerms.value);
-  const position = pendingPoint ?? (currentHighlight === null || range === null ? null : clampToPlane(positionOf(currentHighlight, range)));
+  const position =
+    pendingPoint ??
+    (currentHighlight === null || range === null ? null : clampToPlane(positionOf(currentHighlight, range)));
   const go = (x: number, y: number) => {
     const next = clampToPlane({ x, y });
     if (selectedMaterial.peek() !== null) setPendingPoint(next);

@@ -58,7 +58,8 @@ export async function generate(geometry: Geometry): Promise<void> {
 
 export const importImages = (file: File) => uploadJob((onProgress) => uploadBtf(file, onProgress));
 /** `period`: width of one repeat in meters; null: the width of the bounding box. */
-export const makeFromMesh = (file: File, period: number | null) => uploadJob((onProgress) => uploadGeometry(file, period, onProgress));
+export const makeFromMesh = (file: File, period: number | null) =>
+  uploadJob((onProgress) => uploadGeometry(file, period, onProgress));
 
 async function uploadJob(upload: (onProgress: (fraction: number) => void) => Promise<BtfJobBody>): Promise<void> {
   btfUploadProgress.value = 0;

@@ -45,7 +45,15 @@ export const groups = computed(() => uniqueOf(library.value.map((material) => ma
 export const fittedModels = computed(() => uniqueOf(library.value.map((material) => material.model)));
 
 function fittedEntry({ id, name, source, terms, model: modelName, group: groupName }: MaterialBody): LibraryEntry {
-  return { id, name, description: `${name}. ${source}`, thumbnail: materialThumbnailUrl(id), terms, model: modelName, group: groupName };
+  return {
+    id,
+    name,
+    description: `${name}. ${source}`,
+    thumbnail: materialThumbnailUrl(id),
+    terms,
+    model: modelName,
+    group: groupName,
+  };
 }
 
 function measuredEntry({ id, name, thumbnail, terms }: MeasuredBody): LibraryEntry {
@@ -71,7 +79,9 @@ export const hasGroups = computed(() => model.value !== MEASURED && model.value 
 /** Entries of the selected model and category, one per material and source. */
 export const visibleEntries = computed<LibraryEntry[]>(() => {
   const isOfGroup = (entry: LibraryEntry) => !hasGroups.value || group.value === "all" || entry.group === group.value;
-  return entries.value.filter((entry) => entry.model === model.value && isOfGroup(entry) && matchesSearch(entry, query.value));
+  return entries.value.filter(
+    (entry) => entry.model === model.value && isOfGroup(entry) && matchesSearch(entry, query.value),
+  );
 });
 
 const MAX_OTHER_GROUPS = 4;
@@ -89,16 +99,24 @@ export function showGroup(groupName: string): void {
   [model.value, group.value] = [groupName, "all"];
 }
 
-export function matchesSearch({ name, description }: Pick<LibraryEntry, "name" | "description">, typed: string): boolean {
+export function matchesSearch(
+  { name, description }: Pick<LibraryEntry, "name" | "description">,
+  typed: string,
+): boolean {
   const text = `${name} ${description}`.toLowerCase().replaceAll("-", " ");
-  return typed.toLowerCase().replaceAll("-", " ").split(/\s+/).every((word) => text.includes(word));
+  return typed
+    .toLowerCase()
+    .replaceAll("-", " ")
+    .split(/\s+/)
+    .every((word) => text.includes(word));
 }
 
 export async function openLibrary(): Promise<void> {
   togglePanel("library");
   await reportErrors(async () => {
     await refreshBtfs(); // the command line may have created some
-    if (library.value.length === 0) [library.value, measured.value] = await Promise.all([listMaterials(), listMeasured()]);
+    if (library.value.length === 0)
+      [library.value, measured.value] = await Promise.all([listMaterials(), listMeasured()]);
     if (libraryOpen.value) await trackJobs(refreshBtfs);
   });
 }

@@ -11,7 +11,8 @@ export interface MapPosition {
 }
 
 const fractionOf = (value: number, [low, high]: [number, number]) => (value - low) / (high - low || 1);
-const interpolate = (fraction: number, [low, high]: [number, number]) => low + Math.min(1, Math.max(0, fraction)) * (high - low);
+const interpolate = (fraction: number, [low, high]: [number, number]) =>
+  low + Math.min(1, Math.max(0, fraction)) * (high - low);
 
 /** Range over the materials on the map; at least two. */
 export function mapRange(points: readonly { f0: number; sigma: number }[]): HighlightRange {
@@ -35,10 +36,16 @@ const logRange = (range: HighlightRange): [number, number] => [Math.log(range.si
 
 /** Position in the unit square; smooth and dark is at the upper left. */
 export function positionOf(point: { f0: number; sigma: number }, range: HighlightRange): MapPosition {
-  return { x: fractionOf(Math.sqrt(point.f0), squareRootRange(range)), y: fractionOf(Math.log(point.sigma), logRange(range)) };
+  return {
+    x: fractionOf(Math.sqrt(point.f0), squareRootRange(range)),
+    y: fractionOf(Math.log(point.sigma), logRange(range)),
+  };
 }
 
 /** Inverse of `positionOf`; points outside the square are clamped to its edge. */
 export function highlightAt(position: MapPosition, range: HighlightRange): { f0: number; sigma: number } {
-  return { f0: interpolate(position.x, squareRootRange(range)) ** 2, sigma: Math.exp(interpolate(position.y, logRange(range))) };
+  return {
+    f0: interpolate(position.x, squareRootRange(range)) ** 2,
+    sigma: Math.exp(interpolate(position.y, logRange(range))),
+  };
 }

@@ -77,7 +77,7 @@ export function Emission({ name, light }: Props) {
         label="Emission"
         quantity
         value={light.emission}
-        initial={(defaultLook.value?.lights[name]?.emission) ?? null}
+        initial={defaultLook.value?.lights[name]?.emission ?? null}
         onChange={(value) => editLight("Emission", name, "emission", value)}
       />
       <Temperature name={name} light={light} />

@@ -63,7 +63,8 @@ const SHAPES: Record<LightKind | "aim", string> = {
   point: "M-5 0a5 5 0 1 0 10 0a5 5 0 1 0 -10 0z",
   spot: "M-2 -6h4l4 11h-12z",
   rectangle: "M-5 -5h10v10h-10z",
-  directional: "M-3.5 0a3.5 3.5 0 1 0 7 0a3.5 3.5 0 1 0 -7 0zM0 -5.5v-2.5M0 5.5v2.5M-5.5 0h-2.5M5.5 0h2.5M-4 -4l-1.7 -1.7M4 4l1.7 1.7M-4 4l-1.7 1.7M4 -4l1.7 -1.7",
+  directional:
+    "M-3.5 0a3.5 3.5 0 1 0 7 0a3.5 3.5 0 1 0 -7 0zM0 -5.5v-2.5M0 5.5v2.5M-5.5 0h-2.5M5.5 0h2.5M-4 -4l-1.7 -1.7M4 4l1.7 1.7M-4 4l-1.7 1.7M4 -4l1.7 -1.7",
   mesh: "",
   aim: "M0 -6l6 6l-6 6l-6 -6z",
 };
@@ -108,8 +109,7 @@ function LightHandle({ projection, name, light, position, label, change }: Handl
     if (step !== undefined) {
       applyDrag();
       go(projection.dragged(position, ...step, event.shiftKey));
-    }
-    else if ((event.key === "Delete" || event.key === "Backspace") && !event.repeat) removeLight(name);
+    } else if ((event.key === "Delete" || event.key === "Backspace") && !event.repeat) removeLight(name);
     else return;
     event.preventDefault();
     event.stopPropagation();
@@ -130,7 +130,10 @@ function LightHandle({ projection, name, light, position, label, change }: Handl
       onKeyDown={key}
     >
       <svg viewBox="-9 -9 18 18" aria-hidden="true">
-        <path d={SHAPES[label === "Move" ? light.kind : "aim"]} style={light.enabled ? { fill: toHex(emittedColor, 0) } : undefined} />
+        <path
+          d={SHAPES[label === "Move" ? light.kind : "aim"]}
+          style={light.enabled ? { fill: toHex(emittedColor, 0) } : undefined}
+        />
       </svg>
     </button>
   );
@@ -166,7 +169,13 @@ export function LightHandles({ screen }: { screen: ImageCanvas }) {
         if (anchors === null) return null;
         const common = { projection, name, light };
         return [
-          <LightHandle key={name} {...common} position={anchors.position} label="Move" change={(to) => moveLight(light, to, camera, aimLocked.value)} />,
+          <LightHandle
+            key={name}
+            {...common}
+            position={anchors.position}
+            label="Move"
+            change={(to) => moveLight(light, to, camera, aimLocked.value)}
+          />,
           name === selected && anchors.target !== null && light.kind !== "directional" && (
             <LightHandle
               key={`aim ${name}`}

@@ -13,7 +13,15 @@ import { Emission } from "./Emission";
 import { angleFieldsOf, numbersFieldsOf, type AngleField, type NumbersField } from "./lightFields";
 import { placeLight } from "./handleGeometry";
 import { completeLight, LIGHT_KINDS, labelOf, changeKind, type AddedKind } from "./lightKinds";
-import { changeLight, duplicateLight, editLight, isAddedLight, lightPath, removeLight, renameLight } from "./lightEdits";
+import {
+  changeLight,
+  duplicateLight,
+  editLight,
+  isAddedLight,
+  lightPath,
+  removeLight,
+  renameLight,
+} from "./lightEdits";
 
 interface NamedLight {
   name: string;

@@ -25,10 +25,7 @@ function LightRow({ name, light }: { name: string; light: Light }) {
     if (selected) row.current?.scrollIntoView({ block: "nearest" }); // a new light may be out of view
   }, [selected]);
   return (
-    <li
-      ref={row}
-      class={`light ${selected ? "selected" : ""} ${light.enabled ? "" : "off"}`}
-    >
+    <li ref={row} class={`light ${selected ? "selected" : ""} ${light.enabled ? "" : "off"}`}>
       <IconButton
         icon="light"
         label={`Turn ${light.enabled ? "off" : "on"} ${name}`}
@@ -103,7 +100,9 @@ export function LightsPanel() {
   return (
     <Section title={TITLE} count={all.length} actions={<LightActions />}>
       {isAddMenuOpen.value && <LightKindMenu />}
-      {all.length === 0 && look.value !== null && !isAddMenuOpen.value && <p class="environment-text">No lights yet. Click + to add one.</p>}
+      {all.length === 0 && look.value !== null && !isAddMenuOpen.value && (
+        <p class="environment-text">No lights yet. Click + to add one.</p>
+      )}
       <ul class="lights">
         {all.map(([name, light]) => (
           <LightRow key={name} name={name} light={light} />

@@ -60,7 +60,10 @@ export function renameLight(name: string, to: string): void {
   const current = look.peek();
   if (current === null || !isAddedLight(name) || to === name) return;
   if (current.lights[to] !== undefined) return showNote(`A light named “${to}” already exists.`);
-  const renamed = Object.entries(current.lights).map(([entryName, light]) => [entryName === name ? to : entryName, light]);
+  const renamed = Object.entries(current.lights).map(([entryName, light]) => [
+    entryName === name ? to : entryName,
+    light,
+  ]);
   batch(() => {
     replaceLook(`${name} · Rename to ${to}`, { ...current, lights: Object.fromEntries(renamed) as Look["lights"] });
     if (selectedLight.peek() === name) selectedLight.value = to;

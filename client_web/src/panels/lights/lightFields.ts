@@ -24,7 +24,15 @@ export interface NumbersField {
 const XYZ = ["x", "y", "z"];
 
 const NUMBERS: readonly NumbersField[] = [
-  { field: "position", editLabel: "Move", label: "Position", unit: "m", names: XYZ, ...RANGES.light.position, step: 0.01 },
+  {
+    field: "position",
+    editLabel: "Move",
+    label: "Position",
+    unit: "m",
+    names: XYZ,
+    ...RANGES.light.position,
+    step: 0.01,
+  },
   {
     field: "direction",
     editLabel: "Aim",

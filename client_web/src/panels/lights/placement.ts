@@ -44,7 +44,10 @@ function addPlacedLight(kind: AddedKind, view: string, probed: InspectAnswer): v
   const distance = length(subtract(position, projectionCameraOf(info).position));
   const radiance = meanRadiance(stage.imageOf(view));
   stopPlacement();
-  addLight(nextLightName(labelOf(kind), lightNames.peek()), createLight(kind, { position, normal, distance, radiance }));
+  addLight(
+    nextLightName(labelOf(kind), lightNames.peek()),
+    createLight(kind, { position, normal, distance, radiance }),
+  );
 }
 
 /** Place the light at the surface under this pixel of a view. */

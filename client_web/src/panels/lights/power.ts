@@ -45,7 +45,9 @@ function emittingExtent(light: Light): number {
 
 /** Power of a light in watts, with intensity and tint, whether it is on or off. */
 export function wattsOf(light: Light): number {
-  const emittedRadiance = light.emission.map((value, channel) => value * light.intensity * (light.color[channel] as number)) as Rgb;
+  const emittedRadiance = light.emission.map(
+    (value, channel) => value * light.intensity * (light.color[channel] as number),
+  ) as Rgb;
   return luminance(emittedRadiance) * emittingExtent(light);
 }
 

@@ -80,7 +80,12 @@ function SavedTile({ saved }: { saved: SavedLook }) {
           disabled={isDisplayed || !mayEdit.value}
           onClick={() => look.value && void updateLook(saved, look.value)}
         />
-        <IconButton icon="trash" label={`Delete ${saved.name}`} disabled={!mayEdit.value} onClick={() => void deleteLook(saved)} />
+        <IconButton
+          icon="trash"
+          label={`Delete ${saved.name}`}
+          disabled={!mayEdit.value}
+          onClick={() => void deleteLook(saved)}
+        />
       </span>
       <LookName saved={saved} />
     </li>
@@ -167,7 +172,8 @@ function StepTile({ count, label, look }: { count: number; label: string; look: 
 function HistorySteps() {
   const strip = useRef<HTMLUListElement>(null);
   const steps = history.steps.value;
-  const showCurrent = () => strip.current?.querySelector(".shown")?.scrollIntoView({ block: "nearest", inline: "nearest" });
+  const showCurrent = () =>
+    strip.current?.querySelector(".shown")?.scrollIntoView({ block: "nearest", inline: "nearest" });
   const cursor = history.cursor.value;
   useEffect(showCurrent, [cursor, steps.length]);
   useEffect(() => {
@@ -176,7 +182,8 @@ function HistorySteps() {
     return () => observer.disconnect();
   }, []);
   const first = Math.max(0, steps.length - MAX_STEPS);
-  const opened = steps.find((step) => step.kind === "look")?.before ?? previewedStep.value?.before ?? look.value ?? undefined;
+  const opened =
+    steps.find((step) => step.kind === "look")?.before ?? previewedStep.value?.before ?? look.value ?? undefined;
   // steps without a look, such as a deletion, show the previous image
   let last = opened;
   const tiles = steps.map((step, i) => {

@@ -65,8 +65,7 @@ export function swapWithA(): void {
   if (a === null || live === null) return;
   const cameras = currentCameras();
   stage.storeReference();
-  if (!isDeepEqual(live, a.look) && history.commitUndone())
-    showNote("Your redo steps are kept in the history.");
+  if (!isDeepEqual(live, a.look) && history.commitUndone()) showNote("Your redo steps are kept in the history.");
   replaceLook("Swap A and B", a.look);
   applyCameras(a.cameras);
   sideA.value = { look: live, label: "swapped", cameras };

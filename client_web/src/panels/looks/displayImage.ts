@@ -49,7 +49,8 @@ export function renderThumbnail(pixels: PixelBuffer, display: Display, width = T
   const step = pixels.width / width;
   const image = new ImageData(width, Math.max(1, Math.round(pixels.height / step)));
   for (let y = 0; y < image.height; y++) {
-    for (let x = 0; x < image.width; x++) writePixel(image, y * image.width + x, boxSample(pixels, x, y, step), display);
+    for (let x = 0; x < image.width; x++)
+      writePixel(image, y * image.width + x, boxSample(pixels, x, y, step), display);
   }
   return toCanvas(image).toDataURL("image/jpeg", 0.85);
 }

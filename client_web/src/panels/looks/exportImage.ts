@@ -26,7 +26,9 @@ const LONGEST_STEM = 120;
 export function fileStem(kind = "", space = ""): string {
   const limits = lightFilters.value.map((limit) => limit.label);
   const nameParts = [scene.value?.name ?? "picture", activeViewName.value, kind, ...limits, space].join(" ").trim();
-  return Array.from(nameParts.replace(/[^\p{L}\p{N}._-]+/gu, "-")).slice(0, LONGEST_STEM).join("");
+  return Array.from(nameParts.replace(/[^\p{L}\p{N}._-]+/gu, "-"))
+    .slice(0, LONGEST_STEM)
+    .join("");
 }
 
 export async function exportPng(): Promise<void> {
@@ -51,15 +53,31 @@ export function currentSize(): [number, number] | null {
 }
 
 /** Render the visible look, or other looks with the same filters, on the server; `fetchFrom`: the result's file. */
-export async function startExport(exportName: string, fetchFrom: string, more: Pick<RenderRequest, "format"> & Partial<RenderRequest>) {
+export async function startExport(
+  exportName: string,
+  fetchFrom: string,
+  more: Pick<RenderRequest, "format"> & Partial<RenderRequest>,
+) {
   const [id, current] = [bake.value, look.value];
   if (id === null || current === null) return;
-  const looks = ((more.looks as Look[] | undefined) ?? [current]).map((exportedLook) => ({ ...visibleLookOf(exportedLook) }));
-  const request = { bake: id, view: activeViewName.value, name: fileStem(exportName), size: currentSize(), ...more, looks };
+  const looks = ((more.looks as Look[] | undefined) ?? [current]).map((exportedLook) => ({
+    ...visibleLookOf(exportedLook),
+  }));
+  const request = {
+    bake: id,
+    view: activeViewName.value,
+    name: fileStem(exportName),
+    size: currentSize(),
+    ...more,
+    looks,
+  };
   await renderAndSave(exportName, fetchFrom, request, lightFilterText());
 }
 
-const KINDS = new Map<boolean | "light_groups", string>([[false, "flat"], ["light_groups", "light groups"]]);
+const KINDS = new Map<boolean | "light_groups", string>([
+  [false, "flat"],
+  ["light_groups", "light groups"],
+]);
 
 /** Export an EXR: flat, with one layer per light and per light path, or with direct and indirect light per light. */
 export function exportExr(layers: boolean | "light_groups"): Promise<void> {

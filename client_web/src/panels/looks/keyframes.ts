@@ -18,7 +18,9 @@ export const isLooping = signal(true);
 export type CameraPathMode = "still" | "around" | "along" | "object" | "environment";
 export const cameraPathMode = signal<CameraPathMode>("still");
 /** The motion possible in the active view: with a fixed camera, only of the environment. */
-export const currentPath = computed<CameraPathMode>(() => (hasFreeCamera.value || cameraPathMode.value === "environment" ? cameraPathMode.value : "still"));
+export const currentPath = computed<CameraPathMode>(() =>
+  hasFreeCamera.value || cameraPathMode.value === "environment" ? cameraPathMode.value : "still",
+);
 /** Minimum number of looks for playback. */
 export const fewestKeyframes = computed(() => (currentPath.value === "still" || currentPath.value === "along" ? 2 : 1));
 
@@ -30,7 +32,8 @@ function replaceKeyframes(label: string, after: readonly Keyframe[]): void {
 }
 
 export function addKeyframe(keyframe: Keyframe): void {
-  if (keyframes.peek().length < MAX_KEYFRAMES) replaceKeyframes(`Add ${keyframe.name} to timeline`, [...keyframes.peek(), keyframe]);
+  if (keyframes.peek().length < MAX_KEYFRAMES)
+    replaceKeyframes(`Add ${keyframe.name} to timeline`, [...keyframes.peek(), keyframe]);
 }
 
 export function removeKeyframe(index: number): void {
@@ -42,13 +45,17 @@ export function removeKeyframe(index: number): void {
 export function moveKeyframe(index: number, offset: -1 | 1): void {
   const [moved, to] = [keyframes.peek()[index], index + offset];
   if (moved === undefined || to < 0 || to >= keyframes.peek().length) return;
-  replaceKeyframes(`Move ${moved.name} ${offset < 0 ? "earlier" : "later"}`, keyframes.peek().toSpliced(index, 1).toSpliced(to, 0, moved));
+  replaceKeyframes(
+    `Move ${moved.name} ${offset < 0 ? "earlier" : "later"}`,
+    keyframes.peek().toSpliced(index, 1).toSpliced(to, 0, moved),
+  );
 }
 
 /** Change a keyframe's camera on the camera path. */
 export function setKeyframeCamera(index: number, camera: NonNullable<Keyframe["camera"]>): void {
   const moved = keyframes.peek()[index];
-  if (moved !== undefined) replaceKeyframes(`Camera of ${moved.name}`, keyframes.peek().with(index, { ...moved, camera }));
+  if (moved !== undefined)
+    replaceKeyframes(`Camera of ${moved.name}`, keyframes.peek().with(index, { ...moved, camera }));
 }
 
 /** A name for an unsaved look. */
@@ -87,7 +94,12 @@ export function trackTimeline(): void {
   effect(() => {
     const id = scene.value?.id ?? null;
     const [shownKeys, cameraPath] = [keyframes.value, cameraPathMode.value];
-    const stored: StoredTimeline = { keyframes: shownKeys, seconds: seconds.value, interpolation: interpolation.value, cameraPath };
+    const stored: StoredTimeline = {
+      keyframes: shownKeys,
+      seconds: seconds.value,
+      interpolation: interpolation.value,
+      cameraPath,
+    };
     if (id === null) return;
     if (id !== displayedScene) {
       displayedScene = id;

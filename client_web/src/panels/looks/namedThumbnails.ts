@@ -28,7 +28,8 @@ export async function uploadThumbnail(path: string, etag: string): Promise<void>
   try {
     await fetchThumbnail(etag);
     const base64 = thumbnailOf(etag);
-    if (base64 !== null && mayEdit.peek()) await request(`${path}/thumbnail`, json("PUT", { picture: base64 }, { "If-Match": etag }));
+    if (base64 !== null && mayEdit.peek())
+      await request(`${path}/thumbnail`, json("PUT", { picture: base64 }, { "If-Match": etag }));
   } catch {
     // the look has changed or the server is unreachable: the next client to show it uploads one
   }

@@ -17,7 +17,12 @@ interface ExportJob {
 }
 
 /** The running export: its progress, and a way to stop it once it has started. */
-export const exporting = signal<{ exportName: string; progress: number; secondsLeft: number | null; stop: (() => void) | null } | null>(null);
+export const exporting = signal<{
+  exportName: string;
+  progress: number;
+  secondsLeft: number | null;
+  stop: (() => void) | null;
+} | null>(null);
 
 export function exportText({ exportName, progress, secondsLeft }: NonNullable<typeof exporting.value>): string {
   const left = secondsLeft === null ? "" : `, ${formatSeconds(secondsLeft)} left`;
@@ -44,7 +49,10 @@ async function finishRendering({ id, exportName }: ExportJob): Promise<RenderBod
     const state = await nullIfUnavailable(getRender(id));
     if (isStopped()) return null;
     if (state?.state === "ready" || state?.state === "failed") return state;
-    const { progress, seconds_left: secondsLeft } = state ?? { progress: exporting.peek()?.progress ?? 0, seconds_left: null };
+    const { progress, seconds_left: secondsLeft } = state ?? {
+      progress: exporting.peek()?.progress ?? 0,
+      seconds_left: null,
+    };
     exporting.value = { exportName, progress, secondsLeft, stop };
     await new Promise((waited) => setTimeout(waited, POLL_MS));
     if (isStopped()) return null;
@@ -80,7 +88,12 @@ async function runExport(exportName: string, work: () => Promise<void>): Promise
 }
 
 /** Render and download a job, unless one is running; `light`: text of the active filters. */
-export async function renderAndSave(exportName: string, fetchFrom: string, request: RenderRequest, light: string): Promise<void> {
+export async function renderAndSave(
+  exportName: string,
+  fetchFrom: string,
+  request: RenderRequest,
+  light: string,
+): Promise<void> {
   if (exporting.peek() !== null) return;
   await runExport(exportName, async () => {
     showNote(`Rendering ${exportName}${light}…`);

@@ -62,9 +62,7 @@ function reportConflict(error: unknown, name: string, isNew = false): never {
     throw new Error(`A look named “${name}” already exists, perhaps in another scene. Choose another name.`);
   if (error instanceof ApiError && (error.status === 412 || error.status === 428)) {
     void refreshSavedLooks();
-    throw new Error(
-      `“${name}” was changed elsewhere. Nothing was overwritten; check the new version first.`,
-    );
+    throw new Error(`“${name}” was changed elsewhere. Nothing was overwritten; check the new version first.`);
   }
   throw error;
 }
@@ -97,8 +95,13 @@ async function eraseLook(name: string): Promise<void> {
 }
 
 /** Replace a saved look by another; null: none. `image`: its thumbnail, if any. */
-export async function exchangeSavedLook(from: NamedLook | null, to: NamedLook | null, image: string | null = null): Promise<void> {
-  if (to !== null) await writeLook({ created: from?.created, ...to }, from?.name === to.name ? etagOf(to.name) : null, image);
+export async function exchangeSavedLook(
+  from: NamedLook | null,
+  to: NamedLook | null,
+  image: string | null = null,
+): Promise<void> {
+  if (to !== null)
+    await writeLook({ created: from?.created, ...to }, from?.name === to.name ? etagOf(to.name) : null, image);
   if (from !== null && from.name !== to?.name) await eraseLook(from.name);
 }
 
@@ -114,7 +117,12 @@ let pendingChange: Promise<void> | null = null;
 /** Resolves when all changes are done and in the history; null without pending changes. */
 export const whenSaved = (): Promise<void> | null => pendingChange;
 
-async function runChange(label: string, before: NamedLook | null, to: NamedLook | null, image: string | null): Promise<void> {
+async function runChange(
+  label: string,
+  before: NamedLook | null,
+  to: NamedLook | null,
+  image: string | null,
+): Promise<void> {
   await reportErrors(async () => {
     await exchangeSavedLook(before, to, image);
     const saved = savedLooks.value.find(({ name }) => name === to?.name);

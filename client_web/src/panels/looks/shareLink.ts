@@ -52,7 +52,16 @@ export async function copyShareLink(): Promise<void> {
 function urlStateOf(shared: ShareBody, room: string | null, watch: string | null): UrlState {
   const sideBySide = shared.views.length > 1 ? shared.views : [];
   const nothing = { material: null, term: 0, curve: null, light: null };
-  return { scene: shared.scene, bake: shared.bake, view: shared.view, sideBySide, ...nothing, room, watch, share: shared.id };
+  return {
+    scene: shared.scene,
+    bake: shared.bake,
+    view: shared.view,
+    sideBySide,
+    ...nothing,
+    room,
+    watch,
+    share: shared.id,
+  };
 }
 
 /** Apply a shared state: the look is a step, which undo reverts. */

@@ -27,7 +27,8 @@ let timer = 0;
 /** Set the thumbnail of a saved look or scene variant that has none, when it is shown. */
 export function attachThumbnail(storedLook: Look, image: string): void {
   const isOf = (partial: unknown) => isDeepEqual(completeLook(partial as Partial<Look>), storedLook);
-  for (const saved of savedLooks.peek()) if (thumbnailOf(saved.etag) === null && isOf(saved.look)) attachSavedThumbnail(saved, image);
+  for (const saved of savedLooks.peek())
+    if (thumbnailOf(saved.etag) === null && isOf(saved.look)) attachSavedThumbnail(saved, image);
   for (const { name, look: partial } of scene.peek()?.variants ?? []) {
     if (variantThumbnail(name) === null && isOf(partial)) storeVariantThumbnail(name, image);
   }
@@ -54,7 +55,8 @@ function currentStep(): Look | null {
   return done?.after ?? steps.slice(cursor).find(isCurrentLook)?.before ?? null;
 }
 
-const isStepLook = (candidate: Look) => history.steps.peek().some((step) => step.before === candidate || step.after === candidate);
+const isStepLook = (candidate: Look) =>
+  history.steps.peek().some((step) => step.before === candidate || step.after === candidate);
 
 /** Take a step's thumbnail when it is left, if it has none: input may be faster than shading. */
 function takePreviousThumbnail(left: Look): void {

@@ -18,7 +18,8 @@ function reverseStep({ before, after, patch, inverse }: LookStep): LookChange {
 /** The part of a change that nobody else has edited since: users undo only their own edits. */
 function isUnchangedSince(change: LookChange, step: LookStep, current: Look): LookChange {
   const patch = change.patch.filter(({ path }) => isDeepEqual(getAt(current, path), getAt(change.before, path)));
-  if (patch.length < change.patch.length) showNote(`“${step.label}” was changed by someone else; their version is kept.`);
+  if (patch.length < change.patch.length)
+    showNote(`“${step.label}” was changed by someone else; their version is kept.`);
   return changeByPatch(current, patch);
 }
 
@@ -26,7 +27,8 @@ function isUnchangedSince(change: LookChange, step: LookStep, current: Look): Lo
  * in between, the patch is computed again. */
 function applyStep(step: Step, isUndo: boolean): void | Promise<void> {
   if (step.kind === "timeline") return void (keyframes.value = isUndo ? step.before : step.after);
-  if (step.kind === "savedLook") return isUndo ? exchangeSavedLook(step.after, step.before) : exchangeSavedLook(step.before, step.after);
+  if (step.kind === "savedLook")
+    return isUndo ? exchangeSavedLook(step.after, step.before) : exchangeSavedLook(step.before, step.after);
   const change = isUndo ? reverseStep(step) : step;
   const current = look.peek();
   if (isInRoom.peek() && current !== null) return applyChange(isUnchangedSince(change, step, current));

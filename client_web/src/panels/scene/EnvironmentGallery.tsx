@@ -5,7 +5,13 @@ import { bake } from "../../state/bakes";
 import { look } from "../../state/look";
 import { IconButton } from "../../ui/IconButton";
 import { onRadioKey } from "../../ui/radio";
-import { chooseEnvironment, environments, importProgress, loadEnvironments, importEnvironmentFile } from "./environments";
+import {
+  chooseEnvironment,
+  environments,
+  importProgress,
+  loadEnvironments,
+  importEnvironmentFile,
+} from "./environments";
 
 interface EnvironmentEntry {
   map: string | null;
@@ -16,12 +22,25 @@ interface EnvironmentEntry {
 }
 
 function entriesOf(current: string): EnvironmentEntry[] {
-  const ownEntry = { map: null, name: "Original", title: "The scene’s original environment", thumbnail: bakedEnvironmentThumbnailUrl(current) };
+  const ownEntry = {
+    map: null,
+    name: "Original",
+    title: "The scene’s original environment",
+    thumbnail: bakedEnvironmentThumbnailUrl(current),
+  };
   const importedEntries = environments.value.map(({ map, name, thumbnail }) => ({ map, name, title: name, thumbnail }));
   return [ownEntry, ...importedEntries];
 }
 
-function EnvironmentTile({ entry, isSelected, focusable }: { entry: EnvironmentEntry; isSelected: boolean; focusable: boolean }) {
+function EnvironmentTile({
+  entry,
+  isSelected,
+  focusable,
+}: {
+  entry: EnvironmentEntry;
+  isSelected: boolean;
+  focusable: boolean;
+}) {
   return (
     <button
       type="button"
@@ -79,7 +98,9 @@ export function EnvironmentGallery() {
         role="radiogroup"
         aria-label="Environment"
         onKeyDown={(event) =>
-          onRadioKey(event, entries.length, focusable, (index) => chooseEnvironment((entries[index] as EnvironmentEntry).map))
+          onRadioKey(event, entries.length, focusable, (index) =>
+            chooseEnvironment((entries[index] as EnvironmentEntry).map),
+          )
         }
       >
         {entries.map((entry, k) => (
@@ -88,7 +109,9 @@ export function EnvironmentGallery() {
       </div>
       <div class="environment-text" role="status">
         {importProgress.value}
-        {map !== null && <p>This environment was added after baking, so shadows of small light sources are approximate.</p>}
+        {map !== null && (
+          <p>This environment was added after baking, so shadows of small light sources are approximate.</p>
+        )}
       </div>
     </>
   );

@@ -17,16 +17,15 @@ function EnvironmentActions({ scale }: { scale: number }) {
   const isOn = scale > 0;
   const toggle = () => {
     if (isOn) previousScale.current = scale;
-    editValue(isOn ? "Turn off environment" : "Turn on environment", "/environment/intensity", isOn ? 0 : previousScale.current);
+    editValue(
+      isOn ? "Turn off environment" : "Turn on environment",
+      "/environment/intensity",
+      isOn ? 0 : previousScale.current,
+    );
   };
   return (
     <>
-      <IconButton
-        icon="light"
-        label={`Turn ${isOn ? "off" : "on"} environment`}
-        pressed={isOn}
-        onClick={toggle}
-      />
+      <IconButton icon="light" label={`Turn ${isOn ? "off" : "on"} environment`} pressed={isOn} onClick={toggle} />
       <IconButton
         icon="solo"
         label="Solo environment"

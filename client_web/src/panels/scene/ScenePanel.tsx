@@ -24,7 +24,8 @@ function MaterialSwatch({ name, material }: { name: string; material: MaterialLo
   const ball = displayedBalls.value.get(name);
   if (ball !== undefined) return <span class="swatch" style={{ background: `url(${ball}) center / 130%` }} />;
   const measured = terms.find((term) => term.data != null)?.data;
-  if (measured != null) return <span class="swatch" style={{ background: `url(${measuredThumbnailUrl(measured)}) center / 130%` }} />;
+  if (measured != null)
+    return <span class="swatch" style={{ background: `url(${measuredThumbnailUrl(measured)}) center / 130%` }} />;
   const diffuse = terms.find((term) => modelOf(term)?.texture === "diffuse");
   const glossy = terms.find((term) => modelOf(term)?.texture !== "diffuse");
   const body = diffuse === undefined ? "#1c1c1c" : toHex(diffuse.color);
@@ -59,9 +60,7 @@ function MaterialList() {
     >
       {materialNames.value.map((name) => {
         const material = look.value?.materials[name];
-        const changed =
-          look.value !== null &&
-          !isDeepEqual(material, defaultLook.value?.materials[name]);
+        const changed = look.value !== null && !isDeepEqual(material, defaultLook.value?.materials[name]);
         return (
           <button
             key={name}

@@ -59,7 +59,8 @@ export async function importEnvironmentFile(files: readonly File[]): Promise<voi
     return;
   }
   const onProgress = (fraction: number) =>
-    (importProgress.value = fraction < 1 ? `Uploading ${file.name}, ${Math.round(100 * fraction)} %` : `Processing ${file.name}…`);
+    (importProgress.value =
+      fraction < 1 ? `Uploading ${file.name}, ${Math.round(100 * fraction)} %` : `Processing ${file.name}…`);
   onProgress(0);
   const body = await reportErrors(() => uploadEnvironment(file, onProgress), "files");
   importProgress.value = null;

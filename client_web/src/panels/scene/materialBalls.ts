@@ -17,7 +17,8 @@ export const displayedBalls = signal<ReadonlyMap<string, string>>(new Map());
 let timer: ReturnType<typeof setTimeout> | undefined;
 let isBusy = false;
 
-const keyOf = (sceneId: string, material: string, terms: readonly Term[]): string => JSON.stringify([sceneId, material, terms]);
+const keyOf = (sceneId: string, material: string, terms: readonly Term[]): string =>
+  JSON.stringify([sceneId, material, terms]);
 
 function store(key: string, ball: string | null): void {
   materialBalls.set(key, ball);
@@ -35,7 +36,9 @@ async function requestBalls(): Promise<void> {
   // a ball shows only reflection, not the transmission of glass
   const renderable = Object.entries(materials).filter(([name]) => materialOf(name)?.is_glass !== true);
   const keys = renderable.map(([name, { terms }]) => [name, keyOf(sceneId, name, terms), terms] as const);
-  displayedBalls.value = new Map(keys.flatMap(([name, key]) => (materialBalls.get(key) == null ? [] : [[name, materialBalls.get(key) as string]])));
+  displayedBalls.value = new Map(
+    keys.flatMap(([name, key]) => (materialBalls.get(key) == null ? [] : [[name, materialBalls.get(key) as string]])),
+  );
   const next = keys.find(([, key]) => !materialBalls.has(key));
   if (next === undefined || isBusy) return;
   const [name, key, terms] = next;

@@ -51,7 +51,9 @@ const FIXED_CAMERA_MOTIONS: CameraPathMode[] = ["still", "environment"];
 
 /** Chooses the motion during playback. */
 function MotionSelect() {
-  const options = Object.entries(MOTION_LABELS).filter(([mode]) => hasFreeCamera.value || FIXED_CAMERA_MOTIONS.includes(mode as CameraPathMode));
+  const options = Object.entries(MOTION_LABELS).filter(
+    ([mode]) => hasFreeCamera.value || FIXED_CAMERA_MOTIONS.includes(mode as CameraPathMode),
+  );
   return (
     <select
       aria-label="Motion"
@@ -151,8 +153,18 @@ function KeyframeTile({ index, name }: { index: number; name: string }) {
           }}
         />
       )}
-      <IconButton icon="earlier" label={`Move ${name} earlier`} disabled={index === 0} onClick={() => moveKeyframe(index, -1)} />
-      <IconButton icon="later" label={`Move ${name} later`} disabled={index === last} onClick={() => moveKeyframe(index, 1)} />
+      <IconButton
+        icon="earlier"
+        label={`Move ${name} earlier`}
+        disabled={index === 0}
+        onClick={() => moveKeyframe(index, -1)}
+      />
+      <IconButton
+        icon="later"
+        label={`Move ${name} later`}
+        disabled={index === last}
+        onClick={() => moveKeyframe(index, 1)}
+      />
       <IconButton icon="close" label={`Remove ${name}`} onClick={() => removeKeyframe(index)} />
     </li>
   );
@@ -168,7 +180,8 @@ function AddKeyframe() {
   const lookChoiceMap = lookChoices();
   const addChoice = (choiceKey: string) => {
     const live = look.peek();
-    if (choiceKey === "live" && live !== null) addKeyframe({ name: nextKeyframeName(), look: live, camera: currentPose() });
+    if (choiceKey === "live" && live !== null)
+      addKeyframe({ name: nextKeyframeName(), look: live, camera: currentPose() });
     const saved = lookChoiceMap.get(choiceKey);
     if (saved !== undefined) addKeyframe({ name: saved.name, look: completeLook(saved.look), camera: currentPose() });
   };
@@ -209,7 +222,9 @@ function RenderSelect() {
     >
       <option value="">Render…</option>
       {hasFreeCamera.value && <option value="mp4 quick">Video (fast), {count} frames</option>}
-      <option value="mp4 exact">Video{hasFreeCamera.value ? " (full quality)" : ""}, {count} frames at {FPS} fps</option>
+      <option value="mp4 exact">
+        Video{hasFreeCamera.value ? " (full quality)" : ""}, {count} frames at {FPS} fps
+      </option>
       {hasFreeCamera.value && <option value="png quick">PNG sequence (fast), ZIP</option>}
       <option value="png exact">PNG sequence{hasFreeCamera.value ? " (full quality)" : ""}, ZIP</option>
     </select>
@@ -219,7 +234,11 @@ function RenderSelect() {
 /** A component of its own: the previewed look changes with every frame. */
 function KeepLookButton() {
   return (
-    <button disabled={previewedStep.value === null} title="Continue with the look shown, as one step" onClick={commitShownLook}>
+    <button
+      disabled={previewedStep.value === null}
+      title="Continue with the look shown, as one step"
+      onClick={commitShownLook}
+    >
       Use this look
     </button>
   );
@@ -240,10 +259,19 @@ export function Timeline() {
         <span class="timeline-hint" role="status">
           {hintText}
         </span>
-        <RadioRow label="Interpolation" choices={INTERPOLATIONS} selected={interpolation.value} onSelect={(mode) => (interpolation.value = mode)} />
+        <RadioRow
+          label="Interpolation"
+          choices={INTERPOLATIONS}
+          selected={interpolation.value}
+          onSelect={(mode) => (interpolation.value = mode)}
+        />
         <RenderSelect />
         <KeepLookButton />
-        <IconButton icon="close" label="Close timeline and restore the look" onClick={() => (timelineOpen.value = false)} />
+        <IconButton
+          icon="close"
+          label="Close timeline and restore the look"
+          onClick={() => (timelineOpen.value = false)}
+        />
       </div>
     </section>
   );

@@ -9,7 +9,15 @@ import { bake } from "../../state/bakes";
 import { timelineOpen } from "../../state/panels";
 import { activeViewName } from "../../state/views";
 import { reportErrors } from "../../ui/toasts";
-import { interpolation, fewestKeyframes, keyframes, isLooping, seconds, currentPath, type CameraPathMode } from "../looks/keyframes";
+import {
+  interpolation,
+  fewestKeyframes,
+  keyframes,
+  isLooping,
+  seconds,
+  currentPath,
+  type CameraPathMode,
+} from "../looks/keyframes";
 
 export const FPS = 25;
 const REQUEST_DELAY_MS = 120; // after the last change of the timeline
@@ -32,7 +40,11 @@ export function renderPath(motion: CameraPathMode, num: number): NonNullable<Ren
   if (freeCamera === null || motion === "still") return null;
   const cameras = keyframes.peek().map((key): CameraPose => key.camera ?? freeCamera.first);
   if (motion === "along") return { cameras: cameras };
-  return { turntable: num, rotate: motion === "object" ? motion : "camera", start_camera: cameras[0] ?? freeCamera.first };
+  return {
+    turntable: num,
+    rotate: motion === "object" ? motion : "camera",
+    start_camera: cameras[0] ?? freeCamera.first,
+  };
 }
 
 function showPlayhead(): void {
@@ -113,7 +125,11 @@ effect(() => {
 let newestRequest = 0;
 effect(() => {
   const [id, looks] = [bake.value, keyframes.value.map(({ look }) => look)];
-  const body = { frames: Math.max(numFrames.value, looks.length), between: interpolation.value, view: activeViewName.value };
+  const body = {
+    frames: Math.max(numFrames.value, looks.length),
+    between: interpolation.value,
+    view: activeViewName.value,
+  };
   const motion = currentPath.value;
   const requestNumber = ++newestRequest;
   frameLookList.value = null;

@@ -20,13 +20,17 @@ export function parseLut(bytes: ArrayBuffer): LutTable {
 export function sampleLut(table: LutTable, radiance: Rgb): Rgb {
   const coordinates = radiance.map((x) => Math.min(LAST, SCALE * Math.log1p(LUT_GAIN * Math.sqrt(Math.max(0, x)))));
   const nodes = coordinates.map((coordinate) => Math.min(LAST - 1, Math.floor(coordinate)));
-  const steps = coordinates.map((coordinate, c) => ({ fraction: coordinate - (nodes[c] as number), by: STEPS[c] as number }));
+  const steps = coordinates.map((coordinate, c) => ({
+    fraction: coordinate - (nodes[c] as number),
+    by: STEPS[c] as number,
+  }));
   steps.sort((a, b) => b.fraction - a.fraction); // the largest fraction first: from the corner at 0 to the one at 1
   let index = nodes.reduce((sum, node, c) => sum + node * (STEPS[c] as number), 0);
   const displayed: Rgb = [0, 0, 0];
   let previousFraction = 1;
   for (const { fraction, by } of [...steps, { fraction: 0, by: 0 }]) {
-    for (let c = 0; c < 3; c++) displayed[c] = (displayed[c] as number) + (previousFraction - fraction) * (table[index + c] as number);
+    for (let c = 0; c < 3; c++)
+      displayed[c] = (displayed[c] as number) + (previousFraction - fraction) * (table[index + c] as number);
     index += by;
     previousFraction = fraction;
   }

@@ -136,7 +136,8 @@ export const albedoGlsl = (lobe: string) =>
   `mix(texelFetch(uLobes, at(${lobe}), 0).rgb, texelFetch(uLobes, at(${lobe} + ${NUM_GROUPS + 1}), 0).rgb, fraction)`;
 
 /** Difference of that albedo between neighboring rows. */
-export const albedoStepGlsl = (lobe: string) => `(texelFetch(uLobes, at(${lobe} + ${NUM_GROUPS + 1}), 0).rgb - texelFetch(uLobes, at(${lobe}), 0).rgb)`;
+export const albedoStepGlsl = (lobe: string) =>
+  `(texelFetch(uLobes, at(${lobe} + ${NUM_GROUPS + 1}), 0).rgb - texelFetch(uLobes, at(${lobe}), 0).rgb)`;
 /** Y of linear Rec. 709. */
 export const LUMINANCE = [0.2126, 0.7152, 0.0722] as const;
 export const luminanceGlsl = `vec3(${LUMINANCE.join(", ")})`;

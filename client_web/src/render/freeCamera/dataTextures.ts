@@ -49,13 +49,26 @@ export class DataTextures {
     const [internal, format, type] = formatOf(gl, kind, numbers);
     const count = bytes.byteLength / (BYTES_PER_TEXEL[kind] * numbers);
     const height = Math.max(1, Math.ceil(count / TEXELS_PER_ROW));
-    if (height > (gl.getParameter(gl.MAX_TEXTURE_SIZE) as number)) throw new Error(`The array “${name}” is too large for this browser's textures`);
+    if (height > (gl.getParameter(gl.MAX_TEXTURE_SIZE) as number))
+      throw new Error(`The array “${name}” is too large for this browser's textures`);
     gl.bindTexture(gl.TEXTURE_2D, this.textureNamed(name));
     gl.texImage2D(gl.TEXTURE_2D, 0, internal, TEXELS_PER_ROW, height, 0, format, type, null);
     const [view, fullRows] = [viewOf(kind, bytes), Math.floor(count / TEXELS_PER_ROW)];
     if (fullRows > 0) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, TEXELS_PER_ROW, fullRows, format, type, view, 0);
     const remainder = count - fullRows * TEXELS_PER_ROW;
-    if (remainder > 0) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, fullRows, remainder, 1, format, type, view, fullRows * TEXELS_PER_ROW * numbers);
+    if (remainder > 0)
+      gl.texSubImage2D(
+        gl.TEXTURE_2D,
+        0,
+        0,
+        fullRows,
+        remainder,
+        1,
+        format,
+        type,
+        view,
+        fullRows * TEXELS_PER_ROW * numbers,
+      );
     this.counts.set(name, count);
   }
 
@@ -63,7 +76,8 @@ export class DataTextures {
   uploadMap(name: string, width: number, height: number, encoded: Uint8Array): void {
     const { gl } = this;
     gl.bindTexture(gl.TEXTURE_2D, this.textureNamed(name));
-    for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.LINEAR);
+    for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER])
+      gl.texParameteri(gl.TEXTURE_2D, filter, gl.LINEAR);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.REPEAT);
     const view = viewOf("rgb9e5", encoded.subarray(0, 4 * width * height));
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGB9_E5, width, height, 0, gl.RGB, gl.UNSIGNED_INT_5_9_9_9_REV, view);
@@ -82,7 +96,8 @@ export class DataTextures {
     const texture = gl.createTexture();
     this.textures.set(name, texture);
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
+    for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER])
+      gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
     for (const wrap of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, wrap, gl.CLAMP_TO_EDGE);
     return texture;
   }

@@ -45,7 +45,21 @@ const STORED_ARRAYS: Record<string, [TexelType, number]> = {
   levels: ["uint32", 4],
 };
 /** Arrays of the probe shader, besides incident radiance coefficients. */
-const PROBE_ARRAYS = ["probe_positions", "probe_normals", "tangents", "isotropic", "anisotropic", "lobes", "environment", "visible_lights", "lobe_lights", "lobe_lists", "lobe_firsts", "bright_light_members", "environment_lights"];
+const PROBE_ARRAYS = [
+  "probe_positions",
+  "probe_normals",
+  "tangents",
+  "isotropic",
+  "anisotropic",
+  "lobes",
+  "environment",
+  "visible_lights",
+  "lobe_lights",
+  "lobe_lists",
+  "lobe_firsts",
+  "bright_light_members",
+  "environment_lights",
+];
 const SAMPLES = 4; // per pixel
 const NEAR_PLANE = 1e-4; // fraction of the scene's size, to the nearest visible point
 const FAR_PLANE = 100;
@@ -93,7 +107,8 @@ export class FreeCameraRenderer {
     arrays: ReadonlyMap<string, Uint8Array>,
   ) {
     this.gl = gl;
-    if (gl.getExtension("EXT_color_buffer_float") === null) throw new Error("This browser cannot render floating-point images");
+    if (gl.getExtension("EXT_color_buffer_float") === null)
+      throw new Error("This browser cannot render floating-point images");
     if (gl.getParameter(gl.MAX_DRAW_BUFFERS) < LAYERS) throw new Error("This browser supports too few render targets");
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     this.texels = new DataTextures(gl);
@@ -160,7 +175,10 @@ export class FreeCameraRenderer {
   private setMaterials(): void {
     const { gl, rows, scales } = this;
     const previous = JSON.stringify(this.materials.map(({ pixels }) => pixels));
-    this.materials = readMaterials(new Int32Array(rows.materials.buffer), (name, k) => scales.get(`${name}/${k}/scale`)?.[1] ?? 0);
+    this.materials = readMaterials(
+      new Int32Array(rows.materials.buffer),
+      (name, k) => scales.get(`${name}/${k}/scale`)?.[1] ?? 0,
+    );
     this.layers = layersOfMaterials(this.materials);
     if (JSON.stringify(this.materials.map(({ pixels }) => pixels)) === previous) return;
     for (const { buffer } of this.faces) gl.deleteBuffer(buffer);
@@ -199,7 +217,10 @@ export class FreeCameraRenderer {
     this.materials.forEach(({ points, tables, lobe }, k) => {
       const [first, end] = [surface.first_probes[k] as number, surface.first_probes[k + 1] as number];
       if (first === end) return;
-      const compiled = this.program({ points, layers }, () => new Program(gl, FULLSCREEN_VERTEX, probeShader(surface, points, layers)));
+      const compiled = this.program(
+        { points, layers },
+        () => new Program(gl, FULLSCREEN_VERTEX, probeShader(surface, points, layers)),
+      );
       const program = this.use(compiled, PROBE_ARRAYS);
       this.bindVectors(program, "vectors", k, PROBE_ARRAYS.length);
       this.bindVectors(program, "others", k, PROBE_ARRAYS.length + 1);
@@ -209,7 +230,11 @@ export class FreeCameraRenderer {
       gl.uniform2iv(program.uniform("uTables"), tables.plain);
       gl.uniform4iv(program.uniform("uHighlights"), tables.highlights);
       gl.uniform1i(program.uniform("uLobe"), lobe);
-      gl.uniform1i(program.uniform("uVisibilityTexels"), this.texels.count("visible_lights") / Math.max(1, surface.first_probes[surface.first_probes.length - 1] as number));
+      gl.uniform1i(
+        program.uniform("uVisibilityTexels"),
+        this.texels.count("visible_lights") /
+          Math.max(1, surface.first_probes[surface.first_probes.length - 1] as number),
+      );
       gl.uniform3fv(program.uniform("uCameraPosition"), positionOf(camera));
       this.setEnvironmentUniforms(program, numbers);
       for (const rectangle of rectanglesOf(first, end)) {
@@ -225,7 +250,10 @@ export class FreeCameraRenderer {
     const array = `${name}/${material}`;
     this.texels.bind(array, unit);
     gl.uniform1i(program.uniform(uniform(name)), unit);
-    gl.uniform1f(program.uniform(name === "vectors" ? "uScale" : "uOthersScale"), this.scales.get(`${array}/scale`)?.[0] ?? 1);
+    gl.uniform1f(
+      program.uniform(name === "vectors" ? "uScale" : "uOthersScale"),
+      this.scales.get(`${array}/scale`)?.[0] ?? 1,
+    );
   }
 
   private drawSlots(): void {
@@ -242,7 +270,9 @@ export class FreeCameraRenderer {
     const { width, height, hasAlpha } = images;
     const [half, direct] = [Math.tan(camera.yfov / 2), this.samples === 0];
     const [across, up] = [(half * width) / height, direct ? -half : half]; // encoded images have their top row first
-    const [right, above, back] = [0, 1, 2].map((k) => [0, 1, 2].map((row) => camera.to_world[4 * row + k] as number)) as [number[], number[], number[]];
+    const [right, above, back] = [0, 1, 2].map((k) =>
+      [0, 1, 2].map((row) => camera.to_world[4 * row + k] as number),
+    ) as [number[], number[], number[]];
     const scaled = (axis: number[], factor: number) => axis.map((value) => value * factor);
     const features: ImageFeatures = { map: isMap(numbers), coverage: hasAlpha, direct };
 
@@ -255,7 +285,13 @@ export class FreeCameraRenderer {
     for (const faces of this.faces) {
       const program = this.useProgramFor(faces, features);
       this.setBackgroundUniforms(program, numbers);
-      gl.uniform4f(program.uniform("uFrustum"), 1 / across, 1 / up, (far + near) / (near - far), (2 * far * near) / (near - far));
+      gl.uniform4f(
+        program.uniform("uFrustum"),
+        1 / across,
+        1 / up,
+        (far + near) / (near - far),
+        (2 * far * near) / (near - far),
+      );
       gl.uniformMatrix3fv(program.uniform("uRotation"), false, [...right, ...above, ...back]);
       gl.uniform3fv(program.uniform("uCameraPosition"), positionOf(camera));
       gl.uniform1f(program.uniform("uPixelAngle"), camera.yfov / height);
@@ -265,9 +301,16 @@ export class FreeCameraRenderer {
       gl.drawElements(gl.TRIANGLES, faces.corners.length, gl.UNSIGNED_INT, 0);
     }
 
-    const background = this.use(this.program({ background: features }, () => new Program(gl, FULLSCREEN_VERTEX, backgroundShader(features))), ["background"]);
+    const background = this.use(
+      this.program({ background: features }, () => new Program(gl, FULLSCREEN_VERTEX, backgroundShader(features))),
+      ["background"],
+    );
     this.setBackgroundUniforms(background, numbers);
-    gl.uniformMatrix3fv(background.uniform("uRays"), false, [...scaled(right, across), ...scaled(above, up), ...scaled(back, -1)]);
+    gl.uniformMatrix3fv(background.uniform("uRays"), false, [
+      ...scaled(right, across),
+      ...scaled(above, up),
+      ...scaled(back, -1),
+    ]);
     gl.uniform2f(background.uniform("uSize"), width, height);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.disable(gl.DEPTH_TEST);
@@ -277,15 +320,37 @@ export class FreeCameraRenderer {
   private useProgramFor({ shows }: FaceClass, imageFeatures: ImageFeatures): Program {
     const { gl, surface } = this;
     const features = { ...shows, ...imageFeatures };
-    const compiled = this.program({ features }, () => new Program(gl, cornerShader(shows), surfaceShader(surface, features)));
-    const program = this.use(compiled, ["corners", "sides", "facing", "normals", "points", "weights", "unoccluded", "materials", "lobes", "environment", "levels", "texels", "uvs", "background", "positions"]);
+    const compiled = this.program(
+      { features },
+      () => new Program(gl, cornerShader(shows), surfaceShader(surface, features)),
+    );
+    const program = this.use(compiled, [
+      "corners",
+      "sides",
+      "facing",
+      "normals",
+      "points",
+      "weights",
+      "unoccluded",
+      "materials",
+      "lobes",
+      "environment",
+      "levels",
+      "texels",
+      "uvs",
+      "background",
+      "positions",
+    ]);
     this.bindValues(program, this.slotValues, 15);
     return program;
   }
 
   private encodeRadiance(images: ImageTargets, radiance: WebGLTexture): void {
     const { gl } = this;
-    const encodeProgram = this.program({ words: images.hasAlpha }, () => new Program(gl, FULLSCREEN_VERTEX, encodeShader(images.hasAlpha)));
+    const encodeProgram = this.program(
+      { words: images.hasAlpha },
+      () => new Program(gl, FULLSCREEN_VERTEX, encodeShader(images.hasAlpha)),
+    );
     images.resolve();
     gl.useProgram(encodeProgram.handle);
     gl.activeTexture(gl.TEXTURE0);
@@ -324,19 +389,31 @@ export class FreeCameraRenderer {
     const { gl } = this;
     gl.uniform3fv(program.uniform("uEnvironmentGain"), numbers.environment_gain);
     gl.uniform3iv(program.uniform("uEnvironmentLevels"), numbers.environment_mips.slice(0, ENVIRONMENT_LEVELS).flat());
-    gl.uniform1i(program.uniform("uNumEnvironmentLevels"), Math.min(ENVIRONMENT_LEVELS, numbers.environment_mips.length));
+    gl.uniform1i(
+      program.uniform("uNumEnvironmentLevels"),
+      Math.min(ENVIRONMENT_LEVELS, numbers.environment_mips.length),
+    );
     gl.uniform1f(program.uniform("uTurn"), numbers.environment_rotation);
     const brightLights = numbers.bright_lights.slice(0, MAX_BRIGHT_LIGHTS);
     gl.uniform1i(program.uniform("uNumBrightLights"), brightLights.length);
     if (brightLights.length === 0) return;
-    gl.uniform4fv(program.uniform("uBrightLightDirections"), brightLights.flatMap(([x, y, z, , , , spread]) => [x, y, z, spread]));
-    gl.uniform3fv(program.uniform("uBrightLightRadiances"), brightLights.flatMap(([, , , ...light]) => light.slice(0, 3)));
+    gl.uniform4fv(
+      program.uniform("uBrightLightDirections"),
+      brightLights.flatMap(([x, y, z, , , , spread]) => [x, y, z, spread]),
+    );
+    gl.uniform3fv(
+      program.uniform("uBrightLightRadiances"),
+      brightLights.flatMap(([, , , ...light]) => light.slice(0, 3)),
+    );
   }
 
   private setBackgroundUniforms(program: Program, numbers: Tables): void {
     const { gl } = this;
     gl.uniform3fv(program.uniform("uBackgroundGain"), numbers.background_gain);
-    gl.uniform3fv(program.uniform("uBackgroundColor"), numbers.background === "color" ? numbers.background_color : [0, 0, 0]);
+    gl.uniform3fv(
+      program.uniform("uBackgroundColor"),
+      numbers.background === "color" ? numbers.background_color : [0, 0, 0],
+    );
     gl.uniform1f(program.uniform("uTurn"), numbers.environment_rotation);
     gl.uniform1f(program.uniform("uFree"), numbers.shows_direct ? 1 : 0);
   }
@@ -344,14 +421,21 @@ export class FreeCameraRenderer {
 
 const isMap = ({ background }: Tables): boolean => background === "map" || background === "blurred";
 
-const positionOf = ({ to_world }: RenderCamera): [number, number, number] => [to_world[3] as number, to_world[7] as number, to_world[11] as number];
+const positionOf = ({ to_world }: RenderCamera): [number, number, number] => [
+  to_world[3] as number,
+  to_world[7] as number,
+  to_world[11] as number,
+];
 
 const encodedBytesOf = (bytes: Uint8Array): Uint32Array => new Uint32Array(bytes.slice().buffer);
 
 /** Diagonal of the bounding box. */
 function diagonalOf(positions: Uint8Array): number {
   const all = new Float32Array(positions.buffer, positions.byteOffset, positions.byteLength / 4);
-  const [lowest, highest] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
+  const [lowest, highest] = [
+    [Infinity, Infinity, Infinity],
+    [-Infinity, -Infinity, -Infinity],
+  ];
   for (let k = 0; k < all.length; k += 4) {
     for (let axis = 0; axis < 3; axis++) {
       lowest[axis] = Math.min(lowest[axis] as number, all[k + axis] as number);

@@ -4,11 +4,16 @@ import type { FreeCameraBody } from "../../protocol";
 import { albedoGlsl, albedoStepGlsl, NUM_GROUPS, type TableKinds, luminanceGlsl } from "./dataLayout";
 
 /** Computes `gradient`, after the sums of other light. `crossed`: the incident radiance coefficients' derivative by φ. */
-export function lobeGradientGlsl({ table_rows }: FreeCameraBody, { isotropic, anisotropic }: TableKinds, crossed: string): string {
+export function lobeGradientGlsl(
+  { table_rows }: FreeCameraBody,
+  { isotropic, anisotropic }: TableKinds,
+  crossed: string,
+): string {
   const groups = isotropic.flatMap((is, group) => (is ? [group] : []));
   const sum = (value: (group: number) => string) => groups.map(value).join(" + ");
   const table = (group: number) => `uHighlights[${group}].z`;
-  const groupValue = (group: number) => (anisotropic[group] ? `isotropic(${table(group)}, row, fraction)` : `beside${group}`);
+  const groupValue = (group: number) =>
+    anisotropic[group] ? `isotropic(${table(group)}, row, fraction)` : `beside${group}`;
   const texel = (group: number) => `albedos + ${group}`;
   return `int albedos = (uLobe * ${table_rows} + row) * ${NUM_GROUPS + 1};
   vec3 outgoing = ${sum(groupValue)}, rowStep = ${sum((group) => `isotropicStep(${table(group)}, row)`)};

@@ -2,7 +2,9 @@
 import type { FreeCameraBody } from "../../protocol";
 
 /** Visible fraction of the environment's light in a lobe, and of two bright lights. */
-export const lobeVisibilityGlsl = ({ lobe_lists: { bins_per_side, max_listed, lights_per_bright_light: lightsPerBrightLight, min_width, widths } }: FreeCameraBody) => `
+export const lobeVisibilityGlsl = ({
+  lobe_lists: { bins_per_side, max_listed, lights_per_bright_light: lightsPerBrightLight, min_width, widths },
+}: FreeCameraBody) => `
 uniform usampler2D uVisibleLights;
 uniform isampler2D uLobeLists, uLobeFirsts;
 uniform sampler2D uLobeLights, uBrightLightMembers;

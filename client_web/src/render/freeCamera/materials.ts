@@ -32,10 +32,19 @@ const TEXTURE = 3;
 export function readMaterials(rows: Int32Array, functions: FunctionCounts): RendererMaterial[] {
   const groups = Array.from({ length: NUM_GROUPS }, (_, group) => group);
   return Array.from({ length: rows.length / (4 * MATERIAL_TEXELS) }, (_, index) => {
-    const tableValue = (texel: number, number: number) => rows[4 * (index * MATERIAL_TEXELS + texel) + number] as number;
-    const [lobe, normalMap, catchesShadows] = [tableValue(NUM_GROUPS, 0), tableValue(NUM_GROUPS, 1), tableValue(NUM_GROUPS, 2)];
+    const tableValue = (texel: number, number: number) =>
+      rows[4 * (index * MATERIAL_TEXELS + texel) + number] as number;
+    const [lobe, normalMap, catchesShadows] = [
+      tableValue(NUM_GROUPS, 0),
+      tableValue(NUM_GROUPS, 1),
+      tableValue(NUM_GROUPS, 2),
+    ];
     const emittingGroups = groups.filter((group) => tableValue(group, EMISSION) > 0);
-    const kinds = groups.map((group) => [tableValue(group, ISOTROPIC_TABLE), tableValue(group, ANISOTROPIC_TABLE), ...[0, 1, 2, 3].map((k) => tableValue(NUM_GROUPS + 2 + group, k))]);
+    const kinds = groups.map((group) => [
+      tableValue(group, ISOTROPIC_TABLE),
+      tableValue(group, ANISOTROPIC_TABLE),
+      ...[0, 1, 2, 3].map((k) => tableValue(NUM_GROUPS + 2 + group, k)),
+    ]);
     const kindsAt = (first: number): TableKinds => ({
       isotropic: kinds.map((indices) => (indices[first] as number) >= 0),
       anisotropic: kinds.map((indices) => (indices[first + 1] as number) >= 0),
@@ -54,11 +63,17 @@ export function readMaterials(rows: Int32Array, functions: FunctionCounts): Rend
       },
       pixels: {
         groups: emittingGroups.some((group) => group > 0),
-        textures: normalMap >= 0 || tableValue(NUM_GROUPS + 1, TEXTURE) >= 0 || emittingGroups.some((group) => tableValue(group, TEXTURE) >= 0),
+        textures:
+          normalMap >= 0 ||
+          tableValue(NUM_GROUPS + 1, TEXTURE) >= 0 ||
+          emittingGroups.some((group) => tableValue(group, TEXTURE) >= 0),
         lobes: lobe >= 0,
         catchesShadows: catchesShadows === 1,
       },
-      tables: { plain: kinds.flatMap((indices) => indices.slice(0, 2)), highlights: kinds.flatMap((kinds) => kinds.slice(2)) },
+      tables: {
+        plain: kinds.flatMap((indices) => indices.slice(0, 2)),
+        highlights: kinds.flatMap((kinds) => kinds.slice(2)),
+      },
       lobe,
     };
   });
@@ -67,7 +82,11 @@ export function readMaterials(rows: Int32Array, functions: FunctionCounts): Rend
 /** The value layers that some material needs: see `probeShader`. */
 export function layersOfMaterials(materials: readonly RendererMaterial[]): number[] {
   const any = (is: (material: RendererMaterial) => boolean) => materials.some(is);
-  const [groups, map, lobes] = [any(({ pixels }) => pixels.groups), any(({ points }) => points.map), any(({ pixels }) => pixels.lobes)];
+  const [groups, map, lobes] = [
+    any(({ pixels }) => pixels.groups),
+    any(({ points }) => points.map),
+    any(({ pixels }) => pixels.lobes),
+  ];
   return [0, ...(groups ? [1] : []), ...(groups || map ? [2] : []), ...(lobes ? [3, 4] : [])];
 }
 

@@ -4,7 +4,18 @@
  * maps. Twenty numbers per probe: radiance of three groups, the light direction, the visible fraction of the environment in the
  * lobe and of two bright lights, one unused, the gradient. */
 import type { FreeCameraBody } from "../../protocol";
-import { albedoGlsl, NUM_GROUPS, SHADER_HEADER, type TableKinds, LOBES_GLSL, LUMINANCE, EQUIRECTANGULAR_GLSL, elevationRowGlsl, ENVIRONMENT_GLSL, TEXELS_PER_ROW } from "./dataLayout";
+import {
+  albedoGlsl,
+  NUM_GROUPS,
+  SHADER_HEADER,
+  type TableKinds,
+  LOBES_GLSL,
+  LUMINANCE,
+  EQUIRECTANGULAR_GLSL,
+  elevationRowGlsl,
+  ENVIRONMENT_GLSL,
+  TEXELS_PER_ROW,
+} from "./dataLayout";
 import { lobeVisibilityGlsl } from "./lobeVisibilityShader";
 import { highlightGlsl } from "./highlightShader";
 import { lobeGradientGlsl } from "./lobeGradientShader";
@@ -16,7 +27,10 @@ const floatLiteral = (value: number) => (Number.isInteger(value) ? value.toFixed
 /** One component of four-component texels. No GLSL arrays: software rasterizers keep those in memory. */
 const texelPart = (texels: string, k: number) => `${texels}${k >> 2}.${COMPONENTS[k & 3]}`;
 const indexRange = (count: number) => Array.from({ length: count }, (_, k) => k);
-const namedTexels = (texels: string, count: number) => `vec4 ${indexRange(count).map((k) => `${texels}${k}`).join(", ")};`;
+const namedTexels = (texels: string, count: number) =>
+  `vec4 ${indexRange(count)
+    .map((k) => `${texels}${k}`)
+    .join(", ")};`;
 
 type TableKind = "plain" | "environment" | "otherLight";
 
@@ -50,7 +64,9 @@ function rotationGlsl(orders: number): string {
 
 /** Rows of the recurrence table for the functions of a material's coefficients. */
 const basisGlsl = ({ recurrence }: FreeCameraBody, { functions, otherFunctions }: ProbeFeatures) =>
-  indexRange(recurrence.order.length).filter((row) => (recurrence.cosine[row] as number) < Math.max(functions, otherFunctions));
+  indexRange(recurrence.order.length).filter(
+    (row) => (recurrence.cosine[row] as number) < Math.max(functions, otherFunctions),
+  );
 
 /** One incident radiance coefficient, stored channel by channel. The environment's is all light minus other light. */
 function loadLightGlsl(features: ProbeFeatures, quantity: TableKind, channel: number, k: number): string {
@@ -67,7 +83,9 @@ function rotatedGlsl(surface: FreeCameraBody, features: ProbeFeatures, quantity:
       const m = recurrence.order[row] as number;
       const cosine = loadLightGlsl(features, quantity, channel, recurrence.cosine[row] as number);
       const sine = loadLightGlsl(features, quantity, channel, recurrence.sine[row] as number);
-      const turn = isChange ? `${m.toFixed(1)} * (c${m} * ${sine} - s${m} * ${cosine})` : `c${m} * ${cosine} + s${m} * ${sine}`;
+      const turn = isChange
+        ? `${m.toFixed(1)} * (c${m} * ${sine} - s${m} * ${cosine})`
+        : `c${m} * ${cosine} + s${m} * ${sine}`;
       const value = m > 0 ? turn : isChange ? "0.0" : cosine;
       return `${texelPart("turned", channel * recurrence.order.length + row)} = ${value};`;
     }),
@@ -81,7 +99,9 @@ function expansionGlsl({ gradient_basis }: FreeCameraBody, features: ProbeFeatur
     const summands = row.flatMap((value, k) =>
       Math.abs(value) < 1e-7
         ? []
-        : [`${floatLiteral(value)} * (${CHANNELS.map((c) => `${LUMINANCE[c]} * ${loadLightGlsl(features, "plain", c, k)}`).join(" + ")})`],
+        : [
+            `${floatLiteral(value)} * (${CHANNELS.map((c) => `${LUMINANCE[c]} * ${loadLightGlsl(features, "plain", c, k)}`).join(" + ")})`,
+          ],
     );
     return summands.join(" + ") || "0.0";
   });
@@ -94,10 +114,14 @@ function isotropicGlsl(surface: FreeCameraBody, features: ProbeFeatures, isStep 
   const used = new Set(basisGlsl(surface, features));
   // texels of rows that hold only functions of high degree are omitted
   const lines = indexRange(rows).flatMap((q) => {
-    const components = COMPONENTS.split("").filter((_, k) => used.has(4 * q + k)).join("");
+    const components = COMPONENTS.split("")
+      .filter((_, k) => used.has(4 * q + k))
+      .join("");
     if (components === "") return [];
     const sums = CHANNELS.map((channel) => channel * rows + q).map((k) => {
-      const [nearer, farther] = ["near", "far"].map((row) => `texelFetch(uIsotropic, at(${row} + ${k}), 0).${components}`);
+      const [nearer, farther] = ["near", "far"].map(
+        (row) => `texelFetch(uIsotropic, at(${row} + ${k}), 0).${components}`,
+      );
       const factor = isStep ? `(${farther} - ${nearer})` : `mix(${nearer}, ${farther}, fraction)`;
       const factors = [factor, `turned${k}.${components}`].join(components.length > 1 ? ", " : " * ");
       return components.length > 1 ? `dot(${factors})` : factors;
@@ -113,15 +137,24 @@ function isotropicGlsl(surface: FreeCameraBody, features: ProbeFeatures, isStep 
 }
 
 /** Radiance from a table over θo and φo. */
-function anisotropicGlsl({ table_rows, table_columns, num_basis }: FreeCameraBody, features: ProbeFeatures, quantity: TableKind): string {
+function anisotropicGlsl(
+  { table_rows, table_columns, num_basis }: FreeCameraBody,
+  features: ProbeFeatures,
+  quantity: TableKind,
+): string {
   const texels = num_basis / 4;
-  const texel = (row: string, column: string, k: number) => `texelFetch(uAnisotropic, at((${row} + ${column}) * ${3 * texels} + ${k}), 0)`;
+  const texel = (row: string, column: string, k: number) =>
+    `texelFetch(uAnisotropic, at((${row} + ${column}) * ${3 * texels} + ${k}), 0)`;
   const sums = CHANNELS.map((channel) =>
     indexRange(Math.ceil(Math.max(features.functions, features.otherFunctions) / 4))
       .map((q) => {
         const k = channel * texels + q;
-        const [nearer, farther] = ["near", "far"].map((row) => `mix(${texel(row, "column", k)}, ${texel(row, "beside", k)}, blend)`);
-        return `dot(mix(${nearer}, ${farther}, fraction), vec4(${indexRange(4).map((n) => loadLightGlsl(features, quantity, channel, 4 * q + n)).join(", ")}))`;
+        const [nearer, farther] = ["near", "far"].map(
+          (row) => `mix(${texel(row, "column", k)}, ${texel(row, "beside", k)}, blend)`,
+        );
+        return `dot(mix(${nearer}, ${farther}, fraction), vec4(${indexRange(4)
+          .map((n) => loadLightGlsl(features, quantity, channel, 4 * q + n))
+          .join(", ")}))`;
       })
       .join(" +\n    "),
   );
@@ -137,9 +170,15 @@ function anisotropicGlsl({ table_rows, table_columns, num_basis }: FreeCameraBod
 /** Outgoing radiance from the tables of one kind; each group is a vector named `name` plus its number. */
 function sumGlsl(surface: FreeCameraBody, features: ProbeFeatures, quantity: TableKind, name: string): string {
   const { isotropic, anisotropic } = features[quantity];
-  const table = (group: number, k: number) => (quantity === "plain" ? `uTables[${group}].${COMPONENTS[k]}` : `uHighlights[${group}].${COMPONENTS[(quantity === "environment" ? 0 : 2) + k]}`);
+  const table = (group: number, k: number) =>
+    quantity === "plain"
+      ? `uTables[${group}].${COMPONENTS[k]}`
+      : `uHighlights[${group}].${COMPONENTS[(quantity === "environment" ? 0 : 2) + k]}`;
   const groups = indexRange(NUM_GROUPS).map((group) => {
-    const summands = [isotropic[group] && `isotropic(${table(group, 0)}, row, fraction)`, anisotropic[group] && `${quantity}Anisotropic(${table(group, 1)}, row, fraction, cp, sp)`];
+    const summands = [
+      isotropic[group] && `isotropic(${table(group, 0)}, row, fraction)`,
+      anisotropic[group] && `${quantity}Anisotropic(${table(group, 1)}, row, fraction, cp, sp)`,
+    ];
     return `vec3 ${name}${group} = ${summands.filter(Boolean).join(" + ") || "vec3(0.0)"};`;
   });
   return `${isotropic.includes(true) ? rotatedGlsl(surface, features, quantity) : ""}
@@ -176,11 +215,15 @@ uniform vec3 uCameraPosition;
 /** Load numbers of a probe from an array of whole texels. */
 const loadGlsl = (destination: string, array: string, scale: string, numbers: number) =>
   indexRange(Math.ceil(numbers / 4))
-    .map((q) => `${destination}${q} = ${scale} * texelFetch(${array}, at((p - uFirst) * ${Math.ceil(numbers / 4)} + ${q}), 0);`)
+    .map(
+      (q) =>
+        `${destination}${q} = ${scale} * texelFetch(${array}, at((p - uFirst) * ${Math.ceil(numbers / 4)} + ${q}), 0);`,
+    )
     .join(" ");
 
 /** Outputs of four numbers each, one per layer. */
-export const outputGlsl = (layers: readonly number[]) => layers.map((layer, k) => `layout(location = ${k}) out vec4 out${layer};`).join("\n");
+export const outputGlsl = (layers: readonly number[]) =>
+  layers.map((layer, k) => `layout(location = ${k}) out vec4 out${layer};`).join("\n");
 
 /** GLSL functions of the probe shader and their variables. */
 function functionsGlsl(surface: FreeCameraBody, features: ProbeFeatures): string {
@@ -191,20 +234,31 @@ function functionsGlsl(surface: FreeCameraBody, features: ProbeFeatures): string
 ${numbers("o", features.otherFunctions)}
 ${isEven ? `${namedTexels("turned", 3 * (surface.recurrence.order.length / 4))}\n${isotropicGlsl(surface, features)}` : ""}
 ${hasGradients(features) ? isotropicGlsl(surface, features, true) : ""}
-${kinds.filter((kind) => features[kind].anisotropic.includes(true)).map((kind) => anisotropicGlsl(surface, features, kind)).join("\n")}`;
+${kinds
+  .filter((kind) => features[kind].anisotropic.includes(true))
+  .map((kind) => anisotropicGlsl(surface, features, kind))
+  .join("\n")}`;
 }
 
 export function probeShader(surface: FreeCameraBody, features: ProbeFeatures, layers: readonly number[]): string {
   const { functions, otherFunctions, lobe, map, otherLight } = features;
   const orders = basisGlsl(surface, features).map((row) => surface.recurrence.order[row] as number);
   const otherLightGlsl = `${sumGlsl(surface, features, "otherLight", "beside")}
-  ${indexRange(NUM_GROUPS).map((group) => `outgoing${group} += max(beside${group}, 0.0);`).join(" ")}
+  ${indexRange(NUM_GROUPS)
+    .map((group) => `outgoing${group} += max(beside${group}, 0.0);`)
+    .join(" ")}
   ${hasGradients(features) ? lobeGradientGlsl(surface, otherLight, rotatedGlsl(surface, features, "otherLight", true)) : ""}`;
   const lobesGlsl = `int lobeTexel = (uLobe * ${surface.table_rows} + row) * ${NUM_GROUPS + 1} + ${NUM_GROUPS};
   Lobes lobes = lobesAlong(lobeTexel, fraction, n, -wo);
   visibility.xyz = lobeVisibilityOf(lobes, p);
   ${environmentHighlightGlsl(surface, features)}`;
-  const values = ["vec4(outgoing0, outgoing1.r)", "vec4(outgoing1.gb, outgoing2.rg)", "vec4(outgoing2.b, towards)", "visibility", "gradient"];
+  const values = [
+    "vec4(outgoing0, outgoing1.r)",
+    "vec4(outgoing1.gb, outgoing2.rg)",
+    "vec4(outgoing2.b, towards)",
+    "visibility",
+    "gradient",
+  ];
   return `${SHADER_HEADER}${elevationRowGlsl(surface.table_rows)}${lobe ? `${EQUIRECTANGULAR_GLSL}${ENVIRONMENT_GLSL}${LOBES_GLSL}${lobeVisibilityGlsl(surface)}${hasTables(features.environment) ? "" : highlightGlsl(surface)}` : ""}${UNIFORMS}
 ${outputGlsl(layers)}
 ${functionsGlsl(surface, features)}

@@ -61,7 +61,8 @@ function createImage(gl: Gl, format: number, width: number, height: number): Web
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, texture);
   gl.texStorage2D(gl.TEXTURE_2D, 1, format, width, height);
-  for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
+  for (const filter of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER])
+    gl.texParameteri(gl.TEXTURE_2D, filter, gl.NEAREST);
   return texture;
 }
 
@@ -73,7 +74,10 @@ export class ImageTargets {
   /** The resolved radiance; null without multisampling. */
   readonly radiance: WebGLTexture | null = null;
   private readonly framebuffer: WebGLFramebuffer | null = null;
-  private readonly made: { renderbuffers: WebGLRenderbuffer[]; textures: WebGLTexture[] } = { renderbuffers: [], textures: [] };
+  private readonly made: { renderbuffers: WebGLRenderbuffer[]; textures: WebGLTexture[] } = {
+    renderbuffers: [],
+    textures: [],
+  };
 
   constructor(
     private readonly gl: Gl,
@@ -83,7 +87,8 @@ export class ImageTargets {
     /** Coverage is drawn too. */
     readonly hasAlpha: boolean,
   ) {
-    const createEncoded = () => this.textures(...Array.from({ length: hasAlpha ? 2 : 1 }, () => createImage(gl, gl.RGBA8, width, height)));
+    const createEncoded = () =>
+      this.textures(...Array.from({ length: hasAlpha ? 2 : 1 }, () => createImage(gl, gl.RGBA8, width, height)));
     if (samples === 0) {
       this.drawn = this.encoded = createFramebuffer(gl, () => {
         this.renderbuffer(gl.DEPTH_ATTACHMENT, gl.DEPTH_COMPONENT24);

@@ -1,7 +1,18 @@
 /** Draws surfaces as `primary_visibility`, `shade_pixels` and, for shadow catchers, `background` of
  * `relume.live.free_camera`. Triangles are rasterized; the radiance of lattice nodes is interpolated per pixel. */
 import type { FreeCameraBody } from "../../protocol";
-import { albedoGlsl, backgroundGlsl, NUM_GROUPS, SHADER_HEADER, LOBES_GLSL, luminanceGlsl, MATERIAL_TEXELS, EQUIRECTANGULAR_GLSL, elevationRowGlsl, ENVIRONMENT_GLSL } from "./dataLayout";
+import {
+  albedoGlsl,
+  backgroundGlsl,
+  NUM_GROUPS,
+  SHADER_HEADER,
+  LOBES_GLSL,
+  luminanceGlsl,
+  MATERIAL_TEXELS,
+  EQUIRECTANGULAR_GLSL,
+  elevationRowGlsl,
+  ENVIRONMENT_GLSL,
+} from "./dataLayout";
 import type { MaterialFeatures } from "./materials";
 
 /** Features of an image; only these are compiled. */
@@ -16,7 +27,8 @@ export interface ImageFeatures {
 export type SurfaceFeatures = MaterialFeatures & ImageFeatures;
 
 /** True if pixels need their position and material, besides the outgoing radiance. */
-const needsWholeSurface = ({ lobes, textures, catchesShadows }: MaterialFeatures) => lobes || textures || catchesShadows;
+const needsWholeSurface = ({ lobes, textures, catchesShadows }: MaterialFeatures) =>
+  lobes || textures || catchesShadows;
 
 /** Per-triangle data: lattice nodes or the first of them, and the number of rows; emission; if needed, corners and
  * material, normal and texture scale, lobe and normal map. */
@@ -125,7 +137,8 @@ vec3 mappedNormal(int map, vec2 uv, float footprint, vec3 n, vec4 tangent, vec3 
 `;
 
 /** Unrolled: software rasterizers index vectors through memory. */
-const blendGlsl = (value: (k: string) => string) => ["x", "y", "z"].map((k) => `weights.${k} * ${value(k)}`).join(" + ");
+const blendGlsl = (value: (k: string) => string) =>
+  ["x", "y", "z"].map((k) => `weights.${k} * ${value(k)}`).join(" + ");
 const fetchGlsl = (name: string, layer: number) =>
   `vec4 ${name} = ${blendGlsl((k) => `texelFetch(uValues, ivec3(at(slots.${k}), ${layer}), 0)`)};`;
 
@@ -229,7 +242,8 @@ export function surfaceShader({ table_rows }: FreeCameraBody, features: SurfaceF
     lobes && `${elevationRowGlsl(table_rows)}${ENVIRONMENT_GLSL}${LOBES_GLSL}${mirrorGlsl(table_rows)}`,
     textures && `${TEXTURES}${NORMAL_MAP_GLSL}uniform float uPixelAngle;`,
     catchesShadows && `${backgroundGlsl(features.map)}${UNOCCLUDED_GLSL}`,
-    needsWholeSurface(features) && "uniform sampler2D uNormals;\nuniform isampler2D uMaterials;\ncentroid in vec3 vAway;",
+    needsWholeSurface(features) &&
+      "uniform sampler2D uNormals;\nuniform isampler2D uMaterials;\ncentroid in vec3 vAway;",
   ];
   const completeBody = `vec3 d = normalize(vAway);
   float along = dot(vFacing.xyz, d), ratio = 1.0;
@@ -263,7 +277,9 @@ void main() {
 }
 
 /** Draws the background. `uRays` maps an image point, −1…1, to a direction. */
-export const backgroundShader = (features: ImageFeatures) => `${SHADER_HEADER}${EQUIRECTANGULAR_GLSL}${backgroundGlsl(features.map)}${finishGlsl(features)}
+export const backgroundShader = (
+  features: ImageFeatures,
+) => `${SHADER_HEADER}${EQUIRECTANGULAR_GLSL}${backgroundGlsl(features.map)}${finishGlsl(features)}
 uniform mat3 uRays;
 uniform vec2 uSize;
 uniform float uFree;

@@ -111,7 +111,9 @@ export const getScene = (id: string) => getJson<SceneBody>(`/api/scenes/${encode
 export const listBuiltIns = () => getJson<ExampleSceneBody[]>("/api/example-scenes");
 /** Create a built-in scene; repeated calls return the same one. */
 export async function createBuiltInScene(name: string): Promise<SceneBody> {
-  return (await (await request(`/api/example-scenes/${encodeURIComponent(name)}`, { method: "POST" })).json()) as SceneBody;
+  return (await (
+    await request(`/api/example-scenes/${encodeURIComponent(name)}`, { method: "POST" })
+  ).json()) as SceneBody;
 }
 export const listModels = () => getJson<ModelBody[]>("/api/models");
 export const listMaterials = () => getJson<MaterialBody[]>("/api/materials");
@@ -134,7 +136,8 @@ export async function deleteBtfJob(id: string): Promise<void> {
 }
 export const listMeasured = () => getJson<MeasuredBody[]>("/api/materials/measured");
 export const getMaterialMap = () => getJson<MaterialMapBody>("/api/materials/map");
-export const getMaterialAt = (f0: number, sigma: number) => getJson<Term[]>(`/api/materials/map/at?f0=${f0}&sigma=${sigma}`);
+export const getMaterialAt = (f0: number, sigma: number) =>
+  getJson<Term[]>(`/api/materials/map/at?f0=${f0}&sigma=${sigma}`);
 /** Thumbnail of a library material with id "table/material". */
 export const materialThumbnailUrl = (id: string) =>
   `/api/materials/${id.split("/").map(encodeURIComponent).join("/")}/thumbnail.png`;
@@ -158,7 +161,12 @@ export async function deleteImage(id: string): Promise<void> {
   await request(`/api/images/${encodeURIComponent(id)}`, { method: "DELETE" });
 }
 /** A material's terms with a metalness map. */
-export async function addMetalness(image: string, scene: string, material: string, terms: readonly Term[]): Promise<Term[]> {
+export async function addMetalness(
+  image: string,
+  scene: string,
+  material: string,
+  terms: readonly Term[],
+): Promise<Term[]> {
   const path = `/api/images/${encodeURIComponent(image)}/metalness`;
   return ((await (await request(path, json("POST", { scene, material, terms }))).json()) as MetalnessBody).terms;
 }
@@ -179,7 +187,9 @@ export async function deleteScene(id: string): Promise<void> {
 
 /** Create a copy of a scene with a ground plane. */
 export async function addGround(id: string): Promise<SceneBody> {
-  return (await (await request(`/api/scenes/${encodeURIComponent(id)}/ground`, { method: "POST" })).json()) as SceneBody;
+  return (await (
+    await request(`/api/scenes/${encodeURIComponent(id)}/ground`, { method: "POST" })
+  ).json()) as SceneBody;
 }
 
 export async function planBake(body: BakeRequest): Promise<DryRunBody> {
@@ -248,7 +258,9 @@ export async function startComparison(body: ComparisonRequest): Promise<Comparis
 export const getComparison = (id: string) => getJson<ComparisonBody>(comparisonPath(id));
 /** Estimated cost of a comparison, without starting it. */
 export async function planComparison(body: ComparisonRequest): Promise<ComparisonPlanBody> {
-  return (await (await request("/api/comparisons", json("POST", { ...body, dry_run: true }))).json()) as ComparisonPlanBody;
+  return (await (
+    await request("/api/comparisons", json("POST", { ...body, dry_run: true }))
+  ).json()) as ComparisonPlanBody;
 }
 /** Stop a comparison; its passes so far remain. */
 export async function stopComparison(id: string): Promise<void> {

@@ -63,7 +63,8 @@ function parseHeader(text: string): FrameHeader {
   if (!isIntegerUpTo(width, MAX_SIDE) || !isIntegerUpTo(height, MAX_SIDE) || width === 0 || height === 0) {
     throw new FrameError("a frame's size is out of range");
   }
-  if (!isIntegerUpTo(frame, 2 ** 53) || !isIntegerUpTo(revision, 2 ** 53)) throw new FrameError("a frame has no number");
+  if (!isIntegerUpTo(frame, 2 ** 53) || !isIntegerUpTo(revision, 2 ** 53))
+    throw new FrameError("a frame has no number");
   if (typeof format !== "string") throw new FrameError("a frame has no format");
   validateTiles(tiles, width, height);
   return header as FrameHeader;

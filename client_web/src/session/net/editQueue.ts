@@ -133,7 +133,10 @@ export class EditQueue {
   /** Apply the unconfirmed edits on top of the confirmed look, and the unsent ones on top of them. */
   private rebaseTarget(unsentPatch: readonly PatchOp[]): void {
     let look = this.confirmedLook as Look;
-    this.outstandingEdits = this.outstandingEdits.map((edit) => ({ ...edit, look: (look = rebasePatch(look, edit.patch)) }));
+    this.outstandingEdits = this.outstandingEdits.map((edit) => ({
+      ...edit,
+      look: (look = rebasePatch(look, edit.patch)),
+    }));
     this.sentLook = look;
     if (this.target !== null) this.target = { ...this.target, look: rebasePatch(look, unsentPatch) };
     this.pendingPatch = unsentPatch;
@@ -147,8 +150,11 @@ export class EditQueue {
 
   /** Append a change to the recorded edits. */
   private extendPatch(change: LookChange | null): readonly PatchOp[] | null {
-    if (this.sentLook === null || this.pendingPatch === null || change === null || change.before !== this.target?.look) return null;
-    return this.pendingPatch.length === 0 ? change.patch : changeByPatch(this.sentLook, [...this.pendingPatch, ...change.patch]).patch;
+    if (this.sentLook === null || this.pendingPatch === null || change === null || change.before !== this.target?.look)
+      return null;
+    return this.pendingPatch.length === 0
+      ? change.patch
+      : changeByPatch(this.sentLook, [...this.pendingPatch, ...change.patch]).patch;
   }
 
   get hasPending(): boolean {

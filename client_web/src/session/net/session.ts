@@ -69,11 +69,15 @@ export class Session {
     private readonly handlers: SessionHandlers,
     openParameters?: OpenParameters,
   ) {
-    this.socket = new SessionSocket(bake, {
-      connection: (state, retryInMs, reason) => handlers.connection(state, retryInMs, reason),
-      received: (data) => this.receive(data),
-      ended: (reason, code) => handlers.ended(reason, code),
-    }, openParameters);
+    this.socket = new SessionSocket(
+      bake,
+      {
+        connection: (state, retryInMs, reason) => handlers.connection(state, retryInMs, reason),
+        received: (data) => this.receive(data),
+        ended: (reason, code) => handlers.ended(reason, code),
+      },
+      openParameters,
+    );
     this.messages = {
       hello: (message) => this.onHello(message),
       status: (message) => handlers.status(message),
@@ -174,7 +178,10 @@ export class Session {
 
   /** Set the target state and the edit that made it; sent immediately, then at most once per animation frame. */
   setTarget(target: TargetState, change: LookChange | null = null): void {
-    if (this.readOnlyLook !== null && !diffLooks(this.readOnlyLook, target.look).every(({ path }) => isViewSetting(path))) {
+    if (
+      this.readOnlyLook !== null &&
+      !diffLooks(this.readOnlyLook, target.look).every(({ path }) => isViewSetting(path))
+    ) {
       return this.handlers.readOnly();
     }
     this.queue.setTarget(target, change);

@@ -59,7 +59,8 @@ export async function bakePreview(scene: SceneBody, choice: BakeSettings): Promi
   const sizeOverride = size === undefined ? {} : { size: previewSize(size) };
   const preview = await api.startBake({ scene: scene.id, ...settings, ...sizeOverride, preset: "preview" });
   pendingBake.value = preview;
-  const finished = preview.state === "ready" ? preview : await waitForBake(preview.id, (update) => (pendingBake.value = update));
+  const finished =
+    preview.state === "ready" ? preview : await waitForBake(preview.id, (update) => (pendingBake.value = update));
   if (finished.state === "ready") return finished.id;
   throw new api.ApiError(`Preview failed: ${api.problemText(finished.problem, finished.state)}`, 0);
 }

@@ -48,7 +48,8 @@ export function useElapsedSeconds(bake: BakeStatus | null): number {
   const phaseKey = bake === null || bake.phase === null ? "" : `${bake.id} ${bake.phase}`;
   const startTime = Date.now() - 1000 * (bake?.phase_seconds ?? 0);
   // not every message has the elapsed time
-  if (phaseStart.current.key !== phaseKey || startTime < phaseStart.current.at) phaseStart.current = { key: phaseKey, at: startTime };
+  if (phaseStart.current.key !== phaseKey || startTime < phaseStart.current.at)
+    phaseStart.current = { key: phaseKey, at: startTime };
   useEffect(() => {
     if (phaseKey === "") return undefined;
     const timer = window.setInterval(() => count((seconds) => seconds + 1), 1000);

@@ -113,7 +113,11 @@ export async function openScene(
 }
 
 /** Show the bake of this id, else the finest; start one if there is none or settings were chosen. */
-async function openBestBake(openedScene: SceneBody, id: string | null, choice: BakeSettings | undefined): Promise<void> {
+async function openBestBake(
+  openedScene: SceneBody,
+  id: string | null,
+  choice: BakeSettings | undefined,
+): Promise<void> {
   const ready = bakes.peek().filter((each) => each.state === "ready");
   const bestBake = ready.find((each) => each.id === id) ?? ready[0];
   const running = bakes.peek().find((each) => each.state === "running" || each.state === "queued");

@@ -58,7 +58,8 @@ function storeText(key: string, text: string): void {
   try {
     sessionStorage.setItem(key, text);
   } catch {
-    for (const otherKey of Object.keys(sessionStorage)) if (otherKey.startsWith(HISTORY_KEY_PREFIX)) sessionStorage.removeItem(otherKey);
+    for (const otherKey of Object.keys(sessionStorage))
+      if (otherKey.startsWith(HISTORY_KEY_PREFIX)) sessionStorage.removeItem(otherKey);
     sessionStorage.setItem(key, text);
   }
 }

@@ -56,15 +56,20 @@ export function resizeToAspect([width, height]: BakeSize, aspect: number): BakeS
 const isIntegerInRange = (value: number, { minimum, maximum }: { minimum: number; maximum: number }) =>
   Number.isInteger(value) && value >= minimum && value <= maximum;
 
-const isUnsetOrInRange = (value: number | undefined, range: { minimum: number; maximum: number }) => value === undefined || isIntegerInRange(value, range);
+const isUnsetOrInRange = (value: number | undefined, range: { minimum: number; maximum: number }) =>
+  value === undefined || isIntegerInRange(value, range);
 
-const rangeText = ({ minimum, maximum }: { minimum: number; maximum: number }) => `${minimum}–${maximum.toLocaleString("en")}`;
+const rangeText = ({ minimum, maximum }: { minimum: number; maximum: number }) =>
+  `${minimum}–${maximum.toLocaleString("en")}`;
 
 /** Error message of a recipe; null if valid. */
 export function validateRecipe({ size, lights, patches, gather_rays }: CustomBakeRecipe): string | null {
-  if (!size.every((side) => isIntegerInRange(side, SIDE_RANGE))) return `Enter a width and height in pixels (${rangeText(SIDE_RANGE)}).`;
+  if (!size.every((side) => isIntegerInRange(side, SIDE_RANGE)))
+    return `Enter a width and height in pixels (${rangeText(SIDE_RANGE)}).`;
   if (!isIntegerInRange(lights, LIGHTS_RANGE)) return `Enter an environment detail of ${rangeText(LIGHTS_RANGE)}.`;
-  if (!isUnsetOrInRange(patches, PATCHES_RANGE)) return `Enter ${rangeText(PATCHES_RANGE)} bounce samples, or leave empty for auto.`;
-  if (!isUnsetOrInRange(gather_rays, GATHER_RAYS_RANGE)) return `Enter ${rangeText(GATHER_RAYS_RANGE)} rays per sample, or leave empty for auto.`;
+  if (!isUnsetOrInRange(patches, PATCHES_RANGE))
+    return `Enter ${rangeText(PATCHES_RANGE)} bounce samples, or leave empty for auto.`;
+  if (!isUnsetOrInRange(gather_rays, GATHER_RAYS_RANGE))
+    return `Enter ${rangeText(GATHER_RAYS_RANGE)} rays per sample, or leave empty for auto.`;
   return null;
 }

@@ -6,7 +6,9 @@ const MAX_DEPTH = 12;
 
 class TooManyFilesError extends Error {
   constructor() {
-    super(`This folder has more than ${MAX_FILES.toLocaleString("en")} files or ${MAX_DEPTH} levels. Drop only the scene's folder.`);
+    super(
+      `This folder has more than ${MAX_FILES.toLocaleString("en")} files or ${MAX_DEPTH} levels. Drop only the scene's folder.`,
+    );
   }
 }
 
@@ -34,7 +36,8 @@ async function collectFiles(entry: FileSystemEntry, into: DroppedFile[], depth: 
   if (entry.isFile)
     into.push({ path: entry.fullPath.replace(/^\//, ""), file: await readFile(entry as FileSystemFileEntry) });
   else
-    for (const inner of await readEntries(entry as FileSystemDirectoryEntry)) await collectFiles(inner, into, depth + 1);
+    for (const inner of await readEntries(entry as FileSystemDirectoryEntry))
+      await collectFiles(inner, into, depth + 1);
 }
 
 /** The dropped files. Call it inside the event handler: the entries are invalid afterwards. */

@@ -62,7 +62,11 @@ async function readGlbJson(file: File): Promise<string> {
 }
 
 /** Material files that an .obj refers to, and the images whose names occur in them. */
-async function findObjReferences(scene: DroppedFile, findFile: FindFile, images: readonly DroppedFile[]): Promise<References> {
+async function findObjReferences(
+  scene: DroppedFile,
+  findFile: FindFile,
+  images: readonly DroppedFile[],
+): Promise<References> {
   const head = await scene.file.slice(0, OBJ_HEAD_BYTES).text();
   const names = [...head.matchAll(/^mtllib[ \t]+(.+?)[ \t]*\r?$/gm)].map((match) => match[1] as string);
   const libraries = resolveReferences(scene, names, findFile);
@@ -72,7 +76,11 @@ async function findObjReferences(scene: DroppedFile, findFile: FindFile, images:
   return { companions: [...libraries.companions, ...namedImages], missing: libraries.missing };
 }
 
-export async function findReferences(scene: DroppedFile, findFile: FindFile, images: readonly DroppedFile[]): Promise<References> {
+export async function findReferences(
+  scene: DroppedFile,
+  findFile: FindFile,
+  images: readonly DroppedFile[],
+): Promise<References> {
   const suffix = scene.path.toLowerCase().split(".").at(-1);
   if (suffix === "obj") return findObjReferences(scene, findFile, images);
   if (suffix === "glb") return resolveReferences(scene, parseUris(await readGlbJson(scene.file)), findFile);

@@ -4,14 +4,31 @@ import { endsWith, isImportable, isSceneFile, MEASURED_SUFFIXES } from "./sceneF
 
 /** Unsupported formats of measured materials. */
 const OTHER_MEASURED_SUFFIXES = [".brdf", ".bsdf", ".merl", ".mbdf"];
-const UNSUPPORTED_SCENE_SUFFIXES = [".fbx", ".blend", ".usd", ".usda", ".usdc", ".usdz", ".dae", ".stl", ".3ds", ".max", ".abc"];
+const UNSUPPORTED_SCENE_SUFFIXES = [
+  ".fbx",
+  ".blend",
+  ".usd",
+  ".usda",
+  ".usdc",
+  ".usdz",
+  ".dae",
+  ".stl",
+  ".3ds",
+  ".max",
+  ".abc",
+];
 
 const MAX_LISTED_FILES = 5;
 
 /** The first few file names. */
 function listFileNames(files: readonly DroppedFile[]): string {
   const more = files.length > MAX_LISTED_FILES ? ` and ${files.length - MAX_LISTED_FILES} more` : "";
-  return files.slice(0, MAX_LISTED_FILES).map(({ path }) => path).join(", ") + more;
+  return (
+    files
+      .slice(0, MAX_LISTED_FILES)
+      .map(({ path }) => path)
+      .join(", ") + more
+  );
 }
 
 const MEASURED_MESSAGE = "Open a scene and drop measured materials on the Library: MERL (.binary) or BTF (.btf, .zip).";
@@ -21,7 +38,8 @@ const SCENES_MESSAGE = "Scenes: GLB, glTF, OBJ, PLY or ZIP.";
 function rejectionReason([first]: readonly DroppedFile[], fallback: string): string {
   const name = first?.path ?? "";
   if (endsWith(name, [...MEASURED_SUFFIXES, ...OTHER_MEASURED_SUFFIXES])) return MEASURED_MESSAGE;
-  if (endsWith(name, UNSUPPORTED_SCENE_SUFFIXES)) return `${SCENES_MESSAGE} Export a GLB and drop it on the start page.`;
+  if (endsWith(name, UNSUPPORTED_SCENE_SUFFIXES))
+    return `${SCENES_MESSAGE} Export a GLB and drop it on the start page.`;
   return fallback;
 }
 

@@ -26,7 +26,9 @@ function collectDifferences(path: string, from: unknown, to: unknown, patch: Pat
       else collectDifferences(next, from[key], value, patch);
     }
   } else if (areObjectLists(from, to)) {
-    (to as JsonObject[]).forEach((value, index) => collectDifferences(`${path}/${index}`, (from as JsonObject[])[index], value, patch));
+    (to as JsonObject[]).forEach((value, index) =>
+      collectDifferences(`${path}/${index}`, (from as JsonObject[])[index], value, patch),
+    );
   } else replaceDocument(path, from, to, patch);
 }
 
@@ -49,8 +51,11 @@ export function diffLooks(from: Look, to: Look): PatchOp[] {
 /** True if two values of a look are equal, regardless of member order. */
 export function isDeepEqual(a: unknown, b: unknown): boolean {
   if (a === b) return true;
-  if (Array.isArray(a) && Array.isArray(b)) return a.length === b.length && a.every((value, k) => isDeepEqual(value, b[k]));
+  if (Array.isArray(a) && Array.isArray(b))
+    return a.length === b.length && a.every((value, k) => isDeepEqual(value, b[k]));
   if (!isObject(a) || !isObject(b)) return false;
   const keys = Object.keys(a);
-  return keys.length === Object.keys(b).length && keys.every((key) => Object.hasOwn(b, key) && isDeepEqual(a[key], b[key]));
+  return (
+    keys.length === Object.keys(b).length && keys.every((key) => Object.hasOwn(b, key) && isDeepEqual(a[key], b[key]))
+  );
 }

@@ -39,7 +39,11 @@ export const lightFilters = computed<ActiveFilter[]>(() => {
 /** Light filters and the solo material, which only affects the display. */
 export const activeFilters = computed<ActiveFilter[]>(() => {
   if (soloMaterial.value === null) return lightFilters.value;
-  const materialFilter = { label: `Solo: ${soloMaterial.value}`, title: "Show all materials (S)", clear: () => (soloMaterial.value = null) };
+  const materialFilter = {
+    label: `Solo: ${soloMaterial.value}`,
+    title: "Show all materials (S)",
+    clear: () => (soloMaterial.value = null),
+  };
   return [...lightFilters.value, materialFilter];
 });
 

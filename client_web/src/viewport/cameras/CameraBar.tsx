@@ -10,13 +10,16 @@ import { freeCameraOf } from "./freeCamera";
 import { CAMERA_STEPS } from "./cameraSteps";
 import { orbitKeyStep } from "./useCameraControl";
 
-const BROWSER_TITLE = "This browser draws while the camera moves, without network traffic. Server drawing also smooths one-pixel highlights.";
+const BROWSER_TITLE =
+  "This browser draws while the camera moves, without network traffic. Server drawing also smooths one-pixel highlights.";
 const SERVER_TITLE = "The server draws while the camera moves and streams each picture.";
 const CHOICES: Record<RendererMode, string> = { auto: "Automatic", client: "This browser", server: "Server" };
 
 /** Chooses the renderer of camera motion. */
 function RendererSelect() {
-  const serverTitle = usesTexelShading.value ? "The server draws while the camera moves, because this look uses BTFs or tri-planar textures." : SERVER_TITLE;
+  const serverTitle = usesTexelShading.value
+    ? "The server draws while the camera moves, because this look uses BTFs or tri-planar textures."
+    : SERVER_TITLE;
   const title = isClientRendering.value ? BROWSER_TITLE : serverTitle;
   return (
     <label class="renderer-choice" title={title}>
@@ -44,18 +47,27 @@ export function CameraBar() {
   if (freeCamera === null) return null;
   return (
     <div class="camera-bar" role="group" aria-label="Camera">
-      <button aria-expanded={open} title="Drag: orbit · Shift or right-drag: pan · Wheel: dolly" onClick={() => setOpen(!open)}>
+      <button
+        aria-expanded={open}
+        title="Drag: orbit · Shift or right-drag: pan · Wheel: dolly"
+        onClick={() => setOpen(!open)}
+      >
         {cameraMessage} {open ? "▾" : "▸"}
       </button>
       {open && (
         <>
           {CAMERA_STEPS.map(({ key, sign, label }) => (
-            <button key={key} title={label} aria-label={label} onClick={() => orbitKeyStep(freeCamera.change, freeCamera.bounds, key, false)}>
+            <button
+              key={key}
+              title={label}
+              aria-label={label}
+              onClick={() => orbitKeyStep(freeCamera.change, freeCamera.bounds, key, false)}
+            >
               {sign}
             </button>
           ))}
           <button title="Return to the initial camera (Home)" onClick={() => freeCamera.restart()}>
-          Reset view
+            Reset view
           </button>
           <RendererSelect />
           {sceneId !== null && <CameraMenu scene={sceneId} freeCamera={freeCamera} name={name} />}

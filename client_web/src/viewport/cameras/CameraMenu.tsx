@@ -22,7 +22,15 @@ function ImageSizeFields({ freeCamera }: { freeCamera: FreeCamera }) {
   const [width, height] = freeCamera.size;
   const maxSide = (otherSide: number) => Math.floor(MAX_CAMERA_PIXELS / otherSide);
   const field = (label: string, value: number, onChange: (value: number) => void) => (
-    <NumberField label={label} value={value} minimum={MIN_SIDE} maximum={MAX_SIDE} step={10} isInteger onChange={onChange} />
+    <NumberField
+      label={label}
+      value={value}
+      minimum={MIN_SIDE}
+      maximum={MAX_SIDE}
+      step={10}
+      isInteger
+      onChange={onChange}
+    />
   );
   return (
     <div class="camera-size">
@@ -47,7 +55,8 @@ function CameraList({ scene, freeCamera, name }: ListProps) {
   const read = useCallback(async () => setCameras(await listCameras(scene)), [scene]);
   const run = (work: () => Promise<void>) => void reportErrors(work).then(() => reportErrors(read));
   useEffect(() => void reportErrors(read), [read]);
-  const save = () => run(() => saveCameraAs(scene, nextCameraName(cameras.map((camera) => camera.name)), freeCamera.pose, null));
+  const save = () =>
+    run(() => saveCameraAs(scene, nextCameraName(cameras.map((camera) => camera.name)), freeCamera.pose, null));
   const remove = (camera: CameraEntry) => run(() => removeCamera(scene, camera, () => void reportErrors(read)));
   return (
     <>
@@ -91,7 +100,7 @@ export function CameraMenu({ scene, freeCamera, name }: ListProps) {
       </button>
       {open && (
         <div class="menu-body camera-menu" role="dialog" aria-label="Camera options">
-        <LabeledSlider
+          <LabeledSlider
             label="Field of view"
             unit="°"
             title="Vertical"
@@ -103,7 +112,7 @@ export function CameraMenu({ scene, freeCamera, name }: ListProps) {
           />
           {Math.abs(freeCamera.orbit.roll) > UPRIGHT && (
             <button title="Remove the camera's roll" onClick={() => freeCamera.change(levelOrbit)}>
-            Level horizon
+              Level horizon
             </button>
           )}
           <ImageSizeFields freeCamera={freeCamera} />

@@ -7,7 +7,16 @@ import { LabeledSlider } from "../../ui/LabeledSlider";
 import { renderPlacement, nextCameraName, getPlacementView, listCameras, MAX_NAME, pickTarget } from "./cameraRequests";
 import { saveCameraAs } from "./savedCameras";
 import { CameraMotion } from "./cameraMotion";
-import { poseOf, MAX_YFOV, MIN_YFOV, orbitOf, withFieldOfView, type Bounds, type CameraPose, type Orbit } from "./orbit";
+import {
+  poseOf,
+  MAX_YFOV,
+  MIN_YFOV,
+  orbitOf,
+  withFieldOfView,
+  type Bounds,
+  type CameraPose,
+  type Orbit,
+} from "./orbit";
 import { PlacementImages } from "./placementImages";
 import { CAMERA_STEPS } from "./cameraSteps";
 import { orbitKeyStep, useCameraControl } from "./useCameraControl";
@@ -36,7 +45,10 @@ interface PlacementStart {
 /** The scene's bounds, and the initial orbit, by default of its first camera: it orbits the point in the image's
  * center. */
 async function startPlacement(scene: string, from: CameraPose | null): Promise<PlacementStart> {
-  const [{ bounds_min, bounds_max, default_camera }, cameras] = await Promise.all([getPlacementView(scene), listCameras(scene)]);
+  const [{ bounds_min, bounds_max, default_camera }, cameras] = await Promise.all([
+    getPlacementView(scene),
+    listCameras(scene),
+  ]);
   const bounds: Bounds = { lowest: bounds_min as Triple, highest: bounds_max as Triple };
   const frame = from ?? cameras[0] ?? default_camera;
   const target = await pickTarget(scene, frame, IDLE_SIZE, IDLE_SIZE[0] / 2, IDLE_SIZE[1] / 2);
@@ -53,7 +65,13 @@ export function CameraPlacement({ scene, from, name, onSave, onClose }: Props) {
   }, [scene.id, from]);
   const title = name === null ? `New camera in “${scene.name}”` : `Move “${name}”`;
   return (
-    <dialog class="placement" ref={dialog} aria-label={title} onClose={onClose} onKeyDown={(event) => event.stopPropagation()}>
+    <dialog
+      class="placement"
+      ref={dialog}
+      aria-label={title}
+      onClose={onClose}
+      onKeyDown={(event) => event.stopPropagation()}
+    >
       <header class="panel-head">
         <h2>{title}</h2>
         <IconButton icon="close" label="Close" onClick={() => dialog.current?.close()} />
@@ -68,7 +86,12 @@ export function CameraPlacement({ scene, from, name, onSave, onClose }: Props) {
 }
 
 /** The placed camera and its image. */
-function usePlacementCamera(scene: string, canvas: { current: HTMLCanvasElement | null }, first: Orbit, fail: (text: string) => void) {
+function usePlacementCamera(
+  scene: string,
+  canvas: { current: HTMLCanvasElement | null },
+  first: Orbit,
+  fail: (text: string) => void,
+) {
   const [orbit, setOrbit] = useState(first);
   const pipeline = useRef<{ motion: CameraMotion; images: PlacementImages } | null>(null);
   useEffect(() => {
@@ -86,7 +109,9 @@ function usePlacementCamera(scene: string, canvas: { current: HTMLCanvasElement 
       },
       (error) => fail(error instanceof Error ? error.message : String(error)),
     );
-    const motion = new CameraMotion(first, (displayed, isLast) => images.show(poseOf(displayed), isLast ? IDLE_SIZE : MOVING_SIZE));
+    const motion = new CameraMotion(first, (displayed, isLast) =>
+      images.show(poseOf(displayed), isLast ? IDLE_SIZE : MOVING_SIZE),
+    );
     pipeline.current = { motion, images };
     images.show(poseOf(first), IDLE_SIZE);
     return () => {
@@ -153,12 +178,16 @@ function PlacementView({ scene, bounds, first, overview, name, onSave }: Placeme
         }}
         {...control}
       />
-      <p class="placement-help">
-        Drag to orbit, Shift- or right-drag to pan, scroll to zoom, click to focus.
-      </p>
+      <p class="placement-help">Drag to orbit, Shift- or right-drag to pan, scroll to zoom, click to focus.</p>
       <div class="placement-steps" role="group" aria-label="Move the camera">
         {CAMERA_STEPS.map(({ key, sign, label }) => (
-          <button key={key} type="button" title={label} aria-label={label} onClick={() => orbitKeyStep(change, bounds, key, false)}>
+          <button
+            key={key}
+            type="button"
+            title={label}
+            aria-label={label}
+            onClick={() => orbitKeyStep(change, bounds, key, false)}
+          >
             {sign}
           </button>
         ))}
@@ -178,7 +207,12 @@ function PlacementView({ scene, bounds, first, overview, name, onSave }: Placeme
       />
       <div class="placement-keep">
         <label for={field}>Name</label>
-        <input id={field} value={cameraName} maxLength={MAX_NAME} onInput={(event) => setCameraName(event.currentTarget.value)} />
+        <input
+          id={field}
+          value={cameraName}
+          maxLength={MAX_NAME}
+          onInput={(event) => setCameraName(event.currentTarget.value)}
+        />
         <button class="primary" disabled={cameraName.trim() === ""}>
           Save camera
         </button>

@@ -80,7 +80,10 @@ export class FreeCamera {
   async grab(): Promise<void> {
     const [width, height] = limitRenderSize(...this.size);
     const middle = requestPixelProbe(this.view.name, Math.floor(width / 2), Math.floor(height / 2));
-    const position = await middle.then((answer) => answer.position, () => null);
+    const position = await middle.then(
+      (answer) => answer.position,
+      () => null,
+    );
     if (position !== null) this.motion.replace((orbit) => orbitOf(poseOf(orbit), this.bounds, position));
   }
 
@@ -139,7 +142,9 @@ export class FreeCamera {
     const camera = { to_world, yfov: yfov / DEGREES };
     const [width, height] = this.size;
     // overlays such as light handles follow
-    views.value = views.peek().map((current) => (current.name === name ? { ...current, camera, width, height } : current));
+    views.value = views
+      .peek()
+      .map((current) => (current.name === name ? { ...current, camera, width, height } : current));
     const hasOwnPose = this.hasMoved || this.sizeOverride !== null;
     storeCamera(name, hasOwnPose ? { camera, size: limitRenderSize(width, height) } : null);
     const isRenderedHere = !isLast && renderIfPossible(name);
@@ -153,7 +158,15 @@ export class FreeCamera {
     const { name } = this.view;
     this.number = Math.max(this.number + 1, Date.now());
     connections.shown?.cameraSeqs.set(name, this.number);
-    sendToShown({ type: "camera", view: name, seq: this.number, ...camera, size: limitRenderSize(...this.size), active_control: null, refine });
+    sendToShown({
+      type: "camera",
+      view: name,
+      seq: this.number,
+      ...camera,
+      size: limitRenderSize(...this.size),
+      active_control: null,
+      refine,
+    });
   }
 
   private get key(): string {
@@ -171,9 +184,16 @@ export class FreeCamera {
 
   private load(): StoredCamera {
     try {
-      const { orbit, size } = JSON.parse(sessionStorage.getItem(this.key) ?? "{}") as { orbit?: Orbit | null; size?: number[] | null };
-      const isSize = Array.isArray(size) && size.length === 2 && size.every((side) => Number.isInteger(side) && side > 0);
-      return { orbit: orbit && isClose(orbit, orbit) ? orbit : null, size: isSize ? (size as StoredCamera["size"]) : null };
+      const { orbit, size } = JSON.parse(sessionStorage.getItem(this.key) ?? "{}") as {
+        orbit?: Orbit | null;
+        size?: number[] | null;
+      };
+      const isSize =
+        Array.isArray(size) && size.length === 2 && size.every((side) => Number.isInteger(side) && side > 0);
+      return {
+        orbit: orbit && isClose(orbit, orbit) ? orbit : null,
+        size: isSize ? (size as StoredCamera["size"]) : null,
+      };
     } catch {
       return { orbit: null, size: null };
     }

@@ -94,7 +94,10 @@ export function dollyOrbit(orbit: Orbit, factor: number, bounds: Bounds): Orbit 
 
 export const levelOrbit = (orbit: Orbit): Orbit => ({ ...orbit, roll: 0 });
 
-export const withFieldOfView = (orbit: Orbit, yfov: number): Orbit => ({ ...orbit, yfov: clamp(yfov, MIN_YFOV, MAX_YFOV) });
+export const withFieldOfView = (orbit: Orbit, yfov: number): Orbit => ({
+  ...orbit,
+  yfov: clamp(yfov, MIN_YFOV, MAX_YFOV),
+});
 
 /** The shortest signed difference between two angles. */
 const interpolateAngle = (from: number, to: number) =>

@@ -6,7 +6,12 @@ import type { CameraPose } from "./orbit";
 
 /** Save a camera under a name. `previousName`: the camera that it replaces; null: a new one. Throws if the name is taken
  * or invalid. */
-export async function saveCameraAs(scene: string, name: string, frame: CameraPose, previousName: string | null): Promise<void> {
+export async function saveCameraAs(
+  scene: string,
+  name: string,
+  frame: CameraPose,
+  previousName: string | null,
+): Promise<void> {
   if (name.includes("/")) throw new Error("Camera names can't contain slashes. Choose another name.");
   const storedCameras = name === previousName ? [] : await listCameras(scene);
   const existing = storedCameras.find((stored) => stored.name === name);

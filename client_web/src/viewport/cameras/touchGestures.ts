@@ -19,7 +19,8 @@ const midpoint = (points: ScreenPoint[]): ScreenPoint => ({
   y: points.reduce((sum, { y }) => sum + y, 0) / points.length,
 });
 
-const distanceBetween = ([a, b]: ScreenPoint[]): number => (a === undefined || b === undefined ? 0 : Math.hypot(a.x - b.x, a.y - b.y));
+const distanceBetween = ([a, b]: ScreenPoint[]): number =>
+  a === undefined || b === undefined ? 0 : Math.hypot(a.x - b.x, a.y - b.y);
 
 export class TouchGestures {
   private readonly points = new Map<number, ScreenPoint>();

@@ -50,7 +50,8 @@ export function useCameraControl(change: OrbitChange, bounds: Bounds, click: (u:
     const { height } = event.currentTarget.getBoundingClientRect();
     const [across, down] = [pinch.across / height, pinch.down / height];
     traveled.current += Math.hypot(pinch.across, pinch.down) * pinch.count;
-    if (pinch.count > 1 || event.shiftKey || (event.buttons & 6) !== 0) change((orbit) => panOrbit(orbit, across, down));
+    if (pinch.count > 1 || event.shiftKey || (event.buttons & 6) !== 0)
+      change((orbit) => panOrbit(orbit, across, down));
     else change((orbit) => rotateOrbit(orbit, -RADIANS_PER_PIXEL * across, RADIANS_PER_PIXEL * down));
     if (pinch.count > 1) change((orbit) => dollyOrbit(orbit, 1 / pinch.spread, bounds));
   };

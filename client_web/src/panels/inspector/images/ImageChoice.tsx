@@ -22,7 +22,18 @@ export interface ImageChoiceProps {
   onOther: (value: string) => void;
 }
 
-export function ImageChoice({ label, title, file, material, displayedImage, fallbackLabel = "", children, assign, unassign, onOther }: ImageChoiceProps) {
+export function ImageChoice({
+  label,
+  title,
+  file,
+  material,
+  displayedImage,
+  fallbackLabel = "",
+  children,
+  assign,
+  unassign,
+  onOther,
+}: ImageChoiceProps) {
   const image = displayedImage === null ? undefined : imageOf(displayedImage);
   const choose = (name: string) => {
     const selectedImage = imageOf(name);
@@ -32,13 +43,22 @@ export function ImageChoice({ label, title, file, material, displayedImage, fall
   return (
     <div class="base-image-row">
       {image !== undefined && <img src={image.thumbnail} alt="" width={24} height={24} />}
-      <select aria-label={label} title={title} value={displayedImage ?? fallbackLabel} onChange={(event) => choose(event.currentTarget.value)}>
+      <select
+        aria-label={label}
+        title={title}
+        value={displayedImage ?? fallbackLabel}
+        onChange={(event) => choose(event.currentTarget.value)}
+      >
         {children}
         <ImageOptions displayedImage={displayedImage} image={image} />
       </select>
       <ImageFileField label={file} onFile={(selectedFile) => void uploadAndAssign(material, selectedFile, assign)} />
       {image !== undefined && (
-        <IconButton icon="trash" label={`Delete ${image.name}`} onClick={() => offerToDeleteImage(material, image, unassign)} />
+        <IconButton
+          icon="trash"
+          label={`Delete ${image.name}`}
+          onClick={() => offerToDeleteImage(material, image, unassign)}
+        />
       )}
     </div>
   );

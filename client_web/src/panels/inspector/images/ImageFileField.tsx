@@ -14,8 +14,13 @@ export function ImageFileField({ label, onFile }: Props) {
   const file = useRef<HTMLInputElement>(null);
   return (
     <>
-      <button type="button" title={label} disabled={imageUploadProgress.value !== null} onClick={() => file.current?.click()}>
-      Load…
+      <button
+        type="button"
+        title={label}
+        disabled={imageUploadProgress.value !== null}
+        onClick={() => file.current?.click()}
+      >
+        Load…
       </button>
       <input
         ref={file}

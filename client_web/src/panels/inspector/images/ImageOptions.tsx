@@ -12,7 +12,9 @@ interface Props {
 export function ImageOptions({ displayedImage, image }: Props) {
   return (
     <>
-      {displayedImage !== null && image === undefined && <option value={displayedImage}>{areListed.value ? "Missing image" : "Loading…"}</option>}
+      {displayedImage !== null && image === undefined && (
+        <option value={displayedImage}>{areListed.value ? "Missing image" : "Loading…"}</option>
+      )}
       {uploadedImages.value.map((imageOption) => (
         <option key={imageOption.id} value={imageOption.texture}>
           {imageOption.name}

@@ -40,7 +40,9 @@ export function NormalImage({ material, materialLook, mirrors }: Props) {
           maximum={4}
           step={0.01}
           scale="linear"
-          onChange={(scale) => editValue("Normal map strength", jsonPointer("materials", material, "normal_map", "scale"), scale)}
+          onChange={(scale) =>
+            editValue("Normal map strength", jsonPointer("materials", material, "normal_map", "scale"), scale)
+          }
         />
       )}
       {map !== null && mirrors && (

@@ -36,12 +36,17 @@ export function withTexture(terms: readonly Term[], index: number, texture: stri
 
 /** Set an image as base color: a color without a texture becomes white; the tint of a texture stays. */
 export function withBaseImage(terms: readonly Term[], texture: string): Term[] {
-  return baseTermIndices(terms).reduce<Term[]>((result, index) => {
-    const term = result[index] as Term;
-    const isUntextured = (terms[index]?.texture ?? null) === null;
-    const bare = result.map((current, k) => (k === index && isUntextured ? { ...term, color: [1, 1, 1] as Term["color"] } : current));
-    return withTexture(bare, index, texture);
-  }, [...terms]);
+  return baseTermIndices(terms).reduce<Term[]>(
+    (result, index) => {
+      const term = result[index] as Term;
+      const isUntextured = (terms[index]?.texture ?? null) === null;
+      const bare = result.map((current, k) =>
+        k === index && isUntextured ? { ...term, color: [1, 1, 1] as Term["color"] } : current,
+      );
+      return withTexture(bare, index, texture);
+    },
+    [...terms],
+  );
 }
 
 /** Terms without the image, with the textures and colors of the original ones. */

@@ -10,7 +10,9 @@ const hasFiles = ({ dataTransfer }: DragEvent): boolean => dataTransfer?.types.i
 
 /** True if images may be among the dragged files: a folder has no type, and reveals its files only on drop. */
 function mayHoldImages({ dataTransfer }: DragEvent): boolean {
-  return [...(dataTransfer?.items ?? [])].some(({ kind, type }) => kind === "file" && (type === "" || IMAGE_TYPES.includes(type)));
+  return [...(dataTransfer?.items ?? [])].some(
+    ({ kind, type }) => kind === "file" && (type === "" || IMAGE_TYPES.includes(type)),
+  );
 }
 
 export function acceptImageDrops(screen: ImageCanvas): () => void {
@@ -24,7 +26,11 @@ export function acceptImageDrops(screen: ImageCanvas): () => void {
     const { view } = screen.image;
     hoveredMaterial.value = null;
     // in free-camera views the server picks the material; the page handles the files when the event bubbles up
-    onDrop(freeCameraOf(view) === null ? Promise.resolve(material) : requestPixelProbe(view, px, py).then((answer) => answer.material));
+    onDrop(
+      freeCameraOf(view) === null
+        ? Promise.resolve(material)
+        : requestPixelProbe(view, px, py).then((answer) => answer.material),
+    );
   };
   canvas.addEventListener("dragover", target);
   canvas.addEventListener("drop", drop);

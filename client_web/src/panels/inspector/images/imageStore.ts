@@ -36,7 +36,8 @@ export type AssignImage = (material: string, image: ImageBody) => void | Promise
 /** Edits a material's terms; `own`: the scene's original terms. */
 type MakeTerms = (terms: readonly Term[], own: readonly Term[]) => Term[];
 
-export const imageOf = (texture: string): ImageBody | undefined => images.value.find((image) => image.texture === texture);
+export const imageOf = (texture: string): ImageBody | undefined =>
+  images.value.find((image) => image.texture === texture);
 
 export async function loadImages(): Promise<void> {
   await reportErrors(async () => {
@@ -59,7 +60,9 @@ async function applyMetalness(label: string, material: string, image: ImageBody,
   const terms = termsOf(material);
   const sceneId = scene.value?.id;
   if (terms === undefined || sceneId === undefined) return;
-  const metalTerms = await reportErrors(() => addMetalness(image.id, sceneId, material, make(terms, ownTerms(material))));
+  const metalTerms = await reportErrors(() =>
+    addMetalness(image.id, sceneId, material, make(terms, ownTerms(material))),
+  );
   if (metalTerms === undefined) return;
   await loadImages(); // lists generated images before the look refers to them
   if (termsOf(material) !== terms) return showNote("The material changed in the meantime. Apply the image again.");
@@ -76,7 +79,9 @@ function metalnessImageOf(material: string): ImageBody | undefined {
 function replaceBase(label: string, material: string, make: MakeTerms): void | Promise<void> {
   const metal = metalnessImageOf(material);
   if (metal === undefined) return replaceTerms(label, material, make);
-  return applyMetalness(label, material, metal, (terms, originals) => make(withoutMetalness(terms, originals, imageOf), originals));
+  return applyMetalness(label, material, metal, (terms, originals) =>
+    make(withoutMetalness(terms, originals, imageOf), originals),
+  );
 }
 
 /** The current base-color texture, also below a metalness map. */
@@ -94,7 +99,11 @@ export async function assignImage(material: string, { texture, name }: ImageBody
 }
 
 /** Set a material's metalness map; `make` changes the material in the same step. */
-export async function assignMetalness(material: string, image: ImageBody, make: MakeTerms = (terms) => [...terms]): Promise<void> {
+export async function assignMetalness(
+  material: string,
+  image: ImageBody,
+  make: MakeTerms = (terms) => [...terms],
+): Promise<void> {
   if (!canBeMetal(termsOf(material) ?? [])) return showNote(NO_METAL);
   selectMaterial(material);
   await applyMetalness(`Metalness · ${image.name}`, material, image, make);
@@ -128,7 +137,9 @@ export function assignNormals(material: string, { texture, name }: ImageBody): v
 
 /** Restore the original normal map. */
 export function removeNormalMap(material: string): void {
-  replaceMaterial("Remove normal map", material, (current) => withoutNormals(current, defaultLook.value?.materials[material]));
+  replaceMaterial("Remove normal map", material, (current) =>
+    withoutNormals(current, defaultLook.value?.materials[material]),
+  );
 }
 
 /** Set an image as roughness and metalness map, packed as in glTF: roughness in green, metalness in blue. */
@@ -154,7 +165,11 @@ export async function unassign(material: string): Promise<void> {
 }
 
 /** Assign the images of a set to a material, in one step; returns the rejected ones with reasons. */
-export async function assignSet(label: string, material: string, set: Map<Slot, ImageBody>): Promise<Map<Slot, string>> {
+export async function assignSet(
+  label: string,
+  material: string,
+  set: Map<Slot, ImageBody>,
+): Promise<Map<Slot, string>> {
   const rejections = new Map<Slot, string>();
   const current = look.value?.materials[material];
   const sceneId = scene.value?.id;
@@ -168,7 +183,8 @@ export async function assignSet(label: string, material: string, set: Map<Slot, 
   let terms = withColorAndRoughness(bare, set);
   if (metal !== undefined) terms = await addMetalness(metal.id, sceneId, material, terms);
   await loadImages(); // lists generated images before the look refers to them
-  if (look.value?.materials[material] !== current) throw new Error("The material changed in the meantime. Drop the images again.");
+  if (look.value?.materials[material] !== current)
+    throw new Error("The material changed in the meantime. Drop the images again.");
   if (set.size > 0) replaceMaterial(label, material, () => withSet(current, terms, set));
   return rejections;
 }
@@ -177,7 +193,8 @@ export async function assignSet(label: string, material: string, set: Map<Slot, 
 export async function uploadAndAssign(material: string, file: File, assign: AssignImage = assignImage): Promise<void> {
   if (imageUploadProgress.value !== null) return showNote("Still uploading; try again in a moment.");
   const onProgress = (fraction: number) =>
-    (imageUploadProgress.value = fraction < 1 ? `Uploading ${file.name}, ${Math.round(100 * fraction)} %` : `Processing ${file.name}…`);
+    (imageUploadProgress.value =
+      fraction < 1 ? `Uploading ${file.name}, ${Math.round(100 * fraction)} %` : `Processing ${file.name}…`);
   onProgress(0);
   const image = await reportErrors(() => uploadImage(file, onProgress), "files");
   imageUploadProgress.value = null;
@@ -188,7 +205,11 @@ export async function uploadAndAssign(material: string, file: File, assign: Assi
 }
 
 /** Delete an image after confirmation; the material gets its original map back. Saved looks keep theirs. */
-export function offerToDeleteImage(material: string, { id, name }: ImageBody, off: (material: string) => void | Promise<void>): void {
+export function offerToDeleteImage(
+  material: string,
+  { id, name }: ImageBody,
+  off: (material: string) => void | Promise<void>,
+): void {
   showNote(`Delete the image “${name}”? You can upload it again later.`, {
     label: "Delete",
     run: () =>

@@ -3,7 +3,17 @@ import { selectMaterial, selectedMaterial } from "../../../state/selection";
 import { reportErrors, showNote, showError } from "../../../ui/toasts";
 import { uploadImage } from "../../../session/net/upload";
 import type { ImageBody } from "../../../protocol";
-import { loadImages, assignRoughnessAndMetalness, assignMetalness, assignNormals, assignRoughness, assignSet, imageUploadProgress, uploadAndAssign, type AssignImage } from "./imageStore";
+import {
+  loadImages,
+  assignRoughnessAndMetalness,
+  assignMetalness,
+  assignNormals,
+  assignRoughness,
+  assignSet,
+  imageUploadProgress,
+  uploadAndAssign,
+  type AssignImage,
+} from "./imageStore";
 import { isColorName, detectMap } from "./mapNames";
 import { planSet, setName, setMessage, type Slot } from "./textureSet";
 
@@ -61,7 +71,8 @@ async function uploadSet(slots: ReadonlyMap<Slot, File>, reject: (name: string, 
   for (const [k, file] of files.entries()) {
     const progressLabel = `${k + 1} of ${files.length}: ${file.name}`;
     const onProgress = (fraction: number) =>
-      (imageUploadProgress.value = fraction < 1 ? `Uploading ${progressLabel}, ${Math.round(100 * fraction)} %` : `Processing ${progressLabel}…`);
+      (imageUploadProgress.value =
+        fraction < 1 ? `Uploading ${progressLabel}, ${Math.round(100 * fraction)} %` : `Processing ${progressLabel}…`);
     onProgress(0);
     try {
       uploaded.set(file, await uploadImage(file, onProgress));
@@ -80,7 +91,9 @@ async function applySet(material: string, files: readonly File[]): Promise<void>
   try {
     const uploaded = await uploadSet(slots, (name, reason) => rejected.push({ name, reason }));
     await loadImages();
-    const set = new Map([...slots].flatMap(([slot, file]) => (uploaded.has(file) ? [[slot, uploaded.get(file) as ImageBody]] : [])));
+    const set = new Map(
+      [...slots].flatMap(([slot, file]) => (uploaded.has(file) ? [[slot, uploaded.get(file) as ImageBody]] : [])),
+    );
     const label = `Textures · ${setName([...slots.values()].map(({ name }) => name))}`;
     const images = new Map(set);
     for (const [slot, reason] of await assignSet(label, material, set)) {

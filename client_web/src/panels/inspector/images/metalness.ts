@@ -22,7 +22,9 @@ export function metalnessOf(terms: readonly Term[], find: FindImage): string | n
 /** True if a material has a diffuse term, and a highlight with an adjustable reflectance. */
 export function canBeMetal(terms: readonly Term[]): boolean {
   const models = terms.map(modelOf);
-  const shines = models.some((model) => model?.texture === "specular" && model.parameters.some(({ name }) => name === "f0"));
+  const shines = models.some(
+    (model) => model?.texture === "specular" && model.parameters.some(({ name }) => name === "f0"),
+  );
   return shines && models.some((model) => model?.texture === "diffuse");
 }
 
@@ -42,6 +44,10 @@ export function withoutMetalness(terms: readonly Term[], originals: readonly Ter
       return { ...term, texture: original?.texture ?? null, color: (shared && original?.color) || term.color };
     }
     const f0 = original?.params?.f0;
-    return { ...term, texture: original?.texture ?? null, params: f0 === undefined ? term.params : { ...term.params, f0 } };
+    return {
+      ...term,
+      texture: original?.texture ?? null,
+      params: f0 === undefined ? term.params : { ...term.params, f0 },
+    };
   });
 }

@@ -15,7 +15,8 @@ export function roughnessImage(terms: readonly Term[]): string | null {
 
 /** Indices of the terms that a dropped roughness map applies to: those with a map or able to have one, else all with a width. */
 export function roughTermIndices(terms: readonly Term[]): number[] {
-  const indicesWhere = (predicate: (term: Term) => boolean) => terms.flatMap((term, k) => (modelOf(term)?.width_parameter != null && predicate(term) ? [k] : []));
+  const indicesWhere = (predicate: (term: Term) => boolean) =>
+    terms.flatMap((term, k) => (modelOf(term)?.width_parameter != null && predicate(term) ? [k] : []));
   const following = indicesWhere((term) => term.roughness_map !== undefined);
   return following.length > 0 ? following : indicesWhere(() => true);
 }
@@ -57,6 +58,10 @@ export function withoutRoughnessImage(terms: readonly Term[], originals: readonl
     const value = width == null ? undefined : original?.params?.[width];
     const params = width == null || value === undefined ? term.params : { ...term.params, [width]: value };
     const { roughness_map: _image, ...bare } = term;
-    return { ...bare, params, ...(original?.roughness_map === undefined ? {} : { roughness_map: original.roughness_map }) };
+    return {
+      ...bare,
+      params,
+      ...(original?.roughness_map === undefined ? {} : { roughness_map: original.roughness_map }),
+    };
   });
 }

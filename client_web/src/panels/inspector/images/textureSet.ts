@@ -60,7 +60,10 @@ export function planSet(files: readonly File[], isReadable: (file: File) => bool
     else if (free.length === 0) reject(file, `another image is used as ${slotNames.join(" and ")}`);
     else for (const slot of free) slots.set(slot, file);
   }
-  return { slots: new Map(SLOT_ORDER.flatMap((slot) => (slots.has(slot) ? [[slot, slots.get(slot) as File]] : []))), rejected };
+  return {
+    slots: new Map(SLOT_ORDER.flatMap((slot) => (slots.has(slot) ? [[slot, slots.get(slot) as File]] : []))),
+    rejected,
+  };
 }
 
 /** Terms with the base color and roughness of a set; the server applies metalness. */
@@ -92,7 +95,8 @@ function joinPhrases(phrases: readonly string[]): string {
 
 /** Message about the used and the rejected files. */
 export function setMessage(material: string, used: readonly Slot[], rejected: readonly RejectedFile[]): string {
-  const onto = used.length === 0 ? `Nothing applied to “${material}”.` : `Applied to “${material}”: ${joinPhrases(used)}.`;
+  const onto =
+    used.length === 0 ? `Nothing applied to “${material}”.` : `Applied to “${material}”: ${joinPhrases(used)}.`;
   if (rejected.length === 0) return onto;
   const more = rejected.length > MAX_NAMED ? `; and ${rejected.length - MAX_NAMED} more` : "";
   const rejections = rejected.slice(0, MAX_NAMED).map(({ name, reason }) => `${name} (${reason})`);
