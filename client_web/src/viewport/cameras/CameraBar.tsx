@@ -12,7 +12,7 @@ import { orbitKeyStep } from "./useCameraControl";
 
 const BROWSER_TITLE =
   "This browser draws while the camera moves, without network traffic. The server draws hard shadows of the sun and of " +
-  "lamps, contact lines and one-pixel highlights too; looks with BTFs, glass and cutouts are always the server's.";
+  "lamps, contact lines and one-pixel highlights too; scenes with glass or cutouts are always the server's.";
 const SERVER_TITLE = "The server draws while the camera moves and streams each picture.";
 const CHOICES: Record<RendererMode, string> = { auto: "Automatic", client: "This browser", server: "Server" };
 
