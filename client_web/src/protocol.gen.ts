@@ -347,7 +347,7 @@ export interface BtfJobBody {
   name: string;
   user: string;
   geometry: "weave" | "pebbles" | "corduroy" | "mesh" | null;
-  state: "queued" | "running" | "ready" | "failed" | "stopped";
+  state: "queued" | "running" | "ready" | "failed" | "canceled";
   created: string;
   started: string | null;
   ended: string | null;
@@ -409,7 +409,7 @@ export interface ComparisonBody {
   user: string;
   bake: string;
   view: string;
-  state: "queued" | "running" | "ready" | "failed" | "stopped";
+  state: "queued" | "running" | "ready" | "failed" | "canceled";
   created: string;
   started: string | null;
   ended: string | null;
@@ -792,7 +792,7 @@ export interface RenderBody {
   view: string;
   format: "exr" | "png" | "webp" | "mp4";
   size: [number, number] | null;
-  state: "queued" | "running" | "ready" | "failed" | "stopped";
+  state: "queued" | "running" | "ready" | "failed" | "canceled";
   created: string;
   started: string | null;
   ended: string | null;

@@ -52,7 +52,7 @@ afterEach(() => {
 });
 
 it("makes no second texture of a kind while one is made", () => {
-  btfJobs.value = [work("a", { geometry: "weave" }), work("b", { geometry: "pebbles", state: "stopped" })];
+  btfJobs.value = [work("a", { geometry: "weave" }), work("b", { geometry: "pebbles", state: "canceled" })];
   expect([isBeingMade("weave"), isBeingMade("pebbles")]).toEqual([true, false]);
 });
 
@@ -90,7 +90,7 @@ describe("textures in the making", () => {
     btfJobs.value = [work("a"), work("b")];
     await stopJob("a");
     await stopJob("b");
-    expect(btfJobs.value.map(({ state }) => state)).toEqual(["stopped", "stopped"]);
+    expect(btfJobs.value.map(({ state }) => state)).toEqual(["canceled", "canceled"]);
     await deleteJob("a");
     expect(btfJobs.value.map(({ id }) => id)).toEqual(["b"]);
     expect(requests).toEqual([

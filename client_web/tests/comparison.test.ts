@@ -84,7 +84,7 @@ describe("messages of the comparison", () => {
     );
     const on = { state: "running" as const, completed: 4, total: 16, progress: 0.3, problem: null, seconds_left: 61 };
     expect(comparisonProgressText(on, 3)).toContain("left");
-    expect(comparisonProgressText({ ...on, state: "stopped", seconds_left: null }, 3)).toBe(
+    expect(comparisonProgressText({ ...on, state: "canceled", seconds_left: null }, 3)).toBe(
       "Stopped after 4 of 16 passes",
     );
   });

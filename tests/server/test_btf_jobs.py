@@ -165,7 +165,7 @@ def test_stopped_job_keeps_partial_data_and_resumes(
     assert has_begun.wait(WAIT_S)
     assert client.get(url).json()["progress"] == 0.5
     assert client.delete(url).status_code == 204
-    assert client.get(url).json()["state"] == "stopped"
+    assert client.get(url).json()["state"] == "canceled"
     assert has_ended.wait(WAIT_S)
     assert client.post(f"{url}/resume").status_code == 202
     assert wait_for(client, url, "ready", "failed")["state"] == "ready"

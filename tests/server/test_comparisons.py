@@ -130,7 +130,7 @@ def test_stopped_comparison_keeps_its_result_and_resumes(client: TestClient, con
     wait_until(client, url, lambda body: body["completed"] >= 3 and body["error_all_paths"] is not None)
     assert client.delete(url).status_code == 204
     stopped = client.get(url).json()
-    assert (stopped["state"], stopped["seconds_left"]) == ("stopped", None)
+    assert (stopped["state"], stopped["seconds_left"]) == ("canceled", None)
     assert stopped["error_all_paths"]["noise"] > 0
     assert client.get(f"{url}/error.png").status_code == 200
     assert client.delete(url).status_code == 204  # again: nothing left to stop

@@ -98,7 +98,7 @@ def test_filters(client: TestClient, filled: Baked) -> None:
     assert ids(f"/api/renders?bake={filled.bake}&user=") == ["c", "b", "a"]
     for none in ("state=queued", f"bake={'0' * 16}", "user=ann"):
         assert ids(f"/api/renders?{none}") == []
-    assert len(ids("/api/comparisons?state=stopped")) == 3
+    assert len(ids("/api/comparisons?state=canceled")) == 3
     assert len(ids(f"/api/bakes?state=ready&scene={filled.scene}&user=")) == 3
     assert ids("/api/bakes?state=failed") == []
     assert ids("/api/scenes?name=c") == ["c"]
@@ -113,7 +113,7 @@ def test_jobs_have_an_owner_and_times(client: TestClient, filled: Baked) -> None
     assert (render["user"], render["name"], render["state"]) == ("", "a", "ready")
     assert render["created"] <= render["started"] <= render["ended"]
     comparison = client.get("/api/comparisons").json()[0]
-    assert comparison["state"] == "stopped"
+    assert comparison["state"] == "canceled"
     assert comparison["ended"] is not None
     assert all(bake["created"] and bake["user"] == "" for bake in client.get("/api/bakes").json())
 

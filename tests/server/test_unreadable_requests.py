@@ -31,7 +31,7 @@ UNREADABLE_REQUESTS = {
     "c": '{"bake":"012',
     "d": "",
 }
-STATES = ("queued", "running", "ready", "failed", "stopped")
+STATES = ("queued", "running", "ready", "failed", "canceled")
 URLS = {"render": "/api/renders", "comparison": "/api/comparisons", "btf": "/api/materials/btf/jobs"}
 
 
@@ -87,7 +87,7 @@ def test_unreadable_requests_that_are_queued_fail_in_the_database(restarted: Tes
     while states(restarted) & {"queued", "running"}:
         assert time.monotonic() < deadline
         time.sleep(0.02)
-    assert states(restarted) == {"ready", "failed", "stopped"}
+    assert states(restarted) == {"ready", "failed", "canceled"}
 
 
 @pytest.mark.parametrize("text", ['{"missing":[],"error":1}', '{"material":', "[]", ""])

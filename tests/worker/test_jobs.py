@@ -261,7 +261,7 @@ def test_job_ends_at_once_when_it_is_not_wanted(tmp_path: Path, ledger: Ledger, 
     if end == "delete":
         wait_for(lambda: not (tmp_path / identity).exists())
     else:
-        assert jobs.frames.get(identity).state == ("stopped" if end == "stop" else "running")
+        assert jobs.frames.get(identity).state == ("canceled" if end == "stop" else "running")
     if end != "close":
         jobs.service.close()
     with ledger.sessions() as session:

@@ -27,9 +27,10 @@ from relume_worker.database.clock import epoch_s
 from relume_worker.database.models import BakeRow, TaskRow
 from relume_worker.estimate import CompletedBake, crowding, machine_load
 from relume_worker.executor import is_tiny
+from relume_worker.job_state import JobState
 from relume_worker.jobs.fair_share import Waiting
 from relume_worker.lease import is_alive, log_taken_over
-from relume_worker.status import BakeState, BakeStatus, Phase, TaskCost, bake_id, recipe_from_json, recipe_json
+from relume_worker.status import BakeStatus, Phase, TaskCost, bake_id, recipe_from_json, recipe_json
 
 
 class Ledger:
@@ -77,7 +78,7 @@ class Ledger:
         self.requeue(identity, ("failed", "canceled"))
         return identity
 
-    def requeue(self, identity: str, states: Sequence[BakeState]) -> None:
+    def requeue(self, identity: str, states: Sequence[JobState]) -> None:
         """Queue a bake that is in one of `states` again."""
         self._change(identity, states, state="queued", problem=None, queued=time.time(), seconds_left=None, phase=None)
 
@@ -158,7 +159,7 @@ class Ledger:
         return self._change(identity, None, BakeRow.owner == owner, heartbeat=epoch_s())
 
     def finish(
-        self, identity: str, owner: str, state: BakeState, problem: str | None = None, num_bytes: int = 0
+        self, identity: str, owner: str, state: JobState, problem: str | None = None, num_bytes: int = 0
     ) -> bool:
         """Give up the lease; a running bake changes to `state`, a canceled one stays canceled.
 
@@ -287,7 +288,7 @@ class Ledger:
         with self.sessions() as session:
             return session.get(BakeRow, identity)
 
-    def _change(self, identity: str, states: Sequence[BakeState] | None, *conditions: Any, **values: Any) -> bool:
+    def _change(self, identity: str, states: Sequence[JobState] | None, *conditions: Any, **values: Any) -> bool:
         statement = update(BakeRow).where(BakeRow.id == identity, *conditions).values(**values)
         if states is not None:
             statement = statement.where(BakeRow.state.in_(states))
@@ -333,7 +334,7 @@ def _status(row: BakeRow, queue_positions: Mapping[str, int]) -> BakeStatus:
     return BakeStatus(
         id=row.id,
         scene=row.scene_id,
-        state=cast("BakeState", row.state),
+        state=cast("JobState", row.state),
         progress=row.progress,
         phase=cast("Phase | None", row.phase),
         phase_since=row.phase_since if row.phase else None,

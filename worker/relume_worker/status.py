@@ -11,8 +11,8 @@ from relume.core.source_hash import bake_code
 from relume.scene.custom_camera import read_custom_camera
 from relume.store.bake_protocol import Plan, Recipe
 from relume.store.schema import SCHEMA_VERSION
+from relume_worker.job_state import FINAL_STATES, JobState
 
-BakeState = Literal["queued", "running", "ready", "failed", "canceled"]
 Phase = Literal["starting", "loading", "reading", "building", "compiling", "sampling", "tracing", "publishing"]
 PHASE_LABELS: dict[Phase, str] = {
     "starting": "starting worker processes",
@@ -24,7 +24,6 @@ PHASE_LABELS: dict[Phase, str] = {
     "tracing": "tracing",
     "publishing": "checking and publishing",
 }
-FINAL_STATES: frozenset[BakeState] = frozenset({"ready", "failed", "canceled"})
 
 # methods with a free camera: their images are exact once it stops, not at once
 FREE_CAMERA_METHODS = frozenset({"probes"})
@@ -48,7 +47,7 @@ class BakeStatus:
 
     id: str
     scene: str
-    state: BakeState
+    state: JobState
     progress: float
     phase: Phase | None
     phase_since: float | None

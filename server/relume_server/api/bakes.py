@@ -30,10 +30,11 @@ from relume_server.schemas.bodies import BakeBody, BakeRequest, DryRunBody, Plan
 from relume_server.schemas.cameras import CameraBody
 from relume_server.services import Services, ServicesDep
 from relume_worker.cameras import resolve_views
+from relume_worker.job_state import JobState
 from relume_worker.jobs.job import NotReadyError
 from relume_worker.presets import PRESETS, resolve_num_probes
 from relume_worker.scenes import get_scene
-from relume_worker.status import FREE_CAMERA_METHODS, BakeState, BakeStatus, bake_id
+from relume_worker.status import FREE_CAMERA_METHODS, BakeStatus, bake_id
 
 router = APIRouter(prefix="/api/bakes", tags=["bakes"])
 
@@ -75,7 +76,7 @@ def list_bakes(
     services: ServicesDep,
     page: PageDep,
     scene: Annotated[Id | None, Query()] = None,
-    state: Annotated[BakeState | None, Query()] = None,
+    state: Annotated[JobState | None, Query()] = None,
     user: Annotated[str | None, Query(max_length=80)] = None,
 ) -> list[BakeBody]:
     """List bakes, newest first, filtered by scene, state or user."""

@@ -18,9 +18,10 @@ from relume_server.batch.frame_sequence import comparison_camera
 from relume_server.io.downloads import Download
 from relume_server.jobs.comparison_jobs import ComparisonJob
 from relume_server.openapi import files
-from relume_server.schemas.base import Id, JobState
+from relume_server.schemas.base import Id
 from relume_server.schemas.bodies import ComparisonBody, ComparisonPlanBody, ComparisonRequest
 from relume_server.services import Services, ServicesDep
+from relume_worker.job_state import JobState
 from relume_worker.jobs.job import JobFilter, NotReadyError
 
 router = APIRouter(prefix="/api/comparisons", tags=["comparisons"])

@@ -25,7 +25,7 @@ from relume_server.io.downloads import Download, ZipStream
 from relume_server.io.video import check_encoder
 from relume_server.jobs.render_jobs import RenderJob, planned_bytes
 from relume_server.openapi import files
-from relume_server.schemas.base import MAX_NAME, Id, JobState, Name
+from relume_server.schemas.base import MAX_NAME, Id, Name
 from relume_server.schemas.cameras import CameraFrame
 from relume_server.schemas.protocol import MAX_CAMERA_PIXELS
 from relume_server.schemas.renders import (
@@ -39,6 +39,7 @@ from relume_server.schemas.renders import (
     RenderRequest,
 )
 from relume_server.services import Services, ServicesDep
+from relume_worker.job_state import JobState
 from relume_worker.jobs.job import JobFilter, NotReadyError, new_id
 from relume_worker.scenes import get_scene
 

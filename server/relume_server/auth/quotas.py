@@ -19,6 +19,7 @@ from relume_server.auth.tables import OwnedRow
 from relume_server.errors import NearlyFullError
 from relume_server.runtime.disk_space import free_bytes
 from relume_worker.database.models import BakeRow
+from relume_worker.job_state import ACTIVE_STATES
 from relume_worker.jobs.job import BusyError, QuotaError
 
 if TYPE_CHECKING:
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 OwnedKind = Literal["upload", "scene", "environment", "material", "btf-job", "btf", "image", "bake", "render"]
-_ACTIVE = ("queued", "running")
 MAX_STREAMS_EACH = 32
 """Maximum number of event streams per caller."""
 
@@ -156,7 +156,7 @@ class Quotas:
             select(func.count())
             .select_from(OwnedRow)
             .join(BakeRow, BakeRow.id == OwnedRow.object)
-            .where(OwnedRow.kind == "bake", OwnedRow.owner == owner, BakeRow.state.in_(_ACTIVE))
+            .where(OwnedRow.kind == "bake", OwnedRow.owner == owner, BakeRow.state.in_(ACTIVE_STATES))
         )
         with self._sessions() as session:
             num_active = session.scalar(query) or 0
@@ -181,7 +181,7 @@ class Quotas:
         with self._sessions() as session:
             total = int(session.scalar(other_bytes) or 0)
             for planned, written, state, progress in session.execute(bakes):
-                total += planned if state in _ACTIVE else written if state == "ready" else int(planned * progress)
+                total += planned if state in ACTIVE_STATES else written if state == "ready" else int(planned * progress)
         return total
 
     def assign_owner(self, owner: str, kind: OwnedKind, object_id: str, num_bytes: int) -> None:

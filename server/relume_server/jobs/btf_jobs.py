@@ -23,7 +23,7 @@ class BtfJobs(JobKind[BtfRequest]):
     """BTF jobs with files in `data`/btf-jobs/<id>/; one step per job, in slices of time."""
 
     name, placeholder = "btf", BtfRequest(name="unknown", error=BOUND)
-    resumable = ("stopped",)
+    resumable = ("canceled",)
 
     def __init__(
         self,

@@ -10,11 +10,12 @@ from pydantic import Field
 from relume.core.import_warnings import Severity
 from relume.look.document import MAX_BOUNCES
 from relume.look.model import PathFilter
-from relume_server.schemas.base import Body, Id, JobState, Name
+from relume_server.schemas.base import Body, Id, Name
 from relume_server.schemas.cameras import CameraBody, CameraFrame
 from relume_server.schemas.comments import MAX_PICTURE_TEXT
 from relume_server.schemas.protocol import MAX_VISIBLE_VIEWS
 from relume_server.schemas.renders import Side
+from relume_worker.job_state import JobState
 from relume_worker.status import Phase
 
 Preset = Literal["preview", "good", "final"]

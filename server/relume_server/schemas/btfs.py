@@ -6,7 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from relume_server.schemas.base import Body, Id, JobState, Name
+from relume_server.schemas.base import Body, Id, Name
+from relume_worker.job_state import JobState
 
 Geometry = Literal["weave", "pebbles", "corduroy"]
 GeometrySource = Literal[Geometry, "mesh"]

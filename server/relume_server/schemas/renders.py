@@ -8,8 +8,9 @@ from pydantic import Discriminator, Field, Tag
 
 from relume.look.interpolate import InterpolationMode
 from relume.output.exr.layers import Layering
-from relume_server.schemas.base import Body, Id, JobState, Name
+from relume_server.schemas.base import Body, Id, Name
 from relume_server.schemas.cameras import CameraFrame
+from relume_worker.job_state import JobState
 
 Side = Annotated[int, Field(ge=1, le=16384)]
 ImageFormat = Literal["exr", "png", "webp"]

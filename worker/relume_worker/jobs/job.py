@@ -11,8 +11,6 @@ from pydantic import BaseModel, ValidationError
 from relume.core.errors import RelumeError
 from relume_worker.database.models import JobRow
 
-ACTIVE = ("queued", "running")
-STATES = (*ACTIVE, "ready", "failed", "stopped")
 UNREADABLE = "the request cannot be read, because another version of relume wrote it or it is damaged; request it again"
 
 Request = TypeVar("Request", bound=BaseModel)

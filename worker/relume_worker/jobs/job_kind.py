@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any, ClassVar, Generic, Protocol
 
 from relume_worker.database.models import JobRow
-from relume_worker.jobs.job import ACTIVE, UNREADABLE, Job, JobFilter, NotReadyError, Request, new_id, read_row
+from relume_worker.job_state import ACTIVE_STATES
+from relume_worker.jobs.job import UNREADABLE, Job, JobFilter, NotReadyError, Request, new_id, read_row
 from relume_worker.jobs.job_ledger import JobLedger
 from relume_worker.jobs.job_run import JobRun
 from relume_worker.jobs.step import RunStep
@@ -43,7 +44,7 @@ class JobKind(ABC, Generic[Request]):
 
     name: ClassVar[str]
     placeholder: Request
-    resumable: ClassVar[Sequence[str]] = ("stopped", "failed")
+    resumable: ClassVar[Sequence[str]] = ("canceled", "failed")
     """States from which a job can be resumed: its files are still there."""
 
     def __init__(self, service: JobHost, folder: Path) -> None:
@@ -160,7 +161,7 @@ class JobKind(ABC, Generic[Request]):
         Raises:
             NotFoundError. NotReadyError: it is ready, or its files are deleted. BusyError, QuotaError: as `submit`.
         """
-        if self.get(identity).state not in ACTIVE:
+        if self.get(identity).state not in ACTIVE_STATES:
             self.requeue(identity, self.resumable)
 
     def requeue(self, identity: str, states: Sequence[str], prepare: Callable[[], object] = lambda: None) -> None:

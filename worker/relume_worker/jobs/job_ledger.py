@@ -17,8 +17,9 @@ from sqlalchemy.orm import Session, sessionmaker
 from relume.core.errors import NotFoundError
 from relume_worker.database.clock import epoch_s
 from relume_worker.database.models import BakeRow, JobRow
+from relume_worker.job_state import ACTIVE_STATES
 from relume_worker.jobs.fair_share import Waiting
-from relume_worker.jobs.job import ACTIVE, BusyError, JobFilter, NotReadyError, Quota, QuotaError, noun
+from relume_worker.jobs.job import BusyError, JobFilter, NotReadyError, Quota, QuotaError, noun
 from relume_worker.lease import is_alive, log_taken_over
 
 
@@ -48,7 +49,7 @@ class JobLedger:
 
     def _check_quota(self, session: Session, kind: str, client: str) -> None:
         quota = self._quota
-        active = JobRow.kind == kind, JobRow.state.in_(ACTIVE)
+        active = JobRow.kind == kind, JobRow.state.in_(ACTIVE_STATES)
         clients = session.scalars(select(JobRow.client).where(*active)).all()
         if len(clients) >= quota.max_total:
             text = f"the limit of {quota.max_total} unfinished {noun(kind)}s is reached; try again later"
@@ -91,7 +92,7 @@ class JobLedger:
     def referencing(self, kind: str, text: str) -> list[str]:
         """Ids of queued and running jobs whose request contains a text, oldest first."""
         contains = JobRow.request.contains(text, autoescape=True)
-        query = select(JobRow.id).where(JobRow.kind == kind, JobRow.state.in_(ACTIVE), contains)
+        query = select(JobRow.id).where(JobRow.kind == kind, JobRow.state.in_(ACTIVE_STATES), contains)
         with self._sessions() as session:
             return list(session.scalars(query.order_by(JobRow.created)))
 
@@ -121,14 +122,14 @@ class JobLedger:
 
     def stop(self, identity: str) -> None:
         """Stop a queued or running job."""
-        self._update(JobRow.id == identity, JobRow.state.in_(ACTIVE), state="stopped", ended=time.time())
+        self._update(JobRow.id == identity, JobRow.state.in_(ACTIVE_STATES), state="canceled", ended=time.time())
 
     # leases
 
     def claimable(self, running: frozenset[str]) -> list[Waiting]:
         """Jobs without a live owner. running: those that this service runs already."""
         columns = JobRow.id, JobRow.client, JobRow.is_first, JobRow.created, JobRow.owner, JobRow.heartbeat
-        query = select(*columns, epoch_s().label("now")).where(JobRow.state.in_(ACTIVE))  # requests may be large
+        query = select(*columns, epoch_s().label("now")).where(JobRow.state.in_(ACTIVE_STATES))  # requests may be large
         with self._sessions() as session:
             rows = [row for row in session.execute(query) if row.id not in running and not self._is_leased(row)]
         return [Waiting(row.id, row.client or "", bool(row.is_first), row.created) for row in rows]
@@ -143,7 +144,7 @@ class JobLedger:
         row = row_and_time[0]
         is_unchanged = or_(JobRow.owner.is_(None), JobRow.owner == row.owner)
         started = func.coalesce(JobRow.started, time.time())
-        conditions = JobRow.id == identity, JobRow.state.in_(ACTIVE), is_unchanged
+        conditions = JobRow.id == identity, JobRow.state.in_(ACTIVE_STATES), is_unchanged
         if not self._update(*conditions, owner=self.owner, heartbeat=epoch_s(), started=started):
             return None
         if row.owner not in (None, self.owner):
@@ -161,13 +162,15 @@ class JobLedger:
 
     def update_leased(self, identity: str, **values: Any) -> bool:
         """Change an active row whose lease is here. False if it is not any more."""
-        return self._update(JobRow.id == identity, JobRow.state.in_(ACTIVE), JobRow.owner == self.owner, **values)
+        return self._update(
+            JobRow.id == identity, JobRow.state.in_(ACTIVE_STATES), JobRow.owner == self.owner, **values
+        )
 
     def holds_lease(self, identity: str) -> bool:
         """True if the job is active, and its lease is here."""
         with self._sessions() as session:
             row = session.get(JobRow, identity)
-        return row is not None and row.state in ACTIVE and row.owner == self.owner
+        return row is not None and row.state in ACTIVE_STATES and row.owner == self.owner
 
     def release(self, identity: str) -> bool:
         """Give up a lease. False if it was lost before."""
@@ -180,10 +183,10 @@ class JobLedger:
 
 def count_jobs(sessions: sessionmaker[Session], kinds: Sequence[str]) -> Mapping[tuple[str, str], int]:
     """Count bakes, and jobs of some kinds, by kind and state, "queued" or "running"."""
-    counts = {(kind, state): 0 for kind in ("bake", *kinds) for state in ACTIVE}
+    counts: dict[tuple[str, str], int] = {(kind, state): 0 for kind in ("bake", *kinds) for state in ACTIVE_STATES}
     columns = JobRow.kind, JobRow.state
-    jobs = select(*columns, func.count()).where(JobRow.state.in_(ACTIVE)).group_by(*columns)
-    bakes = select(BakeRow.state, func.count()).where(BakeRow.state.in_(ACTIVE)).group_by(BakeRow.state)
+    jobs = select(*columns, func.count()).where(JobRow.state.in_(ACTIVE_STATES)).group_by(*columns)
+    bakes = select(BakeRow.state, func.count()).where(BakeRow.state.in_(ACTIVE_STATES)).group_by(BakeRow.state)
     with sessions() as session:
         counts.update({(kind, state): num for kind, state, num in session.execute(jobs)})
         counts.update({("bake", state): num for state, num in session.execute(bakes)})

@@ -58,7 +58,7 @@ function ComparisonButtons({ isOld: isOutdated }: { isOld: boolean }) {
   return (
     <div class="group" role="group" aria-label="Comparison">
       {isInProgress(body) && <button onClick={() => void haltComparison()}>Stop</button>}
-      {body.state === "stopped" && <button onClick={() => void continueComparison()}>Resume</button>}
+      {body.state === "canceled" && <button onClick={() => void continueComparison()}>Resume</button>}
       <button onClick={() => void beginComparison()}>{isOutdated ? "Compare this picture" : "Restart"}</button>
     </div>
   );

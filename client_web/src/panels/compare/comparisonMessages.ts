@@ -40,7 +40,7 @@ export function comparisonProgressText(progress: ComparisonProgress, elapsed: nu
     }
     case "ready":
       return `Reference: ${progress.total} passes`;
-    case "stopped":
+    case "canceled":
       return `Stopped after ${progress.completed} of ${progress.total} passes`;
     case "failed":
       return progress.problem ?? "The comparison failed.";

@@ -26,7 +26,7 @@ function BtfJob({ work }: { work: BtfJobBody }) {
         <button onClick={() => void stopJob(id)}>Stop</button>
       ) : (
         <span class="group" role="group" aria-label={name}>
-          {state === "stopped" && <button onClick={() => void resumeJob(id)}>Resume</button>}
+          {state === "canceled" && <button onClick={() => void resumeJob(id)}>Resume</button>}
           <button onClick={() => void deleteJob(id)}>Remove</button>
         </span>
       )}

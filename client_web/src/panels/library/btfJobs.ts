@@ -76,7 +76,7 @@ async function uploadJob(upload: (onProgress: (fraction: number) => void) => Pro
 export async function stopJob(id: string): Promise<void> {
   await reportErrors(async () => {
     await stopBtfJob(id);
-    btfJobs.value = btfJobs.value.map((work) => (work.id === id ? { ...work, state: "stopped" as const } : work));
+    btfJobs.value = btfJobs.value.map((work) => (work.id === id ? { ...work, state: "canceled" as const } : work));
   });
 }
 
@@ -105,7 +105,7 @@ export function jobText({ state, progress, seconds_left, problem }: BtfJobBody):
       const left = seconds_left === null ? "" : `, ${formatSeconds(seconds_left)} left`;
       return `${Math.floor(100 * progress)} %${left}`;
     }
-    case "stopped":
+    case "canceled":
       return "stopped; progress is saved";
     case "failed":
       return problem ?? "failed";

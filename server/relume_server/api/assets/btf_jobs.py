@@ -24,9 +24,10 @@ from relume_server.io.import_request import UPLOAD_PREFIX, ImportRequest
 from relume_server.io.upload_middleware import ReservationDep
 from relume_server.io.uploads import plain_stem, save_upload, upload_bytes
 from relume_server.jobs.btf_jobs import BtfJob
-from relume_server.schemas.base import Id, JobState
+from relume_server.schemas.base import Id
 from relume_server.schemas.btfs import BOUND, TEXELS, Bound, BtfJobBody, BtfRequest, Period, SyntheticBtfRequest, Texels
 from relume_server.services import Services, ServicesDep
+from relume_worker.job_state import JobState
 from relume_worker.jobs.job import JobFilter, new_id
 
 PREFIX = "/api/materials/btf/jobs"

@@ -1,4 +1,4 @@
-"""Renders, comparisons and BTF jobs in one table."""
+"""Renders, comparisons and BTF jobs in one table, with the states of bakes."""
 
 from __future__ import annotations
 
@@ -33,5 +33,6 @@ def upgrade() -> None:
     for kind, table in (("render", "renders"), ("comparison", "truths"), ("btf", "btfs")):
         op.execute(f"INSERT INTO jobs (kind, {_COLUMNS}) SELECT '{kind}', {_COLUMNS} FROM {table}")  # noqa: S608
         op.drop_table(table)
+    op.execute("UPDATE jobs SET state = 'canceled' WHERE state = 'stopped'")
     op.create_index("ix_jobs_kind", "jobs", ["kind"])
     op.create_index("ix_jobs_state", "jobs", ["state"])
