@@ -37,7 +37,12 @@ class RayScratch(NamedTuple):
 
 
 def allocate_scratch(num_curves: int, max_rays: int, num_columns: int) -> RayScratch:
-    """Allocate scratch memory. max_rays: of a point. num_columns: of `Contraction.settings`."""
+    """Allocate scratch memory.
+
+    Args:
+        num_curves: number of curves. max_rays: maximum number of rays of a point.
+        num_columns: number of columns of `Contraction.settings`.
+    """
     gamma, weight = np.empty(max_rays, np.float32), np.empty((3, max_rays), np.float32)
     return RayScratch(gamma, weight, np.zeros((num_curves, max_rays), np.int64), np.empty(num_columns, np.float32))
 
@@ -165,7 +170,7 @@ def weight_rays(listed, num_points, shading, curves, scratch, out):  # type: ign
     """Compute the contribution of each listed ray of the first points, with all curves contracted.
 
     Args:
-        listed, shading, curves, scratch: as in `project_rays`. out: written. (3, K) float32
+        num_points: number of points. listed, shading, curves, scratch: as in `project_rays`. out: written. (3, K) float32
     """
     for p in range(num_points):
         begin, end = listed.first[p], listed.first[p + 1]

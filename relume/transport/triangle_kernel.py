@@ -42,7 +42,12 @@ class Subtriangles(NamedTuple):
 
 
 def allocate_subtriangles(num_curves: int, capacity: int, num_rows: int) -> Subtriangles:
-    """Allocate memory for subtriangles. num_rows: of `Contraction.settings`."""
+    """Allocate memory for subtriangles.
+
+    Args:
+        num_curves: number of curves. capacity: maximum number of subtriangles.
+        num_rows: number of rows of `Contraction.settings`.
+    """
     corners, area_fraction = np.empty((num_curves, 3, capacity), np.float32), np.empty(capacity, np.float32)
     overlaps, weight = np.empty((5, capacity), np.float32), np.empty((3, capacity), np.float32)
     mean, product = np.empty(num_rows, np.float32), np.empty((_SUBTRIANGLES_PER_BATCH, num_rows), np.float32)

@@ -73,7 +73,12 @@ def allocate_chunks(num: int, num_rows: int) -> Chunks:
 
 
 def allocate_scratch(curves: WholeCurves, max_lights: int, *, has_groups: bool = False) -> ListScratch:
-    """Allocate scratch memory for points with at most `max_lights` lights or, if `has_groups`, groups."""
+    """Allocate scratch memory.
+
+    Args:
+        curves: curves of the contraction. max_lights: maximum number of lights of a point, or of groups if
+            `has_groups`.
+    """
     chunks = allocate_chunks(max_lights // CHUNK + 1, int(curves.num_rows.max(initial=1)))
     local, averages = np.empty((3, 6, CHUNK), np.float32), np.empty((11, CHUNK), np.float32)
     wo, between_variance = np.empty_like(curves.axes), np.empty(CHUNK if has_groups else 0, np.float32)
