@@ -170,7 +170,8 @@ def weight_rays(listed, num_points, shading, curves, scratch, out):  # type: ign
     """Compute the contribution of each listed ray of the first points, with all curves contracted.
 
     Args:
-        num_points: number of points. listed, shading, curves, scratch: as in `project_rays`. out: written. (3, K) float32
+        num_points: number of points. listed, shading, curves, scratch: as in `project_rays`.
+        out: written. (3, K) float32
     """
     for p in range(num_points):
         begin, end = listed.first[p], listed.first[p + 1]
