@@ -235,6 +235,15 @@ class View:
         unfiltered = read_gather_rays(self.store, self.index, material, rows.start, rows.stop, outgoing)
         return replace(unfiltered, sharing=self._neighbor_filter(material))
 
+    def mirror_lights(self, material: int) -> Shaped[NDArray[np.uint8], "n bytes"]:
+        """Read the virtual lights in planar mirrors that a material's samples see, as bits."""
+        rows = self.rows(material)
+
+        def read() -> NDArray[np.uint8]:
+            return np.asarray(self.store.read(f"views/{self.index}/mirror_lights", rows.start, rows.stop), np.uint8)
+
+        return self.cache.transient.get_value((self.key, "mirror lights", *self.sample_key(material)), read)
+
     def trace_gather_rays(self, material: int, is_canceled: Callable[[], bool]) -> None:
         """Trace gather rays that were not baked, because of an overridden normal map; reading them is then immediate.
 

@@ -32,7 +32,7 @@ from relume.patches.patch_kdtree import NO_PATCH
 from relume.patches.patches import patch_sample_points
 from relume.radiosity.patch_irradiance import PatchLight
 from relume.radiosity.reflectance_operator import IncidentLight
-from relume.radiosity.solve_bounces import solve_indirect
+from relume.radiosity.solve_bounces import solve_bounces
 from relume.raytrace.gather_rays import lattice_offsets, local_ray, make_pattern, ray_weight
 from relume.raytrace.scene_buffers import build_scene_buffers
 from relume.reference import ReferencePoints, environment_texels
@@ -80,7 +80,7 @@ def patches(lights):
 def outgoing_from_patches(patches, lights, first=1, last=24, reflectances=REFLECTANCES):
     reflecting = patches.reflectance_operator(reflectances)
     vectors = patches.incident_coefficients(reflecting.rows, lights, OUTGOING_DEGREE)
-    return solve_indirect(
+    return solve_bounces(
         patches, reflecting, IncidentLight(patches.irradiance(lights), vectors), first, last
     ).outgoing_light(patches)
 

@@ -22,6 +22,7 @@ from relume.live.fixed_camera.illumination import Illumination, split_for_shadin
 from relume.live.fixed_camera.live_term import LiveTerm
 from relume.live.fixed_camera.material_image import MaterialImage
 from relume.live.fixed_camera.operator_budget import OperatorForm, precompute_subsampled
+from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.fixed_camera.texel_light_cache import is_cacheable, put_texel_light
 from relume.live.fixed_camera.view_images import MERGED_LIGHT_SUFFIX, ViewImages
 from relume.look.model import Rgb
@@ -145,7 +146,8 @@ class PrecomputeOperator:
         images, material, _ = self.target
 
         def build_operator() -> Operator:
-            lights, receivers = images.incident_light(material, self.light, is_canceled)
+            quality = LightQuality.MERGED if self.form.is_merged_light else LightQuality.EXACT
+            lights, receivers = images.incident_light(material, self.light, is_canceled, quality)
 
             def precompute_samples(subset: ShadingPoints) -> LinearOperator | QuantizedOperator:
                 callbacks = progress, is_canceled
@@ -154,7 +156,6 @@ class PrecomputeOperator:
                 )
 
             if self.form.is_merged_light:
-                lights = images.transfer.clustered_lights(self.light)
                 return MergedLightOperator(**vars(precompute_samples(receivers)))
             if self.form.step == 1:
                 return precompute_samples(receivers)

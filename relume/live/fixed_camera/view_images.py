@@ -14,7 +14,6 @@ from relume.brdf.term_validation import complete_term
 from relume.brdf.texture_slots import roughness_image
 from relume.core.cache import Cache
 from relume.core.errors import ParameterError
-from relume.lights.spherical_triangles import TriangleLights
 from relume.live.fixed_camera.edit_pointers import CurvePointer, ParameterPointer
 from relume.live.fixed_camera.illumination import (
     Illumination,
@@ -27,7 +26,7 @@ from relume.live.fixed_camera.illumination import (
 from relume.live.fixed_camera.live_term import LiveTerm
 from relume.live.fixed_camera.material_image import MaterialImage
 from relume.live.fixed_camera.mirror_samples import MirrorFactors
-from relume.live.fixed_camera.protocols import EditAxis, FixedViewTransfer
+from relume.live.fixed_camera.protocols import EditAxis, FixedViewTransfer, LightQuality, LightsAndPoints
 from relume.look import Look, TermLook, validate
 from relume.operators.edit_basis import CurveBasis, EditBasis
 from relume.operators.operator import Operator
@@ -154,19 +153,15 @@ class ViewImages:
         return self.mirrors.update_emission(documents)
 
     def incident_light(
-        self, material: MaterialImage, light: Illumination, is_canceled: Callable[[], bool]
-    ) -> tuple[TriangleLights, ShadingPoints]:
-        """Return the incident light at the samples of a material; missing rays are traced.
-
-        Args:
-            material: its image. light: the illumination. is_canceled: polled regularly.
-        Raises:
-            CancelledError: `is_canceled` returned true.
-        """
-        if light.paths.has_indirect and material.num_samples:
-            self.view.trace_gather_rays(material.index, is_canceled)
-            self.transfer.solve_indirect_cache(light, is_canceled)
-        return self.transfer.incident_light(self.view, material.index, light, self.cache)
+        self,
+        material: MaterialImage,
+        light: Illumination,
+        is_canceled: Callable[[], bool],
+        quality: LightQuality = LightQuality.EXACT,
+    ) -> LightsAndPoints:
+        """Return the incident light at the samples of a material. See `FixedViewTransfer.incident_light`."""
+        samples = self.transfer.samples(self.view, material.index, self.cache)
+        return self.transfer.incident_light(samples, light, quality, is_canceled)
 
     def unlit_samples(self, material: MaterialImage) -> ShadingPoints:
         """Return the samples of a material without incident light."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,23 +11,20 @@ from jaxtyping import Shaped
 from numpy.typing import NDArray
 
 from relume.core.cache import Cache
-from relume.live.fixed_camera.illumination import Illumination, Normals
-from relume.live.fixed_camera.protocols import EditAxis
+from relume.live.fixed_camera.illumination import Illumination, Normals, with_baked_normals
+from relume.live.fixed_camera.protocols import EditAxis, LightQuality, Samples
 from relume.methods.indirect_solver import IndirectSolver
 from relume.methods.local_lights import LocalLights
-from relume.methods.opened.fixed_views import BakedFixedViews, IntegrateEnvironment, SampledTransfer
+from relume.methods.opened.fixed_views import BakedFixedViews, FindLights, SelectedSamples
 from relume.methods.patch_direct_light import DirectPatchLight
-from relume.methods.planar_mirror_light import AddedMirrorLights, MirrorLights, MirrorLightTransfer
+from relume.methods.planar_mirror_light import MirrorLights, MirrorLightTransfer
 from relume.methods.retrace import NormalRetracer
 from relume.methods.spherical_harmonic_transfer import HarmonicLight, read_harmonic_light
-from relume.patches.patch_kdtree import NO_PATCH
 from relume.radiosity.normal_mapped_patches import normal_mapped_patches
 from relume.radiosity.patch_irradiance import PatchLight
-from relume.transport.outgoing_patch_light import isotropic
-from relume.transport.shading_points import GatherRays, RayList
+from relume.transport.outgoing_patch_light import OutgoingLight, no_light
+from relume.transport.shading_points import RayList
 from relume.views.view import View
-
-_NO_LIGHT = isotropic(np.zeros((NO_PATCH + 1, 3), np.float32))
 
 
 @dataclass(frozen=True)
@@ -46,36 +43,56 @@ class BakedIndirectViews(BakedFixedViews):
 
     @cached_property
     def indirect(self) -> IndirectSolver:
-        """Solver for the outgoing light of the patches."""
+        """Solver for the light of patches at samples, which see virtual lights in planar mirrors as well."""
+        return self._solver(self.mirror_light)
+
+    @cached_property
+    def indirect_at_probes(self) -> IndirectSolver:
+        """Solver for the light of patches at probes, which store no visibility of virtual lights."""
+        return self._solver(None)
+
+    def _solver(self, mirror_light: MirrorLightTransfer | None) -> IndirectSolver:
         direct_light = DirectPatchLight(self.patches, *self._direct_light_args, self.harmonic)
-        return IndirectSolver(direct_light, self._normal_mapped_direct_light, self.cache, self.key)
+        return IndirectSolver(direct_light, self._normal_mapped_direct_light, mirror_light, self.cache, self.key)
 
-    def _normal_mapped_direct_light(self, normals: Normals) -> DirectPatchLight:
+    def _normal_mapped_direct_light(self, normals: Normals, is_canceled: Callable[[], bool]) -> DirectPatchLight:
         """Return the direct light of patches with normal-map overrides: one image per material, None for none."""
-        return DirectPatchLight(
-            self._normal_mapped_patches(normals), *self._direct_light_args, normal_overrides=(normals,)
-        )
-
-    def _normal_mapped_patches(self, normals: Normals, is_canceled: Callable[[], bool] = lambda: False) -> PatchLight:
         key = self.key, "patches with mapped normals", normals
-        return self.cache.get_value(key, lambda: normal_mapped_patches(self.patches, normals, self.tracer, is_canceled))
+        patches = self.cache.get_value(
+            key, lambda: normal_mapped_patches(self.patches, normals, self.tracer, is_canceled)
+        )
+        return DirectPatchLight(patches, *self._direct_light_args, normal_overrides=(normals,))
 
-    def solve_indirect_cache(self, light: Illumination, is_canceled: Callable[[], bool]) -> None:
-        """Trace missing rays of patches with overridden normals. See `FixedViewTransfer`."""
-        if any(normals := light.normals):
-            self._normal_mapped_patches(normals, is_canceled)
+    def outgoing_patch_light(
+        self, light: Illumination, is_canceled: Callable[[], bool] = lambda: False, *, at_probes: bool = False
+    ) -> OutgoingLight:
+        """Return the exact outgoing light of patches, cached.
+
+        Args:
+            light: with indirect paths. is_canceled: see `IndirectSolver.solve_indirect`.
+            at_probes: see `indirect_at_probes`.
+        """
+        solver, indirect = self.indirect, light._replace(paths=light.paths.without_direct())
+        is_complete = self.mirror_light is None or not self.mirror_light.is_in(light)
+        if at_probes:
+            solver, is_complete = self.indirect_at_probes, True
+
+        def solve() -> OutgoingLight:
+            return solver.solve_indirect(indirect, LightQuality.EXACT, is_canceled=is_canceled).along_rays()
+
+        return self.cache.get_value((self.key, "indirect light", indirect, is_complete), solve)
 
     @property
-    def _direct_light_args(self) -> tuple[LocalLights, IntegrateEnvironment, IntegrateEnvironment, Cache, str]:
+    def _direct_light_args(self) -> tuple[LocalLights, FindLights, Cache, str]:
         """Arguments of `DirectPatchLight`."""
-        return self.local, self.light_of_environment, self.preview_light_of_environment, self.cache, self.key
+        return self.local, self.environment_lights, self.cache, self.key
 
     @cached_property
     def mirror_light(self) -> MirrorLightTransfer | None:
         """Light of planar mirrors in any look."""
         if self.mirror_lights is None:
             return None
-        return MirrorLightTransfer(self.mirror_lights, self.patches, self.light_of_environment, self.cache, self.key)
+        return MirrorLightTransfer(self.mirror_lights, self.patches, self.environment_lights, self.cache, self.key)
 
     @cached_property
     def tracer(self) -> NormalRetracer:
@@ -87,48 +104,18 @@ class BakedIndirectViews(BakedFixedViews):
         """Spherical-harmonic transfer to probes and patches, if baked."""
         return read_harmonic_light(self.store, self.patches)
 
-    def _rays(self, view: View, material: int, light: Illumination, cache: Cache) -> Sequence[RayList]:
-        """Return the rays of incident light: from patches and local lights."""
-        local = super()._rays(view, material, light, cache)
-        if not light.paths.has_indirect:
-            return local
-        rays, mirror_visibility = view.gather_rays(material, _NO_LIGHT), self.mirror_lights_of(view, material)
-        return (*self.indirect_rays(light, rays, mirror_visibility), *local)
-
-    def indirect_rays(
+    def samples(
         self,
-        light: Illumination,
-        gather_rays: GatherRays,
-        mirror_visibility: Shaped[NDArray[np.uint8], "n bytes"] | None,
-    ) -> tuple[RayList, ...]:
-        """Return the rays that carry indirect illumination to samples. See `BakedFixedViews`."""
-        mirror_light = self.mirror_light
-        if mirror_visibility is None or mirror_light is None or not mirror_light.is_in(light):
-            return super().indirect_rays(light, gather_rays, mirror_visibility)
-        outgoing = self.indirect.excluding(light, mirror_light.patch_part)
-        return replace(gather_rays, outgoing=outgoing), mirror_light.rays(light, mirror_visibility)
-
-    def mirror_lights_of(self, view: View, material: int) -> Shaped[NDArray[np.uint8], "n bytes"] | None:
-        """Return the lights that a material's samples see in planar mirrors."""
-        if self.mirror_lights is None:
-            return None
-        rows = view.rows(material)
-
-        def read() -> NDArray[np.uint8]:
-            return view.store.read(f"views/{view.index}/mirror_lights", rows.start, rows.stop)
-
-        return self.cache.transient.get_value((self.key, "mirror lights", *view.sample_key(material)), read)
-
-    def mirror_lights_delta(self, before: Illumination, after: Illumination) -> AddedMirrorLights | None:
-        """Return the change of light from planar mirrors. See `FixedViewTransfer`."""
-        return None if self.mirror_light is None else self.mirror_light.delta(before, after)
-
-    def subset(
-        self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " m"], *, has_indirect: bool
-    ) -> SampledTransfer:
+        view: View,
+        material: int,
+        cache: Cache,
+        sample_indices: Shaped[NDArray[np.integer], " m"] | None = None,
+        *,
+        has_indirect: bool = True,
+    ) -> Samples:
         """Select samples of a material. See `FixedViewTransfer`."""
-        samples = super().subset(view, material, sample_indices, has_indirect=has_indirect)
-        if not has_indirect:
+        samples = super().samples(view, material, cache, sample_indices)
+        if not isinstance(samples, SelectedSamples) or sample_indices is None or not has_indirect:
             return samples
         mirror_visibility = (
             None
@@ -137,6 +124,21 @@ class BakedIndirectViews(BakedFixedViews):
         )
         return replace(
             samples,
-            gather_rays=view.subset_rays(material, sample_indices, _NO_LIGHT),
+            stored_rays=view.subset_rays(material, sample_indices, no_light()),
             mirror_visibility=mirror_visibility,
         )
+
+    def _indirect_rays(
+        self, samples: Samples, light: Illumination, is_canceled: Callable[[], bool]
+    ) -> tuple[RayList, ...]:
+        """Return the rays from patches, and those from virtual lights in planar mirrors."""
+        gather_rays = samples.gather_rays(is_canceled)
+        if gather_rays is None:
+            return ()
+        reflected = light if samples.has_traced_normals else with_baked_normals(light)
+        rays = replace(gather_rays, outgoing=self.outgoing_patch_light(reflected, is_canceled))
+        mirror_light = self.mirror_light
+        if mirror_light is None or not mirror_light.is_in(light):
+            return (rays,)
+        assert samples.mirror_visibility is not None  # stored with the gather rays
+        return rays, mirror_light.virtual_lights(light).rays(samples.mirror_visibility)

@@ -19,12 +19,12 @@ from relume.brdf.term import Term
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination, is_same_environment
 from relume.live.fixed_camera.jobs import CancelCheck, Job, ProgressCallback, TermTarget
-from relume.live.fixed_camera.protocols import MirrorLightsDelta
+from relume.live.fixed_camera.protocols import LightQuality, PatchRadiance
 from relume.live.fixed_camera.strategies.moved_lights import MovedLights
 from relume.live.fixed_camera.view_images import ViewImages
 from relume.math.haar import haar
 from relume.operators.indirect import IndirectOperator, expected_light, num_channels, precompute_rows, row_bytes
-from relume.transport.outgoing_patch_light import isotropic
+from relume.transport.outgoing_patch_light import no_light
 
 F32 = NDArray[np.float32]
 
@@ -58,13 +58,9 @@ class PrecomputeRows:
     def _precompute(self, progress: ProgressCallback, is_canceled: CancelCheck) -> IndirectOperator:
         reflected = self.images.transfer.indirect
         assert reflected is not None
-        radiance, view = reflected.preview(self.light), self.images.view
-        receivers, rays = (
-            view.receivers(self.material, is_lit=False),
-            view.gather_rays(self.material, isotropic(radiance)),
-        )
-        expected = expected_light(radiance[: reflected.num_patches])
-        return precompute_rows(self.term, self.bands, receivers, rays, expected, progress, is_canceled)
+        radiance, view = reflected.solve_indirect(self.light, LightQuality.PREVIEW).mean_to_others(), self.images.view
+        receivers, rays = view.receivers(self.material, is_lit=False), view.gather_rays(self.material, no_light())
+        return precompute_rows(self.term, self.bands, receivers, rays, expected_light(radiance), progress, is_canceled)
 
     def install(self, result: IndirectOperator) -> None:
         """See `Job`; the result is in the cache, so nothing is left to do."""
@@ -78,7 +74,7 @@ class IncrementalLight:
     def __init__(self, images: ViewImages) -> None:
         self._images, self._moved_lights = images, MovedLights(images)
         self._reflected = images.transfer.indirect
-        self._change: tuple[Illumination, Illumination, F32, MirrorLightsDelta | None] | None = None
+        self._change: tuple[Illumination, Illumination, PatchRadiance, F32] | None = None
 
     def fits_budget(self) -> bool:
         """Return whether all needed rows fit half of the memory budget."""
@@ -111,28 +107,20 @@ class IncrementalLight:
         np.copyto(image, reference.image)
         self._moved_lights.add_change(target, reference.light, light, image)
         if rows is not None:
-            outgoing_change, mirror_change = self._outgoing_change(reference.light, light)
-            rows.add(outgoing_change, image)
-            mirror_bits = (
-                None if mirror_change is None else images.transfer.mirror_lights_of(images.view, target.material.index)
-            )
-            if mirror_change is not None and mirror_bits is not None:
-                self._moved_lights.add_mirror_lights(target, mirror_change.rays(mirror_bits), image)
+            change, coefficients = self._indirect_change(reference.light, light)
+            rows.add(coefficients, image)
+            rays = change.rays_to(images.view, target.material.index)
+            if rays is not None:
+                self._moved_lights.add_rays(target, rays, image)
         live.set_ready(replace(live.ready, image=image, fidelity=self.fidelity, bands=reference.bands, light=light))
 
-    def _outgoing_change(self, before: Illumination, after: Illumination) -> tuple[F32, MirrorLightsDelta | None]:
-        """Return the Haar coefficients of the change of patch radiance, (padded patches, 3) float32, and the change of
-        mirror lights; equal for all terms.
-        """
+    def _indirect_change(self, before: Illumination, after: Illumination) -> tuple[PatchRadiance, F32]:
+        """Return the change of patch radiance, and its Haar coefficients; equal for all terms. (padded patches, 3)"""
         reflected = self._reflected
         assert reflected is not None
         if self._change is None or self._change[:2] != (before, after):
-            change, mirror_change = (
-                reflected.preview_delta(before, after),
-                self._images.transfer.mirror_lights_delta(before, after),
-            )
-            change_in_highlights = change if mirror_change is None else change - mirror_change.patch_radiance
-            self._change = before, after, haar(change_in_highlights).astype(np.float32), mirror_change
+            change = reflected.solve_indirect(after, LightQuality.PREVIEW, start_from=before)
+            self._change = before, after, change, haar(change.mean_to_others()).astype(np.float32)
         return self._change[2:]
 
     def _key(self, target: TermTarget) -> tuple[Hashable, ...]:

@@ -18,6 +18,7 @@ from relume.live.fixed_camera.illumination import Illumination, LightSource, dir
 from relume.live.fixed_camera.jobs import TermTarget, weighted_sum
 from relume.live.fixed_camera.live_term import LiveTerm
 from relume.live.fixed_camera.material_image import MaterialImage
+from relume.live.fixed_camera.protocols import RaysToSamples
 from relume.live.fixed_camera.view_images import ViewImages
 from relume.look import LightGeometry
 from relume.operators.shade import ShadedTerm, shade_rows, shaded_bytes
@@ -25,7 +26,7 @@ from relume.raytrace.light_visibility import compute_irradiance
 from relume.raytrace.moving_light import MovingLight
 from relume.raytrace.surface_points import SurfacePoints
 from relume.transport.roughness_ranges import contract_levels
-from relume.transport.shading_points import LocalRays, MirrorRays, ShadingPoints
+from relume.transport.shading_points import LocalRays, ShadingPoints
 from relume.transport.term_contraction import contract
 from relume.views.compose_terms import add_diffuse
 
@@ -60,18 +61,18 @@ class MovedLights:
         if added:
             self._add_moved(material, live, added, out)
 
-    def add_mirror_lights(self, target: TermTarget, rays: MirrorRays, out: Shaped[F32, "tiles 3 lanes"]) -> None:
-        """Add light of planar mirrors to the few samples of a term that receive any.
+    def add_rays(self, target: TermTarget, added: RaysToSamples, out: Shaped[F32, "tiles 3 lanes"]) -> None:
+        """Add light along rays to some samples of a term.
 
         Args:
-            target, out: as in `add_change`. rays: to all samples of its material.
+            target, out: as in `add_change`. added: the rays.
         """
         _, material, live = target
-        lit = np.flatnonzero(rays.visible.any(axis=1))
-        if len(lit):
-            subset = replace(self._images.unlit_samples(material).without_light(lit), rays=[rays.unshared(lit)])
-            tile, offset = np.divmod(lit, out.shape[2])
-            out[tile, :, offset] += self._rows(live, subset, len(lit), None)
+        samples = added.sample_indices
+        if len(samples):
+            receivers = replace(self._images.unlit_samples(material).without_light(samples), rays=[added.rays])
+            tile, offset = np.divmod(samples, out.shape[2])
+            out[tile, :, offset] += self._rows(live, receivers, len(samples), None)
 
     def _static_image(self, material: MaterialImage, live: LiveTerm, light: Illumination) -> F32:
         """Direct light from a light before it moved, as exact as in the converged image; cached, since every frame uses
@@ -96,8 +97,7 @@ class MovedLights:
 
     def _exact_rays(self, material: MaterialImage, light: Illumination) -> list[LocalRays]:
         """Rays of a light that has only local lights, as in converged images."""
-        images = self._images
-        _, points = images.transfer.incident_light(images.view, material.index, light, images.cache)
+        _, points = self._images.incident_light(material, light, lambda: False)
         return [rays for rays in points.rays if isinstance(rays, LocalRays)]
 
     def _add_moved(self, material: MaterialImage, live: LiveTerm, added: list[LightSource], out: F32) -> None:

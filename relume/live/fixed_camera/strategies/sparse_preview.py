@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from relume.brdf.term import Term
+from relume.core.cache import Cache
 from relume.live.fixed_camera.displayed import DisplayedImage
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination, direct_only
 from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback, TermTarget
 from relume.live.fixed_camera.priority_region import with_samples
-from relume.live.fixed_camera.protocols import FixedViewTransfer, SampledShading
+from relume.live.fixed_camera.protocols import FixedViewTransfer, LightQuality, Samples
 from relume.live.fixed_camera.view_images import ViewImages
 from relume.look.model import Rgb
 from relume.operators.shade import ShadedTerm, shade
@@ -49,7 +50,7 @@ class SampleSubset:
         samples: the shaded samples. weights: sparse float32, rows sum to 1. (samples, shaded samples)
     """
 
-    samples: SampledShading
+    samples: Samples
     weights: Any
 
     @property
@@ -60,14 +61,14 @@ class SampleSubset:
 
 
 def choose_samples(
-    transfer: FixedViewTransfer, view: View, material: int, detail: int, *, has_indirect: bool
+    transfer: FixedViewTransfer, view: View, material: int, cache: Cache, detail: int, *, has_indirect: bool
 ) -> SampleSubset:
     """Select one sample per pixel block of a material; reads the store.
 
     The others are averages of the nearest selected samples, by image position and normal.
 
     Args:
-        transfer: an open bake. view: one of its views. material: index of the material.
+        transfer: an open bake. view: one of its views. material: index of the material. cache: of shadows.
         detail: number of refinements. has_indirect: they are shaded with indirect light.
     """
     step = max(1, int(np.ceil(np.sqrt(view.num_surface_samples / _num_shaded(detail)))))
@@ -76,7 +77,8 @@ def choose_samples(
     first, shape = np.arange(0, weight.size + 1, weight.shape[1]), (len(weight), len(sample_indices))
     weights = csr_array((weight.ravel(), neighbors.ravel(), first), shape=shape)
     weights.eliminate_zeros()
-    return SampleSubset(transfer.subset(view, material, sample_indices, has_indirect=has_indirect), weights)
+    samples = transfer.samples(view, material, cache, sample_indices, has_indirect=has_indirect)
+    return SampleSubset(samples, weights)
 
 
 def _num_shaded(detail: int) -> int:
@@ -88,7 +90,7 @@ def _sample_subset(images: ViewImages, material: int, light: Illumination, detai
     has_indirect = light.paths.has_indirect
 
     def choose() -> SampleSubset:
-        return choose_samples(images.transfer, images.view, material, detail, has_indirect=has_indirect)
+        return choose_samples(images.transfer, images.view, material, images.cache, detail, has_indirect=has_indirect)
 
     cache = images.cache.transient if detail else images.cache
     return cache.get(_key(images, material, light, detail), SampleSubset, _subset_bytes(images, material), choose)
@@ -186,7 +188,8 @@ class SparsePreview:
 
     def _preview_image(self, snapshot: _TermSnapshot, subset: SampleSubset, is_canceled: CancelCheck) -> F32:
         """Return one term's image, (tiles, 3, samples) float32; BTFs evaluate a texel per sample if that is fast."""
-        incident, btf_ref = subset.samples.incident_light(self.light), snapshot.term.texels
+        transfer, btf_ref = self.images.transfer, snapshot.term.texels
+        incident = transfer.incident_light(subset.samples, self.light, LightQuality.PREVIEW, is_canceled)
         if btf_ref is None or not fits_budget(btf_ref, snapshot.target.material.num_samples):
             return _interpolate(
                 shade(snapshot.term, snapshot.bands, *incident, _ignore_progress, is_canceled), subset.weights
