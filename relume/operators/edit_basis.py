@@ -14,7 +14,6 @@ from relume.brdf.term import Curve, Term
 from relume.lights.spherical_triangles import TriangleLights
 from relume.math.daubechies import analysis
 from relume.operators.linear_operator import LinearOperator, precompute
-from relume.operators.quantized import QuantizedOperator
 from relume.transport.shading_points import ShadingPoints
 
 F64 = NDArray[np.float64]
@@ -59,9 +58,8 @@ class EditBasis(Protocol):
         receivers: ShadingPoints,
         progress: Callable[[float], None],
         is_canceled: Callable[[], bool],
-        *,
-        is_quantized: bool = False,
-    ) -> LinearOperator | QuantizedOperator:
+        bits: int = 32,
+    ) -> LinearOperator:
         """Precompute the operator. See `relume.operators.linear_operator.precompute`."""
         ...
 
@@ -102,8 +100,7 @@ class CurveBasis:
         receivers: ShadingPoints,
         progress: Callable[[float], None],
         is_canceled: Callable[[], bool],
-        *,
-        is_quantized: bool = False,
-    ) -> LinearOperator | QuantizedOperator:
+        bits: int = 32,
+    ) -> LinearOperator:
         """See `relume.operators.linear_operator.precompute`."""
-        return precompute(term, bands, self.name, lights, receivers, progress, is_canceled, is_quantized=is_quantized)
+        return precompute(term, bands, self.name, lights, receivers, progress, is_canceled, bits)

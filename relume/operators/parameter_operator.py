@@ -29,7 +29,6 @@ from relume.lights.spherical_triangles import TriangleLights
 from relume.math.curve_nodes import CurveNodes, choose_nodes
 from relume.math.pca import joint
 from relume.operators.linear_operator import LinearOperator, level_bounds, pack_columns
-from relume.operators.quantized import QuantizedOperator
 from relume.transport.roughness_ranges import at_roughness, num_levels, project_levels, without_free_curves
 from relume.transport.shading_points import ShadingPoints
 from relume.transport.term_contraction import contract
@@ -121,9 +120,8 @@ class ParameterOperator:
         receivers: ShadingPoints,
         progress: Callable[[float], None],
         is_canceled: Callable[[], bool],
-        *,
-        is_quantized: bool = False,
-    ) -> LinearOperator | QuantizedOperator:
+        bits: int = 32,
+    ) -> LinearOperator:
         """Contract all curves at all nodes in one pass: the columns are the images at the nodes.
 
         If the parameter affects a single curve, its nodes are combinations of that curve's bands, which are faster to
@@ -133,7 +131,7 @@ class ParameterOperator:
             bands: of all the term's curves, (3, J) each; values of the affected ones do not matter.
             lights, receivers: incident light, and its receivers.
             progress: called with the completed fraction. is_canceled: polled.
-            is_quantized: whether the operator is quantized.
+            bits: see `Compression`.
         Raises:
             CancelledError: `is_canceled` returned True.
         """
@@ -153,7 +151,7 @@ class ParameterOperator:
                 return np.stack([projected[:, :, c] @ matrices[c].T for c in range(3)])
             return np.ascontiguousarray(projected.transpose(2, 0, 1))
 
-        return pack_columns(rows, self.num_columns, receivers, bounds, progress, is_canceled, is_quantized=is_quantized)
+        return pack_columns(rows, self.num_columns, receivers, bounds, progress, is_canceled, bits)
 
 
 def linearize(document: Mapping[str, Any], parameter: str) -> ParameterOperator | None:

@@ -21,15 +21,13 @@ from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination, split_for_shading
 from relume.live.fixed_camera.live_term import LiveTerm
 from relume.live.fixed_camera.material_image import MaterialImage
-from relume.live.fixed_camera.operator_budget import OperatorForm, precompute_subsampled
+from relume.live.fixed_camera.operator_budget import compressed_bytes, precompute_subsampled
 from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.fixed_camera.texel_light_cache import is_cacheable, put_texel_light
 from relume.live.fixed_camera.view_images import MERGED_LIGHT_SUFFIX, ViewImages
 from relume.look.model import Rgb
 from relume.operators.edit_basis import EditBasis
-from relume.operators.linear_operator import LinearOperator, MergedLightOperator
-from relume.operators.operator import Operator
-from relume.operators.quantized import QuantizedOperator
+from relume.operators.linear_operator import Compression, LinearOperator
 from relume.operators.shade import PartialImage, ShadedTerm, shaded_bytes
 from relume.transport.shading_points import ShadingPoints
 
@@ -105,7 +103,7 @@ class PrecomputeOperator:
 
     Attributes:
         bands: of the term's curves, (3, J) each. light: the illumination.
-        form: precision and sampling of the operator.
+        form: compression of the operator.
     """
 
     target: TermTarget
@@ -114,20 +112,20 @@ class PrecomputeOperator:
     term: Term
     bands: Mapping[str, F64]
     light: Illumination
-    form: OperatorForm
+    form: Compression
     is_refinement: bool
     state: Literal["precomputing", "shading"] = "precomputing"
     is_resumable = False
 
     @classmethod
-    def for_target(cls, target: TermTarget, basis: EditBasis, form: OperatorForm) -> PrecomputeOperator:
+    def for_target(cls, target: TermTarget, basis: EditBasis, form: Compression) -> PrecomputeOperator:
         """Return the job for the current target of a term.
 
         Args:
             target: the term. basis: its free coefficients. form: from `operator_form`.
         """
         images, material, live = target
-        key = images.operator_key(material, live, basis, live.target_bands, is_merged_light=form.is_merged_light)
+        key = images.operator_key(material, live, basis, live.target_bands, is_merged_light=form.has_merged_lights)
         is_refinement = live.has_preview()
         return cls(target, basis, key, live.term, live.target_bands, live.light, form, is_refinement)
 
@@ -139,38 +137,33 @@ class PrecomputeOperator:
     @property
     def num_bytes(self) -> int:
         """Memory of the result."""
-        return self.form.num_bytes(self.target.material, self.basis.num_columns)
+        return compressed_bytes(self.target.material, self.basis.num_columns, self.form)
 
-    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> Operator:
+    def run(self, progress: ProgressCallback, is_canceled: CancelCheck) -> LinearOperator:
         """See `Job`."""
-        images, material, _ = self.target
+        images, (step, bits, has_merged_lights) = self.target.images, self.form
 
-        def build_operator() -> Operator:
-            quality = LightQuality.MERGED if self.form.is_merged_light else LightQuality.EXACT
+        def build_operator() -> LinearOperator:
+            material, quality = self.target.material, LightQuality.MERGED if has_merged_lights else LightQuality.EXACT
             lights, receivers = images.incident_light(material, self.light, is_canceled, quality)
 
-            def precompute_samples(subset: ShadingPoints) -> LinearOperator | QuantizedOperator:
-                callbacks = progress, is_canceled
-                return self.basis.precompute(
-                    self.term, self.bands, lights, subset, *callbacks, is_quantized=self.form.is_quantized
-                )
+            def precompute(samples: ShadingPoints) -> LinearOperator:
+                return self.basis.precompute(self.term, self.bands, lights, samples, progress, is_canceled, bits)
 
-            if self.form.is_merged_light:
-                return MergedLightOperator(**vars(precompute_samples(receivers)))
-            if self.form.step == 1:
-                return precompute_samples(receivers)
-            return precompute_subsampled(images.view, material.index, self.form.step, receivers, precompute_samples)
+            if step > 1:
+                return precompute_subsampled(images.view, material.index, step, receivers, precompute)
+            return replace(precompute(receivers), has_merged_lights=has_merged_lights)
 
-        return images.cache.get(self.key, Operator, self.num_bytes, build_operator)  # type: ignore[type-abstract]
+        return images.cache.get(self.key, LinearOperator, self.num_bytes, build_operator)
 
-    def install(self, result: Operator) -> None:
+    def install(self, result: LinearOperator) -> None:
         """See `Job`; used only if the fixed curves of the operator are still those of the target.
 
         If the image shows other curves, or the operator is more exact, the image is summed anew. An operator that is
         not exact continues from the current image, if that differs in nothing else.
         """
         images, material, live = self.target
-        is_merged_light = self.form.is_merged_light
+        is_merged_light = self.form.has_merged_lights
         if not is_merged_light:
             images.cache.evict((*self.key, MERGED_LIGHT_SUFFIX))
         current_key = images.operator_key(

@@ -17,7 +17,7 @@ from relume.live.fixed_camera.active_control import ActiveControl
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination, element_gains, single_source
 from relume.live.fixed_camera.jobs import Job, PrecomputeOperator, Shade, TermTarget, can_resume_from
-from relume.live.fixed_camera.operator_budget import EXACT, MERGED_LIGHT, OperatorForm, operator_form, use_coarse
+from relume.live.fixed_camera.operator_budget import EXACT, MERGED_LIGHT, operator_form, use_coarse
 from relume.live.fixed_camera.priority_region import is_exact_within, is_visible, make_region_job
 from relume.live.fixed_camera.strategies import operator, texel_sum
 from relume.live.fixed_camera.strategies.base import LightStrategy
@@ -35,7 +35,7 @@ from relume.live.fixed_camera.view_images import ViewImages
 from relume.look import Look
 from relume.look.model import Rgb
 from relume.operators.edit_basis import CurveBasis, EditBasis
-from relume.operators.linear_operator import MergedLightOperator
+from relume.operators.linear_operator import Compression
 from relume.operators.shade import shaded_bytes
 from relume.transport.roughness_ranges import contract_levels
 
@@ -241,7 +241,7 @@ class StrategyScheduler:
                 new_basis = basis or CurveBasis.from_curve(live.term.curve(first))
                 yield target, new_basis if self._reaches_target(target, new_basis, changed) else None
 
-    def _form(self, target: TermTarget, basis: EditBasis) -> OperatorForm | None:
+    def _form(self, target: TermTarget, basis: EditBasis) -> Compression | None:
         """Return the operator form that fits the memory budget; None: the term is shaded instead."""
         return operator_form(target.material, basis.num_columns, self._images.cache.budget_bytes)
 
@@ -285,14 +285,12 @@ class StrategyScheduler:
     def _exact_operator_job(self, control: ActiveControl) -> Job | None:
         """Return the job for the exact operator of a term with a coarse one; frames continue meanwhile."""
         for target in self._targets():
-            basis = target.live.ready.basis
-            if basis is not None and isinstance(
-                self._images.operator(target.material, target.live), MergedLightOperator
-            ):
+            basis, active = target.live.ready.basis, self._images.operator(target.material, target.live)
+            if basis is not None and active is not None and active.has_merged_lights:
                 return PrecomputeOperator.for_target(target, basis, EXACT)
         return None
 
-    def _operator_job(self, target: TermTarget, basis: EditBasis, form: OperatorForm) -> PrecomputeOperator:
+    def _operator_job(self, target: TermTarget, basis: EditBasis, form: Compression) -> PrecomputeOperator:
         """Return an operator job; a coarse operator comes first if the exact one takes long and the edit can use it."""
         images, (_, material, live) = self._images, target
         if form != EXACT or images.cache.contains(images.operator_key(material, live, basis, live.target_bands)):

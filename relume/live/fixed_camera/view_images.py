@@ -29,7 +29,7 @@ from relume.live.fixed_camera.mirror_samples import MirrorFactors
 from relume.live.fixed_camera.protocols import EditAxis, FixedViewTransfer, LightQuality, LightsAndPoints
 from relume.look import Look, TermLook, validate
 from relume.operators.edit_basis import CurveBasis, EditBasis
-from relume.operators.operator import Operator
+from relume.operators.linear_operator import LinearOperator
 from relume.operators.parameter_operator import linearize
 from relume.operators.shade import ShadedTerm, shaded_bytes
 from relume.transport.shading_points import ShadingPoints
@@ -256,11 +256,11 @@ class ViewImages:
         key = self.image_key(material, live, self.light)
         return self.cache.get_cached(key, ShadedTerm) is not None or self.transfer.has_image(key[1:])
 
-    def operator(self, material: MaterialImage, live: LiveTerm) -> Operator | None:
+    def operator(self, material: MaterialImage, live: LiveTerm) -> LinearOperator | None:
         """Return the active operator of a term, a coarse one until the exact one is ready; None if it was evicted."""
         ready = live.ready
         if ready.basis is None or not live.is_converged:
             return None
         key = self.operator_key(material, live, ready.basis, ready.bands)
-        candidates = (self.cache.get_cached(name, Operator) for name in (key, (*key, MERGED_LIGHT_SUFFIX)))  # type: ignore[type-abstract]
+        candidates = (self.cache.get_cached(name, LinearOperator) for name in (key, (*key, MERGED_LIGHT_SUFFIX)))
         return next((operator for operator in candidates if operator is not None), None)

@@ -2,8 +2,8 @@
 
 A step adds the most important coefficients first if time is short (eqs. 29 to 31, Ben-Artzi 2006). Along a parameter,
 whose few coefficients only approximate curves, a step sums all of them, and the image is nearly exact. A subsampled
-operator (`relume.operators.subsampled`) adds the change to an image of all samples. The results of subsampled and
-quantized operators (`relume.operators.quantized`) are shaded exactly when the drag ends.
+operator adds the change to an image of all samples. The results of compressed operators
+(`relume.operators.linear_operator`) are shaded exactly when the drag ends.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from relume.live.fixed_camera.displayed import MAX_EXACT_ROUNDING, DisplayedImage, accumulated_error, norm_of
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.jobs import Resum, TermTarget
-from relume.operators.operator import Operator
+from relume.operators.linear_operator import LinearOperator
 
 F64 = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ def step(target: TermTarget, max_coefficients: int | None) -> None:
 
 
 def advance(
-    ready: DisplayedImage, target_bands: Mapping[str, F64], operator: Operator, max_coefficients: int | None
+    ready: DisplayedImage, target_bands: Mapping[str, F64], operator: LinearOperator, max_coefficients: int | None
 ) -> DisplayedImage:
     """Return an image after one step along its basis; the same if no free curve differs.
 
@@ -83,7 +83,7 @@ def resum_job(target: TermTarget) -> Resum | None:
 
 
 def _add_change(
-    ready: DisplayedImage, new_bands: Mapping[str, F64], operator: Operator, max_coefficients: int | None
+    ready: DisplayedImage, new_bands: Mapping[str, F64], operator: LinearOperator, max_coefficients: int | None
 ) -> DisplayedImage:
     """Add T · Δc; resum if the rounding error is too large."""
     assert ready.basis is not None
