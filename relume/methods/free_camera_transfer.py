@@ -193,7 +193,7 @@ class BakedFreeCamera:
         probes = self.stored_scene.probes
         rays: list[RayList] = list(self.light_transport.local.rays_to(element, probes, is_coarse=True))
         if element.paths.has_indirect:
-            outgoing = self.light_transport.outgoing_patch_light(element, at_probes=True)
+            outgoing = self.light_transport.indirect_at_probes.outgoing_light(element)
             rays.append(GatherRays(self._gather_hits, self._pattern, outgoing))
         lights = self._direct_lights(element, LightQuality.EXACT, without_sun_disks)
         return incident_coefficients(probes, self.visible, lights, rays)

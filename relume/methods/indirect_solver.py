@@ -143,6 +143,18 @@ class IndirectSolver:
         virtual_lights = None if self._mirror_light is None else self._mirror_light.virtual_lights(light, start_from)
         return IndirectSolution(after.patches, after.outgoing.subtract(before.outgoing), virtual_lights)
 
+    def outgoing_light(self, light: Illumination, is_canceled: Callable[[], bool] = lambda: False) -> OutgoingLight:
+        """Return the exact solution, tabulated for gather rays and cached. See `solve_indirect`."""
+        indirect = _indirect_only(light)
+
+        def solve() -> OutgoingLight:
+            return self.solve_indirect(light, LightQuality.EXACT, is_canceled=is_canceled).along_rays()
+
+        return self._cache.get_value((self._key, "indirect light", indirect, self._has_mirror_light(indirect)), solve)
+
+    def _has_mirror_light(self, light: Illumination) -> bool:
+        return self._mirror_light is not None and self._mirror_light.is_in(light)
+
     def _solve(
         self, light: Illumination, approximation: _Approximation, is_canceled: Callable[[], bool]
     ) -> IndirectSolution:

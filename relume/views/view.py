@@ -185,7 +185,7 @@ class View:
 
         Args:
             material: its index.
-            outgoing: light of the patches for gather rays; from `FixedViewTransfer.outgoing_patch_light`.
+            outgoing: light of the patches for gather rays.
             local: of local lights that are visible from the samples.
             is_lit: the environment emits light; else no visibility is read.
         """

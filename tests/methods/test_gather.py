@@ -261,7 +261,9 @@ def default_look(transfer):
 def against_paths(scene, transfer, index, every, spp):
     """Indirect light at samples of a material, and by path tracing with its variance. (n, 3)"""
     view, look, name = transfer.views["front"], default_look(transfer), transfer.material_names[index]
-    reflected = transfer.outgoing_patch_light(illumination_from_look(look, transfer.material_names, has_bounces=True))
+    reflected = transfer.indirect.outgoing_light(
+        illumination_from_look(look, transfer.material_names, has_bounces=True)
+    )
     rows, lit = view.rows(index), view.receivers(index, reflected)
     rows_compared, dark = np.arange(0, rows.stop - rows.start, every), replace(lit, visible=0 * lit.visible)
     radiance = np.zeros((len(lit.normal), 3))

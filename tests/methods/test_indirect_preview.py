@@ -46,11 +46,11 @@ def one_bounce(document):
 def test_previewed_light_is_not_reused_as_exact(store, monkeypatch):
     monkeypatch.setattr(transfers, "PREVIEW_WIDTH", 4)
     expected = open_transfer(store, Cache(BUDGET))
-    exact = expected.outgoing_patch_light(rotated(expected)).isotropic[: expected.patches.num_patches]
+    exact = expected.indirect.outgoing_light(rotated(expected)).isotropic[: expected.patches.num_patches]
     again = open_transfer(store, Cache(BUDGET))
     rough = again.indirect.solve_indirect(rotated(again), LightQuality.PREVIEW).mean_to_others()
     assert np.abs(rough - exact).max() > 1e-3 * exact.max()  # the small map differs
-    reopened = again.outgoing_patch_light(rotated(again)).isotropic[: len(exact)]
+    reopened = again.indirect.outgoing_light(rotated(again)).isotropic[: len(exact)]
     np.testing.assert_array_equal(reopened, exact)
 
 

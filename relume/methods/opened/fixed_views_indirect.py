@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import Illumination, Normals, with_baked_normals
-from relume.live.fixed_camera.protocols import EditAxis, LightQuality, Samples
+from relume.live.fixed_camera.protocols import EditAxis, Samples
 from relume.methods.indirect_solver import IndirectSolver
 from relume.methods.local_lights import LocalLights
 from relume.methods.opened.fixed_views import BakedFixedViews, FindLights, SelectedSamples
@@ -22,7 +22,7 @@ from relume.methods.retrace import NormalRetracer
 from relume.methods.spherical_harmonic_transfer import HarmonicLight, read_harmonic_light
 from relume.radiosity.normal_mapped_patches import normal_mapped_patches
 from relume.radiosity.patch_irradiance import PatchLight
-from relume.transport.outgoing_patch_light import OutgoingLight, no_light
+from relume.transport.outgoing_patch_light import no_light
 from relume.transport.shading_points import RayList
 from relume.views.view import View
 
@@ -62,25 +62,6 @@ class BakedIndirectViews(BakedFixedViews):
             key, lambda: normal_mapped_patches(self.patches, normals, self.tracer, is_canceled)
         )
         return DirectPatchLight(patches, *self._direct_light_args, normal_overrides=(normals,))
-
-    def outgoing_patch_light(
-        self, light: Illumination, is_canceled: Callable[[], bool] = lambda: False, *, at_probes: bool = False
-    ) -> OutgoingLight:
-        """Return the exact outgoing light of patches, cached.
-
-        Args:
-            light: with indirect paths. is_canceled: see `IndirectSolver.solve_indirect`.
-            at_probes: see `indirect_at_probes`.
-        """
-        solver, indirect = self.indirect, light._replace(paths=light.paths.without_direct())
-        is_complete = self.mirror_light is None or not self.mirror_light.is_in(light)
-        if at_probes:
-            solver, is_complete = self.indirect_at_probes, True
-
-        def solve() -> OutgoingLight:
-            return solver.solve_indirect(indirect, LightQuality.EXACT, is_canceled=is_canceled).along_rays()
-
-        return self.cache.get_value((self.key, "indirect light", indirect, is_complete), solve)
 
     @property
     def _direct_light_args(self) -> tuple[LocalLights, FindLights, Cache, str]:
@@ -136,7 +117,7 @@ class BakedIndirectViews(BakedFixedViews):
         if gather_rays is None:
             return ()
         reflected = light if samples.has_traced_normals else with_baked_normals(light)
-        rays = replace(gather_rays, outgoing=self.outgoing_patch_light(reflected, is_canceled))
+        rays = replace(gather_rays, outgoing=self.indirect.outgoing_light(reflected, is_canceled))
         mirror_light = self.mirror_light
         if mirror_light is None or not mirror_light.is_in(light):
             return (rays,)
