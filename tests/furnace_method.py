@@ -30,7 +30,7 @@ from relume.patches.patches import choose_patches
 from relume.raytrace.gather_rays import make_pattern
 from relume.scene.model import Scene
 from relume.store.bake_protocol import ArraySpec, Plan, Recipe, StoreReader, Task, TaskOutput
-from relume.transport.outgoing_patch_light import OutgoingLight, isotropic, no_light
+from relume.transport.outgoing_patch_light import OutgoingLight, isotropic
 from relume.views.store_io import read_surface_points
 from relume.views.view import View
 
@@ -63,20 +63,12 @@ class FurnaceViews(BakedFixedViews):
         rays = replace(samples.gather_rays(is_canceled), outgoing=self.glow(light))
         return self.lights.empty(), replace(samples.receivers(is_lit=False), rays=(rays,))
 
-    def samples(
-        self,
-        view: View,
-        material: int,
-        cache: Cache,
-        sample_indices: np.ndarray | None = None,
-        *,
-        has_indirect: bool = True,
-    ) -> Samples:
-        """Select all samples, or a few for previews."""
-        if sample_indices is None:
-            return super().samples(view, material, cache)
+    def selected_samples(
+        self, view: View, material: int, sample_indices: np.ndarray, *, has_indirect: bool
+    ) -> SelectedSamples:
+        """Select a few samples for previews."""
         points = view.receivers(material, is_lit=False).without_light(sample_indices)
-        rays = view.gather_rays(material, no_light()).unshared(sample_indices)
+        rays = view.gather_rays(material).unshared(sample_indices)
         return SelectedSamples(points, self.local, rays)
 
 

@@ -204,7 +204,8 @@ def gather_incident_light(transfer, view: View, index, look):
         )
     local = transfer.local.rays_to(light, view.surface_points(index))
     direct_lights = replace(lights, irradiance=lights.irradiance * gain) if light.paths.direct else lights.empty()
-    return direct_lights, view.receivers(index, indirect, local, is_lit=light.paths.direct)
+    gather_rays = () if indirect is None else (replace(view.gather_rays(index), outgoing=indirect),)
+    return direct_lights, replace(view.receivers(index, is_lit=light.paths.direct), rays=(*gather_rays, *local))
 
 
 def evaluate_outgoing(outgoing, patch, direction, *, is_narrow=False):

@@ -19,13 +19,12 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.core.cache import Cache
 from relume.core.errors import CancelledError
 from relume.live.fixed_camera.jobs import CancelCheck, ProgressCallback
-from relume.live.fixed_camera.protocols import Samples
 from relume.methods.gather import GatherMethod
 from relume.methods.indirect_solver import IndirectSolver
 from relume.methods.local_lights import LocalLights
+from relume.methods.opened.fixed_views import SelectedSamples
 from relume.methods.opened.fixed_views_indirect import BakedIndirectViews
 from relume.operators.image_cache import ImageFiles
 from relume.scene.custom_camera import with_cameras
@@ -109,17 +108,12 @@ class StaticView(BakedIndirectViews):
         """Solver for the outgoing light of the patches."""
         return self.light_transport.indirect
 
-    def samples(
-        self,
-        view: View,
-        material: int,
-        cache: Cache,
-        sample_indices: Shaped[NDArray[np.integer], " m"] | None = None,
-        *,
-        has_indirect: bool = True,
-    ) -> Samples:
+    def selected_samples(
+        self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " m"], *, has_indirect: bool
+    ) -> SelectedSamples:
         """Select samples of a material, with gather rays if traced. See `FixedViewTransfer`."""
-        return super().samples(view, material, cache, sample_indices, has_indirect=has_indirect and self.reflects)
+        has_rays = has_indirect and self.reflects
+        return super().selected_samples(view, material, sample_indices, has_indirect=has_rays)
 
 
 class StaticTracing:

@@ -15,8 +15,6 @@ from relume.raytrace.surface_points import FIXED_ALPHA_SAMPLE, SurfacePoints
 from relume.scene.model import Camera
 from relume.scene.validate import check_camera
 from relume.store.bake_protocol import StoreReader
-from relume.transport.outgoing_patch_light import OutgoingLight
-from relume.transport.shading_points import GatherRays
 
 F32 = NDArray[np.float32]
 
@@ -55,19 +53,6 @@ def make_material_pattern(store: StoreReader, k: int, material: int) -> RayPatte
     """Recreate the pattern of the gather rays of a material's samples in the k-th view of a store."""
     num_cosine, num_glossy = store.attributes["gather_rays"][material]
     return make_pattern(num_cosine, num_glossy, int(store.attributes["gather_seed"]) + 1 + k)
-
-
-def read_gather_rays(
-    store: StoreReader, k: int, material: int, start: int, stop: int, outgoing: OutgoingLight
-) -> GatherRays:
-    """Read the gather rays of samples of one material.
-
-    Args:
-        store: an open store. k: index of the view. material: index of the material.
-        start, stop: rows of the view's arrays. outgoing: light of the patches.
-    """
-    gather_hits = store.read(f"views/{k}/gather_hits", start, stop)
-    return GatherRays(gather_hits, make_material_pattern(store, k, material), outgoing)
 
 
 def read_seeds(store: StoreReader, k: int, start: int, stop: int) -> Shaped[NDArray[np.uint32], " n"]:

@@ -264,7 +264,8 @@ def against_paths(scene, transfer, index, every, spp):
     reflected = transfer.indirect.outgoing_light(
         illumination_from_look(look, transfer.material_names, has_bounces=True)
     )
-    rows, lit = view.rows(index), view.receivers(index, reflected)
+    rows = view.rows(index)
+    lit = replace(view.receivers(index), rays=(replace(view.gather_rays(index), outgoing=reflected),))
     rows_compared, dark = np.arange(0, rows.stop - rows.start, every), replace(lit, visible=0 * lit.visible)
     radiance = np.zeros((len(lit.normal), 3))
     for document in look.materials[name].terms:

@@ -65,12 +65,9 @@ class Samples(Protocol):
     """Points that receive light: samples of a material, as far as they are read.
 
     Attributes:
-        has_traced_normals: overridden normals are traced.
         mirror_visibility: virtual lights that they see in planar mirrors, as bits; None for none.
     """
 
-    @property
-    def has_traced_normals(self) -> bool: ...
     @property
     def mirror_visibility(self) -> Shaped[NDArray[np.uint8], "n bytes"] | None: ...
     @property
@@ -223,20 +220,21 @@ class FixedViewTransfer(OpenBake, Protocol):
         """Return whether the image of a term is cached on disk, by a job's key without the store's own."""
         ...
 
-    def samples(
-        self,
-        view: View,
-        material: int,
-        cache: Cache,
-        sample_indices: Shaped[NDArray[np.integer], " k"] | None = None,
-        *,
-        has_indirect: bool = True,
-    ) -> Samples:
-        """Return samples of a material: all, read when they are lit; or some, read now to be lit quickly.
+    def samples(self, view: View, material: int, cache: Cache) -> Samples:
+        """Return all samples of a material, read when they are lit.
 
         Args:
             view: the view. material: index of the material. cache: holds shadows that must be traced.
-            sample_indices: counted from the material's first; None: all.
+        """
+        ...
+
+    def selected_samples(
+        self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " k"], *, has_indirect: bool
+    ) -> Samples:
+        """Return some of a material's samples, read now to be lit quickly.
+
+        Args:
+            view: the view. material: index of the material. sample_indices: counted from the material's first.
             has_indirect: include indirect light if it was baked; reading its rays takes longest.
         """
         ...

@@ -31,7 +31,6 @@ from relume.methods.store_layout import read_lights, read_shadow_ray_directions,
 from relume.operators.image_cache import ImageFiles
 from relume.raytrace.surface_points import SurfacePoints
 from relume.store.bake_protocol import StoreReader
-from relume.transport.outgoing_patch_light import no_light
 from relume.transport.shading_points import GatherRays, LocalRays, RayList, ShadingPoints
 from relume.views.downsampled import DownsampledStore
 from relume.views.view import View, open_view
@@ -179,18 +178,14 @@ class BakedFixedViews:
         """Indirect illumination: none was baked."""
         return None
 
-    def samples(
-        self,
-        view: View,
-        material: int,
-        cache: Cache,
-        sample_indices: Shaped[NDArray[np.integer], " m"] | None = None,
-        *,
-        has_indirect: bool = True,
-    ) -> Samples:
+    def samples(self, view: View, material: int, cache: Cache) -> Samples:
+        """Return all samples of a material. See `FixedViewTransfer`."""
+        return MaterialSamples(view, material, self.local, cache, (self.key, *view.sample_key(material)))
+
+    def selected_samples(
+        self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " m"], *, has_indirect: bool
+    ) -> SelectedSamples:
         """Select samples of a material. See `FixedViewTransfer`."""
-        if sample_indices is None:
-            return MaterialSamples(view, material, self.local, cache, (self.key, *view.sample_key(material)))
         shading_points = view.receivers(material, is_lit=False).without_light(sample_indices)
         visible = np.asarray(view.read_rows("visibility", material, sample_indices), np.uint8)
         return SelectedSamples(replace(shading_points, visible=visible), self.local)
@@ -210,11 +205,11 @@ class BakedFixedViews:
         """Return the incident light at samples. See `FixedViewTransfer`."""
         lights = self.direct_lights(light, quality)
         receivers = samples.receivers(is_lit=lights.num_lights > 0)
-        indirect = self._indirect_rays(samples, light, is_canceled) if light.paths.has_indirect else ()
+        indirect = self._indirect_rays(samples, light, quality, is_canceled) if light.paths.has_indirect else ()
         return lights, replace(receivers, rays=(*indirect, *samples.local_rays(light, receivers.points)))
 
     def _indirect_rays(
-        self, samples: Samples, light: Illumination, is_canceled: Callable[[], bool]
+        self, samples: Samples, light: Illumination, quality: LightQuality, is_canceled: Callable[[], bool]
     ) -> tuple[RayList, ...]:
         """Return the rays that carry indirect illumination to samples: none was baked."""
         return ()
@@ -275,7 +270,6 @@ class MaterialSamples:
     cache: Cache
     key: tuple[Hashable, ...]
 
-    has_traced_normals = True  # overridden normals are traced
     num_bytes = 0
 
     def receivers(self, *, is_lit: bool) -> ShadingPoints:
@@ -287,7 +281,7 @@ class MaterialSamples:
         rows = self.view.rows(self.material)
         if rows.start < rows.stop:
             self.view.trace_gather_rays(self.material, is_canceled)
-        return self.view.gather_rays(self.material, no_light())
+        return self.view.gather_rays(self.material)
 
     @property
     def mirror_visibility(self) -> Shaped[NDArray[np.uint8], "n bytes"]:
@@ -320,8 +314,6 @@ class SelectedSamples:
     local: LocalLights
     stored_rays: GatherRays | None = None
     mirror_visibility: Shaped[NDArray[np.uint8], "n bytes"] | None = None
-
-    has_traced_normals = False  # tracing overridden normals takes too long
 
     @property
     def num_bytes(self) -> int:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from relume.core.cache import Cache
 from relume.live.fixed_camera.illumination import Illumination, Normals, with_baked_normals
-from relume.live.fixed_camera.protocols import EditAxis, Samples
+from relume.live.fixed_camera.protocols import EditAxis, LightQuality, Samples
 from relume.methods.indirect_solver import IndirectSolver
 from relume.methods.local_lights import LocalLights
 from relume.methods.opened.fixed_views import BakedFixedViews, FindLights, SelectedSamples
@@ -22,7 +22,6 @@ from relume.methods.retrace import NormalRetracer
 from relume.methods.spherical_harmonic_transfer import HarmonicLight, read_harmonic_light
 from relume.radiosity.normal_mapped_patches import normal_mapped_patches
 from relume.radiosity.patch_irradiance import PatchLight
-from relume.transport.outgoing_patch_light import no_light
 from relume.transport.shading_points import RayList
 from relume.views.view import View
 
@@ -85,38 +84,30 @@ class BakedIndirectViews(BakedFixedViews):
         """Spherical-harmonic transfer to probes and patches, if baked."""
         return read_harmonic_light(self.store, self.patches)
 
-    def samples(
-        self,
-        view: View,
-        material: int,
-        cache: Cache,
-        sample_indices: Shaped[NDArray[np.integer], " m"] | None = None,
-        *,
-        has_indirect: bool = True,
-    ) -> Samples:
+    def selected_samples(
+        self, view: View, material: int, sample_indices: Shaped[NDArray[np.integer], " m"], *, has_indirect: bool
+    ) -> SelectedSamples:
         """Select samples of a material. See `FixedViewTransfer`."""
-        samples = super().samples(view, material, cache, sample_indices)
-        if not isinstance(samples, SelectedSamples) or sample_indices is None or not has_indirect:
+        samples = super().selected_samples(view, material, sample_indices, has_indirect=has_indirect)
+        if not has_indirect:
             return samples
         mirror_visibility = (
             None
             if self.mirror_lights is None
             else np.asarray(view.read_rows("mirror_lights", material, sample_indices), np.uint8)
         )
-        return replace(
-            samples,
-            stored_rays=view.subset_rays(material, sample_indices, no_light()),
-            mirror_visibility=mirror_visibility,
-        )
+        gather_rays = view.subset_rays(material, sample_indices)
+        return replace(samples, stored_rays=gather_rays, mirror_visibility=mirror_visibility)
 
     def _indirect_rays(
-        self, samples: Samples, light: Illumination, is_canceled: Callable[[], bool]
+        self, samples: Samples, light: Illumination, quality: LightQuality, is_canceled: Callable[[], bool]
     ) -> tuple[RayList, ...]:
         """Return the rays from patches, and those from virtual lights in planar mirrors."""
         gather_rays = samples.gather_rays(is_canceled)
         if gather_rays is None:
             return ()
-        reflected = light if samples.has_traced_normals else with_baked_normals(light)
+        # in a preview, tracing overridden normals takes too long
+        reflected = with_baked_normals(light) if quality is LightQuality.PREVIEW else light
         rays = replace(gather_rays, outgoing=self.indirect.outgoing_light(reflected, is_canceled))
         mirror_light = self.mirror_light
         if mirror_light is None or not mirror_light.is_in(light):

@@ -97,7 +97,7 @@ def test_without_memory_there_is_no_preview(transfer):
 def test_other_samples_are_means_of_their_neighbors(transfer):
     view = transfer.views["front"]
     for material in range(len(transfer.material_names)):
-        sparse = choose_samples(transfer, view, material, transfer.cache, 0, has_indirect=True)
+        sparse = choose_samples(transfer, view, material, 0, has_indirect=True)
         rows = view.rows(material)
         num_samples, num_shaded = sparse.weights.shape
         assert num_samples == rows.stop - rows.start

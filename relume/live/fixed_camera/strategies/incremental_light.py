@@ -24,7 +24,6 @@ from relume.live.fixed_camera.strategies.moved_lights import MovedLights
 from relume.live.fixed_camera.view_images import ViewImages
 from relume.math.haar import haar
 from relume.operators.indirect import IndirectOperator, expected_light, num_channels, precompute_rows, row_bytes
-from relume.transport.outgoing_patch_light import no_light
 
 F32 = NDArray[np.float32]
 
@@ -59,7 +58,7 @@ class PrecomputeRows:
         reflected = self.images.transfer.indirect
         assert reflected is not None
         radiance, view = reflected.solve_indirect(self.light, LightQuality.PREVIEW).mean_to_others(), self.images.view
-        receivers, rays = view.receivers(self.material, is_lit=False), view.gather_rays(self.material, no_light())
+        receivers, rays = view.receivers(self.material, is_lit=False), view.gather_rays(self.material)
         return precompute_rows(self.term, self.bands, receivers, rays, expected_light(radiance), progress, is_canceled)
 
     def install(self, result: IndirectOperator) -> None:

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from relume.brdf.term import Term
-from relume.core.cache import Cache
 from relume.live.fixed_camera.displayed import DisplayedImage
 from relume.live.fixed_camera.fidelity import Fidelity
 from relume.live.fixed_camera.illumination import Illumination, direct_only
@@ -61,14 +60,14 @@ class SampleSubset:
 
 
 def choose_samples(
-    transfer: FixedViewTransfer, view: View, material: int, cache: Cache, detail: int, *, has_indirect: bool
+    transfer: FixedViewTransfer, view: View, material: int, detail: int, *, has_indirect: bool
 ) -> SampleSubset:
     """Select one sample per pixel block of a material; reads the store.
 
     The others are averages of the nearest selected samples, by image position and normal.
 
     Args:
-        transfer: an open bake. view: one of its views. material: index of the material. cache: of shadows.
+        transfer: an open bake. view: one of its views. material: index of the material.
         detail: number of refinements. has_indirect: they are shaded with indirect light.
     """
     step = max(1, int(np.ceil(np.sqrt(view.num_surface_samples / _num_shaded(detail)))))
@@ -77,7 +76,7 @@ def choose_samples(
     first, shape = np.arange(0, weight.size + 1, weight.shape[1]), (len(weight), len(sample_indices))
     weights = csr_array((weight.ravel(), neighbors.ravel(), first), shape=shape)
     weights.eliminate_zeros()
-    samples = transfer.samples(view, material, cache, sample_indices, has_indirect=has_indirect)
+    samples = transfer.selected_samples(view, material, sample_indices, has_indirect=has_indirect)
     return SampleSubset(samples, weights)
 
 
@@ -90,7 +89,7 @@ def _sample_subset(images: ViewImages, material: int, light: Illumination, detai
     has_indirect = light.paths.has_indirect
 
     def choose() -> SampleSubset:
-        return choose_samples(images.transfer, images.view, material, images.cache, detail, has_indirect=has_indirect)
+        return choose_samples(images.transfer, images.view, material, detail, has_indirect=has_indirect)
 
     cache = images.cache.transient if detail else images.cache
     return cache.get(_key(images, material, light, detail), SampleSubset, _subset_bytes(images, material), choose)
