@@ -1,7 +1,4 @@
-"""Precomputed linear operators: a term's transport along one free curve, all others fixed, in the wavelet basis.
-
-T_D4 = T_box · S, with S the orthonormal Daubechies-4 synthesis (appendix B, Ben-Artzi 2006).
-"""
+"""Precomputed linear operators: a term's transport along free coefficients, all other factors fixed."""
 
 from __future__ import annotations
 
@@ -14,10 +11,7 @@ import numpy as np
 from jaxtyping import Shaped
 from numpy.typing import NDArray
 
-from relume.brdf.term import Term
 from relume.core.thread_pools import parallel_for_cancellable
-from relume.lights.spherical_triangles import TriangleLights
-from relume.math.daubechies import forward
 from relume.operators.update_kernel import (
     BLOCK_SAMPLES,
     TILE_SAMPLES,
@@ -26,13 +20,7 @@ from relume.operators.update_kernel import (
     stream,
     stream_quantized,
 )
-from relume.transport.roughness_ranges import (
-    contract_levels,
-    num_levels,
-    project_levels,
-    split_by_level,
-    without_free_curves,
-)
+from relume.transport.roughness_ranges import num_levels, split_by_level
 from relume.transport.shading_points import ShadingPoints
 
 F32 = NDArray[np.float32]
@@ -71,14 +59,14 @@ class Interpolation(NamedTuple):
 
 @dataclass(frozen=True)
 class LinearOperator:
-    """Wavelet linear operator from one curve to the image of one term: R = T c, or R' = R + W T Δc if it is compressed.
+    """Linear operator from the coefficients of an edit to the image of one term: R = T c; compressed, R' = R + W T Δc.
 
     16 bits take half the memory: T_ij ≈ s_bj n_ij, with s_bj the largest |T_ij| of block b over 32,767. Images of all
     columns are within 10⁻⁴ of those in float32. With selected samples, W interpolates their changes to all others: the
     image keeps its shadows, edges and normal-mapped detail (docs/direct-light.md#algorithm).
 
     Attributes:
-        transport: wavelet coefficients, samples padded with zeros to whole tiles; float32, or integers of 16 bits.
+        transport: columns, samples padded with zeros to whole tiles; float32, or integers of 16 bits.
         importance: norm of each column over all samples; (3, J), or (L, 3, J) over those of each level.
         bounds: ranges of the levels' samples, if coefficients depend on the level.
         scale: factors of 16-bit values; None for float32.
@@ -170,39 +158,6 @@ def operator_bytes(num_samples: int, num_bands: int, bits: int = 32, num_selecte
     scale_bytes = 4 * -(-samples // BLOCK_SAMPLES) if bits < 32 else 0
     neighbor_bytes = 0 if num_selected is None else num_samples * 8 * NUM_NEIGHBORS
     return tiles * 3 * num_bands * (bits // 8 * samples + scale_bytes) + neighbor_bytes
-
-
-def precompute(
-    term: Term,
-    bands: Mapping[str, NDArray[np.float64]],
-    active: str,
-    lights: TriangleLights,
-    receivers: ShadingPoints,
-    progress: Callable[[float], None],
-    is_canceled: Callable[[], bool],
-    bits: int = 32,
-) -> LinearOperator:
-    """Precompute the operator of one free curve at all receivers.
-
-    Args:
-        bands: of all the term's curves, (3, J) each, or (L, 3, J) if one depends on the level; values of the active
-            one do not matter.
-        lights, receivers: incident light, and its receivers.
-        progress: called with the completed fraction. is_canceled: polled.
-        bits: see `Compression`.
-    Raises:
-        CancelledError: `is_canceled` returned True.
-    """
-    contractions = contract_levels(term, without_free_curves(bands, [active]), active)
-
-    def rows(start: int, stop: int) -> F32:
-        projected = project_levels(term, contractions, lights, receivers, start, stop)
-        coefficients = np.ascontiguousarray(projected.transpose(2, 0, 1))
-        forward(coefficients.reshape(-1, coefficients.shape[2]))
-        return coefficients
-
-    bounds = level_bounds(receivers, bands, [active])
-    return pack_columns(rows, contractions[0].num_columns, receivers, bounds, progress, is_canceled, bits)
 
 
 def pack_columns(

@@ -26,7 +26,7 @@ from relume.live.fixed_camera.protocols import LightQuality
 from relume.live.fixed_camera.texel_light_cache import is_cacheable, put_texel_light
 from relume.live.fixed_camera.view_images import MERGED_LIGHT_SUFFIX, ViewImages
 from relume.look.model import Rgb
-from relume.operators.edit_basis import EditBasis
+from relume.operators.edit_basis import EditBasis, precompute
 from relume.operators.linear_operator import Compression, LinearOperator
 from relume.operators.shade import PartialImage, ShadedTerm, shaded_bytes
 from relume.transport.shading_points import ShadingPoints
@@ -147,12 +147,12 @@ class PrecomputeOperator:
             material, quality = self.target.material, LightQuality.MERGED if has_merged_lights else LightQuality.EXACT
             lights, receivers = images.incident_light(material, self.light, is_canceled, quality)
 
-            def precompute(samples: ShadingPoints) -> LinearOperator:
-                return self.basis.precompute(self.term, self.bands, lights, samples, progress, is_canceled, bits)
+            def precompute_at(samples: ShadingPoints) -> LinearOperator:
+                return precompute(self.basis, self.term, self.bands, lights, samples, progress, is_canceled, bits)
 
             if step > 1:
-                return precompute_subsampled(images.view, material.index, step, receivers, precompute)
-            return replace(precompute(receivers), has_merged_lights=has_merged_lights)
+                return precompute_subsampled(images.view, material.index, step, receivers, precompute_at)
+            return replace(precompute_at(receivers), has_merged_lights=has_merged_lights)
 
         return images.cache.get(self.key, LinearOperator, self.num_bytes, build_operator)
 
